@@ -1,0 +1,77 @@
+"""The error tree: every message says where, what was found, what was expected, and the next step."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class BushfitError(Exception):
+    """Something the user can put right; the command line prints it and exits with status 2.
+
+    Args:
+        problem: what is wrong, in one clause.
+        file: the file it is in.
+        place: the line, row, column or key in that file.
+        found: what stands there.
+        expected: what should stand there.
+        hint: the next step.
+    """
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        file: str | Path | None = None,
+        place: str | None = None,
+        found: str | None = None,
+        expected: str | None = None,
+        hint: str | None = None,
+    ) -> None:
+        self.problem = problem
+        self.file = None if file is None else Path(file)
+        self.place = place
+        self.found = found
+        self.expected = expected
+        self.hint = hint
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        where = ", ".join(part for part in (str(self.file) if self.file else None, self.place) if part)
+        text = f"{where}: {self.problem}" if where else self.problem
+        for label, value in (("found", self.found), ("expected", self.expected), ("try", self.hint)):
+            if value:
+                text += f"\n  {label}: {value}"
+        return text
+
+    def __reduce__(self) -> tuple[object, ...]:
+        state = {key: getattr(self, key) for key in ("file", "place", "found", "expected", "hint")}
+        return _rebuild, (type(self), self.problem, state)
+
+
+def _rebuild(kind: type[BushfitError], problem: str, state: dict[str, str | None]) -> BushfitError:
+    """Pickle support: errors travel between the processes of a batch."""
+    return kind(problem, **state)
+
+
+class UnitError(BushfitError):
+    """A quantity without a unit, with an unknown unit, or with a unit of another dimension."""
+
+
+class CampaignError(BushfitError):
+    """A campaign file that cannot be used."""
+
+
+class MeasurementError(BushfitError):
+    """A measured table that cannot be used."""
+
+
+class ModelError(BushfitError):
+    """A model file, or a set of effects and values, that cannot be used."""
+
+
+class FitError(BushfitError):
+    """Measurements that cannot support the fit that was asked for."""
+
+
+class OutputError(BushfitError):
+    """A result that cannot be written, or must not be overwritten."""
