@@ -1,0 +1,154 @@
+"""The record that describes one physics, and what it may do: branch, modifier or layer.
+
+The measured response is an onion. Inside is the rubber: *branches* in parallel, each adding a stress.
+Around it lie *layers*: each takes the response below it and returns the response above it. A *modifier*
+only changes values that the branches use, by operating condition, and is asked before them. Layers are
+ordered by level (material, component, instrument), never by the order of adding.
+
+Every face broadcasts. The last axis holds operating points (frequency face) or samples (time face);
+parameter values are numbers, or arrays whose last axis has length 1, so that a Jacobian by differences
+or a bootstrap is one call with the values laid along a leading axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bushfit.effects.history import History
+from bushfit.geometry import Bushing, Direction
+
+#: A number, or an array that broadcasts against operating points or samples.
+Value = Any
+Values = Mapping[str, Value]
+Array = NDArray[Any]
+
+#: (omega [rad/s], amplitude [m or rad]) -> complex dynamic stiffness.
+StiffnessBelow = Callable[[Array, Array], Array]
+#: displacement history -> force [N or N m].
+ForceBelow = Callable[[History], Array]
+
+
+class Level(IntEnum):
+    """Where an effect acts, from the rubber outward. Prediction leaves the instrument out."""
+
+    MATERIAL = 1
+    COMPONENT = 2
+    INSTRUMENT = 3
+
+    def __str__(self) -> str:
+        return self.name.lower()
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect.
+
+    Args:
+        name: ASCII name; base effects use it as it is, added effects as `<effect>.<name>`.
+        unit: SI unit, for files and reports.
+        bounds: what a rubber, a bushing or a rig can have.
+        neutral: the value at which the effect vanishes; None where another parameter does that.
+        typical: a usual size; the scale on which a fit moves a linear parameter.
+        log: whether a fit moves its logarithm (strictly positive parameters).
+        meaning: what it is, in a few words.
+    """
+
+    name: str
+    unit: str
+    bounds: tuple[float, float]
+    neutral: float | None
+    typical: float
+    log: bool
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Setting:
+    """The test a response belongs to."""
+
+    bushing: Bushing
+    direction: Direction
+    kind: Literal["sweep", "loop"]
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Operating condition a modifier may depend on: omega [rad/s], displacement amplitude [m or rad],
+    equivalent strain amplitude, and the complex stiffness of the bushing with the values as they came in.
+    """
+
+    setting: Setting
+    omega: Array
+    amplitude: Array
+    strain: Array
+    stiffness: Callable[[Values], Array]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effect:
+    """What every physics states about itself.
+
+    Args:
+        name: the file's stem; the name in files, reports and options.
+        sentence: what it is, for an engineer.
+        equation: its first-harmonic form, ASCII.
+        level: where it acts.
+        parameters: its own parameters.
+        source: where the law comes from.
+        harmonic_error: relative error of the first-harmonic face against the time face; 0 where exact.
+        settles: True where the response changes from cycle to cycle, so that a loop must be followed
+            through all its cycles.
+    """
+
+    name: str
+    sentence: str
+    equation: str
+    level: Level
+    parameters: tuple[Parameter, ...]
+    source: str
+    harmonic_error: float = 0.0
+    settles: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Branch(Effect):
+    """A stress in parallel with the others: modulus = s~ / (2 e~) [Pa], stress [Pa].
+
+    modulus_sensitivities and stress_sensitivities return the derivative with respect to each own
+    parameter; where they are None the model differentiates numerically.
+    """
+
+    modulus: Callable[[Values, Array, Array], Array]
+    stress: Callable[[Values, History], Array]
+    modulus_sensitivities: Callable[[Values, Array, Array], dict[str, Array]] | None = None
+    stress_sensitivities: Callable[[Values, History], dict[str, Array]] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Modifier(Effect):
+    """Changes values of other effects by operating condition; returns the changed ones only."""
+
+    adjust: Callable[[Values, Condition], dict[str, Value]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layer(Effect):
+    """Wraps the response below it, in both faces alike."""
+
+    stiffness: Callable[[Values, StiffnessBelow, Array, Array, Setting], Array]
+    force: Callable[[Values, ForceBelow, History, Setting], Array]
+
+
+def linear_stress(modulus: Callable[[Array], Array], history: History) -> Array:
+    """Steady stress of a linear branch over one cycle: s_h = 2 mu^(h omega) e_h for every harmonic h.
+
+    The modulus at omega = 0 must be finite; it multiplies the mean strain.
+    """
+    spectrum = 2.0 * modulus(history.harmonics) * np.fft.rfft(history.value)
+    return np.fft.irfft(spectrum, n=history.value.shape[-1])

@@ -1,0 +1,66 @@
+"""A motion over time, evenly sampled: from rest, or one cycle of a steady state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Evenly sampled displacement or strain.
+
+    Args:
+        value: samples along the last axis; a leading axis holds variants.
+        step: time between samples [s].
+        periodic: True where the samples are whole cycles of a steady state (the next sample is the
+            first again), False where the motion starts from rest before the first sample.
+        frequency: frequency of the excitation [Hz].
+    """
+
+    value: Array
+    step: float
+    periodic: bool
+    frequency: float
+
+    @classmethod
+    def steady(cls, value: Array, frequency: float, cycles: int = 1) -> History:
+        """Whole cycles of a steady state of the given frequency [Hz]."""
+        return cls(value, cycles / (frequency * value.shape[-1]), periodic=True, frequency=frequency)
+
+    @property
+    def omega(self) -> float:
+        """Angular frequency of the excitation [rad/s]."""
+        return 2.0 * np.pi * self.frequency
+
+    @cached_property
+    def amplitude(self) -> Array:
+        """Half of the range of the values, (..., 1)."""
+        return np.ptp(self.value, axis=-1, keepdims=True) / 2.0
+
+    @property
+    def harmonics(self) -> Array:
+        """Angular frequencies of numpy.fft.rfft over the samples [rad/s]."""
+        return 2.0 * np.pi * np.fft.rfftfreq(self.value.shape[-1], self.step)
+
+    @cached_property
+    def rate(self) -> Array:
+        """Time derivative of the values, same shape."""
+        if self.periodic:
+            ahead, behind = np.roll(self.value, -1, axis=-1), np.roll(self.value, 1, axis=-1)
+            return (ahead - behind) / (2.0 * self.step)
+        return np.gradient(self.value, self.step, axis=-1, edge_order=2)
+
+    def with_value(self, value: Array) -> History:
+        """The same clock with other values."""
+        return replace(self, value=value)
+
+    def scaled(self, factor: float) -> History:
+        """All values times a factor, such as strain per displacement."""
+        return self.with_value(self.value * factor)

@@ -1,0 +1,89 @@
+"""Springpot branch: a fractional derivative, stiffness and loss that grow slowly with frequency."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.signal import fftconvolve
+
+from bushfit.effects.contract import Array, Branch, Level, Parameter, Values, linear_stress
+from bushfit.effects.history import History
+
+
+def power_of_rate(alpha: Array, omega: Array) -> Array:
+    """(i omega)^alpha = omega^alpha exp(i pi alpha / 2); 0 at omega = 0."""
+    return np.power(omega, alpha) * np.exp(0.5j * np.pi * np.asarray(alpha))
+
+
+def modulus(p: Values, omega: Array, strain: Array) -> Array:
+    """mu^ = m/2 (i omega)^alpha [Pa]."""
+    return 0.5 * p["m"] * power_of_rate(p["alpha"], omega)
+
+
+def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, Array]:
+    """d/dm = (i omega)^alpha / 2 and d/dalpha = m/2 (i omega)^alpha ln(i omega)."""
+    by_m = modulus({"m": 1.0, "alpha": p["alpha"]}, omega, strain)
+    safe = np.where(np.asarray(omega) > 0.0, omega, 1.0)
+    return {"m": by_m, "alpha": p["m"] * by_m * (np.log(safe) + 0.5j * np.pi)}
+
+
+@lru_cache(maxsize=64)
+def grunwald_letnikov_weights(alpha: float, count: int) -> Array:
+    """w_0 = 1, w_j = w_{j-1} (j - 1 - alpha)/j (Eq. 3): the first `count` weights."""
+    j = np.arange(1, count)
+    weights = np.concatenate(([1.0], np.cumprod((j - 1.0 - alpha) / j)))
+    weights.flags.writeable = False
+    return weights
+
+
+def fractional_derivative(alpha: float, values: Array, step: float) -> Array:
+    """D^alpha by Gruenwald-Letnikov with full memory, from rest before the first sample (Eq. 3).
+
+    First order in the step: the factor (1 - exp(-i omega step))^alpha stands for (i omega step)^alpha.
+    """
+    count = values.shape[-1]
+    weights = grunwald_letnikov_weights(alpha, count)
+    weights = weights.reshape((1,) * (values.ndim - 1) + (count,))
+    return step**-alpha * fftconvolve(values, weights, axes=-1)[..., :count]
+
+
+def stress(p: Values, history: History) -> Array:
+    """s_v = m D^alpha e (Eqs. 1, 3) [Pa]."""
+    if history.periodic:
+        return linear_stress(lambda omega: modulus(p, omega, history.amplitude), history)
+    alphas = np.asarray(p["alpha"], dtype=float)
+    if alphas.ndim == 0:
+        return p["m"] * fractional_derivative(float(alphas), history.value, history.step)
+    values = np.broadcast_to(history.value, (*alphas.shape[:-1], history.value.shape[-1]))
+    rows = [
+        fractional_derivative(float(alphas[index][0]), values[index], history.step)
+        for index in np.ndindex(alphas.shape[:-1])
+    ]
+    return p["m"] * np.reshape(rows, values.shape)
+
+
+def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
+    """Steady cycles only: the modulus' sensitivities, harmonic by harmonic."""
+
+    def by(name: str) -> Array:
+        return linear_stress(lambda omega: modulus_sensitivities(p, omega, history.amplitude)[name], history)
+
+    return {"m": by("m"), "alpha": by("alpha")}
+
+
+EFFECT = Branch(
+    name="springpot",
+    sentence="The rate dependence of the rubber: stiffness and loss rise with a small power of frequency.",
+    equation="m/2 (i omega)^alpha",
+    level=Level.MATERIAL,
+    parameters=(
+        Parameter("m", "Pa*s^alpha", (1.0, 1e9), 0.0, 2e5, log=True, meaning="springpot constant"),
+        Parameter("alpha", "1", (1e-3, 1.0), None, 0.25, log=False, meaning="order of the fractional derivative"),
+    ),
+    source="Garcia Tarrago et al. 2007, Eqs. 1-3",
+    modulus=modulus,
+    stress=stress,
+    modulus_sensitivities=modulus_sensitivities,
+    stress_sensitivities=stress_sensitivities,
+)

@@ -1,0 +1,246 @@
+"""Model: a bushing, an ordered list of effects, and their values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property, partial, reduce
+from types import MappingProxyType
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+
+from bushfit.effects import BASE, Branch, Effect, Layer, Level, Modifier, Parameter, Setting, effect_named, qualified
+from bushfit.effects.contract import Array, Condition, ForceBelow, StiffnessBelow, Values
+from bushfit.effects.history import History
+from bushfit.errors import ModelError
+from bushfit.geometry import Bushing, Direction
+
+Kind = Literal["sweep", "loop"]
+E = TypeVar("E", bound=Effect)
+
+#: Names of the paper's five parameters.
+FIVE = tuple(parameter.name for name in BASE for parameter in effect_named(name).parameters)
+
+
+def _base_values(values: Values) -> Values:
+    return {name: values[name] for name in FIVE if name in values}
+
+
+@dataclass(frozen=True)
+class Model:
+    """A bushing, the effects its response is made of, and one value per parameter.
+
+    Args:
+        bushing: geometry.
+        effects: names from the library; the order among one level is the order of application.
+        values: SI value of every parameter, by the names of files and reports.
+
+    Raises:
+        ModelError: an unknown effect, one named twice, or a value that is missing, unknown, not finite or
+            outside the parameter's bounds.
+    """
+
+    bushing: Bushing
+    effects: tuple[str, ...]
+    values: Mapping[str, float]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "effects", tuple(self.effects))
+        object.__setattr__(self, "values", MappingProxyType(dict(self.values)))
+        doubles = {name for name in self.effects if self.effects.count(name) > 1}
+        if doubles:
+            raise ModelError("an effect is listed twice", found=", ".join(sorted(doubles)))
+        known = self.parameters
+        for name in known.keys() | self.values.keys():
+            if name not in self.values:
+                raise ModelError("a parameter has no value", place=name, expected=f"a number [{known[name].unit}]")
+            if name not in known:
+                raise ModelError("unknown parameter", place=name, expected="one of " + ", ".join(known))
+            value, parameter = self.values[name], known[name]
+            low, high = parameter.bounds
+            if parameter.neutral is not None:
+                low, high = min(low, parameter.neutral), max(high, parameter.neutral)
+            if not low <= value <= high:
+                raise ModelError(
+                    "impossible value",
+                    place=name,
+                    found=f"{value:g} {parameter.unit}",
+                    expected=f"{low:g} to {high:g} {parameter.unit} ({parameter.meaning})",
+                )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Model, (self.bushing, self.effects, dict(self.values))
+
+    @cached_property
+    def records(self) -> tuple[Effect, ...]:
+        """The effects' records, from the rubber outward."""
+        return tuple(sorted((effect_named(name) for name in self.effects), key=lambda effect: effect.level))
+
+    @cached_property
+    def parameters(self) -> dict[str, Parameter]:
+        """Every parameter by its name in files and reports."""
+        return {qualified(effect, parameter): parameter for effect in self.records for parameter in effect.parameters}
+
+    def with_values(self, values: Mapping[str, float]) -> Model:
+        """The same model with some values replaced."""
+        return replace(self, values={**self.values, **values})
+
+    def with_effect(self, name: str, values: Mapping[str, float] | None = None) -> Model:
+        """The model with one effect more, at the given values or at its neutral and typical ones."""
+        effect = effect_named(name)
+        start = {
+            qualified(effect, parameter): parameter.typical if parameter.neutral is None else parameter.neutral
+            for parameter in effect.parameters
+        }
+        return Model(self.bushing, (*self.effects, name), {**self.values, **start, **(values or {})})
+
+    def without(self, level: Level) -> Model:
+        """The model less every effect of that level."""
+        kept = [effect for effect in self.records if effect.level is not level]
+        names = {qualified(effect, parameter) for effect in kept for parameter in effect.parameters}
+        return Model(
+            self.bushing,
+            tuple(effect.name for effect in kept),
+            {name: value for name, value in self.values.items() if name in names},
+        )
+
+    def equation(self) -> str:
+        """The model as text: its first-harmonic stiffness, the rubber inside, layers and modifiers named."""
+        branches = " + ".join(effect.equation for effect in self._of(Branch))
+        lines = [f"K = G ({branches})"]
+        lines += [f"  {effect.name}: {effect.equation}" for effect in self.records if not isinstance(effect, Branch)]
+        lines += [f"  {name} = {self.values[name]:.6g} {self.parameters[name].unit}" for name in self.parameters]
+        return "\n".join(lines)
+
+    def to_document(self) -> dict[str, Any]:
+        """The model as JSON-ready data: bushing, effects, parameters with value and unit."""
+        return {
+            "bushing": {
+                "name": self.bushing.name,
+                "inner_radius_m": self.bushing.inner_radius,
+                "outer_radius_m": self.bushing.outer_radius,
+                "length_m": self.bushing.length,
+            },
+            "effects": [effect.name for effect in self.records],
+            "parameters": {
+                name: {"value": float(self.values[name]), "unit": parameter.unit}
+                for name, parameter in self.parameters.items()
+            },
+        }
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> Model:
+        """The model of `to_document`.
+
+        Raises:
+            ModelError: a key that is missing, or holds something else than expected.
+        """
+        try:
+            shape = document["bushing"]
+            bushing = Bushing(
+                str(shape["name"]),
+                *(float(shape[key]) for key in ("inner_radius_m", "outer_radius_m", "length_m")),
+            )
+            values = {str(name): float(entry["value"]) for name, entry in document["parameters"].items()}
+            effects = tuple(str(name) for name in document["effects"])
+        except KeyError as missing:
+            raise ModelError("a key is missing", place=str(missing.args[0])) from None
+        except (TypeError, ValueError, AttributeError) as wrong:
+            raise ModelError("a key holds the wrong kind of value", found=str(wrong)) from None
+        return cls(bushing, effects, values)
+
+    def stiffness(
+        self,
+        direction: Direction,
+        frequency: Array | float,
+        amplitude: Array | float,
+        *,
+        kind: Kind = "sweep",
+        values: Values | None = None,
+    ) -> Array:
+        """Complex dynamic stiffness of the steady first harmonic (Eqs. 6 to 12).
+
+        k = G mu^(omega, e0), with G of Eqs. 10, 11 and e0 of Eqs. 7, 8, inside whatever layers the model has.
+
+        Args:
+            direction: axial, radial or torsion.
+            frequency: [Hz], broadcast with amplitude.
+            amplitude: zero-to-peak displacement [m] or rotation [rad].
+            kind: whether a loop or a sweep recorded it; only instrument effects care.
+            values: parameter values in place of the model's own; arrays whose last axis has length 1 add
+                leading axes to the result.
+
+        Returns:
+            [N/m] or [N m/rad].
+        """
+        omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
+        amplitude = np.asarray(amplitude, dtype=float)
+        omega, amplitude = np.broadcast_arrays(omega, amplitude)
+        respond = self._stack_stiffness(
+            Setting(self.bushing, direction, kind), self.values if values is None else values
+        )
+        return respond(omega, amplitude) + np.zeros(omega.shape)
+
+    def force(
+        self,
+        direction: Direction,
+        displacement: History,
+        *,
+        kind: Kind = "sweep",
+        values: Values | None = None,
+    ) -> Array:
+        """Force over a displacement history [N or N m], from rest or on the steady cycle."""
+        respond = self._stack_force(Setting(self.bushing, direction, kind), self.values if values is None else values)
+        return respond(displacement)
+
+    def _stack_stiffness(self, setting: Setting, values: Values) -> StiffnessBelow:
+        def rubber(omega: Array, amplitude: Array) -> Array:
+            strain = amplitude * self.bushing.unit_strain(setting.direction)
+            base = self._adjusted(setting, values, omega, amplitude, strain)
+            return self._branch_stiffness(setting, values, omega, strain, base)
+
+        def wrap(below: StiffnessBelow, layer: Layer) -> StiffnessBelow:
+            own = self._own(layer, values, _base_values(values))
+            return lambda omega, amplitude: layer.stiffness(own, below, omega, amplitude, setting)
+
+        return reduce(wrap, self._of(Layer), rubber)
+
+    def _stack_force(self, setting: Setting, values: Values) -> ForceBelow:
+        per_displacement = self.bushing.unit_strain(setting.direction)
+        factor = self.bushing.stiffness_per_modulus(setting.direction) / (2.0 * per_displacement)
+
+        def rubber(displacement: History) -> Array:
+            strain = displacement.scaled(per_displacement)
+            omega = np.full((1,), displacement.omega)
+            base = self._adjusted(setting, values, omega, displacement.amplitude, strain.amplitude)
+            return factor * sum(branch.stress(self._own(branch, values, base), strain) for branch in self._of(Branch))
+
+        def wrap(below: ForceBelow, layer: Layer) -> ForceBelow:
+            own = self._own(layer, values, _base_values(values))
+            return lambda displacement: layer.force(own, below, displacement, setting)
+
+        return reduce(wrap, self._of(Layer), rubber)
+
+    def _branch_stiffness(self, setting: Setting, values: Values, omega: Array, strain: Array, base: Values) -> Array:
+        modulus = sum(branch.modulus(self._own(branch, values, base), omega, strain) for branch in self._of(Branch))
+        return self.bushing.stiffness_per_modulus(setting.direction) * modulus
+
+    def _adjusted(self, setting: Setting, values: Values, omega: Array, amplitude: Array, strain: Array) -> Values:
+        """The paper's parameters as the modifiers leave them at an operating condition."""
+        base = _base_values(values)
+        stiffness = partial(self._branch_stiffness, setting, values, omega, strain)
+        condition = Condition(setting, omega, amplitude, strain, stiffness)
+        for modifier in self._of(Modifier):
+            base = {**base, **modifier.adjust(self._own(modifier, values, base), condition)}
+        return base
+
+    def _of(self, kind: type[E]) -> list[E]:
+        return [effect for effect in self.records if isinstance(effect, kind)]
+
+    @staticmethod
+    def _own(effect: Effect, values: Values, base: Values) -> Values:
+        """What an effect sees: the paper's parameters, and its own under their short names."""
+        if effect.name in BASE:
+            return base
+        return {**base, **{parameter.name: values[qualified(effect, parameter)] for parameter in effect.parameters}}
