@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce
 from types import MappingProxyType
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, cast
 
 import numpy as np
 
@@ -191,7 +191,8 @@ class Model:
         values: Values | None = None,
     ) -> Array:
         """Force over a displacement history [N or N m], from rest or on the steady cycle."""
-        respond = self._stack_force(Setting(self.bushing, direction, kind), self.values if values is None else values)
+        setting = Setting(self.bushing, direction, kind)
+        respond = self._stack_force(setting, self.values if values is None else values)
         return respond(displacement)
 
     def _stack_stiffness(self, setting: Setting, values: Values) -> StiffnessBelow:
@@ -204,7 +205,7 @@ class Model:
             own = self._own(layer, values, _base_values(values))
             return lambda omega, amplitude: layer.stiffness(own, below, omega, amplitude, setting)
 
-        return reduce(wrap, self._of(Layer), rubber)
+        return reduce(wrap, self._of(Layer), cast(StiffnessBelow, rubber))
 
     def _stack_force(self, setting: Setting, values: Values) -> ForceBelow:
         per_displacement = self.bushing.unit_strain(setting.direction)
@@ -214,17 +215,18 @@ class Model:
             strain = displacement.scaled(per_displacement)
             omega = np.full((1,), displacement.omega)
             base = self._adjusted(setting, values, omega, displacement.amplitude, strain.amplitude)
-            return factor * sum(branch.stress(self._own(branch, values, base), strain) for branch in self._of(Branch))
+            stresses = (branch.stress(self._own(branch, values, base), strain) for branch in self._of(Branch))
+            return factor * sum(stresses, start=np.zeros(1))
 
         def wrap(below: ForceBelow, layer: Layer) -> ForceBelow:
             own = self._own(layer, values, _base_values(values))
             return lambda displacement: layer.force(own, below, displacement, setting)
 
-        return reduce(wrap, self._of(Layer), rubber)
+        return reduce(wrap, self._of(Layer), cast(ForceBelow, rubber))
 
     def _branch_stiffness(self, setting: Setting, values: Values, omega: Array, strain: Array, base: Values) -> Array:
-        modulus = sum(branch.modulus(self._own(branch, values, base), omega, strain) for branch in self._of(Branch))
-        return self.bushing.stiffness_per_modulus(setting.direction) * modulus
+        moduli = (branch.modulus(self._own(branch, values, base), omega, strain) for branch in self._of(Branch))
+        return self.bushing.stiffness_per_modulus(setting.direction) * sum(moduli, start=np.zeros(1))
 
     def _adjusted(self, setting: Setting, values: Values, omega: Array, amplitude: Array, strain: Array) -> Values:
         """The paper's parameters as the modifiers leave them at an operating condition."""

@@ -33,7 +33,7 @@ def stiffness_jacobian(
         for branch in branches:
             slopes |= branch.modulus_sensitivities(model.values, omega, strain)  # type: ignore[misc]
         factor = model.bushing.stiffness_per_modulus(direction)
-        return _stack(slopes, names, factor, frequency.shape, complex)
+        return _stack(slopes, names, factor, frequency)
     return differences(
         model, names, lambda values: model.stiffness(direction, frequency, amplitude, kind=kind, values=values)
     )
@@ -52,17 +52,12 @@ def force_jacobian(
         for branch in branches:
             slopes |= branch.stress_sensitivities(model.values, strain)  # type: ignore[misc]
         factor = model.bushing.stiffness_per_modulus(direction) / (2.0 * per_displacement)
-        return _stack(slopes, names, factor, displacement.value.shape, float)
+        return _stack(slopes, names, factor, displacement.value)
     return differences(model, names, lambda values: model.force(direction, displacement, kind=kind, values=values))
 
 
-def _stack(
-    slopes: Mapping[str, Array], names: Sequence[str], factor: float, shape: tuple[int, ...], kind: type
-) -> Array:
-    out = np.zeros((len(names), *shape), dtype=kind)
-    for row, name in zip(out, names, strict=True):
-        row[...] = factor * slopes[name]
-    return out
+def _stack(slopes: Mapping[str, Array], names: Sequence[str], factor: float, like: Array) -> Array:
+    return factor * np.stack([np.broadcast_to(slopes[name], like.shape) for name in names])
 
 
 def differences(model: Model, names: Sequence[str], respond: Callable[[Values], Array]) -> Array:

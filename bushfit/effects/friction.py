@@ -182,9 +182,7 @@ EFFECT = Branch(
     level=Level.MATERIAL,
     parameters=(
         Parameter("sigma_fmax", "Pa", (1.0, 1e8), 0.0, 1e4, log=True, meaning="largest friction stress"),
-        Parameter(
-            "eps_half", "1", (1e-6, 10.0), None, 1e-2, log=True, meaning="strain that develops half of sigma_fmax"
-        ),
+        Parameter("eps_half", "1", (1e-6, 10.0), None, 1e-2, log=True, meaning="strain at half of sigma_fmax"),
     ),
     source="Garcia Tarrago et al. 2007, Eq. 5; Berg 1998",
     modulus=modulus,
