@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce
 from types import MappingProxyType
@@ -10,7 +10,19 @@ from typing import Any, Literal, TypeVar, cast
 
 import numpy as np
 
-from bushfit.effects import BASE, Branch, Effect, Layer, Level, Modifier, Parameter, Setting, effect_named, qualified
+from bushfit.effects import (
+    BASE,
+    LIBRARY,
+    Branch,
+    Effect,
+    Layer,
+    Level,
+    Modifier,
+    Parameter,
+    Setting,
+    effect_named,
+    qualified,
+)
 from bushfit.effects.contract import Array, Condition, ForceBelow, StiffnessBelow, Values
 from bushfit.effects.history import History
 from bushfit.errors import ModelError
@@ -33,7 +45,7 @@ class Model:
 
     Args:
         bushing: geometry.
-        effects: names from the library; the order among one level is the order of application.
+        effects: names from the library, in any order.
         values: SI value of every parameter, by the names of files and reports.
 
     Raises:
@@ -74,8 +86,9 @@ class Model:
 
     @cached_property
     def records(self) -> tuple[Effect, ...]:
-        """The effects' records, from the rubber outward."""
-        return tuple(sorted((effect_named(name) for name in self.effects), key=lambda effect: effect.level))
+        """The effects' records, from the rubber outward: by level, and within one as the library lists them."""
+        place = {name: place for place, name in enumerate(LIBRARY)}
+        return tuple(sorted(map(effect_named, self.effects), key=lambda effect: (effect.level, place[effect.name])))
 
     @cached_property
     def parameters(self) -> dict[str, Parameter]:
@@ -86,14 +99,19 @@ class Model:
         """The same model with some values replaced."""
         return replace(self, values={**self.values, **values})
 
-    def with_effect(self, name: str, values: Mapping[str, float] | None = None) -> Model:
-        """The model with one effect more, at the given values or at its neutral and typical ones."""
-        effect = effect_named(name)
-        start = {
+    @classmethod
+    def started(cls, bushing: Bushing, effects: Sequence[str], values: Mapping[str, float]) -> Model:
+        """A model with the values given, and neutral or typical ones where none is given."""
+        defaults = {
             qualified(effect, parameter): parameter.typical if parameter.neutral is None else parameter.neutral
+            for effect in map(effect_named, effects)
             for parameter in effect.parameters
         }
-        return Model(self.bushing, (*self.effects, name), {**self.values, **start, **(values or {})})
+        return cls(bushing, tuple(effects), {name: values.get(name, default) for name, default in defaults.items()})
+
+    def with_effect(self, name: str, values: Mapping[str, float] | None = None) -> Model:
+        """The model with one effect more, at the given values or at its neutral and typical ones."""
+        return Model.started(self.bushing, (*self.effects, name), {**self.values, **(values or {})})
 
     def without(self, level: Level) -> Model:
         """The model less every effect of that level."""

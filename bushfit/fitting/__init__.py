@@ -1,0 +1,1 @@
+"""Fits: residuals in units of noise, lmfit, uncertainty."""

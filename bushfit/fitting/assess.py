@@ -1,0 +1,144 @@
+"""What a solution is worth: covariance, quality, and what the data cannot tell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.errors import FitError
+from bushfit.fitting.solve import Coordinates, Solution, jacobian, residual
+from bushfit.fitting.terms import Term
+from bushfit.model import Model
+from bushfit.results import Covariance, Quality, Range
+
+#: Relative standard error beyond which a parameter counts as not determined.
+_UNDETERMINED = 0.3
+#: Correlation beyond which a pair is said to trade off.
+_TRADE_OFF = 0.95
+#: Reduced chi-square beyond which noise alone is no explanation, in standard deviations.
+_LACK_OF_FIT = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """One fit of a procedure: the parameters it moved and the data it saw."""
+
+    names: tuple[str, ...]
+    terms: Sequence[Term]
+
+
+def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = None) -> Covariance:
+    """Covariance of everything a procedure estimated, each stage holding what the others found.
+
+    Each stage solves J_own (J_own^T d_own + J_rest^T d_rest + noise) = 0 for its own parameters while the rest
+    carry their own errors. Stacked over the stages this is M d = b with cov(b) block diagonal, so that
+    cov(d) = M^-1 cov(b) M^-T. A joint fit is the one-stage case, cov = (J J^T)^-1. Parameters `held` with a
+    known covariance enter as they are. Where a stage's residuals exceed its noise, its share is inflated by
+    the reduced chi-square.
+
+    Raises:
+        FitError: the data leave some combination of the parameters wholly open.
+    """
+    held = held or Covariance()
+    names = (*held.names, *(name for stage in stages for name in stage.names))
+    slopes = Coordinates.of(model, names).slopes(model.values)
+    system, scatter = np.eye(len(names)), np.zeros((len(names), len(names)))
+    begin = len(held.names)
+    scatter[:begin, :begin] = held.matrix / np.outer(slopes[:begin], slopes[:begin])
+    for stage in stages:
+        own = slice(begin, begin + len(stage.names))
+        slope = jacobian(model, stage.terms, names)
+        system[own] = slope[own] @ slope.T
+        scatter[own, own] = system[own, own] * _inflation(residual(model, stage.terms), len(stage.names))
+        begin = own.stop
+    try:
+        inverse = np.linalg.inv(system)
+    except np.linalg.LinAlgError:
+        raise FitError(
+            "the data leave a combination of parameters wholly open",
+            found="a singular Jacobian in " + ", ".join(names),
+            hint="hold one of them with vary = false in [fit], or measure another amplitude, frequency or rate",
+        ) from None
+    by_coordinate = inverse @ scatter @ inverse.T
+    return Covariance(names, by_coordinate * np.outer(slopes, slopes))
+
+
+def _inflation(residuals: Array, parameters: int) -> float:
+    freedom = max(residuals.size - parameters, 1)
+    reduced = float(residuals @ residuals) / freedom
+    return reduced if reduced > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else 1.0
+
+
+def quality(model: Model, terms: Sequence[Term], parameters: int) -> Quality:
+    """NRMSE, reduced chi-square, number of residuals and relative noise over some terms."""
+    residuals = residual(model, terms)
+    relative = np.concatenate([np.abs(term.relative(model)) for term in terms])
+    noise = np.concatenate([np.full(term.size, term.relative_noise) for term in terms])
+    return Quality(
+        nrmse=float(np.sqrt(np.mean(relative**2))),
+        reduced_chi_square=float(residuals @ residuals) / max(residuals.size - parameters, 1),
+        points=int(residuals.size),
+        noise=float(np.sqrt(np.mean(noise**2))),
+    )
+
+
+def measured_range(model: Model, terms: Sequence[Term]) -> Range:
+    """Frequencies and equivalent strains that the terms reach."""
+    f = np.concatenate([term.frequency for term in terms])
+    e = np.concatenate([term.amplitude * model.bushing.unit_strain(term.direction) for term in terms])
+    return Range((float(f.min()), float(f.max())), (float(e.min()), float(e.max())))
+
+
+def cautions(solution: Solution, terms: Sequence[Term], cov: Covariance) -> list[str]:
+    """What the data cannot tell, in words: bounds met, parameters not determined, pairs that trade off."""
+    model, names = solution.model, solution.coordinates.names
+    reach = measured_range(model, terms)
+    lines = []
+    for name in names:
+        stderr, parameter = cov.stderr(name), model.parameters[name]
+        scale = abs(model.values[name]) if parameter.log else max(abs(model.values[name]), parameter.typical)
+        reason = _reason(name, model, reach)
+        if name in solution.at_bound:
+            lines.append(f"{name} ended at the edge of what is possible: the data do not determine it{reason}")
+        elif stderr is not None and stderr > _UNDETERMINED * scale:
+            lines.append(f"{name} is not determined: standard error {100 * stderr / scale:.0f} %{reason}")
+    for one, other, value in cov.correlations():
+        if abs(value) > _TRADE_OFF and {one, other} <= set(names):
+            reason = _pair_reason(one, other, model, reach)
+            lines.append(f"{one} and {other} trade off (correlation {value:+.3f}): use them together{reason}")
+    return lines + _misfit(solution)
+
+
+def _reason(name: str, model: Model, reach: Range) -> str:
+    eps_half = model.values.get("eps_half", 0.0)
+    if name in ("sigma_fmax", "eps_half") and reach.strain[1] < eps_half:
+        return f"; amplitudes stop at {reach.strain[1] / eps_half:.2g} of eps_half, so only sigma_fmax/eps_half shows"
+    if name in ("m", "alpha") and reach.frequency[1] < 3.0 * reach.frequency[0]:
+        return f"; all tests run near {reach.frequency[0]:.2g} Hz, too slow and too alike to show the springpot"
+    if name in ("mu", "sigma_fmax", "eps_half") and reach.strain[1] < 1.5 * reach.strain[0]:
+        return "; one amplitude alone cannot tell friction from elasticity"
+    return ""
+
+
+def _pair_reason(one: str, other: str, model: Model, reach: Range) -> str:
+    if {one, other} == {"sigma_fmax", "eps_half"}:
+        ratio = reach.strain[1] / model.values["eps_half"]
+        return f"; strains reach {ratio:.2g} of eps_half, and larger amplitudes would separate them"
+    if {one, other} <= {"mu", "m", "alpha"}:
+        low, high = reach.frequency
+        return f"; frequencies span {low:.3g} to {high:.3g} Hz, and a wider span would separate them"
+    return ""
+
+
+def _misfit(solution: Solution) -> list[str]:
+    residuals = solution.residual
+    if _inflation(residuals, len(solution.coordinates.names)) == 1.0:
+        return []
+    reduced = solution.chi_square / max(residuals.size - len(solution.coordinates.names), 1)
+    return [
+        f"the model misses the data by more than their noise (reduced chi-square {reduced:.2g}): "
+        "standard errors are scaled up; bushfit diagnose looks for what is missing"
+    ]

@@ -1,0 +1,100 @@
+"""A campaign made ready to fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bushfit.campaign import Campaign
+from bushfit.errors import FitError
+from bushfit.fitting.solve import Bounds
+from bushfit.fitting.terms import LoopTerm, SweepTerm, Term, loop_terms, sweep_terms
+from bushfit.geometry import Direction
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """A campaign made ready to fit: one term per loop and per sweep, and the user's settings."""
+
+    campaign: Campaign
+    loops: tuple[LoopTerm, ...]
+    sweeps: tuple[SweepTerm, ...]
+    bounds: Bounds = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, campaign: Campaign) -> Data:
+        settings = campaign.fit.parameters
+        return cls(
+            campaign,
+            tuple(loop_terms(campaign.loops)),
+            tuple(sweep_terms(campaign.sweeps, campaign.fit.residuals)),
+            {name: (setting.min, setting.max) for name, setting in settings.items()},
+        )
+
+    @property
+    def given(self) -> dict[str, float]:
+        """Values the campaign gives, to start from or to hold."""
+        settings = self.campaign.fit.parameters
+        return {name: setting.value for name, setting in settings.items() if setting.value is not None}
+
+    def free(self, names: Sequence[str]) -> tuple[str, ...]:
+        """Those names that the campaign does not hold."""
+        settings = self.campaign.fit.parameters
+        return tuple(name for name in names if name not in settings or settings[name].vary)
+
+    def chosen(self, directions: Sequence[Direction] | None) -> list[Term]:
+        """Terms of the given directions; by default the axial ones, as in the paper, or all where none is."""
+        terms: list[Term] = [*self.loops, *self.sweeps]
+        if directions is None:
+            axial = [term for term in terms if term.direction is Direction.AXIAL]
+            return axial or terms
+        return [term for term in terms if term.direction in directions]
+
+    def static_terms(self) -> list[Term]:
+        """The loops `fit-static` uses: the axial ones, or all where none is axial.
+
+        Raises:
+            FitError: there is no loop.
+        """
+        axial = [term for term in self.loops if term.direction is Direction.AXIAL]
+        if not self.loops:
+            raise FitError(
+                "fit-static needs a loop",
+                file=self.campaign.path,
+                found="no [[loops]]",
+                hint="add a quasi-static loop, or run bushfit fit for the sweeps alone",
+            )
+        return [*(axial or self.loops)]
+
+    def smallest_sweep(self) -> SweepTerm:
+        """The sweep levels `fit-dynamic` uses: those the campaign names, else the smallest axial one.
+
+        Raises:
+            FitError: no sweep, or none at the amplitudes named.
+        """
+        sweeps = [sweep for sweep in self.sweeps if sweep.direction is Direction.AXIAL] or list(self.sweeps)
+        if not sweeps:
+            raise FitError(
+                "fit-dynamic needs a sweep",
+                file=self.campaign.path,
+                found="no [[sweeps]]",
+                hint="add a stepped-sine file, or run bushfit fit-static for the loops alone",
+            )
+        wanted = self.campaign.fit.dynamic_amplitudes
+        if not wanted:
+            sweep = min(sweeps, key=lambda term: float(term.amplitude.min()))
+            return sweep.at_amplitudes((float(sweep.amplitude.min()),))
+        for sweep in sweeps:
+            there = tuple(float(x) for x in np.unique(sweep.amplitude) if np.any(np.isclose(x, wanted, rtol=1e-3)))
+            if there:
+                return sweep.at_amplitudes(there)
+        levels = sorted({float(x) for sweep in sweeps for x in sweep.amplitude})
+        raise FitError(
+            "no sweep at these amplitudes",
+            file=self.campaign.path,
+            place="[fit] dynamic_amplitudes",
+            found=", ".join(f"{x:.4g}" for x in wanted),
+            expected="some of " + ", ".join(f"{x:.4g}" for x in levels),
+        )

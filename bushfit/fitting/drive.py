@@ -1,0 +1,209 @@
+"""What drives the model in a loop: the measured displacement, cleared of its noise.
+
+A loop's displacement is periodic. It is written as the harmonics that rise above its noise, found by least
+squares at the samples as they are (any number of cycles, sine or triangle, evenly sampled or not), so the
+turning points that friction needs are those of the motion and not of the sensor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.effects.history import History
+from bushfit.errors import FitError
+from bushfit.fitting.noise import FLOOR
+from bushfit.measurement import Loop
+
+#: Samples of the model's cycle; measured rows lie between them and are reached by linear interpolation.
+GRID = 1024
+#: Loops with more rows than this are averaged into as many bins of phase.
+MOST_ROWS = 4 * GRID
+_HARMONICS = 60
+_CLOCK_HARMONICS = 15
+_SIGNIFICANT = 4.0
+#: Share of the half range below which both first displacement and first force count as a start from rest.
+_AT_REST = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """A loop made ready for the model.
+
+    Args:
+        loop: the measured loop.
+        frequency: [Hz], found from the displacement.
+        cycles: whole and broken cycles in the record.
+        from_rest: True where the record begins at rest, False where the loop had settled.
+        phase: position of each row [cycles from the first row], (n,).
+        force: measured force per row, or per bin of phase where the loop is long, (n,).
+        weight: rows behind each entry of force, (n,).
+        noise: standard deviation of one row's force [N or N m].
+        coefficients: complex harmonics of the displacement, mean first.
+    """
+
+    loop: Loop
+    frequency: float
+    cycles: float
+    from_rest: bool
+    phase: Array
+    force: Array
+    weight: Array
+    noise: float
+    coefficients: Array
+
+    @property
+    def half_range(self) -> float:
+        """Half of the range of the measured force [N or N m]."""
+        return float(np.ptp(self.force)) / 2.0
+
+    @property
+    def amplitude(self) -> float:
+        """Zero-to-peak displacement [m or rad]."""
+        return float(self.history(settles=False).amplitude[0])
+
+    def displacement(self, phase: Array) -> Array:
+        """The motion at any phase [cycles], noise removed."""
+        order = np.arange(self.coefficients.size)
+        return np.real(np.exp(2j * np.pi * np.outer(phase, order)) @ self.coefficients)
+
+    def first_harmonic(self) -> complex:
+        """Complex stiffness of the loop's fundamental, force over displacement [N/m or N m/rad]."""
+        basis = _basis(self.phase, 1)
+        _, real, imag = _solve(basis * np.sqrt(self.weight)[:, None], self.force * np.sqrt(self.weight))
+        return complex(complex(real, imag) / self.coefficients[1])
+
+    def history(self, settles: bool) -> History:
+        """The motion as the model wants it: one settled cycle, or the whole record where it must be."""
+        if not self.from_rest:
+            cycle = self._cycle
+            count = int(np.ceil(self.cycles - 1e-6)) if settles else 1
+            return History.steady(np.tile(cycle, count), self.frequency, cycles=count)
+        phase = np.arange(int(np.ceil(self.cycles * GRID)) + 2) / GRID
+        motion = self.displacement(phase) - self.displacement(np.zeros(1))
+        return History(motion, 1.0 / (self.frequency * GRID), periodic=False, frequency=self.frequency)
+
+    @cached_property
+    def _cycle(self) -> Array:
+        return self.displacement(np.arange(GRID) / GRID)
+
+    def at_rows(self, response: Array) -> Array:
+        """A response over `history`, linearly interpolated at the rows: (..., n)."""
+        position = self.phase * GRID
+        if not self.from_rest:
+            response = np.concatenate((response, response[..., :1]), axis=-1)
+            position = position % (response.shape[-1] - 1)
+        index = np.minimum(position.astype(np.intp), response.shape[-1] - 2)
+        part = position - index
+        return response[..., index] * (1.0 - part) + response[..., index + 1] * part
+
+
+def drive_of(loop: Loop) -> Drive:
+    """Find the cycles of a loop and clear its displacement of noise.
+
+    Raises:
+        FitError: the displacement is not one whole cycle or more of a periodic motion.
+    """
+    frequency, cycles = _fundamental(loop)
+    phase = (loop.time - loop.time[0]) * frequency
+    half_motion, half_force = np.ptp(loop.displacement) / 2.0, np.ptp(loop.force) / 2.0
+    motion, force_noise = _harmonics(phase, loop)
+    noise = loop.noise * half_force if loop.noise is not None else force_noise
+    from_rest = abs(loop.displacement[0]) < _AT_REST * half_motion and abs(loop.force[0]) < _AT_REST * half_force
+    force, weight = loop.force, np.ones(loop.force.size)
+    if loop.force.size > MOST_ROWS and not from_rest:
+        phase, force, weight = _binned(phase, loop.force)
+    noise = max(noise, FLOOR * half_force)
+    return Drive(loop, frequency, cycles, bool(from_rest), phase, force, weight, noise, motion)
+
+
+def _fundamental(loop: Loop) -> tuple[float, float]:
+    """Frequency [Hz] and number of cycles: from upward crossings, refined by Gauss-Newton on the motion."""
+    x = loop.displacement - (loop.displacement.max() + loop.displacement.min()) / 2.0
+    band = 0.1 * np.ptp(x)
+    state = np.where(x > band, 1, np.where(x < -band, -1, 0))
+    marks = np.flatnonzero(state)
+    ups = marks[1:][(state[marks[1:]] == 1) & (state[marks[:-1]] == -1)]
+    duration = float(loop.time[-1] - loop.time[0])
+    closed = duration * loop.time.size / (loop.time.size - 1)
+    if ups.size < 2:
+        if abs(x[-1] - x[0]) > band:
+            unit = loop.direction.displacement_unit
+            raise FitError(
+                "the loop does not hold a whole cycle",
+                file=loop.source.file if loop.source else None,
+                found=f"displacement from {loop.displacement[0]:.4g} to {loop.displacement[-1]:.4g} {unit}",
+                expected="at least one closed cycle",
+                hint="export the whole cycle, or several",
+            )
+        return 1.0 / closed, 1.0
+    frequency = (ups.size - 1) / float(loop.time[ups[-1]] - loop.time[ups[0]])
+    order = _order(loop.time.size / (closed * frequency), _CLOCK_HARMONICS)
+    sample = slice(None, None, max(1, x.size // 2000))
+    time, motion = loop.time[sample] - loop.time[0], x[sample]
+    for _ in range(4):
+        basis = _basis(time * frequency, order)
+        angle_slope = 2.0 * np.pi * time * (basis @ _turned(_solve(basis, motion)))
+        solution = _solve(np.column_stack((basis, angle_slope)), motion)
+        frequency += float(np.clip(solution[-1], -0.05 * frequency, 0.05 * frequency))
+    return frequency, closed * frequency
+
+
+def _order(rows_per_cycle: float, most: int) -> int:
+    """As many harmonics as the rows of one cycle carry."""
+    return int(np.clip(rows_per_cycle / 5, 1, most))
+
+
+def _basis(phase: Array, order: int) -> Array:
+    """Columns 1, cos, -sin of each harmonic, (n, 2 order + 1)."""
+    turn = np.exp(2j * np.pi * phase)
+    powers = np.cumprod(np.broadcast_to(turn, (order, phase.size)), axis=0)
+    return np.vstack((np.ones(phase.size), powers.real, -powers.imag)).T
+
+
+def _solve(basis: Array, values: Array) -> Array:
+    """Least squares by normal equations; harmonics over whole cycles are nearly orthogonal."""
+    return np.linalg.solve(basis.T @ basis, basis.T @ values)
+
+
+def _turned(solution: Array) -> Array:
+    """Coefficients of the derivative by phase (in radians) of a harmonic series."""
+    order = (solution.size - 1) // 2
+    number = np.arange(1, order + 1)
+    return np.concatenate(([0.0], number * -solution[order + 1 :], number * solution[1 : order + 1]))
+
+
+def _harmonics(phase: Array, loop: Loop) -> tuple[Array, float]:
+    """Significant harmonics of the displacement, and the force's scatter about its own harmonics.
+
+    The scatter holds what does not repeat from cycle to cycle and what is too fast for the rubber.
+    """
+    step = max(1, phase.size // MOST_ROWS)
+    values = np.column_stack((loop.displacement, loop.force))[::step]
+    phase = phase[::step]
+    order = _order(phase.size / max(float(np.ptp(phase)), 1.0), _HARMONICS)
+    basis = _basis(phase, order)
+    solution = _solve(basis, values)
+    freedom = max(phase.size - 2 * order - 1, 1)
+    motion_noise, force_noise = np.sqrt(np.sum(np.square(values - basis @ solution), axis=0) / freedom)
+    motion = solution[:, 0]
+    coefficients = np.concatenate((motion[:1], motion[1 : order + 1] + 1j * motion[order + 1 :]))
+    keep = np.abs(coefficients) > _SIGNIFICANT * motion_noise * np.sqrt(2.0 / phase.size)
+    keep[:2] = True
+    return np.where(keep, coefficients, 0.0)[: int(np.flatnonzero(keep)[-1]) + 1], float(force_noise)
+
+
+def _binned(phase: Array, force: Array) -> tuple[Array, Array, Array]:
+    """Mean phase, mean force and number of rows of each filled bin of every cycle."""
+    bins = (phase * GRID).astype(np.intp)
+    weight = np.bincount(bins).astype(float)
+    filled = weight > 0
+    weight = weight[filled]
+    return (
+        np.bincount(bins, weights=phase)[filled] / weight,
+        np.bincount(bins, weights=force)[filled] / weight,
+        weight,
+    )

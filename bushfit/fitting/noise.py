@@ -1,0 +1,153 @@
+"""Measurement noise: what scatters from point to point, and what a whole block shares.
+
+A block is one run of the rig: one direction, amplitude and repeat. Its points share a gain and a phase error.
+Everything is counted on ln K = ln|K| + i phase, so gain errors are real and phase errors imaginary, both
+relative to |K|.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from scipy.stats import bartlett
+
+from bushfit.effects.contract import Array
+from bushfit.measurement import Sweep
+
+#: No rig measures better than this, relative to the largest force or to |K|.
+FLOOR = 1e-4
+#: Shared errors of a block where nothing was repeated: relative gain and phase [rad].
+ASSUMED_SHARED = (5e-3, float(np.radians(0.25)))
+#: Levels get noise of their own where equal noise is this unlikely.
+_EQUAL_NOISE_P = 1e-3
+#: Degree in ln f of the smooth curve that stands in for repeats.
+_SMOOTH_DEGREE = 4
+
+LevelKey = tuple[str, float]
+_ORIGINS = {
+    "repeats": "from repeats",
+    "stated": "stated in the campaign",
+    "assumed": "no repeats: points against a smooth curve, shared part assumed",
+}
+
+
+@dataclass(frozen=True)
+class SweepNoise:
+    """Noise of all sweeps of a campaign.
+
+    Args:
+        random: standard deviation from point to point of (ln|K|, phase), per level (sweep name, amplitude).
+        shared: standard deviation of what a block shares, (ln|K|, phase [rad]).
+        origin: "repeats", "stated" or "assumed": where it comes from.
+        freedom: degrees of freedom behind the shared part; 0 where it is not measured.
+    """
+
+    random: dict[LevelKey, tuple[float, float]]
+    shared: tuple[float, float]
+    origin: str
+    freedom: int
+
+    def describe(self) -> str:
+        """One line for reports."""
+        point = 100.0 * np.sqrt(np.mean(np.square(list(self.random.values()))))
+        return (
+            f"{point:.2g} % from point to point, {100 * self.shared[0]:.2g} % gain and "
+            f"{np.degrees(self.shared[1]):.2g} deg phase shared by a block ({_ORIGINS[self.origin]})"
+        )
+
+
+@dataclass(frozen=True)
+class _Level:
+    """What one amplitude of one sweep tells: scatter (k, 2) with its degrees of freedom, and the variances
+    its repeats share, (pairs, 2)."""
+
+    scatter: Array
+    freedom: int
+    shared: Array
+    repeats: int
+
+
+def sweep_noise(sweeps: Sequence[Sweep]) -> SweepNoise:
+    """Noise of a campaign's sweeps: variance components from all pairs of repeats.
+
+    With D_f the difference of ln K between two repeats at the frequency f, the variance of D_f over f is
+    twice the random variance, and the square of its mean estimates twice (shared variance + random variance
+    / number of frequencies). Pairs are pooled within a level and over levels; levels keep a random part of
+    their own where Bartlett's test finds them unequal. Without repeats the random part is the scatter about
+    a smooth curve in ln f, and the shared part is ASSUMED_SHARED. A `noise` stated in the campaign replaces
+    the random part.
+    """
+    levels = {
+        (sweep.name, float(amplitude)): _level(sweep, amplitude)
+        for sweep in sweeps
+        for amplitude in np.unique(sweep.amplitude)
+    }
+    variances = {key: np.square(level.scatter).sum(axis=0) / max(level.freedom, 1) for key, level in levels.items()}
+    repeated = [key for key, level in levels.items() if level.repeats > 1]
+    if repeated and not _unequal([levels[key] for key in repeated]):
+        freedoms = np.array([levels[key].freedom for key in repeated], dtype=float)
+        pooled = np.average([variances[key] for key in repeated], axis=0, weights=freedoms)
+        variances |= dict.fromkeys(levels, pooled)
+    stated = {sweep.name: sweep.noise for sweep in sweeps if sweep.noise is not None}
+    random = {}
+    for key, variance in variances.items():
+        gain, phase = np.maximum(stated.get(key[0], np.sqrt(variance)), FLOOR)
+        random[key] = (float(gain), float(phase))
+    if repeated:
+        shared = np.concatenate([levels[key].shared for key in repeated]).mean(axis=0)
+        gain, phase = np.sqrt(np.maximum(shared, 0.0))
+        freedom = sum(levels[key].repeats - 1 for key in repeated)
+        return SweepNoise(random, (float(gain), float(phase)), "repeats", freedom)
+    if len(stated) == len(sweeps):
+        return SweepNoise(random, (0.0, 0.0), "stated", 0)
+    return SweepNoise(random, ASSUMED_SHARED, "assumed", 0)
+
+
+def _level(sweep: Sweep, amplitude: float) -> _Level:
+    chosen = sweep.amplitude == amplitude
+    frequencies, column = np.unique(sweep.frequency[chosen], return_inverse=True)
+    numbers, row = np.unique(sweep.repeat[chosen], return_inverse=True)
+    table = np.full((numbers.size, frequencies.size), np.nan + 0j)
+    table[row, column] = np.log(sweep.stiffness[chosen])
+    scatter, shared = [], []
+    for one, other in combinations(table, 2):
+        difference = one - other
+        difference = difference[~np.isnan(difference.real)]
+        if difference.size < 3:
+            continue
+        mean, spread = _parts(difference).mean(axis=0), _parts(difference - difference.mean())
+        variance = np.square(spread).sum(axis=0) / (difference.size - 1)
+        shared.append((mean**2 - variance / difference.size) / 2.0)
+        scatter.append(spread / np.sqrt(numbers.size))
+    if not scatter:
+        return _about_smooth_curve(np.log(frequencies), np.nanmean(table, axis=0))
+    freedom = (numbers.size - 1) * (scatter[0].shape[0] - 1)
+    return _Level(np.concatenate(scatter), freedom, np.array(shared), int(numbers.size))
+
+
+def _about_smooth_curve(log_frequency: Array, log_stiffness: Array) -> _Level:
+    degree = min(_SMOOTH_DEGREE, log_frequency.size - 2)
+    if degree < 1:
+        return _Level(np.full((1, 2), ASSUMED_SHARED[0]), 1, np.empty((0, 2)), 1)
+    values = _parts(log_stiffness)
+    basis = np.polynomial.legendre.legvander(_unit_interval(log_frequency), degree)
+    residual = values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
+    return _Level(residual, log_frequency.size - degree - 1, np.empty((0, 2)), 1)
+
+
+def _unit_interval(x: Array) -> Array:
+    return 2.0 * (x - x.min()) / max(float(np.ptp(x)), 1e-300) - 1.0
+
+
+def _parts(values: Array) -> Array:
+    return np.stack([np.real(values), np.imag(values)], axis=-1)
+
+
+def _unequal(levels: Sequence[_Level]) -> bool:
+    samples = [level.scatter.ravel() for level in levels]
+    if len(samples) < 2 or any(np.ptp(sample) == 0.0 for sample in samples):
+        return False
+    return bool(bartlett(*samples).pvalue < _EQUAL_NOISE_P)

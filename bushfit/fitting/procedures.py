@@ -1,0 +1,183 @@
+"""The fits a user asks for: static, dynamic, the two in turn, and all parameters together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bushfit.effects import BASE
+from bushfit.effects.contract import Array
+from bushfit.errors import FitError
+from bushfit.fitting.assess import Stage, cautions, covariance, measured_range, quality
+from bushfit.fitting.data import Data
+from bushfit.fitting.solve import Coordinates, Solution, solve
+from bushfit.fitting.starts import start_values
+from bushfit.fitting.terms import Term
+from bushfit.geometry import Direction
+from bushfit.model import Model
+from bushfit.results import Covariance, Result
+
+STATIC = ("mu", "sigma_fmax", "eps_half")
+DYNAMIC = ("m", "alpha")
+
+#: Passes of the two-step procedure agree when no parameter moves by more than this, relative.
+_AGREED = 1e-5
+_MOST_PASSES = 50
+#: A filled natural rubber, to say what leaving the springpot out may do: m/mu [s^alpha] and alpha.
+_TYPICAL_SPRINGPOT = (0.18, 0.24)
+
+
+@dataclass(frozen=True, eq=False)
+class TwoStep:
+    """The paper's procedure, repeated: the values after each pass, and the result of the last."""
+
+    passes: tuple[Mapping[str, float], ...]
+    result: Result
+
+
+def fit_joint(data: Data, *, effects: Sequence[str] = BASE, directions: Sequence[Direction] | None = None) -> Result:
+    """All parameters of a model together, from loops and sweeps.
+
+    Args:
+        data: the campaign.
+        effects: the model; the paper's three branches unless told.
+        directions: tests to use; the axial ones by default, as in the paper.
+
+    Raises:
+        FitError: no test in those directions, or data that cannot support the fit.
+    """
+    terms = data.chosen(directions)
+    solution = _solve(data, terms, effects, {})
+    return _result(solution, terms, [Stage(solution.coordinates.names, terms)])
+
+
+def fit_static(data: Data, springpot: Result | None = None) -> Result:
+    """mu, sigma_fmax and eps_half from the loops, the springpot held (paper, section 4.1).
+
+    Args:
+        data: the campaign.
+        springpot: where m and alpha come from. Without it they are taken from the campaign's [fit] where both
+            have values; failing that the springpot is left out, and a warning says what this does.
+
+    Raises:
+        FitError: no loop, or data that cannot support the fit.
+    """
+    terms = data.static_terms()
+    held, known = _springpot(data, springpot)
+    solution = _solve(data, terms, BASE if held else ("elastic", "friction"), held)
+    notes = [] if held else [_without_springpot(data, solution, terms)]
+    return _result(solution, terms, [Stage(solution.coordinates.names, terms)], known, notes)
+
+
+def fit_dynamic(data: Data, static: Result) -> Result:
+    """m and alpha from the smallest-amplitude sweep, the rest held at the static result (paper, section 4.2).
+
+    The static parameters' own errors are carried into those of m and alpha.
+    """
+    terms: list[Term] = [data.smallest_sweep()]
+    held = {name: static.model.values[name] for name in STATIC}
+    solution = _solve(data, terms, BASE, held)
+    stages = [Stage(solution.coordinates.names, terms)]
+    return _result(solution, terms, stages, static.covariance.restricted(STATIC))
+
+
+def fit_two_step(data: Data) -> TwoStep:
+    """Static and dynamic fit in turn, each holding what the other found, until they agree.
+
+    Raises:
+        FitError: a test is missing, or the passes do not settle.
+    """
+    loops, sweep = data.static_terms(), data.smallest_sweep()
+    springpot: dict[str, float] = {}
+    passes: list[Mapping[str, float]] = []
+    asked: list[Array] = []
+    answered: list[Array] = []
+    for _ in range(_MOST_PASSES):
+        static = _solve(data, loops, BASE if springpot else ("elastic", "friction"), springpot)
+        dynamic = _solve(data, [sweep], BASE, {name: static.model.values[name] for name in STATIC})
+        passes.append(dict(dynamic.model.values))
+        if len(passes) > 1 and _agree(passes[-2], passes[-1]):
+            stages = [Stage(static.coordinates.names, loops), Stage(dynamic.coordinates.names, [sweep])]
+            return TwoStep(tuple(passes), _result(dynamic, [*loops, sweep], stages))
+        coordinates = Coordinates.of(dynamic.model, DYNAMIC)
+        if springpot:
+            asked.append(coordinates.point(springpot))
+            answered.append(coordinates.point(dynamic.model.values))
+        springpot = {name: dynamic.model.values[name] for name in DYNAMIC}
+        if len(asked) > 1:
+            springpot = coordinates.values(_anderson(asked, answered))
+    raise FitError(
+        "the static and the dynamic fit do not settle on each other",
+        file=data.campaign.path,
+        found=f"{_MOST_PASSES} passes",
+        hint="bushfit fit takes all five parameters together",
+    )
+
+
+def _anderson(asked: Sequence[Array], answered: Sequence[Array]) -> Array:
+    """Next point of a fixed-point iteration, from the last three (Anderson 1965): plain passes gain only a
+    fifth each, because a loop of one slow rate and a sweep of one amplitude know little of each other."""
+    points, images = np.array(asked[-3:]), np.array(answered[-3:])
+    gaps = images - points
+    weights = np.linalg.lstsq(np.diff(gaps, axis=0).T, gaps[-1], rcond=None)[0]
+    return images[-1] - weights @ np.diff(images, axis=0)
+
+
+def _agree(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
+    return all(abs(other[name] - one[name]) <= _AGREED * abs(other[name]) for name in other)
+
+
+def _springpot(data: Data, springpot: Result | None) -> tuple[dict[str, float], Covariance | None]:
+    if springpot is not None:
+        return {name: springpot.model.values[name] for name in DYNAMIC}, springpot.covariance.restricted(DYNAMIC)
+    given = {name: data.given[name] for name in DYNAMIC if name in data.given}
+    return (given if len(given) == len(DYNAMIC) else {}), None
+
+
+def _without_springpot(data: Data, solution: Solution, terms: Sequence[Term]) -> str:
+    """What leaving the springpot out did to the static parameters, in words and per cent."""
+    found = solution.model.values
+    if data.sweeps:
+        better, source = fit_two_step(data).result.model.values, "with m and alpha from this campaign's sweep"
+    else:
+        ratio, alpha = _TYPICAL_SPRINGPOT
+        held = {"m": ratio * found["mu"], "alpha": alpha}
+        better = _solve(data, terms, BASE, held).model.values
+        source = f"with the springpot of a typical filled rubber (m = {ratio} mu s^alpha, alpha = {alpha})"
+    changes = ", ".join(f"{name} by {100 * (better[name] / found[name] - 1):+.1f} %" for name in STATIC)
+    return (
+        "m and alpha are not known yet, so the springpot was left out and its stiffness and loss at the loop's rate "
+        f"went into the others; {source} they change: {changes}. bushfit run alternates the two fits, and "
+        "bushfit fit takes all parameters together"
+    )
+
+
+def _solve(data: Data, terms: Sequence[Term], effects: Sequence[str], held: Mapping[str, float]) -> Solution:
+    """Fit what the campaign leaves free of a model, from start values taken from the data."""
+    bushing = data.campaign.bushing
+    start = {**start_values(bushing, terms, held), **data.given, **held}
+    model = Model.started(bushing, effects, start)
+    names = [name for name in data.free(tuple(model.parameters)) if name not in held]
+    return solve(model, terms, names, data.bounds)
+
+
+def _result(
+    solution: Solution,
+    terms: Sequence[Term],
+    stages: Sequence[Stage],
+    held: Covariance | None = None,
+    notes: Sequence[str] = (),
+) -> Result:
+    fitted = tuple(name for stage in stages for name in stage.names)
+    cov = covariance(solution.model, stages, held)
+    return Result(
+        solution.model,
+        fitted,
+        cov,
+        quality(solution.model, terms, len(fitted)),
+        measured_range(solution.model, terms),
+        (*notes, *cautions(solution, terms, cov)),
+        tuple(term.source for term in terms if term.source is not None),
+    )

@@ -1,0 +1,239 @@
+"""Residuals in units of noise: one term per measured loop, one per sweep.
+
+A term knows its data and their noise; asked with a model it returns whitened residuals (model less measured),
+which are independent with unit variance where the model is right, and their derivatives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from bushfit.effects.contract import Array, Values
+from bushfit.fitting.drive import Drive, drive_of
+from bushfit.fitting.noise import SweepNoise, sweep_noise
+from bushfit.geometry import Direction
+from bushfit.measurement import Loop, Source, Sweep
+from bushfit.model import Model
+from bushfit.sensitivity import force_jacobian, stiffness_jacobian
+
+Residuals = Literal["complex", "magnitude_loss_factor"]
+
+
+@dataclass(frozen=True, eq=False)
+class LoopTerm:
+    """Force against time, with the measured displacement driving the model."""
+
+    drive: Drive
+
+    @property
+    def size(self) -> int:
+        return int(self.drive.force.size)
+
+    @property
+    def loop(self) -> Loop:
+        return self.drive.loop
+
+    @property
+    def direction(self) -> Direction:
+        return self.loop.direction
+
+    @property
+    def source(self) -> Source | None:
+        return self.loop.source
+
+    @property
+    def frequency(self) -> Array:
+        """[Hz], (1,)"""
+        return np.array([self.drive.frequency])
+
+    @property
+    def amplitude(self) -> Array:
+        """Zero-to-peak [m or rad], (1,)."""
+        return np.array([self.drive.amplitude])
+
+    @property
+    def measured(self) -> Array:
+        """Complex stiffness of the loop's fundamental, (1,)."""
+        return np.array([self.drive.first_harmonic()])
+
+    @property
+    def relative_noise(self) -> float:
+        """Standard deviation of one row, relative to half the force range."""
+        return self.drive.noise / self.drive.half_range
+
+    def force(self, model: Model, values: Values | None = None) -> Array:
+        """Model force at the rows [N or N m]."""
+        history = self.drive.history(_settles(model))
+        return self.drive.at_rows(model.force(self.loop.direction, history, kind="loop", values=values))
+
+    def residual(self, model: Model, values: Values | None = None) -> Array:
+        """(..., n)"""
+        return (self.force(model, values) - self.drive.force) * self._per_noise
+
+    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
+        """(len(names), n)"""
+        history = self.drive.history(_settles(model))
+        return self.drive.at_rows(force_jacobian(model, self.loop.direction, history, names)) * self._per_noise
+
+    def relative(self, model: Model) -> Array:
+        """Difference relative to half the force range, for NRMSE."""
+        return (self.force(model) - self.drive.force) / self.drive.half_range
+
+    @cached_property
+    def _per_noise(self) -> Array:
+        return np.sqrt(self.drive.weight) / self.drive.noise
+
+
+@dataclass(frozen=True, eq=False)
+class SweepTerm:
+    """Dynamic stiffness, as relative complex residual or as magnitude and loss factor.
+
+    The residual (K - K_meas)/K_meas has the gain error in its real and the phase error in its imaginary part.
+    Within a block of n points with random part s and shared part t the covariance is s^2 I + t^2 1 1^T; its
+    inverse root subtracts the share 1 - 1/sqrt(1 + n t^2/s^2) of the block's mean and divides by s.
+    """
+
+    sweep: Sweep
+    noise: SweepNoise
+    residuals: Residuals = "complex"
+
+    @property
+    def size(self) -> int:
+        return 2 * int(self.sweep.frequency.size)
+
+    @property
+    def direction(self) -> Direction:
+        return self.sweep.direction
+
+    @property
+    def source(self) -> Source | None:
+        return self.sweep.source
+
+    @property
+    def relative_noise(self) -> float:
+        """Standard deviation of one point, relative to |K|, root mean square over levels."""
+        return float(np.sqrt(np.mean(np.square(list(self.noise.random.values())))))
+
+    def at_amplitudes(self, amplitudes: Sequence[float]) -> SweepTerm:
+        """The part of the sweep at some of its levels, with the same noise."""
+        kept = np.isin(self.sweep.amplitude, amplitudes)
+        part = replace(
+            self.sweep,
+            frequency=self.sweep.frequency[kept],
+            amplitude=self.sweep.amplitude[kept],
+            stiffness=self.sweep.stiffness[kept],
+            repeat=self.sweep.repeat[kept],
+        )
+        return replace(self, sweep=part)
+
+    @cached_property
+    def order(self) -> Array:
+        """Rows of the sweep sorted by block (amplitude, repeat), then frequency."""
+        return np.lexsort((self.sweep.frequency, self.sweep.repeat, self.sweep.amplitude))
+
+    @cached_property
+    def frequency(self) -> Array:
+        return self.sweep.frequency[self.order]
+
+    @cached_property
+    def amplitude(self) -> Array:
+        return self.sweep.amplitude[self.order]
+
+    @cached_property
+    def measured(self) -> Array:
+        return self.sweep.stiffness[self.order]
+
+    @cached_property
+    def block_starts(self) -> Array:
+        """Index of the first point of each block, in `order`."""
+        label = np.stack((self.amplitude, self.sweep.repeat[self.order].astype(float)))
+        return np.concatenate(([0], 1 + np.flatnonzero(np.any(np.diff(label), axis=0))))
+
+    def stiffness(self, model: Model, values: Values | None = None) -> Array:
+        """Model stiffness at the points, sorted by block."""
+        return model.stiffness(self.sweep.direction, self.frequency, self.amplitude, values=values)
+
+    def relative(self, model: Model) -> Array:
+        """|K - K_meas| / |K_meas| per point, for NRMSE."""
+        return np.abs(self.stiffness(model) / self.measured - 1.0)
+
+    def deviation(self, model: Model, values: Values | None = None) -> Array:
+        """Residual before whitening: gain in the real, phase (or loss factor) in the imaginary part, (..., n)."""
+        return self._deviation(self.stiffness(model, values))
+
+    def residual(self, model: Model, values: Values | None = None) -> Array:
+        """(..., 2 n): all gain residuals, then all phase residuals."""
+        return self.whiten(self.deviation(model, values))
+
+    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
+        """(len(names), 2 n)"""
+        slopes = stiffness_jacobian(model, self.sweep.direction, self.frequency, self.amplitude, names)
+        if self.residuals == "complex":
+            return self.whiten(slopes / self.measured)
+        stiffness = self.stiffness(model)
+        relative = slopes / stiffness
+        gain = np.abs(stiffness / self.measured) * relative.real
+        loss = relative.imag * (np.abs(stiffness) / stiffness.real) ** 2
+        return self.whiten(gain + 1j * loss * self._loss_scale)
+
+    def _deviation(self, stiffness: Array) -> Array:
+        if self.residuals == "complex":
+            return stiffness / self.measured - 1.0
+        gain = np.abs(stiffness / self.measured) - 1.0
+        loss = stiffness.imag / stiffness.real - self.measured.imag / self.measured.real
+        return gain + 1j * loss * self._loss_scale
+
+    @cached_property
+    def _loss_scale(self) -> Array:
+        """Phase per loss factor, 1/(1 + eta^2)."""
+        return (self.measured.real / np.abs(self.measured)) ** 2
+
+    def whiten(self, deviation: Array) -> Array:
+        """Residuals in units of noise, shared block errors taken out: (..., n) complex -> (..., 2 n)."""
+        parts = (deviation.real, deviation.imag)
+        return np.concatenate([self._whiten(part, which) for which, part in enumerate(parts)], axis=-1)
+
+    def _whiten(self, part: Array, which: int) -> Array:
+        scale, share = self._block_scales[which]
+        means = np.add.reduceat(part, self.block_starts, axis=-1) / self._block_sizes
+        return (part - np.repeat(means * share, self._block_sizes, axis=-1)) * scale
+
+    @cached_property
+    def _block_sizes(self) -> Array:
+        return np.diff(np.append(self.block_starts, self.frequency.size))
+
+    @cached_property
+    def _block_scales(self) -> list[tuple[Array, Array]]:
+        scales = []
+        for which, shared in enumerate(self.noise.shared):
+            random = np.array(
+                [self.noise.random[self.sweep.name, float(x)][which] for x in self.amplitude[self.block_starts]]
+            )
+            share = 1.0 - 1.0 / np.sqrt(1.0 + self._block_sizes * (shared / random) ** 2)
+            scales.append((np.repeat(1.0 / random, self._block_sizes), share))
+        return scales
+
+
+Term = LoopTerm | SweepTerm
+
+
+def _settles(model: Model) -> bool:
+    return any(effect.settles for effect in model.records)
+
+
+def loop_terms(loops: Sequence[Loop]) -> list[LoopTerm]:
+    """One term per loop."""
+    return [LoopTerm(drive_of(loop)) for loop in loops]
+
+
+def sweep_terms(sweeps: Sequence[Sweep], residuals: Residuals = "complex") -> list[SweepTerm]:
+    """One term per sweep; their noise is estimated together."""
+    if not sweeps:
+        return []
+    noise = sweep_noise(sweeps)
+    return [SweepTerm(sweep, noise, residuals) for sweep in sweeps]

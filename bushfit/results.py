@@ -1,0 +1,211 @@
+"""What a fit found: a model with its uncertainty, and the JSON file that holds both."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bushfit import __version__
+from bushfit.effects.contract import Array
+from bushfit.errors import BushfitError, ModelError
+from bushfit.measurement import Source
+from bushfit.model import Model
+
+SCHEMA = "bushfit/model/1"
+#: Half width of a 95 % interval in standard errors.
+Z95 = 1.959963984540054
+_PACKAGES = ("numpy", "scipy", "lmfit")
+
+
+@dataclass(frozen=True, eq=False)
+class Covariance:
+    """Covariance matrix of parameter values, (k, k), in their SI units."""
+
+    names: tuple[str, ...] = ()
+    matrix: Array = field(default_factory=lambda: np.empty((0, 0)))
+
+    def stderr(self, name: str) -> float | None:
+        """Standard error; None where the parameter was held at an exact value."""
+        if name not in self.names:
+            return None
+        i = self.names.index(name)
+        return float(np.sqrt(self.matrix[i, i]))
+
+    def correlations(self) -> list[tuple[str, str, float]]:
+        """All pairs, the most correlated first."""
+        sigma = np.sqrt(np.diag(self.matrix))
+        pairs = [
+            (self.names[i], self.names[j], float(self.matrix[i, j] / (sigma[i] * sigma[j])))
+            for i in range(len(self.names))
+            for j in range(i + 1, len(self.names))
+            if sigma[i] * sigma[j] > 0.0
+        ]
+        return sorted(pairs, key=lambda pair: -abs(pair[2]))
+
+    def restricted(self, names: Sequence[str]) -> Covariance:
+        """The part of some names, in this covariance's order."""
+        kept = [i for i, name in enumerate(self.names) if name in names]
+        return Covariance(tuple(self.names[i] for i in kept), self.matrix[np.ix_(kept, kept)])
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How well a model meets the data it was fitted to.
+
+    Args:
+        nrmse: root mean square difference, relative to half a loop's force range and to |K|.
+        reduced_chi_square: mean square residual in units of noise; 1 is the floor.
+        points: number of residuals.
+        noise: standard deviation of one point, relative, root mean square over all.
+    """
+
+    nrmse: float
+    reduced_chi_square: float
+    points: int
+    noise: float
+
+
+@dataclass(frozen=True)
+class Range:
+    """What was measured: frequencies [Hz] and equivalent strain amplitudes, least and largest."""
+
+    frequency: tuple[float, float]
+    strain: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """A fitted model, or one given by hand, as the JSON files hold it.
+
+    Args:
+        model: bushing, effects and values.
+        fitted: names of the parameters the fit moved.
+        covariance: of the fitted parameters, and of held ones whose error is known.
+        quality: None where the model was not fitted.
+        measured: None where the model was not fitted.
+        warnings: what a user must know before using the numbers.
+        inputs: the files behind it.
+    """
+
+    model: Model
+    fitted: tuple[str, ...] = ()
+    covariance: Covariance = field(default_factory=Covariance)
+    quality: Quality | None = None
+    measured: Range | None = None
+    warnings: tuple[str, ...] = ()
+    inputs: tuple[Source, ...] = ()
+
+    def interval(self, name: str) -> tuple[float, float] | None:
+        """95 % interval of a parameter: symmetric in the logarithm for strictly positive ones."""
+        stderr, value = self.covariance.stderr(name), self.model.values[name]
+        if stderr is None:
+            return None
+        if self.model.parameters[name].log and value > 0.0:
+            factor = float(np.exp(min(Z95 * stderr / value, 700.0)))
+            return value / factor, value * factor
+        return value - Z95 * stderr, value + Z95 * stderr
+
+    def to_document(self) -> dict[str, Any]:
+        """JSON-ready data in the schema bushfit/model/1."""
+        document: dict[str, Any] = {"schema": SCHEMA, **self.model.to_document()}
+        for name, entry in document["parameters"].items():
+            interval = self.interval(name)
+            entry["stderr"] = self.covariance.stderr(name)
+            entry["ci95"] = None if interval is None else list(interval)
+            entry["vary"] = name in self.fitted
+        document["covariance"] = {"names": list(self.covariance.names), "matrix": self.covariance.matrix.tolist()}
+        document["fit"] = None
+        if self.quality and self.measured:
+            document["fit"] = {
+                "nrmse": self.quality.nrmse,
+                "reduced_chi_square": self.quality.reduced_chi_square,
+                "points": self.quality.points,
+                "noise": self.quality.noise,
+                "frequency_Hz": list(self.measured.frequency),
+                "strain": list(self.measured.strain),
+            }
+        document["warnings"] = list(self.warnings)
+        document["provenance"] = {
+            "bushfit": __version__,
+            "inputs": [{"file": str(source.file), "sha256": source.sha256} for source in self.inputs],
+            "packages": {name: importlib.metadata.version(name) for name in _PACKAGES},
+        }
+        return document
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> Result:
+        """The result of `to_document`.
+
+        Raises:
+            ModelError: another schema, or a key that is missing or of the wrong kind.
+        """
+        schema = document.get("schema")
+        if schema != SCHEMA:
+            raise ModelError(
+                "not a model this version reads",
+                place="schema",
+                found=repr(schema),
+                expected=SCHEMA,
+                hint="use a file written by bushfit fit-static, fit-dynamic, fit or diagnose",
+            )
+        model = Model.from_document(document)
+        try:
+            fit, covariance = document.get("fit"), document.get("covariance") or {"names": [], "matrix": []}
+            names = tuple(str(name) for name in covariance["names"])
+            matrix = np.array(covariance["matrix"], dtype=float).reshape(len(names), len(names))
+            if not np.all(np.isfinite(matrix)) or not set(names) <= model.parameters.keys():
+                raise ModelError("the covariance does not belong to the parameters", place="covariance")
+            return cls(
+                model,
+                tuple(name for name, entry in document["parameters"].items() if entry.get("vary")),
+                Covariance(names, matrix),
+                Quality(float(fit["nrmse"]), float(fit["reduced_chi_square"]), int(fit["points"]), float(fit["noise"]))
+                if fit
+                else None,
+                Range(_pair(fit["frequency_Hz"]), _pair(fit["strain"])) if fit and "strain" in fit else None,
+                tuple(str(line) for line in document.get("warnings", ())),
+                tuple(
+                    Source(Path(entry["file"]), str(entry["sha256"]))
+                    for entry in document.get("provenance", {}).get("inputs", ())
+                ),
+            )
+        except KeyError as missing:
+            raise ModelError("a key is missing", place=str(missing.args[0])) from None
+        except (TypeError, ValueError, AttributeError) as wrong:
+            raise ModelError("a key holds the wrong kind of value", found=str(wrong)) from None
+
+
+def _pair(values: Sequence[float]) -> tuple[float, float]:
+    low, high = values
+    return float(low), float(high)
+
+
+def load_result(file: Path) -> Result:
+    """Read a model file.
+
+    Raises:
+        ModelError: a file that is missing, is no JSON, or is no model; it names the file.
+    """
+    try:
+        document = json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ModelError("no such file", file=file, hint="bushfit fit writes one") from None
+    except (OSError, UnicodeDecodeError) as wrong:
+        raise ModelError("cannot be read", file=file, found=str(wrong)) from None
+    except (json.JSONDecodeError, RecursionError) as wrong:
+        place = f"line {wrong.lineno}" if isinstance(wrong, json.JSONDecodeError) else None
+        raise ModelError("not JSON", file=file, place=place, found=str(wrong), expected="a model file") from None
+    if not isinstance(document, dict):
+        raise ModelError("not a model", file=file, found=type(document).__name__, expected="a JSON object")
+    try:
+        return Result.from_document(document)
+    except BushfitError as error:
+        raise type(error)(
+            error.problem, file=file, place=error.place, found=error.found, expected=error.expected, hint=error.hint
+        ) from None
