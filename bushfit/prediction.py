@@ -1,0 +1,160 @@
+"""Prediction: stiffness tables with 95 % bands, for the car and not for the rig.
+
+Material and component effects are kept, instrument effects are left out: the car does not have the rig's faults.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bushfit.effects import Level, effect_named
+from bushfit.effects.contract import Array
+from bushfit.errors import ModelError
+from bushfit.geometry import Direction
+from bushfit.results import Z95, Result
+from bushfit.sensitivity import stiffness_jacobian
+
+#: The paper's grid: frequencies [Hz], amplitudes [m], and for torsion [rad].
+PAPER_FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
+PAPER_AMPLITUDES = (1e-4, 2e-4, 5e-4)
+_TORSION_AMPLITUDES = tuple(float(np.radians(x)) for x in (0.5, 1.0, 2.0))
+#: Beyond the measured range by more than this share, a prediction is an extrapolation.
+_MARGIN = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """A predicted quantity with its 95 % band, each (n,)."""
+
+    value: Array
+    low: Array
+    high: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Dynamic stiffness over operating points, sorted by amplitude, then frequency.
+
+    Args:
+        direction: direction of motion.
+        frequency: [Hz], (n,).
+        amplitude: zero-to-peak [m or rad], (n,).
+        stiffness: |K| [N/m or N m/rad].
+        loss_factor: K''/K'.
+        storage_stiffness: K'.
+        loss_stiffness: K''.
+        warnings: what leaves the measured range.
+    """
+
+    direction: Direction
+    frequency: Array
+    amplitude: Array
+    stiffness: Band
+    loss_factor: Band
+    storage_stiffness: Band
+    loss_stiffness: Band
+    warnings: tuple[str, ...]
+
+
+def default_grid(result: Result, direction: Direction) -> tuple[Array, Array]:
+    """The paper's frequencies [Hz] and amplitudes [m or rad] as far as they were measured, or an even grid over
+    the measured range where they were not."""
+    amplitudes = np.array(_TORSION_AMPLITUDES if direction is Direction.TORSION else PAPER_AMPLITUDES)
+    frequencies = np.array(PAPER_FREQUENCIES)
+    if result.measured is None:
+        return frequencies, amplitudes
+    low, high = result.measured.frequency
+    inside = frequencies[(frequencies >= low * (1 - _MARGIN)) & (frequencies <= high * (1 + _MARGIN))]
+    if inside.size < 2:
+        inside = np.unique(np.geomspace(low, high, 9))
+    if direction is Direction.TORSION:
+        return inside, amplitudes
+    per_displacement = result.model.bushing.unit_strain(Direction.AXIAL)
+    least, most = (strain / per_displacement for strain in result.measured.strain)
+    reached = amplitudes[(amplitudes >= least * (1 - _MARGIN)) & (amplitudes <= most * (1 + _MARGIN))]
+    if reached.size < 2:
+        reached = np.unique([float(f"{x:.2g}") for x in np.geomspace(least, most, 3)])
+    return inside, reached
+
+
+def predict(
+    result: Result,
+    direction: Direction,
+    frequencies: Sequence[float] | Array,
+    amplitudes: Sequence[float] | Array,
+) -> Prediction:
+    """Dynamic stiffness on a grid, with 95 % bands from the covariance of the fit (delta method).
+
+    Args:
+        result: fitted model.
+        direction: axial, radial or torsion.
+        frequencies: [Hz].
+        amplitudes: zero-to-peak [m or rad].
+
+    Raises:
+        ModelError: a frequency or amplitude that is not positive.
+    """
+    for name, given in (("frequency", frequencies), ("amplitude", amplitudes)):
+        if not (np.size(given) and np.all(np.isfinite(given)) and np.min(given) > 0):
+            raise ModelError(f"impossible {name} to predict at", found=str(np.asarray(given)), expected="above zero")
+    model = result.model.without(Level.INSTRUMENT)
+    amplitude, frequency = (
+        axis.ravel() for axis in np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
+    )
+    stiffness = model.stiffness(direction, frequency, amplitude)
+    names = [name for name in result.covariance.names if name in model.values]
+    matrix = result.covariance.restricted(names).matrix
+    if names:
+        slopes = stiffness_jacobian(model, direction, frequency, amplitude, names)
+    else:
+        slopes, matrix = np.zeros((1, frequency.size), dtype=complex), np.zeros((1, 1))
+
+    def band(value: Array, slope: Array) -> Band:
+        half = Z95 * np.sqrt(np.einsum("in,ij,jn->n", slope, matrix, slope))
+        return Band(value, value - half, value + half)
+
+    relative = slopes / stiffness
+    loss_factor = stiffness.imag / stiffness.real
+    return Prediction(
+        direction,
+        frequency,
+        amplitude,
+        stiffness=band(np.abs(stiffness), np.abs(stiffness) * relative.real),
+        loss_factor=band(loss_factor, (1.0 + loss_factor**2) * relative.imag),
+        storage_stiffness=band(stiffness.real, slopes.real),
+        loss_stiffness=band(stiffness.imag, slopes.imag),
+        warnings=_extrapolations(result, direction, frequency, amplitude),
+    )
+
+
+def left_out(result: Result) -> str | None:
+    """A sentence on the instrument effects that prediction leaves out, or None where there are none."""
+    names = [name for name in result.model.effects if effect_named(name).level is Level.INSTRUMENT]
+    if not names:
+        return None
+    return f"left out of the prediction, because they belong to the rig and not to the bushing: {', '.join(names)}"
+
+
+def _extrapolations(result: Result, direction: Direction, frequency: Array, amplitude: Array) -> tuple[str, ...]:
+    lines = []
+    if "springpot" not in result.model.effects:
+        lines.append("the model has no springpot: its stiffness does not depend on frequency")
+    if result.measured is None:
+        return (*lines, "the model was not fitted here: no uncertainty, and no measured range to compare with")
+    strain = amplitude * result.model.bushing.unit_strain(direction)
+    low, high = result.measured.frequency
+    if frequency.min() < low * (1 - _MARGIN) or frequency.max() > high * (1 + _MARGIN):
+        lines.append(
+            f"{direction}: frequencies {frequency.min():.3g} to {frequency.max():.3g} Hz leave the measured "
+            f"{low:.3g} to {high:.3g} Hz"
+        )
+    low, high = result.measured.strain
+    if strain.min() < low * (1 - _MARGIN) or strain.max() > high * (1 + _MARGIN):
+        lines.append(
+            f"{direction}: strains {100 * strain.min():.2g} to {100 * strain.max():.2g} % leave the measured "
+            f"{100 * low:.2g} to {100 * high:.2g} %"
+        )
+    return tuple(lines)
