@@ -4,7 +4,30 @@ from __future__ import annotations
 
 import difflib
 
-from bushfit.effects import elastic, friction, springpot
+from bushfit.effects import (
+    amplitude_rolloff,
+    asymmetry,
+    bump_stop,
+    clearance,
+    coupled_breakdown,
+    delay,
+    elastic,
+    fixture_resonance,
+    force_gain,
+    force_offset,
+    friction,
+    inertia,
+    interface_slip,
+    maxwell,
+    mullins_softening,
+    rate_dependent_friction,
+    rig_compliance,
+    second_friction,
+    self_heating,
+    springpot,
+    strain_stiffening,
+    viscous,
+)
 from bushfit.effects.contract import Branch, Effect, Layer, Level, Modifier, Parameter, Setting
 from bushfit.effects.history import History
 from bushfit.errors import ModelError
@@ -24,13 +47,32 @@ __all__ = [
     "qualified",
 ]
 
-#: Every effect by name, the paper's three branches first.
+#: Every effect by name, the paper's three branches first. Within a level this is the order from the rubber outward.
 LIBRARY: dict[str, Effect] = {
     module.EFFECT.name: module.EFFECT
     for module in (
         elastic,
         springpot,
         friction,
+        viscous,
+        maxwell,
+        strain_stiffening,
+        asymmetry,
+        second_friction,
+        mullins_softening,
+        rate_dependent_friction,
+        coupled_breakdown,
+        self_heating,
+        interface_slip,
+        bump_stop,
+        clearance,
+        rig_compliance,
+        inertia,
+        fixture_resonance,
+        delay,
+        amplitude_rolloff,
+        force_gain,
+        force_offset,
     )
 }
 

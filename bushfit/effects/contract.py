@@ -145,10 +145,19 @@ class Layer(Effect):
     force: Callable[[Values, ForceBelow, History, Setting], Array]
 
 
+def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str, Value]:
+    """The named values times a factor, as far as the model has them: what most modifiers return."""
+    return {name: p[name] * factor for name in names if name in p}
+
+
+def linear_response(transfer: Callable[[Array], Array], history: History) -> Array:
+    """Steady response of a linear system, y_h = H(h omega) x_h for every harmonic h; H(0) must be finite."""
+    return np.fft.irfft(transfer(history.harmonics) * np.fft.rfft(history.value), n=history.value.shape[-1])
+
+
 def linear_stress(modulus: Callable[[Array], Array], history: History) -> Array:
     """Steady stress of a linear branch over one cycle: s_h = 2 mu^(h omega) e_h for every harmonic h.
 
     The modulus at omega = 0 must be finite; it multiplies the mean strain.
     """
-    spectrum = 2.0 * modulus(history.harmonics) * np.fft.rfft(history.value)
-    return np.fft.irfft(spectrum, n=history.value.shape[-1])
+    return linear_response(lambda omega: 2.0 * modulus(omega), history)

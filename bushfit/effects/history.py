@@ -22,12 +22,14 @@ class History:
         periodic: True where the samples are whole cycles of a steady state (the next sample is the
             first again), False where the motion starts from rest before the first sample.
         frequency: frequency of the excitation [Hz].
+        driver: the motion that drives this one, where something that yields lies between the two.
     """
 
     value: Array
     step: float
     periodic: bool
     frequency: float
+    driver: Array | None = None
 
     @classmethod
     def steady(cls, value: Array, frequency: float, cycles: int = 1) -> History:
@@ -55,11 +57,32 @@ class History:
         if self.periodic:
             ahead, behind = np.roll(self.value, -1, axis=-1), np.roll(self.value, 1, axis=-1)
             return (ahead - behind) / (2.0 * self.step)
-        return np.gradient(self.value, self.step, axis=-1, edge_order=2)
+        return np.gradient(self.value, self.step, axis=-1)
+
+    @property
+    def cycles(self) -> int:
+        """Cycles of the excitation in the samples, to the nearest whole one."""
+        return round(self.value.shape[-1] * self.step * self.frequency)
+
+    @property
+    def sense(self) -> Array:
+        """Sign of the rate, 0 at rest; where another motion drives this one, the driver's sign while this one moves."""
+        own = np.sign(self.rate)
+        return own if self.driver is None else np.sign(self.with_value(self.driver).rate) * (own != 0.0)
+
+    @property
+    def acceleration(self) -> Array:
+        """Second time derivative by differences; the ends repeat their neighbours', so no kick at the start."""
+        inner = np.diff(self.value, n=2, axis=-1) / self.step**2
+        return np.concatenate([inner[..., :1], inner, inner[..., -1:]], axis=-1)
 
     def with_value(self, value: Array) -> History:
         """The same clock with other values."""
         return replace(self, value=value)
+
+    def driven(self) -> History:
+        """The same motion, remembered as the driver of whatever follows it."""
+        return replace(self, driver=self.value)
 
     def scaled(self, factor: float) -> History:
         """All values times a factor, such as strain per displacement."""

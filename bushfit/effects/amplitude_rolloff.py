@@ -1,0 +1,43 @@
+"""Amplitude roll-off: the rig does not reach the amplitude it was asked for at high frequency."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
+from bushfit.effects.history import History
+
+#: Frequency at which the amplitude has lost the share c [Hz], and the least share that is left.
+REFERENCE_FREQUENCY = 155.0
+LEAST_SHARE = 0.05
+
+
+def _share(p: Values, omega: Array | float) -> Value:
+    """1 - c (f/155 Hz)^2."""
+    ratio = np.asarray(omega) / (2.0 * np.pi * REFERENCE_FREQUENCY)
+    return np.maximum(1.0 - p["c"] * ratio**2, LEAST_SHARE)
+
+
+def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
+    """K at the amplitude X (1 - c (f/155 Hz)^2) [N/m]."""
+    return below(omega, amplitude * _share(p, omega))
+
+
+def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
+    """F of the true motion, scaled as the rig's stiffness is: by the motion asked for over the true one [N]."""
+    share = _share(p, history.omega)
+    return below(history.with_value(history.value * share)) / share
+
+
+EFFECT = Layer(
+    name="amplitude_rolloff",
+    sentence="The rig falls short of the amplitude asked for at high frequency: stiffness as of a smaller amplitude.",
+    equation="K at X (1 - c (f/155 Hz)^2)",
+    level=Level.INSTRUMENT,
+    parameters=(
+        Parameter("c", "1", (0.0, 0.9), 0.0, 0.05, log=False, meaning="share of the amplitude lost at 155 Hz"),
+    ),
+    source="second-order low-pass of a servo-hydraulic rig, first term of its series",
+    stiffness=stiffness,
+    force=force,
+)

@@ -1,0 +1,28 @@
+"""Coupled breakdown: the rate effect shrinks as the filler structure breaks down with amplitude."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bushfit.effects.contract import Condition, Level, Modifier, Parameter, Value, Values, scaled_values
+
+#: Strain amplitude at which m is as it stands, and the one below which it grows no more.
+REFERENCE_STRAIN = 0.01
+SMALLEST_STRAIN = 1e-9
+
+
+def adjust(p: Values, condition: Condition) -> dict[str, Value]:
+    """m (e0/0.01)^(-q) [Pa s^alpha]."""
+    ratio = np.maximum(condition.strain, SMALLEST_STRAIN) / REFERENCE_STRAIN
+    return scaled_values(p, ("m",), np.power(ratio, -np.asarray(p["q"], dtype=float)))
+
+
+EFFECT = Modifier(
+    name="coupled_breakdown",
+    sentence="The rate effect shrinks as amplitude breaks the filler down: curves flatten at large amplitude.",
+    equation="m (e0/0.01)^(-q)",
+    level=Level.MATERIAL,
+    parameters=(Parameter("q", "1", (0.0, 1.0), 0.0, 0.1, log=False, meaning="power of the strain amplitude"),),
+    source="rate and amplitude dependence coupled, after A. Lion, C. Kardelky, Int. J. Plasticity 20 (2004) 1313",
+    adjust=adjust,
+)

@@ -1,0 +1,35 @@
+"""The dead zone, as a function of time and as a describing function: contact beyond a gap, motion within a play."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bushfit.effects.contract import Array, Value
+
+#: t - sin t = t^3 (1/3! - t^2/5! + ...): enough terms for t up to 2 pi/3.
+_SERIES = np.array([(-1.0) ** k / math.factorial(2 * k + 3) for k in range(12)])
+
+
+def dead_zone(value: Array, half_width: Value) -> Array:
+    """What reaches beyond +-half_width, 0 within; a half_width of 0 gives the value back."""
+    return value - np.clip(value, -np.asarray(half_width), half_width)
+
+
+def first_harmonic(amplitude: Array, half_width: Value) -> Array:
+    """First harmonic of a dead-zoned sine over the sine's amplitude: N(r), r = half_width/amplitude.
+
+    N = 1 - 2/pi (asin r + r sqrt(1 - r^2)) for r < 1, and 0 beyond. With cos(t/2) = r the same is
+    (t - sin t)/pi, a series that keeps its digits where N vanishes like (1 - r)^(3/2).
+
+    Source: A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B.
+    """
+    reach = np.maximum(np.asarray(amplitude) - half_width, 0.0)
+    safe = np.where(reach > 0.0, amplitude, 1.0)
+    ratio = np.clip(half_width / safe, 0.0, 1.0)
+    wide = 1.0 - 2.0 / np.pi * (np.arcsin(ratio) + ratio * np.sqrt(1.0 - ratio**2))
+    angle = 4.0 * np.arcsin(np.sqrt(np.minimum(reach / safe, 0.5) / 2.0))
+    narrow = angle**3 * np.polynomial.polynomial.polyval(angle**2, _SERIES) / np.pi
+    met = (reach > 0.0) | (np.asarray(half_width) == 0.0)
+    return np.where(ratio < 0.5, wide, narrow) * met

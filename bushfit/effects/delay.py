@@ -1,0 +1,41 @@
+"""Delay: the force is recorded later than the displacement."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Values
+from bushfit.effects.history import History
+
+
+def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
+    """K exp(-i omega tau) [N/m]."""
+    return below(omega, amplitude) * np.exp(-1j * np.asarray(omega) * p["tau"])
+
+
+def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
+    """F(t - tau) [N]: every harmonic turned back in a steady cycle, straight lines between samples from rest."""
+    undelayed = below(history)
+    if history.periodic:
+        turn = np.expm1(-1j * history.harmonics * p["tau"])
+        return undelayed + np.fft.irfft(turn * np.fft.rfft(undelayed), n=undelayed.shape[-1])
+    late = np.asarray(p["tau"]) / history.step
+    whole = np.floor(late).astype(int)
+    *lead, count = np.broadcast_shapes(undelayed.shape, late.shape)
+    padded = np.concatenate([np.zeros((*lead, 1)), np.broadcast_to(undelayed, (*lead, count))], axis=-1)
+    index = np.arange(1, count + 1) - whole
+    near, far = (np.broadcast_to(np.maximum(i, 0), (*lead, count)) for i in (index, index - 1))
+    share = late - whole
+    return (1.0 - share) * np.take_along_axis(padded, near, -1) + share * np.take_along_axis(padded, far, -1)
+
+
+EFFECT = Layer(
+    name="delay",
+    sentence="The force channel lags: the loss factor falls in proportion to frequency, at every amplitude alike.",
+    equation="K exp(-i omega tau)",
+    level=Level.INSTRUMENT,
+    parameters=(Parameter("tau", "s", (0.0, 1e-2), 0.0, 1e-4, log=False, meaning="time by which the force is late"),),
+    source="shift theorem of the Fourier transform",
+    stiffness=stiffness,
+    force=force,
+)

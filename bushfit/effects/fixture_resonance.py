@@ -1,0 +1,78 @@
+"""Fixture resonance: the moving mass sits on a fixture that has a mode of its own."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from scipy.signal import cont2discrete, lfilter
+
+from bushfit.effects.contract import (
+    Array,
+    ForceBelow,
+    Layer,
+    Level,
+    Parameter,
+    Setting,
+    StiffnessBelow,
+    Values,
+    linear_response,
+)
+from bushfit.effects.history import History
+from bushfit.geometry import Direction
+
+
+def fixture(p: Values, omega: Array) -> Array:
+    """-M omega^2 wr^2/(wr^2 - omega^2 + 2 i zeta omega wr), wr = 2 pi frequency [N/m]."""
+    ratio = np.asarray(omega) / (2.0 * np.pi * p["frequency"])
+    return -p["mass"] * np.asarray(omega) ** 2 / (1.0 - ratio**2 + 2j * p["damping"] * ratio)
+
+
+def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
+    """K - M omega^2 wr^2/(wr^2 - omega^2 + 2 i zeta omega wr) [N/m]; does not act in torsion."""
+    if setting.direction is Direction.TORSION:
+        return below(omega, amplitude)
+    return below(omega, amplitude) + fixture(p, omega)
+
+
+def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
+    """F + the fixture's force y: y'' + 2 zeta wr y' + wr^2 y = wr^2 M x'' [N].
+
+    From rest the mode rings for 1/(2 pi zeta frequency) seconds before it has fallen to 37 %.
+    """
+    if setting.direction is Direction.TORSION:
+        return below(history)
+    if history.periodic:
+        return below(history) + linear_response(partial(fixture, p), history)
+    shapes = [np.shape(p[name]) for name in ("frequency", "damping")]
+    *lead, _ = np.broadcast_shapes((1,), *shapes, (*history.value.shape[:-1], 1))
+    frequency, damping = (np.broadcast_to(p[name], (*lead, 1)) for name in ("frequency", "damping"))
+    push = np.broadcast_to(history.acceleration, (*lead, history.value.shape[-1]))
+    rows = [
+        _mode(2.0 * np.pi * float(frequency[i][0]), float(damping[i][0]), push[i], history.step)
+        for i in np.ndindex(*lead)
+    ]
+    return below(history) + p["mass"] * np.reshape(rows, push.shape)
+
+
+def _mode(omega: float, damping: float, push: Array, step: float) -> Array:
+    """y'' + 2 zeta w y' + w^2 y = w^2 push from rest, exact for a push that is straight between samples."""
+    system = (np.array([omega**2]), np.array([1.0, 2.0 * damping * omega, omega**2]))
+    above, under, _ = cont2discrete(system, step, method="foh")
+    return np.asarray(lfilter(np.ravel(above), under, push))
+
+
+EFFECT = Layer(
+    name="fixture_resonance",
+    sentence="A mode of the fixture, above or inside the band: inertia that grows towards its resonance.",
+    equation="K - mass omega^2 wr^2/(wr^2 - omega^2 + 2 i damping omega wr), wr = 2 pi frequency",
+    level=Level.INSTRUMENT,
+    parameters=(
+        Parameter("mass", "kg", (0.0, 100.0), 0.0, 0.05, log=False, meaning="moving mass of the mode"),
+        Parameter("frequency", "Hz", (10.0, 1e4), None, 300.0, log=True, meaning="frequency of the mode"),
+        Parameter("damping", "1", (1e-3, 1.0), None, 0.03, log=True, meaning="damping ratio of the mode"),
+    ),
+    source="D. J. Ewins, Modal Testing, 2nd ed., 2000, ch. 2 (one mode, driven at its base)",
+    stiffness=stiffness,
+    force=force,
+)

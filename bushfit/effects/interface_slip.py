@@ -1,0 +1,40 @@
+"""Interface slip: dry friction at the bonded or pressed face of the bushing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
+from bushfit.effects.history import History
+from bushfit.geometry import Direction
+
+#: Amplitude below which the slip stiffness grows no more [m or rad].
+SMALLEST_AMPLITUDE = 1e-12
+
+
+def _force(p: Values, setting: Setting) -> Value:
+    """The slip force [N], or its moment about the axis in torsion, at the outer sleeve's face [N m]."""
+    arm = setting.bushing.outer_radius if setting.direction is Direction.TORSION else 1.0
+    return p["force"] * arm
+
+
+def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
+    """K + i 4 Fc/(pi X) [N/m]."""
+    return below(omega, amplitude) + 4j * _force(p, setting) / (np.pi * np.maximum(amplitude, SMALLEST_AMPLITUDE))
+
+
+def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
+    """F + Fc sgn(dx/dt) [N]."""
+    return below(history) + _force(p, setting) * history.sense
+
+
+EFFECT = Layer(
+    name="interface_slip",
+    sentence="Dry friction at the sleeve's face: extra loss that fades with amplitude, the same at every frequency.",
+    equation="K + i 4 force/(pi X)",
+    level=Level.COMPONENT,
+    parameters=(Parameter("force", "N", (0.0, 1e5), 0.0, 5.0, log=False, meaning="Coulomb force"),),
+    source="Coulomb friction; A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B",
+    stiffness=stiffness,
+    force=force,
+)

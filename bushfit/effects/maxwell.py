@@ -1,0 +1,51 @@
+"""Maxwell branch: a spring and a dashpot in series, one relaxation time."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import lfilter
+
+from bushfit.effects.contract import Array, Branch, Level, Parameter, Values, linear_stress
+from bushfit.effects.history import History
+
+
+def modulus(p: Values, omega: Array, strain: Array) -> Array:
+    """mu^ = mu1 i omega tau / (1 + i omega tau) [Pa]."""
+    turn = 1j * np.asarray(omega) * p["tau"]
+    return p["mu1"] * turn / (1.0 + turn)
+
+
+def relaxed(tau: float, values: Array, step: float) -> Array:
+    """The response y to tau dy/dt + y = tau dx/dt from rest, exact for an x that is straight between samples.
+
+    y_n = r y_{n-1} + (1 - r) tau/step (x_n - x_{n-1}), r = exp(-step/tau).
+    """
+    gain = -np.expm1(-step / tau) * tau / step
+    return np.asarray(lfilter([gain, -gain], [1.0, -np.exp(-step / tau)], values, axis=-1))
+
+
+def stress(p: Values, history: History) -> Array:
+    """s + tau ds/dt = 2 mu1 tau de/dt [Pa]."""
+    if history.periodic:
+        return linear_stress(lambda omega: modulus(p, omega, history.amplitude), history)
+    taus = np.atleast_1d(np.asarray(p["tau"], dtype=float))
+    lead = np.broadcast_shapes(taus.shape[:-1], history.value.shape[:-1])
+    taus = np.broadcast_to(taus, (*lead, 1))
+    values = np.broadcast_to(history.value, (*lead, history.value.shape[-1]))
+    rows = [relaxed(float(taus[i][0]), values[i], history.step) for i in np.ndindex(lead)]
+    return 2.0 * p["mu1"] * np.reshape(rows, values.shape)
+
+
+EFFECT = Branch(
+    name="maxwell",
+    sentence="One relaxation of the rubber: stiffness steps up, and loss peaks, around one frequency.",
+    equation="mu1 i omega tau/(1 + i omega tau)",
+    level=Level.MATERIAL,
+    parameters=(
+        Parameter("mu1", "Pa", (0.0, 1e8), 0.0, 5e4, log=False, meaning="modulus that relaxes"),
+        Parameter("tau", "s", (1e-5, 1e2), None, 2e-3, log=True, meaning="relaxation time"),
+    ),
+    source="Maxwell arm; J. D. Ferry, Viscoelastic Properties of Polymers, 3rd ed., 1980, ch. 3",
+    modulus=modulus,
+    stress=stress,
+)

@@ -1,0 +1,27 @@
+"""Rate-dependent friction: the filler friction grows with the rate of motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bushfit.effects.contract import Condition, Level, Modifier, Parameter, Value, Values, scaled_values
+
+#: Frequency at which sigma_fmax is as it stands [Hz].
+REFERENCE_FREQUENCY = 25.0
+
+
+def adjust(p: Values, condition: Condition) -> dict[str, Value]:
+    """sigma_fmax (f/25 Hz)^n [Pa]."""
+    ratio = np.asarray(condition.omega) / (2.0 * np.pi * REFERENCE_FREQUENCY)
+    return scaled_values(p, ("sigma_fmax",), np.power(ratio, p["n"]))
+
+
+EFFECT = Modifier(
+    name="rate_dependent_friction",
+    sentence="Filler friction grows with frequency, most where friction is most of the stiffness: small amplitudes.",
+    equation="sigma_fmax (f/25 Hz)^n",
+    level=Level.MATERIAL,
+    parameters=(Parameter("n", "1", (0.0, 1.0), 0.0, 0.05, log=False, meaning="power of the rate"),),
+    source="power law of rate on the friction stress of Garcia Tarrago et al. 2007, Eq. 5",
+    adjust=adjust,
+)

@@ -1,0 +1,99 @@
+"""Rig compliance: the rig gives way in series with the bushing, which is moved less than the rig imposes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
+from bushfit.effects.history import History
+from bushfit.geometry import Direction
+
+#: The iterations stop when the motions balance to this share of the imposed one, or after so many rounds.
+TOLERANCE = 1e-14
+ROUNDS = 60
+
+
+def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
+    """K/(1 + c K) [N/m] with K at the amplitude X/|1 + c K| that reaches the bushing; does not act in torsion."""
+    if setting.direction is Direction.TORSION:
+        return below(omega, amplitude)
+    compliance = p["compliance"]
+    inside = below(omega, amplitude * np.exp(_log_share(compliance, below, omega, amplitude)))
+    return inside / (1.0 + compliance * inside)
+
+
+def _log_share(compliance: Value, below: StiffnessBelow, omega: Array, amplitude: Array) -> Array:
+    """v = ln(amplitude at the bushing over the imposed one): v + ln|1 + c K(X e^v)| = 0, by secants."""
+
+    def lost(v: Array) -> Array:
+        given = compliance * below(omega, amplitude * np.exp(v))
+        return 0.5 * np.log1p(2.0 * given.real + given.real**2 + given.imag**2)
+
+    old = np.zeros(np.broadcast_shapes(np.shape(compliance), np.shape(amplitude)))
+    old_excess = lost(old)
+    new = -old_excess
+    for _ in range(ROUNDS):
+        excess = new + lost(new)
+        if np.all(np.abs(excess) <= TOLERANCE):
+            break
+        run, rise = new - old, excess - old_excess
+        slope = np.where((rise != 0.0) & (rise * run > 0.0), rise / np.where(run == 0.0, 1.0, run), 1.0)
+        old, old_excess, new = new, excess, new - excess / slope
+    return new
+
+
+def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
+    """F(x_b) of the motion x_b = x - c F(x_b) that reaches the bushing [N], over the whole history at once.
+
+    The residual of x_b is sent back through 1/(1 + c K) harmonic by harmonic, with K measured once on a
+    pulse; how good that K is decides the pace, not the result. Dry friction inside turns with the imposed
+    motion: the moment for which it sticks is left out.
+    """
+    compliance = p["compliance"]
+    if setting.direction is Direction.TORSION or not np.any(compliance):
+        return below(history)
+    imposed, history = history.value, history.driven()
+    count = imposed.shape[-1]
+    length = count if history.periodic else 2 * count
+    yielding = 1.0 / (1.0 + compliance * _pulse_stiffness(below, history, length))
+    size = np.max(np.abs(imposed), axis=-1, keepdims=True)
+    reached, felt = imposed, below(history)
+    last, pace = np.inf * size, np.ones_like(size)
+    for _ in range(ROUNDS):
+        missing = imposed - reached - compliance * felt
+        off = np.max(np.abs(missing), axis=-1, keepdims=True)
+        if np.all(off <= TOLERANCE * size):
+            break
+        pace, last = np.where(off < last, pace, 0.5 * pace), off
+        change = np.fft.irfft(yielding * np.fft.rfft(missing, n=length), n=length)[..., :count]
+        reached = np.clip(reached + pace * change, -2.0 * size, 2.0 * size)
+        felt = below(history.with_value(reached))
+    return felt
+
+
+def _pulse_stiffness(below: ForceBelow, history: History, length: int) -> Array:
+    """Force over displacement of a pulse as high as the motion's amplitude, per harmonic of `length` samples.
+
+    Counted from the force before the pulse, which friction does not let return to zero; never negative.
+    """
+    at = 4
+    pulse = np.zeros(history.value.shape)
+    pulse[..., at : at + 1] = history.amplitude
+    answer = below(history.with_value(pulse))
+    measured = np.fft.rfft(answer - answer[..., :1], n=length) / np.fft.rfft(pulse, n=length)
+    return np.maximum(measured.real, 0.0) + 1j * measured.imag
+
+
+EFFECT = Layer(
+    name="rig_compliance",
+    sentence="The rig gives way in series: the stiffer the bushing, the softer it seems, most so radially.",
+    equation="1/K' = 1/K + compliance, K at the amplitude that reaches the bushing",
+    level=Level.INSTRUMENT,
+    parameters=(
+        Parameter("compliance", "m/N", (0.0, 1e-5), 0.0, 2e-8, log=False, meaning="give of the rig per force"),
+    ),
+    source="springs in series; ISO 10846-2:2008",
+    harmonic_error=0.01,
+    stiffness=stiffness,
+    force=force,
+)

@@ -1,0 +1,22 @@
+"""Second friction branch: what develops at smaller strains than the first."""
+
+from __future__ import annotations
+
+from bushfit.effects import friction
+from bushfit.effects.contract import Branch, Level, Parameter
+
+EFFECT = Branch(
+    name="second_friction",
+    sentence="A second filler friction at a smaller strain scale: extra stiffness at the smallest amplitudes.",
+    equation="(A + iB)/(2 e0) with sigma_fmax and eps_half of its own",
+    level=Level.MATERIAL,
+    parameters=(
+        Parameter("sigma_fmax", "Pa", (0.0, 1e8), 0.0, 2e3, log=False, meaning="largest stress of this friction"),
+        Parameter(
+            "eps_half", "1", (1e-6, 1.0), None, 1e-3, log=True, meaning="strain that develops half of that stress"
+        ),
+    ),
+    source="Garcia Tarrago et al. 2007, Eq. 5, once more; friction elements in parallel as in Iwan 1966",
+    modulus=friction.modulus,
+    stress=friction.stress,
+)

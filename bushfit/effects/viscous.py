@@ -1,0 +1,32 @@
+"""Viscous branch: a Newtonian dashpot, loss that grows in proportion to frequency."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bushfit.effects.contract import Array, Branch, Level, Parameter, Values, linear_stress
+from bushfit.effects.history import History
+
+
+def modulus(p: Values, omega: Array, strain: Array) -> Array:
+    """mu^ = i omega eta [Pa]."""
+    return 1j * np.asarray(omega) * p["eta"]
+
+
+def stress(p: Values, history: History) -> Array:
+    """s = 2 eta de/dt [Pa]; exact in every harmonic of a steady cycle, central differences from rest."""
+    if history.periodic:
+        return linear_stress(lambda omega: modulus(p, omega, history.amplitude), history)
+    return 2.0 * p["eta"] * history.rate
+
+
+EFFECT = Branch(
+    name="viscous",
+    sentence="Plain viscous damping of the rubber: the loss stiffness grows in proportion to frequency.",
+    equation="i omega eta",
+    level=Level.MATERIAL,
+    parameters=(Parameter("eta", "Pa*s", (0.0, 1e6), 0.0, 100.0, log=False, meaning="viscosity"),),
+    source="Kelvin-Voigt model; J. D. Ferry, Viscoelastic Properties of Polymers, 3rd ed., 1980, ch. 1",
+    modulus=modulus,
+    stress=stress,
+)

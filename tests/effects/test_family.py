@@ -1,0 +1,295 @@
+"""One law for the whole family: what every effect of the library has to obey, whatever it is."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import pickle
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from bushfit.effects import BASE, LIBRARY, Effect, History, Level, Modifier, Parameter, qualified
+from bushfit.geometry import Bushing, Direction
+from bushfit.model import Model
+from bushfit.rig import lock_in, record
+from bushfit.sensitivity import force_jacobian, stiffness_jacobian
+
+ADDED = tuple(name for name in LIBRARY if name not in BASE)
+#: Work can come out of these: a late force channel is no passive system.
+ACTIVE = {"delay"}
+#: The reversal of dry friction falls on a sample only to the accuracy of the sampling.
+SAMPLES = 2**14
+
+
+def random_model(rng: np.random.Generator) -> Model:
+    """The paper's model of a random bushing of random rubber."""
+    inner = rng.uniform(6e-3, 22e-3)
+    bushing = Bushing("random", inner, inner * rng.uniform(1.3, 2.2), rng.uniform(20e-3, 70e-3))
+    values = {
+        "mu": rng.uniform(0.6e6, 2e6),
+        "m": rng.uniform(0.8e5, 3.5e5),
+        "alpha": rng.uniform(0.15, 0.3),
+        "sigma_fmax": rng.uniform(5e3, 3e4),
+        "eps_half": rng.uniform(7e-3, 2e-2),
+    }
+    return Model(bushing, BASE, values)
+
+
+def sized(model: Model, name: str, direction: Direction, amplitude: float, rng: np.random.Generator) -> Model:
+    """The model with the effect in a random size that matters at this amplitude."""
+    stiffness = abs(complex(np.ravel(model.stiffness(direction, 50.0, amplitude))[0]))
+    by_hand = {
+        "interface_slip.force": 0.05 * stiffness * amplitude,
+        "bump_stop.gap": 0.6 * amplitude,
+        "bump_stop.stiffness": 0.3 * stiffness,
+        "clearance.delta": 0.1 * amplitude,
+        "rig_compliance.compliance": 0.1 / stiffness,
+        "inertia.mass": 0.05 * stiffness / (2.0 * np.pi * 155.0) ** 2,
+        "fixture_resonance.mass": 0.05 * stiffness / (2.0 * np.pi * 155.0) ** 2,
+        "self_heating.beta": 0.1 / (100.0 * stiffness * amplitude**2),
+        "force_offset.offset": 0.02 * stiffness * amplitude,
+    }
+    values = {}
+    for parameter in LIBRARY[name].parameters:
+        key = qualified(LIBRARY[name], parameter)
+        values[key] = by_hand.get(key, parameter.typical) * rng.uniform(0.5, 1.5)
+    return model.with_effect(name, values)
+
+
+def operating_point(model: Model, rng: np.random.Generator) -> tuple[Direction, float, float]:
+    """A direction, a frequency [Hz], and an amplitude [m] of 0.3 to 6 % strain."""
+    direction = list(Direction)[rng.integers(2)]
+    return (
+        direction,
+        float(rng.uniform(5.0, 155.0)),
+        10 ** rng.uniform(-2.5, -1.2) / model.bushing.unit_strain(direction),
+    )
+
+
+def steady_sine(amplitude: float, frequency: float, samples: int = SAMPLES) -> History:
+    return History.steady(amplitude * np.cos(2.0 * np.pi * np.arange(samples) / samples), frequency)
+
+
+def harmonic_gap(model: Model, direction: Direction, frequency: float, amplitude: float) -> float:
+    """First harmonic of the steady time face against the frequency face, relative."""
+    force = model.force(direction, steady_sine(amplitude, frequency))
+    timed = 2.0 * np.fft.rfft(force)[..., 1] / (SAMPLES * amplitude)
+    return float(np.ravel(np.abs(timed / model.stiffness(direction, frequency, amplitude) - 1.0))[0])
+
+
+def harmonic_error(model: Model) -> float:
+    return sum(effect.harmonic_error for effect in model.records)
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(20240607)
+
+
+@pytest.fixture(params=ADDED)
+def effect(request: pytest.FixtureRequest) -> Effect:
+    return LIBRARY[request.param]
+
+
+def test_file_stem_is_the_name(effect: Effect) -> None:
+    __import__(f"bushfit.effects.{effect.name}")
+
+
+def test_record_is_complete(effect: Effect) -> None:
+    assert effect.sentence.endswith(".")
+    assert effect.equation
+    assert effect.source
+    assert sum(parameter.neutral is not None for parameter in effect.parameters) == 1
+    for parameter in effect.parameters:
+        low, high = parameter.bounds
+        assert low < parameter.typical < high
+        assert parameter.log == (parameter.neutral is None)
+        assert not parameter.log or low > 0.0
+        assert parameter.neutral is None or low <= parameter.neutral <= high
+
+
+def test_neutral_value_gives_the_plain_model_back(effect: Effect, rng: np.random.Generator) -> None:
+    plain = random_model(rng)
+    neutral = plain.with_effect(effect.name)
+    frequency, amplitude = np.meshgrid([0.1, 5.0, 155.0, 900.0], [0.0, 1e-6, 2e-4, 1e-3])
+    triangle = 1e-3 * np.concatenate([np.linspace(-1.0, 1.0, 300), np.linspace(1.0, -1.0, 300)[1:-1]])
+    histories = [
+        History.steady(triangle, 0.1),
+        History.steady(np.tile(triangle, 3), 0.1, cycles=3),
+        History(triangle + 1e-3, 1e-3, periodic=False, frequency=1.0),
+    ]
+    for direction, kind in itertools.product(Direction, ("sweep", "loop")):
+        expected = plain.stiffness(direction, frequency, amplitude, kind=kind)
+        assert np.array_equal(neutral.stiffness(direction, frequency, amplitude, kind=kind), expected)
+        for history in histories:
+            expected = plain.force(direction, history, kind=kind)
+            assert np.array_equal(neutral.force(direction, history, kind=kind), expected)
+
+
+def test_first_harmonic_of_the_time_face_is_the_frequency_face(effect: Effect, rng: np.random.Generator) -> None:
+    worst = 0.0
+    for _ in range(12):
+        plain = random_model(rng)
+        direction, frequency, amplitude = operating_point(plain, rng)
+        model = sized(plain, effect.name, direction, amplitude, rng)
+        worst = max(worst, harmonic_gap(model, direction, frequency, amplitude))
+    print(f"{effect.name}: worst gap {worst:.1e}, stated {effect.harmonic_error:.0e} + 1e-6")
+    assert worst <= effect.harmonic_error + 1e-6
+
+
+@pytest.mark.parametrize("name", [name for name in ADDED if name != "fixture_resonance"])
+def test_the_rig_from_rest_finds_the_frequency_face(name: str, rng: np.random.Generator) -> None:
+    """To the errors of the rig: Gruenwald-Letnikov is first order in the step, and friction takes cycles to settle."""
+    plain = random_model(rng)
+    direction, frequency, amplitude = operating_point(plain, rng)
+    amplitude = 0.02 / plain.bushing.unit_strain(direction)
+    model = sized(plain, name, direction, amplitude, rng)
+    errors = []
+    for each in (plain, model):
+        measured = record(each, direction, frequency, amplitude, cycles=1, run_in=12, steps_per_cycle=2048)
+        errors.append(lock_in(measured, frequency) / np.ravel(each.stiffness(direction, frequency, amplitude))[0] - 1.0)
+    print(f"{name}: from rest {abs(errors[1]):.1e}, without it {abs(errors[0]):.1e}")
+    assert abs(errors[1] - errors[0]) <= LIBRARY[name].harmonic_error + 3e-4
+
+
+def random_cycle(rng: np.random.Generator, amplitude: float) -> History:
+    """One closed cycle: a triangle, or a sine with overtones."""
+    phase = np.arange(4096) / 4096
+    if rng.random() < 0.4:
+        value = 2.0 / np.pi * np.arcsin(np.sin(2.0 * np.pi * phase))
+    else:
+        value = sum(rng.normal() / h**2 * np.cos(2.0 * np.pi * (h * phase + rng.random())) for h in range(1, 5))
+    return History.steady(amplitude * value / np.max(np.abs(value)), float(rng.choice([0.1, 30.0, 155.0])))
+
+
+@pytest.mark.parametrize("name", [name for name in ADDED if name not in ACTIVE])
+def test_passive_effects_dissipate_in_any_closed_cycle(name: str, rng: np.random.Generator) -> None:
+    worst = np.inf
+    for _ in range(15):
+        plain = random_model(rng)
+        direction, frequency, amplitude = operating_point(plain, rng)
+        model = sized(plain, name, direction, amplitude, rng)
+        if not isinstance(LIBRARY[name], Modifier):
+            model = model.with_values({"m": 0.0, "sigma_fmax": 0.0})
+        history = random_cycle(rng, amplitude)
+        force = model.force(direction, history, kind="loop")
+        velocity = np.fft.irfft(1j * history.harmonics * np.fft.rfft(history.value), n=history.value.size)
+        work = np.mean(force * velocity) / np.sqrt(np.mean(force**2) * np.mean(velocity**2))
+        loss = np.imag(model.stiffness(direction, frequency, amplitude, kind="loop"))
+        worst = min(worst, float(work), float(np.ravel(loss)[0]))
+    print(f"{name}: least work {worst:.1e}")
+    assert worst >= -1e-5
+
+
+def spread(parameter: Parameter, value: float, relative: float) -> float:
+    return relative * (value if parameter.log else parameter.typical)
+
+
+def five_point(model: Model, key: str, respond: object, relative: float = 2e-3) -> np.ndarray:
+    """Derivative by the five-point rule with steps a thousand times those of the model's own differences."""
+    value, step = model.values[key], spread(model.parameters[key], model.values[key], relative)
+    at = [respond(model.with_values({key: value + k * step})) for k in (-2, -1, 1, 2)]  # type: ignore[operator]
+    return (at[0] - 8.0 * at[1] + 8.0 * at[2] - at[3]) / (12.0 * step)
+
+
+def test_sensitivities_match_finite_differences(effect: Effect, rng: np.random.Generator) -> None:
+    plain = random_model(rng)
+    direction, _, amplitude = operating_point(plain, rng)
+    model = sized(plain, effect.name, direction, amplitude, rng)
+    names = list(model.parameters)
+    frequency = np.array([5.0, 60.0, 155.0])
+    amplitudes = amplitude * np.array([0.91, 1.07, 2.1])
+    loop = steady_sine(amplitude, 0.1, 512)
+    swept = stiffness_jacobian(model, direction, frequency, amplitudes, names, kind="loop")
+    looped = force_jacobian(model, direction, loop, names)
+    worst = 0.0
+    for i, key in enumerate(names):
+        size = spread(model.parameters[key], model.values[key], 1.0)
+        stiffness = five_point(model, key, lambda m: m.stiffness(direction, frequency, amplitudes, kind="loop"))
+        force = five_point(model, key, lambda m: m.force(direction, loop, kind="loop"))
+        for found, expected, scale in (
+            (swept[i], stiffness, model.stiffness(direction, frequency, amplitudes)),
+            (looped[i], force, model.force(direction, loop)),
+        ):
+            worst = max(worst, float(np.max(np.abs(found - expected)) * size / np.max(np.abs(scale))))
+    print(f"{effect.name}: sensitivities within {worst:.1e} of the response per relative change")
+    assert worst < 2e-6
+
+
+def stacked(models: list[Model]) -> Mapping[str, np.ndarray]:
+    return {name: np.array([[model.values[name]] for model in models]) for name in models[0].parameters}
+
+
+def test_a_stack_of_values_equals_one_after_the_other(effect: Effect, rng: np.random.Generator) -> None:
+    plain = random_model(rng)
+    direction, _, amplitude = operating_point(plain, rng)
+    model = sized(plain, effect.name, direction, amplitude, rng)
+    models = [
+        model.with_values({name: value * rng.uniform(0.9, 1.1) for name, value in model.values.items()})
+        for _ in range(3)
+    ]
+    frequency, amplitudes = np.array([0.1, 40.0, 155.0, 155.0]), amplitude * np.array([1.0, 0.5, 1.5, 0.0])
+    both = model.stiffness(direction, frequency, amplitudes, kind="loop", values=stacked(models))
+    assert both.shape == (3, 4)
+    for row, each in zip(both, models, strict=True):
+        np.testing.assert_allclose(row, each.stiffness(direction, frequency, amplitudes, kind="loop"), rtol=1e-12)
+    phase = np.arange(600) / 200
+    motion = amplitude * np.sin(2.0 * np.pi * phase)
+    for history in (
+        History.steady(motion, 5.0, cycles=3),
+        History(motion, 1e-3, periodic=False, frequency=5.0),
+    ):
+        both = np.broadcast_to(model.force(direction, history, kind="loop", values=stacked(models)), (3, 600))
+        for row, each in zip(both, models, strict=True):
+            expected = each.force(direction, history, kind="loop")
+            np.testing.assert_allclose(row, expected, rtol=1e-10, atol=1e-10 * np.ptp(expected))
+
+
+def test_any_two_compose(effect: Effect, rng: np.random.Generator) -> None:
+    for other in ADDED:
+        if other == effect.name:
+            continue
+        plain = random_model(rng)
+        direction, frequency, amplitude = operating_point(plain, rng)
+        model = sized(plain, effect.name, direction, amplitude, rng)
+        both = sized(model, other, direction, amplitude, rng)
+        turned = plain.with_effect(other).with_effect(effect.name).with_values(both.values)
+        at = (direction, frequency, amplitude)
+        assert both.records == turned.records
+        assert np.array_equal(both.stiffness(*at), turned.stiffness(*at))
+        gap = harmonic_gap(both, *at)
+        assert gap <= 2.0 * harmonic_error(both) + 1e-6, (other, gap)
+
+
+def test_any_three_compose(rng: np.random.Generator) -> None:
+    worst = 0.0
+    for _ in range(60):
+        plain = random_model(rng)
+        direction, frequency, amplitude = operating_point(plain, rng)
+        model = plain
+        for name in rng.choice(ADDED, size=3, replace=False):
+            model = sized(model, str(name), direction, amplitude, rng)
+        gap = harmonic_gap(model, direction, frequency, amplitude)
+        worst = max(worst, gap)
+        assert gap <= 2.0 * harmonic_error(model) + 1e-6, (model.effects, gap)
+    print(f"three at once: worst gap {worst:.1e}")
+
+
+def test_a_model_survives_files_and_processes(effect: Effect, rng: np.random.Generator) -> None:
+    plain = random_model(rng)
+    model = sized(plain, effect.name, Direction.AXIAL, 2e-4, rng)
+    for copy in (pickle.loads(pickle.dumps(model)), Model.from_document(json.loads(json.dumps(model.to_document())))):
+        assert copy.effects == tuple(e.name for e in model.records)
+        assert copy.values == model.values
+        assert np.array_equal(copy.stiffness("axial", 50.0, 1e-4), model.stiffness("axial", 50.0, 1e-4))
+
+
+def test_prediction_leaves_the_instrument_out(rng: np.random.Generator) -> None:
+    plain = random_model(rng)
+    model = plain
+    for name in ADDED:
+        model = sized(model, name, Direction.AXIAL, 2e-4, rng)
+    kept = {effect.name for effect in model.without(Level.INSTRUMENT).records}
+    assert kept == {name for name, effect in LIBRARY.items() if effect.level is not Level.INSTRUMENT}

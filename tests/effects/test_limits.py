@@ -1,0 +1,198 @@
+"""Effects against simpler ones, and against numbers worked out without them."""
+
+from __future__ import annotations
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from bushfit.effects import BASE, History
+from bushfit.effects.dead_zone import dead_zone, first_harmonic
+from bushfit.effects.maxwell import relaxed
+from bushfit.geometry import Bushing, Direction
+from bushfit.model import Model
+
+PLAIN = Model(
+    Bushing("CMP 15 961", 0.010, 0.018, 0.034),
+    BASE,
+    {"mu": 1.09e6, "m": 2.0e5, "alpha": 0.24, "sigma_fmax": 1.46e4, "eps_half": 1.3e-2},
+)
+FREQUENCY, AMPLITUDE = np.array([5.0, 55.0, 155.0]), np.array([1e-4, 2e-4, 5e-4])
+LOOP = History.steady(5e-4 * np.cos(2.0 * np.pi * np.arange(512) / 512), 5.0)
+STARTED = History(5e-4 * np.sin(2.0 * np.pi * np.arange(20480) / 2048), 1.0 / (20.0 * 2048), False, 20.0)
+
+
+def same(one: Model, other: Model, tolerance: float) -> None:
+    """Both models answer alike in both faces, relative to the largest answer."""
+    pairs = [(m.stiffness("radial", FREQUENCY, AMPLITUDE) for m in (one, other))]
+    pairs += [(m.force("radial", history) for m in (one, other)) for history in (LOOP, STARTED)]
+    for found, expected in pairs:
+        assert np.max(np.abs(found - expected)) <= tolerance * np.max(np.abs(expected))
+
+
+def test_a_fast_maxwell_arm_is_a_dashpot() -> None:
+    tau, eta = 1.1e-5, 100.0
+    arm = PLAIN.with_effect("maxwell", {"maxwell.tau": tau, "maxwell.mu1": eta / tau})
+    same(arm, PLAIN.with_effect("viscous", {"viscous.eta": eta}), 1e-2)
+
+
+def test_a_slow_maxwell_arm_is_a_spring() -> None:
+    arm = PLAIN.with_effect("maxwell", {"maxwell.tau": 99.0, "maxwell.mu1": 1e5})
+    spring = PLAIN.with_values({"mu": PLAIN.values["mu"] + 1e5})
+    same(arm, spring, 2e-3)
+
+
+def test_a_viscous_branch_is_a_springpot_of_order_one() -> None:
+    eta = 150.0
+    pot = PLAIN.with_values({"m": 2.0 * eta, "alpha": 1.0})
+    dashpot = PLAIN.with_values({"m": 0.0}).with_effect("viscous", {"viscous.eta": eta})
+    expected = pot.stiffness("axial", FREQUENCY, AMPLITUDE)
+    np.testing.assert_allclose(dashpot.stiffness("axial", FREQUENCY, AMPLITUDE), expected, rtol=1e-14)
+
+
+def test_a_second_friction_like_the_first_doubles_it() -> None:
+    same(
+        PLAIN.with_effect(
+            "second_friction", {"second_friction.sigma_fmax": 1.46e4, "second_friction.eps_half": 1.3e-2}
+        ),
+        PLAIN.with_values({"sigma_fmax": 2.92e4}),
+        1e-14,
+    )
+
+
+def test_a_stiff_fixture_is_a_mass() -> None:
+    fixture = {"mass": 0.1, "frequency": 1e4, "damping": 0.1}
+    stiff = PLAIN.with_effect("fixture_resonance", {f"fixture_resonance.{k}": v for k, v in fixture.items()})
+    same(stiff, PLAIN.with_effect("inertia", {"inertia.mass": 0.1}), 1e-4)
+
+
+def test_a_fixture_from_rest_rings_down_to_its_steady_state() -> None:
+    mode = {"mass": 0.1, "frequency": 60.0, "damping": 0.2}
+    model = PLAIN.with_effect("fixture_resonance", {f"fixture_resonance.{k}": v for k, v in mode.items()})
+    last = slice(-2048, None)
+    tail = History.steady(STARTED.value[last], 20.0)
+    extra = (model.force("axial", STARTED) - PLAIN.force("axial", STARTED))[last]
+    steady = model.force("axial", tail) - PLAIN.force("axial", tail)
+    assert np.max(np.abs(extra - steady)) < 1e-4 * np.max(np.abs(steady))
+
+
+def test_a_compliant_rig_over_a_spring_is_two_springs_in_series() -> None:
+    spring = PLAIN.with_values({"m": 0.0, "sigma_fmax": 0.0})
+    stiffness = spring.stiffness("radial", np.array([1.0]), np.array([1e-4]))[0]
+    soft = spring.with_effect("rig_compliance", {"rig_compliance.compliance": 1.0 / float(stiffness.real)})
+    np.testing.assert_allclose(soft.stiffness("radial", 1.0, 1e-4), stiffness / 2.0, rtol=1e-14)
+    for history in (LOOP, STARTED):
+        np.testing.assert_allclose(
+            soft.force("radial", history), stiffness.real / 2.0 * history.value, rtol=0.0, atol=1e-11
+        )
+
+
+@pytest.mark.parametrize("history", [LOOP, STARTED], ids=["steady", "from rest"])
+@pytest.mark.parametrize("inside", ["strain_stiffening", "viscous", "bump_stop", "clearance", "self_heating"])
+def test_rig_and_bushing_share_the_motion(inside: str, history: History) -> None:
+    """x = x_b + c F, where F is what the bushing alone answers to x_b."""
+    sizes = {
+        "strain_stiffening": {"c3": 60.0},
+        "viscous": {"eta": 300.0},
+        "bump_stop": {"gap": 3e-4, "stiffness": 1e6},
+        "clearance": {"delta": 4e-5},
+        "self_heating": {"beta": 1e-2},
+    }
+    alone = PLAIN.with_effect(inside, {f"{inside}.{key}": value for key, value in sizes[inside].items()})
+    compliance = 4e-8
+    rigged = alone.with_effect("rig_compliance", {"rig_compliance.compliance": compliance})
+    force = rigged.force("radial", history)
+    again = alone.force("radial", history.with_value(history.value - compliance * force))
+    assert np.max(np.abs(again - force)) < 1e-9 * np.max(np.abs(force))
+
+
+def test_the_amplitude_at_the_bushing_closes_the_circle() -> None:
+    compliance = 1e-7
+    inner = PLAIN.with_effect("strain_stiffening", {"strain_stiffening.c3": 100.0})
+    seen = inner.with_effect("rig_compliance", {"rig_compliance.compliance": compliance}).stiffness(
+        "radial", FREQUENCY, AMPLITUDE
+    )
+    reached = AMPLITUDE * np.abs(1.0 - compliance * seen)
+    bushing = inner.stiffness("radial", FREQUENCY, reached)
+    np.testing.assert_allclose(seen, bushing / (1.0 + compliance * bushing), rtol=1e-13)
+
+
+def test_mullins_softening_fades_over_the_cycles() -> None:
+    model = PLAIN.with_effect("mullins_softening", {"mullins_softening.share": 0.2})
+    phase = np.arange(4 * 256) / 256
+    history = History.steady(1e-3 * np.sin(2.0 * np.pi * phase), 0.1, cycles=4)
+    extra = (model.force("axial", history) - PLAIN.force("axial", history)).reshape(4, 256)
+    peaks = extra.max(axis=1)
+    np.testing.assert_allclose(peaks[1:] / peaks[:-1], np.exp(-1.0), rtol=1e-10)
+    work = np.sum(extra * np.diff(history.value, append=0.0).reshape(4, 256))
+    assert work > 0.0
+
+
+def test_heating_counts_the_loss_of_the_unheated_bushing() -> None:
+    beta, frequency, amplitude = 2e-3, 100.0, 1e-3
+    cold = PLAIN.stiffness("axial", frequency, amplitude)
+    power = np.pi * frequency * amplitude**2 * cold.imag
+    hot = PLAIN.with_effect("self_heating", {"self_heating.beta": beta}).stiffness("axial", frequency, amplitude)
+    np.testing.assert_allclose(hot, cold / (1.0 + beta * power), rtol=1e-14)
+
+
+def test_instrument_masses_springs_and_offsets_do_not_act_in_torsion() -> None:
+    sizes = {
+        "inertia": {"mass": 0.1},
+        "fixture_resonance": {"mass": 0.1},
+        "rig_compliance": {"compliance": 1e-7},
+        "force_offset": {"offset": 10.0},
+        "bump_stop": {"gap": 1e-4, "stiffness": 1e6},
+        "clearance": {"delta": 5e-5},
+    }
+    model = PLAIN
+    for name, values in sizes.items():
+        model = model.with_effect(name, {f"{name}.{key}": value for key, value in values.items()})
+    at = (Direction.TORSION, FREQUENCY, AMPLITUDE)
+    assert np.array_equal(model.stiffness(*at), PLAIN.stiffness(*at))
+    assert np.array_equal(model.force(Direction.TORSION, LOOP), PLAIN.force(Direction.TORSION, LOOP))
+
+
+def test_force_gain_tells_loops_from_sweeps() -> None:
+    model = PLAIN.with_effect("force_gain", {"force_gain.gain": 0.02})
+    assert np.array_equal(model.force("axial", LOOP, kind="sweep"), PLAIN.force("axial", LOOP))
+    np.testing.assert_allclose(model.force("axial", LOOP, kind="loop"), 1.02 * PLAIN.force("axial", LOOP), rtol=1e-15)
+
+
+def test_a_delay_shifts_the_record() -> None:
+    shifted = PLAIN.with_effect("delay", {"delay.tau": 3.0 * STARTED.step}).force("axial", STARTED)
+    np.testing.assert_allclose(shifted[3:], PLAIN.force("axial", STARTED)[:-3], rtol=0.0, atol=1e-9)
+    assert np.all(np.abs(shifted[:3]) < 1e-9)
+    late = PLAIN.with_effect("delay", {"delay.tau": 4.0 * LOOP.step}).force("axial", LOOP)
+    np.testing.assert_allclose(late, np.roll(PLAIN.force("axial", LOOP), 4), rtol=0.0, atol=1e-9)
+
+
+def test_relaxation_of_a_ramp_is_exact() -> None:
+    step, tau = 1e-3, 7e-3
+    time = step * np.arange(200)
+    np.testing.assert_allclose(relaxed(tau, 3.0 * time, step), 3.0 * tau * -np.expm1(-time / tau), rtol=1e-12)
+
+
+@pytest.mark.parametrize("ratio", [1e-6, 0.1, 0.499999, 0.500001, 0.9, 1.0 - 1e-6, 1.0 - 1e-12])
+def test_describing_function_against_sixty_digits(ratio: float) -> None:
+    mpmath.mp.dps = 60
+    r = mpmath.mpf(ratio)
+    exact = 1 - 2 / mpmath.pi * (mpmath.asin(r) + r * mpmath.sqrt(1 - r * r))
+    assert abs(float(first_harmonic(np.array(1.0), ratio)) / float(exact) - 1.0) < 1e-13
+
+
+def test_describing_function_against_quadrature() -> None:
+    for ratio in (0.0, 0.3, 0.8):
+        value, _ = quad(
+            lambda t, r=ratio: float(dead_zone(np.cos(t), r)) * np.cos(t), 0.0, np.pi, points=[np.arccos(ratio)]
+        )
+        assert abs(2.0 / np.pi * value - float(first_harmonic(np.array(1.0), ratio))) < 1e-9
+
+
+@pytest.mark.parametrize("amplitude", [0.0, 1e-9, 0.99e-4, 1e-4])
+def test_nothing_happens_within_the_gap(amplitude: float) -> None:
+    stop = PLAIN.with_effect("bump_stop", {"bump_stop.gap": 1e-4, "bump_stop.stiffness": 1e7})
+    assert np.array_equal(stop.stiffness("axial", 50.0, amplitude), PLAIN.stiffness("axial", 50.0, amplitude))
+    loose = PLAIN.with_effect("clearance", {"clearance.delta": 1e-4})
+    assert np.all(loose.stiffness("axial", 50.0, amplitude) == 0.0)
