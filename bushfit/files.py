@@ -1,0 +1,59 @@
+"""Files given by the user: their bytes, or one clear error."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from pathlib import Path
+
+from bushfit.errors import BushfitError
+
+
+def read_utf8(file: Path, kind: type[BushfitError]) -> bytes:
+    """The bytes of a text file in UTF-8, read once; a byte order mark is left in place.
+
+    Args:
+        file: the file.
+        kind: class of the error to raise.
+
+    Raises:
+        kind: the file is missing, no regular file, not readable, empty, or not UTF-8 text.
+    """
+    if not file.exists():
+        siblings = [path.name for path in file.parent.iterdir()] if file.parent.is_dir() else []
+        near = get_close_matches(file.name, siblings, n=1)
+        raise kind(
+            "there is no such file",
+            file=file,
+            expected="an existing file; a relative path counts from the folder of the file that names it",
+            hint=f'did you mean "{near[0]}"?' if near else "check the path for a typing error",
+        )
+    if not file.is_file():
+        found = "a folder" if file.is_dir() else "a device"
+        raise kind("this is not a file", file=file, found=found, expected="a file")
+    try:
+        data = file.read_bytes()
+    except OSError as error:
+        raise kind("the file cannot be read", file=file, found=error.strerror or str(error)) from error
+    if not data.strip():
+        raise kind("the file is empty", file=file, expected="text", hint="export it again")
+    _check_utf8(data, file, kind)
+    return data
+
+
+def _check_utf8(data: bytes, file: Path, kind: type[BushfitError]) -> None:
+    bad = data.find(b"\0")
+    if bad < 0 and not data.isascii():
+        try:
+            data.decode("utf-8")
+        except UnicodeDecodeError as error:
+            bad = error.start
+    if bad >= 0:
+        line = data.count(b"\n", 0, bad) + 1
+        raise kind(
+            "the file is not UTF-8 text",
+            file=file,
+            place=f"line {line}",
+            found=f"byte 0x{data[bad]:02x}",
+            expected="text in UTF-8, with or without byte order mark",
+            hint='save it as "CSV UTF-8" or convert it: iconv -f LATIN1 -t UTF-8 old > new',
+        )

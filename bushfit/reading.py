@@ -1,0 +1,210 @@
+"""CSV files of a test rig -> Loop and Sweep in SI, with one clear error for what cannot be read or cannot be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bushfit.geometry import Direction
+from bushfit.measurement import Floats, Loop, Source, Sweep, Waveform, rebuild_time
+from bushfit.table import Column, Table
+
+AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak"]
+
+#: For each column of a loop, the headers it goes by.
+LOOP_COLUMNS = {
+    "time": ("time", "t"),
+    "displacement": (
+        "displacement",
+        "disp",
+        "deflection",
+        "stroke",
+        "travel",
+        "position",
+        "rotation",
+        "angle",
+        "twist",
+    ),
+    "force": ("force", "load", "torque", "moment"),
+}
+#: For each column of a sweep, the headers it goes by.
+SWEEP_COLUMNS = {
+    "frequency": ("frequency", "freq"),
+    "amplitude": ("amplitude", "ampl", "amp", "displacement amplitude", "rotation amplitude", "angle amplitude"),
+    "stiffness": ("stiffness", "dynamic stiffness", "stiffness magnitude", "kdyn", "|k|"),
+    "loss_factor": ("loss factor", "tan delta", "tandelta", "eta"),
+    "phase": ("phase", "phase angle", "loss angle", "delta"),
+    "storage_stiffness": ("storage stiffness", "k'"),
+    "loss_stiffness": ("loss stiffness", "k''"),
+    "repeat": ("repeat", "repetition"),
+}
+#: The pairs of columns that a complex stiffness can be read from, in order of preference.
+STIFFNESS_PAIRS = (("stiffness", "loss_factor"), ("stiffness", "phase"), ("storage_stiffness", "loss_stiffness"))
+_FEWEST_LOOP_ROWS = 10
+_FEWEST_SWEEP_ROWS = 3
+#: Noise may push a loss factor below zero; what lies outside these limits is no measured bushing.
+_LOSS_FACTOR_RANGE = (-0.5, 5.0)
+
+
+def read_loop(
+    file: Path,
+    direction: Direction,
+    *,
+    name: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    force_sign: Literal[1, -1] = 1,
+    rate: float | None = None,
+    frequency: float | None = None,
+    waveform: Waveform = "triangle",
+    noise: float | None = None,
+) -> Loop:
+    """Read a hysteresis loop.
+
+    Args:
+        file: a table with columns time (optional), displacement and force.
+        direction: direction of the test, which settles the units that fit.
+        name: of the loop and its provenance; default the name of the file.
+        columns: header of a role (a key of LOOP_COLUMNS), where it is not the usual one.
+        units: unit of a role, where the file does not carry it.
+        force_sign: -1 turns the recorded force around.
+        rate: speed of the displacement [m/s or rad/s], for a file without time.
+        frequency: cycles per time [Hz], for a file without time; goes with `waveform`.
+        waveform: course of the displacement in time.
+        noise: passed on.
+
+    Raises:
+        MeasurementError, UnitError: a file, column, unit or value that cannot be used.
+    """
+    table = Table.open(file, LOOP_COLUMNS, columns, units)
+    _check_not_swapped(table, direction)
+    wanted = {
+        "displacement": table.column("displacement", direction.displacement_unit),
+        "force": table.column("force", direction.force_unit),
+    }
+    if "time" in table.roles:
+        wanted["time"] = table.column("time", "s")
+    elif rate is None and frequency is None:
+        raise table.missing("time", hint='or state rate = "10 mm/min", or frequency and waveform, in the campaign')
+    values = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
+
+    displacement, force = values["displacement"], force_sign * values["force"]
+    for column, series in ((wanted["displacement"], displacement), (wanted["force"], force)):
+        if np.ptp(series) == 0.0:
+            raise table.error(f"the {column.role} never changes", column=column, expected="a loop")
+    if np.dot(displacement - displacement.mean(), force - force.mean()) < 0.0:
+        raise table.error(
+            "the force falls where the displacement rises",
+            column=wanted["force"],
+            expected="force and displacement counted in the same direction",
+            hint="if the load cell counts the other way round, write force_sign = -1 in the campaign"
+            if force_sign == 1
+            else "take force_sign = -1 out of the campaign",
+        )
+    if "time" in values:
+        time = values["time"]
+        table.refuse(
+            np.diff(time, prepend=-np.inf) <= 0.0, wanted["time"], "time does not increase", "a later time on every row"
+        )
+    else:
+        time = rebuild_time(displacement, rate=rate, frequency=frequency, waveform=waveform)
+    source = Source(Path(name or file.name), table.sha256)
+    return Loop(name or file.name, direction, time, displacement, force, noise, source)
+
+
+def read_sweep(
+    file: Path,
+    direction: Direction,
+    *,
+    name: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    amplitude: AmplitudeConvention = "zero-to-peak",
+    noise: float | None = None,
+) -> Sweep:
+    """Read a stepped-sine sweep.
+
+    Args:
+        file: a table with columns frequency, amplitude, one of STIFFNESS_PAIRS, and repeat (optional: without it,
+            an operating point that occurs again is a repeat).
+        direction: direction of the test, which settles the units that fit.
+        name: of the sweep and its provenance; default the name of the file.
+        columns: header of a role (a key of SWEEP_COLUMNS), where it is not the usual one.
+        units: unit of a role, where the file does not carry it.
+        amplitude: how the file counts amplitudes; the sweep has them zero-to-peak.
+        noise: passed on.
+
+    Raises:
+        MeasurementError, UnitError: a file, column, unit or value that cannot be used.
+    """
+    table = Table.open(file, SWEEP_COLUMNS, columns, units)
+    pair = next((pair for pair in STIFFNESS_PAIRS if set(pair) <= set(table.roles)), None)
+    if pair is None:
+        pairs = ", or ".join(" and ".join(pair) for pair in STIFFNESS_PAIRS).replace("_", " ")
+        raise table.error(
+            "no pair of columns gives a complex stiffness", found=", ".join(table.headers), expected=pairs
+        )
+    expected = {"frequency": "Hz", "amplitude": direction.displacement_unit, "loss_factor": "1", "phase": "rad"}
+    roles = ["frequency", "amplitude", *pair, *(["repeat"] if "repeat" in table.roles else [])]
+    wanted = {
+        role: table.column(role, expected.get(role, "1" if role == "repeat" else direction.stiffness_unit))
+        for role in roles
+    }
+    values = table.read(wanted, fewest_rows=_FEWEST_SWEEP_ROWS)
+
+    for role in {"frequency", "amplitude", "stiffness", "storage_stiffness"} & set(values):
+        label = role.replace("_", " ")
+        table.refuse(values[role] <= 0.0, wanted[role], f"the {label} is not positive", f"a {label} above zero")
+    stiffness, loss_factor = _complex_stiffness(pair, values[pair[0]], values[pair[1]])
+    low, high = _LOSS_FACTOR_RANGE
+    table.refuse(
+        ~((loss_factor >= low) & (loss_factor <= high)),
+        wanted[pair[1]],
+        "no bushing has this loss",
+        f"a loss factor (loss over storage stiffness) from {low:g} to {high:g}",
+        "check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]",
+    )
+    zero_to_peak = values["amplitude"] * (0.5 if amplitude == "peak-to-peak" else 1.0)
+    repeat = _repeats(table, wanted, values)
+    source = Source(Path(name or file.name), table.sha256)
+    return Sweep(name or file.name, direction, values["frequency"], zero_to_peak, stiffness, repeat, noise, source)
+
+
+def _check_not_swapped(table: Table, direction: Direction) -> None:
+    """Refuse a displacement in units of force beside a force in units of displacement."""
+    if table.agrees("displacement", direction.force_unit) and table.agrees("force", direction.displacement_unit):
+        displacement, force = (table.roles[role].header for role in ("displacement", "force"))
+        raise table.error(
+            "displacement and force are swapped",
+            found=f'"{displacement}" and "{force}"',
+            expected="a displacement in units of displacement, and a force in units of force",
+            hint="correct the header, or name the columns in the campaign: columns = "
+            f'{{ displacement = "{force}", force = "{displacement}" }}',
+        )
+
+
+def _complex_stiffness(pair: tuple[str, str], first: Floats, second: Floats) -> tuple[NDArray[np.complex128], Floats]:
+    """Complex stiffness and loss factor from one of STIFFNESS_PAIRS; the loss factor is nan from 90 deg on."""
+    match pair:
+        case ("stiffness", "loss_factor"):
+            return (first / np.hypot(1.0, second)) * (1.0 + 1j * second), second
+        case ("stiffness", "phase"):
+            return first * np.exp(1j * second), np.where(np.abs(second) < np.pi / 2, np.tan(second), np.nan)
+        case _:
+            return first + 1j * second, second / first
+
+
+def _repeats(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> NDArray[np.int64]:
+    """The repeat column, or else the count of earlier rows at the same frequency and amplitude, from 1."""
+    if "repeat" in values:
+        repeat = values["repeat"]
+        table.refuse(repeat != np.round(repeat), wanted["repeat"], "this is no repeat number", "a whole number")
+        return repeat.astype(np.int64)
+    import pandas as pd
+
+    points = pd.DataFrame({role: values[role] for role in ("frequency", "amplitude")})
+    return np.asarray(points.groupby(["frequency", "amplitude"]).cumcount(), dtype=np.int64) + 1

@@ -1,0 +1,179 @@
+"""Units, with pint behind one door: texts such as "10 mm" and headers such as "force [kN]" become SI.
+
+An expected unit is written in SI: "m", "rad", "N*m/rad", "1" for a ratio. Unlike in pint, an angle is no plain
+number here: "deg" fits "rad" but not "1", and "rad/s" is not "Hz".
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from bushfit.errors import UnitError
+
+if TYPE_CHECKING:
+    import pint
+
+#: What an expected unit measures, and units a user would write for it.
+_KINDS = {
+    "m": ("a length", "mm"),
+    "rad": ("an angle", "deg"),
+    "s": ("a time", "s"),
+    "Hz": ("a frequency", "Hz"),
+    "N": ("a force", "N"),
+    "N*m": ("a moment", "N m"),
+    "N/m": ("a stiffness", "N/mm"),
+    "N*m/rad": ("a torsional stiffness", "N m/deg"),
+    "m/s": ("a speed", "mm/min"),
+    "rad/s": ("an angular speed", "deg/min"),
+    "Pa": ("a stress", "MPa"),
+    "1": ("a ratio", "%"),
+}
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_FACTOR = r"(?:[^\W\d_]+|%|°|1)(?:(?:\^|\*\*)-?[1-9]|⁻?[¹²³])?"
+#: The products and quotients of units that are handed on to pint, which would otherwise evaluate any arithmetic.
+_UNIT = re.compile(rf"{_FACTOR}(?:(?:\s*[*/·⋅]\s*|\s+){_FACTOR})*")
+_LONGEST = 40
+_BRACKETS = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*")
+
+
+def is_number(text: str) -> bool:
+    """Whether a text is a plain decimal number, with a decimal point."""
+    return _NUMBER.fullmatch(text.strip()) is not None
+
+
+def split_header(text: str) -> tuple[str, str | None]:
+    """Name and unit of a header cell such as "force [N]" or "force (kN)"; the unit is None where there is none."""
+    match = _BRACKETS.fullmatch(text.strip())
+    return (match["name"], match["unit"].strip()) if match else (text.strip(), None)
+
+
+def factor(text: str, expected: str) -> float:
+    """The number that turns values in the unit `text` into SI.
+
+    Args:
+        text: a unit such as "kN" or "N/mm"; "-" and "" stand for a ratio.
+        expected: the SI unit that it has to agree with.
+
+    Raises:
+        UnitError: an unknown unit, or a unit of another dimension.
+    """
+    scale, base = _resolve(text)
+    if base != _resolve(expected)[1]:
+        raise UnitError("the unit does not fit", found=f'"{text}"', expected=describe(expected))
+    return scale
+
+
+def is_unit(text: str) -> bool:
+    """Whether `text` is a unit, of whatever dimension."""
+    try:
+        _resolve(text)
+    except UnitError:
+        return False
+    return True
+
+
+def agrees(text: str, expected: str) -> bool:
+    """Whether `text` is a known unit of the same dimension as `expected`."""
+    try:
+        factor(text, expected)
+    except UnitError:
+        return False
+    return True
+
+
+def quantity(value: object, *expected: str) -> float:
+    """The SI value of a text such as "10 mm".
+
+    Args:
+        value: what the user wrote.
+        expected: the SI units that it may agree with, such as "m".
+
+    Raises:
+        UnitError: no text, no number, no unit, or a unit of another dimension.
+    """
+    number, unit = _split_quantity(value, expected[0])
+    fitting = next((choice for choice in expected if agrees(unit, choice)), expected[0])
+    return _si(number, factor(unit, fitting))
+
+
+def any_quantity(value: object) -> float:
+    """The SI value of a plain number (taken as SI) or of a text with a unit of any dimension.
+
+    Raises:
+        UnitError: neither of the two.
+    """
+    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+        return float(value)
+    number, unit = _split_quantity(value, "1")
+    return _si(number, _resolve(unit)[0])
+
+
+def describe(expected: str) -> str:
+    """An expected SI unit in words: "a length, such as mm"."""
+    kind, example = _KINDS[expected]
+    return f"{kind}, such as {example}"
+
+
+def example(expected: str) -> str:
+    """A unit that a user would write where the SI unit `expected` is meant."""
+    return _KINDS[expected][1]
+
+
+def _si(number: float, scale: float) -> float:
+    """The product without the last digit's dust: 18 mm are 0.018 m."""
+    return float(f"{number * scale:.15g}")
+
+
+def _split_quantity(value: object, expected: str) -> tuple[float, str]:
+    kind, unit = _KINDS[expected]
+    wanted = f'{kind} with its unit, such as "10 {unit}"'
+    text = str(value).strip()
+    number = _NUMBER.match(text)
+    if not isinstance(value, str | int | float) or isinstance(value, bool) or number is None:
+        raise UnitError("this is no quantity", found=f'"{text}"' if isinstance(value, str) else text, expected=wanted)
+    rest = text[number.end() :].strip()
+    if not rest:
+        hint = None if expected == "1" else f'write "{text} {unit}"'
+        raise UnitError("a number without a unit", found=text, expected=wanted, hint=hint)
+    if rest[0] in ",.":
+        raise UnitError(
+            "this is no quantity", found=f'"{text}"', expected=wanted, hint="write numbers with a decimal point"
+        )
+    if not math.isfinite(float(number[0])):
+        raise UnitError("the number is too large", found=f'"{text}"', expected=wanted)
+    return float(number[0]), rest
+
+
+@lru_cache(maxsize=256)
+def _resolve(text: str) -> tuple[float, str]:
+    """Scale and SI base unit of a unit; angles keep their radian."""
+    text = text.strip()
+    if text in ("", "-"):
+        text = "1"
+    unknown = UnitError(
+        "unknown unit", found=f'"{text[:_LONGEST]}"', expected="a unit such as mm, N, kN/mm, deg, Hz or %"
+    )
+    if len(text) > _LONGEST or not _UNIT.fullmatch(text):
+        raise unknown
+    registry = _registry()
+    try:
+        unit = registry.parse_units(text.replace("⋅", "*"))
+        one, zero = (registry.Quantity(number, unit).to_base_units() for number in (1.0, 0.0))
+    except Exception as error:  # pint lets its parser's and Python's own errors through
+        raise unknown from error
+    if zero.magnitude != 0.0:  # decibel and the like
+        raise unknown
+    return float(one.magnitude), str(one.units)
+
+
+@lru_cache(maxsize=1)
+def _registry() -> pint.UnitRegistry[Any]:
+    import pint
+
+    registry: pint.UnitRegistry[Any] = pint.UnitRegistry(cache_folder=None, on_redefinition="ignore")
+    registry.define("newton_meter = newton * meter = Nm")  # pint's Nm is a measure of yarn
+    registry.define("newton_millimeter = newton * millimeter = Nmm")
+    return registry
