@@ -9,6 +9,9 @@ Source: Garcia Tarrago et al. 2007, Eq. 5; M. Berg, Vehicle System Dynamics 30 (
 
 from __future__ import annotations
 
+from itertools import pairwise
+from typing import Any
+
 import numpy as np
 
 from bushfit.effects.contract import Array, Branch, Level, Parameter, Values
@@ -80,11 +83,14 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
     }
 
 
-def turning_points(value: Array) -> Array:
-    """Indices of the samples at which the motion reverses; level stretches do not count, (k,)."""
-    step = np.sign(np.diff(value))
-    moving = np.flatnonzero(step)
-    return moving[1:][step[moving[1:]] != step[moving[:-1]]]
+def reversals(value: Array) -> Array:
+    """Whether the motion reverses at a sample, (..., n - 1); of level stretches the last sample counts."""
+    step = np.sign(np.diff(value, axis=-1))
+    moving = np.maximum.accumulate(np.where(step != 0.0, np.arange(step.shape[-1]), -1), axis=-1)
+    sense = np.where(moving >= 0, np.take_along_axis(step, np.maximum(moving, 0), axis=-1), 0.0)
+    turned = np.zeros(step.shape, dtype=bool)
+    turned[..., 1:] = sense[..., 1:] * sense[..., :-1] < 0.0
+    return turned
 
 
 def _move(start: Array, sign: float, distance: Array) -> tuple[Array, Array, Array]:
@@ -98,15 +104,13 @@ def _move(start: Array, sign: float, distance: Array) -> tuple[Array, Array, Arr
     )
 
 
-def _follow(strain: Array, reversals: Array, start: Array, slope: Array, eps_half: Array) -> tuple[Array, Array]:
+def _follow(strain: Array, turns: Array, start: Array, slope: Array, eps_half: Array) -> tuple[Array, Array]:
     """u and du/deps_half of every sample, from the value `start` (and its slope) of the first one."""
-    ends = np.concatenate((reversals, [strain.size - 1]))
-    begins = np.concatenate(([0], reversals))
     pieces, slopes = [start], [slope]
-    for begin, end in zip(begins, ends, strict=True):
-        sign = float(np.sign(strain[end] - strain[begin]))
-        distance = np.abs(strain[begin + 1 : end + 1] - strain[begin]) / eps_half
-        path, by_start, by_distance = _move(start, sign, distance)
+    for begin, end in pairwise([0, *turns, strain.shape[-1] - 1]):
+        travel = strain[..., begin + 1 : end + 1] - strain[..., begin : begin + 1]
+        distance = np.abs(travel) / eps_half
+        path, by_start, by_distance = _move(start, np.sign(travel[..., -1:]), distance)
         path_slope = by_start * slope - by_distance * distance / eps_half
         pieces.append(path)
         slopes.append(path_slope)
@@ -119,13 +123,15 @@ def _steady_start(levels: Array, eps_half: Array) -> tuple[Array, Array]:
 
     Newton on the map of one cycle: its slope is the product of the du/du_s of the pieces.
     """
-    u = np.zeros(np.shape(eps_half))
+    travel = np.roll(levels, -1, axis=-1) - levels
+    senses, distances = np.sign(travel), np.abs(travel) / eps_half
+    u = np.zeros((*distances.shape[:-1], 1))
     forced = np.zeros_like(u)
     for _ in range(50):
         end, contraction, forced = u, np.ones_like(u), np.zeros_like(u)
-        for begin, stop in zip(levels, np.roll(levels, -1), strict=True):
-            distance = np.abs(stop - begin) / eps_half
-            end, by_start, by_distance = _move(end, float(np.sign(stop - begin)), distance)
+        for i in range(levels.shape[-1]):
+            distance = distances[..., i : i + 1]
+            end, by_start, by_distance = _move(end, senses[..., i : i + 1], distance)
             forced = by_start * forced - by_distance * distance / eps_half
             contraction = contraction * by_start
         change = (end - u) / (1.0 - contraction)
@@ -135,34 +141,53 @@ def _steady_start(levels: Array, eps_half: Array) -> tuple[Array, Array]:
     return u, forced / (1.0 - contraction)
 
 
-def _walk(strain: Array, periodic: bool, eps_half: Array) -> tuple[Array, Array]:
-    """u = s_f/sigma_fmax and du/deps_half along one history, (..., n)."""
-    zero = np.zeros(np.shape(eps_half))
+def _walk(strain: Array, turns: Array, periodic: bool, eps_half: Array) -> tuple[Array, Array]:
+    """u = s_f/sigma_fmax and du/deps_half along histories that share their turning points, (..., n).
+
+    A steady history is closed (its first sample again at the end) and begins at its top.
+    """
+    zero = np.zeros((*np.broadcast_shapes(strain.shape[:-1], np.shape(eps_half)[:-1]), 1))
     if not periodic:
-        with_rest = np.concatenate(([0.0], strain))
-        u, slope = _follow(with_rest, turning_points(with_rest), zero, zero, eps_half)
-        return u[..., 1:], slope[..., 1:]
-    top = int(np.argmax(strain))
-    cycle = np.roll(strain, -top)
-    closed = np.append(cycle, cycle[0])
-    reversals = turning_points(closed)
-    if reversals.size == 0:
-        return np.zeros((*np.shape(eps_half)[:-1], strain.size)), np.zeros((*np.shape(eps_half)[:-1], strain.size))
-    start, slope = _steady_start(closed[np.concatenate(([0], reversals))], eps_half)
-    u, slopes = _follow(closed, reversals, start, slope, eps_half)
-    return np.roll(u[..., :-1], top, axis=-1), np.roll(slopes[..., :-1], top, axis=-1)
+        return _follow(strain, turns, zero, zero, eps_half)
+    if turns.size == 0:
+        still = zero + np.zeros(strain.shape[-1])
+        return still, still
+    start, slope = _steady_start(strain[..., np.concatenate(([0], turns))], eps_half)
+    return _follow(strain, turns, start, slope, eps_half)
 
 
 def _walk_all(eps_half: Array, history: History) -> tuple[Array, Array]:
-    """The walk for one history under many values, or for a stack of histories row by row."""
+    """The walk for one history under many values, or for a stack of histories: those that turn alike at once."""
     eps_half = np.atleast_1d(np.asarray(eps_half, dtype=float))
-    if history.value.ndim == 1:
-        return _walk(history.value, history.periodic, eps_half)
-    lead = np.broadcast_shapes(history.value.shape[:-1], eps_half.shape[:-1])
-    strain = np.broadcast_to(history.value, (*lead, history.value.shape[-1]))
-    scale = np.broadcast_to(eps_half, (*lead, 1))
-    both = np.array([_walk(strain[i], history.periodic, scale[i]) for i in np.ndindex(lead)])
-    return both[:, 0].reshape(strain.shape), both[:, 1].reshape(strain.shape)
+    count = history.value.shape[-1]
+    lead = () if history.value.ndim == 1 else np.broadcast_shapes(history.value.shape[:-1], eps_half.shape[:-1])
+    rows = np.broadcast_to(history.value, (*lead, count)).reshape(-1, count)
+    scale = np.broadcast_to(eps_half, (*lead, 1)).reshape(-1, 1) if lead else eps_half
+    if history.periodic:
+        tops = np.argmax(rows, axis=-1, keepdims=True)
+        path = np.take_along_axis(rows, (tops + np.arange(count + 1)) % count, axis=-1)
+        back = (np.arange(count) - tops) % count
+    else:
+        path = np.concatenate([np.zeros((len(rows), 1)), rows], axis=-1)
+        back = np.broadcast_to(np.arange(1, count + 1), rows.shape)
+    turned = reversals(path)
+    if not lead:
+        u, slope = _walk(path[0], np.flatnonzero(turned[0]), history.periodic, scale)
+        return u[..., back[0]], slope[..., back[0]]
+    u, slope = np.empty(path.shape), np.empty(path.shape)
+    for group in _alike(turned):
+        turns = np.flatnonzero(turned[group][0])
+        u[group], slope[group] = _walk(path[group], turns, history.periodic, scale[group])
+    shape = (*lead, count)
+    return np.take_along_axis(u, back, -1).reshape(shape), np.take_along_axis(slope, back, -1).reshape(shape)
+
+
+def _alike(turned: Array) -> list[Any]:
+    """Selections of the rows that are equal."""
+    if np.array_equal(turned, np.broadcast_to(turned[0], turned.shape)):
+        return [slice(None)]
+    _, label = np.unique(np.packbits(turned, axis=-1), axis=0, return_inverse=True)
+    return [label.ravel() == i for i in range(int(label.max()) + 1)]
 
 
 def stress(p: Values, history: History) -> Array:
