@@ -1,1 +1,84 @@
-"""The command line."""
+"""The command line: a file a command; each parses, calls one function and prints."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from typing import NoReturn
+
+import click
+
+from bushfit import __version__
+from bushfit.errors import BushfitError
+
+#: Command, its module and the line that `bushfit --help` shows: no module is loaded before it is needed.
+_COMMANDS = {
+    "run": ("run", "The whole chain: fit-static, fit-dynamic, fit, predict."),
+    "fit-static": ("fit_static", "Loops -> mu, sigma_fmax, eps_half."),
+    "fit-dynamic": ("fit_dynamic", "Smallest-amplitude sweep -> m, alpha."),
+    "fit": ("fit", "Loops and sweeps -> all five parameters together."),
+    "predict": ("predict", "Model -> axial and radial stiffness tables and plots."),
+    "simulate": ("simulate", "Model -> a simulated campaign of raw tests, with noise."),
+}
+
+
+class _Commands(click.Group):
+    """Commands that are imported when called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(_COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in _COMMANDS:
+            return None
+        module = importlib.import_module(f"bushfit.cli.{_COMMANDS[cmd_name][0]}")
+        command: click.Command = module.command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, line) for name, (_, line) in _COMMANDS.items()])
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, "-V", "--version", prog_name="bushfit")
+def cli() -> None:
+    """Fit the stiffness and loss of rubber bushings over frequency and amplitude.
+
+    A campaign file (TOML) names a bushing, its hysteresis loops and its stepped-sine sweeps. Start with
+
+        bushfit run CAMPAIGN.toml
+
+    which writes parameters, stiffness tables and plots to results/<campaign name>. Text for people goes to
+    standard error. Exit status: 0 done, 1 done but a stated limit is missed, 2 wrong usage or unusable input.
+    """
+
+
+def main() -> None:
+    """Entry point: one clear error and exit status 2 for whatever the user can put right."""
+    try:
+        sys.exit(cli.main(standalone_mode=False))
+    except click.exceptions.Abort:
+        _fail("aborted")
+    except click.ClickException as error:
+        error.show()
+        sys.exit(2)
+    except BushfitError as error:
+        _fail(f"error: {error}")
+    except BrokenPipeError:
+        sys.exit(2)
+    except MemoryError:
+        _fail("error: out of memory")
+    except Exception as error:  # a fault of bushfit, not of its user
+        if os.environ.get("BUSHFIT_TRACEBACK"):
+            raise
+        _fail(
+            f"a fault in bushfit itself: {type(error).__name__}: {error}\n"
+            "  try: set BUSHFIT_TRACEBACK=1, run again, and report what it prints"
+        )
+
+
+def _fail(message: str) -> NoReturn:
+    click.echo(f"bushfit: {message}", err=True)
+    sys.exit(2)

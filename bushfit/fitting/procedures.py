@@ -25,6 +25,8 @@ DYNAMIC = ("m", "alpha")
 #: Passes of the two-step procedure agree when no parameter moves by more than this, relative.
 _AGREED = 1e-5
 _MOST_PASSES = 50
+#: An accelerated pass extrapolates the last change by no more than this factor.
+_LONGEST_STRIDE = 5.0
 #: A filled natural rubber, to say what leaving the springpot out may do: m/mu [s^alpha] and alpha.
 _TYPICAL_SPRINGPOT = (0.18, 0.24)
 
@@ -117,12 +119,13 @@ def fit_two_step(data: Data) -> TwoStep:
 
 
 def _anderson(asked: Sequence[Array], answered: Sequence[Array]) -> Array:
-    """Next point of a fixed-point iteration, from the last three (Anderson 1965): plain passes gain only a
-    fifth each, because a loop of one slow rate and a sweep of one amplitude know little of each other."""
-    points, images = np.array(asked[-3:]), np.array(answered[-3:])
-    gaps = images - points
-    weights = np.linalg.lstsq(np.diff(gaps, axis=0).T, gaps[-1], rcond=None)[0]
-    return images[-1] - weights @ np.diff(images, axis=0)
+    """Next point of a fixed-point iteration, from the last two (Anderson 1965): plain passes gain only a fifth
+    each, because a loop of one slow rate and a sweep of one amplitude know little of each other."""
+    points, images = np.array(asked[-2:]), np.array(answered[-2:])
+    before, gap = images - points
+    change = gap - before
+    weight = np.clip(-(change @ gap) / (change @ change), 0.0, _LONGEST_STRIDE)
+    return images[-1] + weight * (images[-1] - images[-2])
 
 
 def _agree(one: Mapping[str, float], other: Mapping[str, float]) -> bool:

@@ -46,7 +46,7 @@ class Coordinates:
         """Where those values lie, (k,)."""
         return np.array([self.forward(name, values[name]) for name in self.names])
 
-    def values(self, point: Sequence[float]) -> dict[str, float]:
+    def values(self, point: Sequence[float] | Array) -> dict[str, float]:
         """Parameter values at a point."""
         return {
             name: float(np.exp(u)) if parameter.log else float(u) * parameter.typical

@@ -1,0 +1,56 @@
+"""The files that commands write, as bytes by name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from bushfit import sheets
+
+if TYPE_CHECKING:
+    from bushfit.fitting.terms import LoopTerm, SweepTerm
+    from bushfit.model import Model
+    from bushfit.prediction import Prediction
+
+
+def loop_files(model: Model, terms: Sequence[LoopTerm], *, plots: bool) -> dict[str, bytes]:
+    """`loops.csv` and `loops.png`; nothing where there are no loops."""
+    if not terms:
+        return {}
+    files = {"loops.csv": sheets.to_csv(sheets.loops_table(model, terms))}
+    if plots:
+        from bushfit.plots import loops_figure, to_png
+
+        files["loops.png"] = to_png(loops_figure(model, terms, model.bushing.name))
+    return files
+
+
+def sweep_files(model: Model, terms: Sequence[SweepTerm], *, plots: bool) -> dict[str, bytes]:
+    """`sweeps.csv` and `sweeps.png`; nothing where there are no sweeps."""
+    if not terms:
+        return {}
+    files = {"sweeps.csv": sheets.to_csv(sheets.sweeps_table(model, terms))}
+    if plots:
+        from bushfit.plots import sweeps_figure, to_png
+
+        files["sweeps.png"] = to_png(sweeps_figure(model, terms, model.bushing.name))
+    return files
+
+
+def prediction_files(
+    predictions: Sequence[Prediction], measured: Sequence[SweepTerm], title: str, *, plots: bool
+) -> dict[str, bytes]:
+    """`<direction>.csv` and `<direction>.png` of each prediction, the measured points over the model."""
+    files = {f"{p.direction}.csv": sheets.to_csv(sheets.prediction_table(p)) for p in predictions}
+    if plots:
+        from bushfit.plots import prediction_figure, to_png
+
+        for prediction in predictions:
+            over = [term for term in measured if term.direction is prediction.direction]
+            files[f"{prediction.direction}.png"] = to_png(prediction_figure(prediction, over, title))
+    return files
+
+
+def artifact_names(kinds: Sequence[str], *, plots: bool) -> list[str]:
+    """Names of the tables and plots of some kinds: loops, sweeps, axial, radial, torsion."""
+    return [f"{kind}.{ending}" for kind in kinds for ending in (("csv", "png") if plots else ("csv",))]

@@ -1,0 +1,173 @@
+"""What the commands share: options, where results go, and how they are told."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from bushfit.output import check_free, write_files
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from bushfit.results import Result
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+#: Width of tables where standard error is no terminal.
+_WIDTH = 100
+
+campaign_argument = click.argument("campaign", type=click.Path(path_type=Path))
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options that every command takes."""
+
+    output: Path | None
+    verbose: bool
+    quiet: bool
+    as_json: bool
+    plots: bool
+    force: bool
+
+    def folder(self, name: str) -> Path:
+        """Where results go: --output, or results/<name>."""
+        return self.output or Path("results") / name
+
+    @property
+    def console(self) -> Console:
+        """People read standard error; nothing at all with --quiet."""
+        from rich.console import Console
+
+        console = Console(stderr=True, quiet=self.quiet, highlight=False, soft_wrap=True)
+        return console if console.is_terminal else Console(stderr=True, quiet=self.quiet, soft_wrap=True, width=_WIDTH)
+
+    def write(self, folder: Path, files: Mapping[str, bytes]) -> None:
+        """Write the results, all or none, and say where."""
+        write_files(folder, files, force=self.force)
+        self.console.print(f"wrote {', '.join(files)} to {folder}", markup=False)
+
+    def require_free(self, folder: Path, names: Sequence[str]) -> None:
+        """Refuse before the work rather than after it."""
+        check_free(folder, list(names), force=self.force)
+
+    def tell(self, document: Mapping[str, Any]) -> None:
+        """The result on standard output, where --json asks for it."""
+        if self.as_json:
+            click.echo(to_json(document).decode(), nl=False)
+
+
+def shared_options(function: F) -> F:
+    """-o, -v, -q, --json, --no-plots, --force, gathered into one `options` argument."""
+
+    @click.option("-o", "--output", type=click.Path(path_type=Path), help="Folder for the results [results/<name>].")
+    @click.option("-v", "--verbose", is_flag=True, help="Say more: noise, correlations, inputs.")
+    @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+    @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on standard output.")
+    @click.option("--no-plots", is_flag=True, help="Write no PNG files.")
+    @click.option("--force", is_flag=True, help="Replace results that stand.")
+    @wraps(function)
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        plots = not kwargs.pop("no_plots")
+        names = ("output", "verbose", "quiet", "as_json", "force")
+        options = Options(plots=plots, **{name: kwargs.pop(name) for name in names})
+        return function(*args, options=options, **kwargs)
+
+    return wrapped  # type: ignore[return-value]
+
+
+max_nrmse_option = click.option(
+    "--max-nrmse",
+    type=click.FloatRange(min=0.0, min_open=True),
+    help="Exit with status 1 if the NRMSE is above this share (0.02 is 2 %).",
+)
+
+
+def to_json(document: Mapping[str, Any]) -> bytes:
+    return (json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
+
+
+def enforce_nrmse(result: Result, limit: float | None) -> None:
+    """Exit with status 1 where the fit misses the user's limit."""
+    if limit is None or result.quality is None or result.quality.nrmse <= limit:
+        return
+    click.echo(f"bushfit: NRMSE {result.quality.nrmse:.4g} is above --max-nrmse {limit:g}", err=True)
+    click.get_current_context().exit(1)
+
+
+def report(options: Options, title: str, result: Result) -> None:
+    """Table 1 of a result, its quality, and its warnings."""
+    console = options.console
+    console.print(parameter_table(title, result))
+    if result.quality:
+        quality = result.quality
+        console.print(
+            f"NRMSE {100 * quality.nrmse:.2g} %, reduced chi-square {quality.reduced_chi_square:.3g} over "
+            f"{quality.points} points, noise {100 * quality.noise:.2g} % a point"
+        )
+    tells = result.covariance.correlations()
+    shown = tells if options.verbose else [pair for pair in tells if abs(pair[2]) > 0.9]
+    if shown:
+        console.print("correlation: " + ", ".join(f"{one}/{other} {value:+.2f}" for one, other, value in shown))
+    warn(options, result.warnings)
+    if options.verbose:
+        console.print(result.model.equation(), markup=False)
+        for source in result.inputs:
+            console.print(f"input: {source.file} sha256 {source.sha256[:12]}", markup=False)
+
+
+def warn(options: Options, lines: Sequence[str]) -> None:
+    from rich.markup import escape
+
+    for line in lines:
+        options.console.print(f"[yellow]warning:[/yellow] {escape(line)}")
+
+
+def new_table(title: str, *columns: str) -> Table:
+    """A table in the house's style: the first column names, the others are numbers."""
+    from rich import box
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(title=escape(title), title_justify="left", box=box.SIMPLE_HEAD, title_style="bold")
+    for number, column in enumerate(columns):
+        table.add_column(escape(column), justify="right" if number else "left", no_wrap=True)
+    return table
+
+
+def parameter_table(title: str, result: Result) -> Table:
+    """The paper's Table 1 with uncertainty: value, standard error, 95 % interval, unit."""
+    table = new_table(title, "parameter", "value", "std error", "95 % interval", "unit")
+    for name, parameter in result.model.parameters.items():
+        value, stderr, interval = result.model.values[name], result.covariance.stderr(name), result.interval(name)
+        digits = _digits(value, stderr)
+        table.add_row(
+            name if name in result.fitted else f"{name} (held)",
+            number(value, digits),
+            "" if stderr is None else number(stderr, 2),
+            "" if interval is None else " to ".join(number(end, digits) for end in interval),
+            "-" if parameter.unit == "1" else parameter.unit,
+        )
+    return table
+
+
+def number(value: float, digits: int) -> str:
+    """A number with that many digits, without the padding of exponents: 1.09e6."""
+    mantissa, exponent, power = f"{value:.{digits}g}".partition("e")
+    return f"{mantissa}e{int(power)}" if exponent else mantissa
+
+
+def _digits(value: float, stderr: float | None) -> int:
+    """Digits that carry meaning: two of the standard error."""
+    if not stderr or not value:
+        return 4
+    return int(min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(stderr)) + 2, 2), 6))

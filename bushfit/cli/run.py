@@ -1,0 +1,104 @@
+"""`bushfit run`: the whole chain."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from bushfit.cli.common import (
+    Options,
+    campaign_argument,
+    enforce_nrmse,
+    max_nrmse_option,
+    new_table,
+    number,
+    report,
+    shared_options,
+    to_json,
+)
+
+if TYPE_CHECKING:
+    from bushfit.fitting.procedures import TwoStep
+    from bushfit.results import Result
+
+
+@click.command("run")
+@campaign_argument
+@max_nrmse_option
+@shared_options
+def command(campaign: Path, max_nrmse: float | None, options: Options) -> None:
+    """Fit CAMPAIGN in every way and predict from the result.
+
+    fit-static and fit-dynamic are repeated in turn until they agree (the paper's procedure), with the table of each
+    pass; then all parameters are fitted together, and both results stand side by side. Steps whose tests are missing
+    are passed over, and said.
+
+    Writes static.json, dynamic.json, model.json, loops and sweeps (CSV and PNG), axial and radial (CSV and PNG).
+    """
+    from bushfit.campaign import load_campaign
+    from bushfit.cli.artifacts import artifact_names, loop_files, prediction_files, sweep_files
+    from bushfit.cli.predict import predict_all, tell_predictions
+    from bushfit.fitting.data import Data
+    from bushfit.fitting.procedures import fit_joint, fit_static, fit_two_step
+
+    loaded = load_campaign(campaign)
+    folder = options.folder(loaded.slug)
+    kinds = [kind for kind, tests in (("loops", loaded.loops), ("sweeps", loaded.sweeps)) if tests]
+    names = ["model.json", *artifact_names([*kinds, "axial", "radial"], plots=options.plots)]
+    options.require_free(folder, names)
+    data = Data.of(loaded)
+    documents: dict[str, Result] = {}
+    two_step = None
+    if loaded.loops:
+        documents["static"] = fit_static(data)
+        report(options, f"{loaded.name}: static fit of the loops", documents["static"])
+    if loaded.loops and loaded.sweeps:
+        two_step = fit_two_step(data)
+        documents["dynamic"] = two_step.result
+        _tell_passes(options, two_step)
+        report(options, f"{loaded.name}: static and dynamic fit in turn", two_step.result)
+    else:
+        missing = "sweeps" if loaded.loops else "loops"
+        options.console.print(f"no {missing}: the two-step procedure is passed over", markup=False)
+    joint = fit_joint(data)
+    documents["model"] = joint
+    report(options, f"{loaded.name}: joint fit", joint)
+    if two_step:
+        _tell_cost(options, two_step.result, joint)
+    predictions = predict_all(joint, loaded.predict)
+    tell_predictions(options, joint, predictions)
+    json_documents = {name: result.to_document() for name, result in documents.items()}
+    files = {
+        **{f"{name}.json": to_json(document) for name, document in json_documents.items()},
+        **loop_files(joint.model, data.loops, plots=options.plots),
+        **sweep_files(joint.model, data.sweeps, plots=options.plots),
+        **prediction_files(predictions, data.sweeps, loaded.bushing.name, plots=options.plots),
+    }
+    options.write(folder, files)
+    options.tell(json_documents)
+    enforce_nrmse(joint, max_nrmse)
+
+
+def _tell_passes(options: Options, two_step: TwoStep) -> None:
+    table = new_table("static and dynamic fit in turn, pass by pass", "pass", *two_step.passes[0])
+    for count, values in enumerate(two_step.passes, start=1):
+        table.add_row(str(count), *(number(value, 5) for value in values.values()))
+    options.console.print(table)
+
+
+def _tell_cost(options: Options, two_step: Result, joint: Result) -> None:
+    """What the two-step procedure costs: its values and errors beside those of the joint fit."""
+    columns = ("two-step", "std error", "joint", "std error", "difference", "error ratio")
+    table = new_table("what the two-step procedure costs", "parameter", *columns)
+    for name in joint.fitted:
+        if name not in two_step.model.values:
+            continue
+        one, other = two_step.model.values[name], joint.model.values[name]
+        errors = two_step.covariance.stderr(name), joint.covariance.stderr(name)
+        ratio = f"{errors[0] / errors[1]:.1f}" if errors[0] and errors[1] else ""
+        shown = ["" if error is None else number(error, 2) for error in errors]
+        difference = f"{100 * (one / other - 1):+.1f} %"
+        table.add_row(name, number(one, 4), shown[0], number(other, 4), shown[1], difference, ratio)
+    options.console.print(table)

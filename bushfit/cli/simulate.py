@@ -1,0 +1,113 @@
+"""`bushfit simulate`: model -> a simulated campaign of raw tests."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from bushfit.cli.common import Options, shared_options
+
+if TYPE_CHECKING:
+    from bushfit.model import Model
+    from bushfit.schema import SimulateSettings
+
+
+@click.command("simulate")
+@click.argument("source", metavar="CAMPAIGN|MODEL.json", type=click.Path(path_type=Path))
+@click.option("--seed", type=click.IntRange(min=0), help="Of the random numbers [0].")
+@click.option("--repeats", type=click.IntRange(1, 1000), help="Of each sweep [1].")
+@click.option("--noise", help='Scatter of a sweep point relative to |K|, such as "0.5 %".')
+@click.option("--force-noise", help="Scatter of a loop's force relative to its half range.")
+@click.option("--displacement-noise", help="Scatter of a loop's displacement relative to its amplitude.")
+@click.option("--gain-error", help='Gain error shared by a block (one repeat of one level), such as "0.4 %".')
+@click.option("--phase-error", help='Phase error shared by a block, such as "0.2 deg".')
+@click.option("--effect", "effects", multiple=True, help='Hide an effect, such as "inertia.mass=0.1 kg".')
+@shared_options
+def command(source: Path, effects: tuple[str, ...], options: Options, **settings: Any) -> None:
+    """Put a model on the virtual rig and write a campaign of simulated raw tests.
+
+    The model is MODEL.json, tested as the paper's bushing was, or the [simulate] table of CAMPAIGN with tests of its
+    own. Equations (3) and (5) are stepped through time; the closed form that the fits use is not involved.
+
+    Writes campaign.toml, the CSV files it names, and truth.json, the model behind them.
+    """
+    from bushfit.simulation import simulate, to_files
+
+    truth, plan = _task(source)
+    plan = _with_options(plan, settings)
+    for text in effects:
+        truth = _with_effect(truth, text)
+    files = to_files(simulate(truth, plan))
+    folder = options.folder(f"simulated {_slug(truth)}")
+    options.console.print(truth.equation(), markup=False)
+    options.write(folder, files)
+    options.tell({"truth": truth.to_document(), "files": sorted(files)})
+
+
+def _task(source: Path) -> tuple[Model, SimulateSettings]:
+    from bushfit.campaign import load_campaign
+    from bushfit.results import load_result
+    from bushfit.schema import SimulateSettings
+    from bushfit.simulation import model_of
+
+    if source.suffix.lower() == ".json":
+        return load_result(source).model, SimulateSettings()
+    campaign = load_campaign(source)
+    truth = model_of(campaign)
+    return truth, campaign.simulate or SimulateSettings()
+
+
+def _with_options(plan: SimulateSettings, settings: dict[str, Any]) -> SimulateSettings:
+    from bushfit.errors import BushfitError, UnitError
+    from bushfit.units import quantity
+
+    changes: dict[str, Any] = {}
+    for name, given in settings.items():
+        if given is None:
+            continue
+        value = given
+        if isinstance(given, str):
+            option = "--" + name.replace("_", "-")
+            try:
+                value = quantity(given, "rad" if name == "phase_error" else "1")
+            except BushfitError as error:
+                error.place = option
+                raise
+            if not 0.0 <= value < 1.0:
+                raise UnitError("impossible size", place=option, found=given, expected="0 up to 100 %, or below 1 rad")
+        changes[name] = value
+    return replace(plan, **changes)
+
+
+def _with_effect(model: Model, text: str) -> Model:
+    from bushfit.errors import ModelError
+    from bushfit.units import any_quantity
+
+    name, found, value = text.partition("=")
+    effect, dot, _ = name.strip().partition(".")
+    if not (found and dot):
+        raise ModelError(
+            "not an effect with a value", place="--effect", found=repr(text), expected='such as "inertia.mass=0.1 kg"'
+        )
+    number = value.strip()
+    size = float(number) if _is_number(number) else any_quantity(number)
+    if effect in model.effects:
+        return model.with_values({name.strip(): size})
+    return model.with_effect(effect, {name.strip(): size})
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _slug(model: Model) -> str:
+    from bushfit.output import folder_name
+
+    return folder_name(model.bushing.name)

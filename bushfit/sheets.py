@@ -1,0 +1,147 @@
+"""Tables for spreadsheets: units in every header, one row a point."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bushfit.geometry import Direction
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from bushfit.effects.contract import Array
+    from bushfit.fitting.terms import LoopTerm, SweepTerm
+    from bushfit.measurement import Loop, Sweep
+    from bushfit.model import Model
+    from bushfit.prediction import Prediction
+
+#: Displacement and stiffness as engineers read them: unit and factor from SI.
+_TRANSLATION = {"length": ("mm", 1e3), "force": ("N", 1.0), "stiffness": ("N/mm", 1e-3)}
+_ROTATION = {"length": ("deg", 180.0 / np.pi), "force": ("N m", 1.0), "stiffness": ("N m/rad", 1.0)}
+
+
+def display_units(direction: Direction) -> Mapping[str, tuple[str, float]]:
+    """Unit and factor from SI of length, force and stiffness in a direction."""
+    return _ROTATION if direction is Direction.TORSION else _TRANSLATION
+
+
+def prediction_table(prediction: Prediction) -> pd.DataFrame:
+    """The table of `predict`: six columns, then low and high of the last four."""
+    import pandas as pd
+
+    units = display_units(prediction.direction)
+    length, length_factor = units["length"]
+    stiffness, factor = units["stiffness"]
+    columns = {
+        "frequency [Hz]": prediction.frequency,
+        f"amplitude [{length}]": prediction.amplitude * length_factor,
+    }
+    bands = {
+        f"stiffness [{stiffness}]": (prediction.stiffness, factor),
+        "loss factor [-]": (prediction.loss_factor, 1.0),
+        f"storage stiffness [{stiffness}]": (prediction.storage_stiffness, factor),
+        f"loss stiffness [{stiffness}]": (prediction.loss_stiffness, factor),
+    }
+    columns |= {name: band.value * scale for name, (band, scale) in bands.items()}
+    for name, (band, scale) in bands.items():
+        columns |= {f"{name}, low": band.low * scale, f"{name}, high": band.high * scale}
+    return pd.DataFrame(columns)
+
+
+def loops_table(model: Model, terms: Sequence[LoopTerm]) -> pd.DataFrame:
+    """Measured and modelled force of every loop, row by row (or by bin of phase where a loop is long)."""
+    import pandas as pd
+
+    frames = []
+    for term in terms:
+        units = display_units(term.direction)
+        (length, length_factor), (force, force_factor) = units["length"], units["force"]
+        drive = term.drive
+        frames.append(
+            pd.DataFrame(
+                {
+                    "loop": term.loop.name,
+                    "direction": str(term.direction),
+                    "time [s]": drive.phase / drive.frequency,
+                    f"displacement [{length}]": drive.displacement(drive.phase) * length_factor,
+                    f"force [{force}]": drive.force * force_factor,
+                    f"model force [{force}]": term.force(model) * force_factor,
+                    "residual [noise]": term.residual(model),
+                }
+            )
+        )
+    return pd.concat(frames, ignore_index=True)
+
+
+def sweeps_table(model: Model, terms: Sequence[SweepTerm]) -> pd.DataFrame:
+    """Measured and modelled dynamic stiffness of every sweep, sorted by amplitude, repeat and frequency."""
+    import pandas as pd
+
+    frames = []
+    for term in terms:
+        units = display_units(term.direction)
+        (length, length_factor), (stiffness, factor) = units["length"], units["stiffness"]
+        modelled = term.stiffness(model)
+        gain, phase = np.split(term.residual(model), 2)
+        frames.append(
+            pd.DataFrame(
+                {
+                    "sweep": term.sweep.name,
+                    "direction": str(term.direction),
+                    "frequency [Hz]": term.frequency,
+                    f"amplitude [{length}]": term.amplitude * length_factor,
+                    "repeat": term.sweep.repeat[term.order],
+                    f"stiffness [{stiffness}]": np.abs(term.measured) * factor,
+                    "loss factor [-]": _loss_factor(term.measured),
+                    f"model stiffness [{stiffness}]": np.abs(modelled) * factor,
+                    "model loss factor [-]": _loss_factor(modelled),
+                    "stiffness residual [noise]": gain,
+                    "loss residual [noise]": phase,
+                }
+            )
+        )
+    return pd.concat(frames, ignore_index=True)
+
+
+def raw_loop_table(loop: Loop) -> pd.DataFrame:
+    """A loop as a rig writes it: time, displacement, force."""
+    import pandas as pd
+
+    units = display_units(loop.direction)
+    (length, length_factor), (force, force_factor) = units["length"], units["force"]
+    return pd.DataFrame(
+        {
+            "time [s]": loop.time,
+            f"displacement [{length}]": loop.displacement * length_factor,
+            f"force [{force}]": loop.force * force_factor,
+        }
+    )
+
+
+def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
+    """A sweep as a rig writes it: frequency, amplitude, repeat, stiffness, loss factor."""
+    import pandas as pd
+
+    units = display_units(sweep.direction)
+    (length, length_factor), (stiffness, factor) = units["length"], units["stiffness"]
+    return pd.DataFrame(
+        {
+            "frequency [Hz]": sweep.frequency,
+            f"amplitude [{length}]": sweep.amplitude * length_factor,
+            "repeat": sweep.repeat,
+            f"stiffness [{stiffness}]": np.abs(sweep.stiffness) * factor,
+            "loss factor [-]": _loss_factor(sweep.stiffness),
+        }
+    )
+
+
+def _loss_factor(stiffness: Array) -> Array:
+    return np.imag(stiffness) / np.real(stiffness)
+
+
+def to_csv(table: pd.DataFrame) -> bytes:
+    """Comma, decimal point, UTF-8, seven digits."""
+    return table.to_csv(index=False, float_format="%.7g", lineterminator="\n").encode()

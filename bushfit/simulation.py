@@ -1,0 +1,181 @@
+"""Simulated campaigns: what a rig would write for a known model, by the time-domain road only.
+
+Loops and sweeps come from `rig`, which steps Eqs. (3) and (5) through time; the closed form that the fits use
+is not involved. Noise is added as a rig has it: from point to point, and shared by a block.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bushfit import rig
+from bushfit.campaign import Campaign
+from bushfit.effects import BASE
+from bushfit.effects.contract import Array
+from bushfit.errors import CampaignError
+from bushfit.geometry import Direction
+from bushfit.measurement import Loop, Sweep
+from bushfit.model import FIVE, Model
+from bushfit.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+
+if TYPE_CHECKING:
+    from numpy.random import Generator
+
+#: The paper's tests: one loop of 1 mm at 0.1 Hz, and 5 to 155 Hz at three amplitudes in two directions.
+PAPER_LOOPS = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=3),)
+PAPER_SWEEPS = tuple(
+    SimulatedSweep(direction, (1e-4, 2e-4, 5e-4), tuple(float(f) for f in range(5, 156, 10)))
+    for direction in (Direction.AXIAL, Direction.RADIAL)
+)
+_ROWS_PER_CYCLE = 1000
+_STEPS_PER_ROW = 2
+_RUN_IN_CYCLES = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """A simulated campaign: the true model, the plan, and what the rig wrote."""
+
+    truth: Model
+    plan: SimulateSettings
+    loops: tuple[Loop, ...]
+    sweeps: tuple[Sweep, ...]
+
+    def campaign(self) -> Campaign:
+        """The measurements as a campaign in memory, without the truth."""
+        bushing = self.truth.bushing
+        return Campaign(bushing.name, Path(bushing.name), bushing, self.loops, self.sweeps)
+
+
+def model_of(campaign: Campaign) -> Model:
+    """The model that a campaign's [simulate] table describes.
+
+    Raises:
+        CampaignError: no such table, or a parameter of the paper's five that has no value.
+        ModelError: an unknown effect or an impossible value.
+    """
+    if campaign.simulate is None:
+        raise CampaignError(
+            "nothing says what to simulate",
+            file=campaign.path,
+            expected="a [simulate] table with parameters",
+            hint="or fit the campaign first and simulate its model.json",
+        )
+    values = dict(campaign.simulate.parameters)
+    missing = [name for name in FIVE if name not in values]
+    if missing:
+        raise CampaignError(
+            "parameters without a value",
+            file=campaign.path,
+            place="[simulate.parameters]",
+            found="no " + ", ".join(missing),
+            expected="all of " + ", ".join(FIVE),
+        )
+    effects = campaign.simulate.effects
+    values |= {f"{effect}.{name}": value for effect, table in effects.items() for name, value in table.items()}
+    return Model(campaign.bushing, (*BASE, *effects), values)
+
+
+def simulate(truth: Model, plan: SimulateSettings) -> Simulated:
+    """Put a model on the virtual rig and measure it as planned; the same seed gives the same data.
+
+    Args:
+        truth: bushing and effects, those of the rig included.
+        plan: tests, repeats, noise and seed; the paper's tests where it names none.
+    """
+    random = np.random.default_rng(plan.seed)
+    tests = (plan.loops, plan.sweeps) if plan.loops or plan.sweeps else (PAPER_LOOPS, PAPER_SWEEPS)
+    loops = tuple(_loop(truth, test, number, plan, random) for number, test in enumerate(tests[0], start=1))
+    names = _names([f"sweep_{test.direction}" for test in tests[1]])
+    sweeps = tuple(_sweep(truth, test, name, plan, random) for name, test in zip(names, tests[1], strict=True))
+    return Simulated(truth, plan, loops, sweeps)
+
+
+def _names(stems: Sequence[str]) -> list[str]:
+    return [stem if stems.count(stem) == 1 else f"{stem}_{number}" for number, stem in enumerate(stems, start=1)]
+
+
+def _loop(truth: Model, test: SimulatedLoop, number: int, plan: SimulateSettings, random: Generator) -> Loop:
+    measured = rig.record(
+        truth,
+        test.direction,
+        test.frequency,
+        test.amplitude,
+        cycles=test.cycles,
+        run_in=_RUN_IN_CYCLES,
+        steps_per_cycle=_ROWS_PER_CYCLE * _STEPS_PER_ROW,
+        waveform=test.waveform,
+        kind="loop",
+    )
+    rows = slice(None, None, _STEPS_PER_ROW)
+    force, displacement = measured.force[rows], measured.displacement[rows]
+    half_range = np.ptp(force) / 2.0
+    return Loop(
+        f"loop_{test.direction}_{number}",
+        test.direction,
+        measured.time[rows],
+        displacement + plan.displacement_noise * test.amplitude * random.standard_normal(force.size),
+        force + plan.force_noise * half_range * random.standard_normal(force.size),
+    )
+
+
+def _sweep(truth: Model, test: SimulatedSweep, name: str, plan: SimulateSettings, random: Generator) -> Sweep:
+    levels, steps = np.meshgrid(test.amplitudes, test.frequencies, indexing="ij")
+    clean = rig.dynamic_stiffness(truth, test.direction, steps.ravel(), levels.ravel()).reshape(levels.shape)
+    measured = np.stack([_with_noise(clean, plan, random) for _ in range(plan.repeats)], axis=1)
+    shape = measured.shape
+
+    def spread(values: Array, axis: int) -> Array:
+        placed = np.reshape(values, [-1 if i == axis else 1 for i in range(3)])
+        return np.broadcast_to(placed, shape).ravel()
+
+    return Sweep(
+        name,
+        test.direction,
+        spread(np.array(test.frequencies), 2),
+        spread(np.array(test.amplitudes), 0),
+        measured.ravel(),
+        spread(np.arange(1, plan.repeats + 1), 1),
+    )
+
+
+def _with_noise(clean: Array, plan: SimulateSettings, random: Generator) -> Array:
+    """One repeat of every level, (levels, frequencies): scatter of each point, gain and phase error of each block."""
+    blocks = (clean.shape[0], 1)
+    gain = plan.gain_error * random.standard_normal(blocks)
+    phase = plan.phase_error * random.standard_normal(blocks)
+    scatter = plan.noise * (random.standard_normal(clean.shape) + 1j * random.standard_normal(clean.shape))
+    return clean * (1.0 + gain) * np.exp(1j * phase) * (1.0 + scatter)
+
+
+def to_files(simulated: Simulated) -> dict[str, bytes]:
+    """The campaign as files: CSVs, `campaign.toml` that names them, and `truth.json`, the model behind them."""
+    from bushfit.results import Result
+    from bushfit.sheets import raw_loop_table, raw_sweep_table, to_csv
+
+    files = {f"{loop.name}.csv": to_csv(raw_loop_table(loop)) for loop in simulated.loops}
+    files |= {f"{sweep.name}.csv": to_csv(raw_sweep_table(sweep)) for sweep in simulated.sweeps}
+    files["campaign.toml"] = _campaign_toml(simulated).encode()
+    truth = Result(simulated.truth, warnings=("simulated: the values a rig simulation was given, not a fit",))
+    files["truth.json"] = (json.dumps(truth.to_document(), indent=1) + "\n").encode()
+    return files
+
+
+def _campaign_toml(simulated: Simulated) -> str:
+    bushing, plan = simulated.truth.bushing, simulated.plan
+    lines = [
+        f"# Simulated by bushfit simulate with seed {plan.seed}: no rubber was tested. The model is in truth.json.",
+        "[bushing]",
+        f"name = {json.dumps(bushing.name, ensure_ascii=False)}",
+        *(f'{key} = "{getattr(bushing, key) * 1e3:.6g} mm"' for key in ("inner_radius", "outer_radius", "length")),
+    ]
+    for kind, tests in (("loops", simulated.loops), ("sweeps", simulated.sweeps)):
+        for test in tests:
+            lines += ["", f"[[{kind}]]", f'file = "{test.name}.csv"', f'direction = "{test.direction}"']
+    return "\n".join(lines) + "\n"
