@@ -18,13 +18,13 @@ from bushfit.geometry import Bushing
 from bushfit.measurement import Loop, Sweep
 from bushfit.reading import read_loop, read_sweep
 from bushfit.schema import (
-    FIT_KEYS,
     CampaignFile,
     FitSettings,
     LoopFile,
     PredictSettings,
     SimulateSettings,
     SweepFile,
+    fit_keys,
     unknown_key,
 )
 
@@ -131,8 +131,9 @@ def _parse(path: Path) -> dict[str, Any]:
             hint="give the campaign file, not a measurement",
         )
     try:
-        return tomllib.loads(data.decode("utf-8-sig"))
-    except tomllib.TOMLDecodeError as error:
+        tables = tomllib.loads(data.decode("utf-8-sig"))
+        repr(tables)  # an error may have to quote any part of it
+    except ValueError as error:
         reason = re.fullmatch(r"(?P<problem>.*) \(at (?P<place>.*)\)", str(error), re.DOTALL)
         raise CampaignError(
             "this is not valid TOML",
@@ -144,6 +145,7 @@ def _parse(path: Path) -> dict[str, Any]:
         ) from error
     except RecursionError as error:
         raise CampaignError("the tables are nested too deeply", file=path, expected="plain tables") from error
+    return tables
 
 
 def _check(tables: Mapping[str, Any], file: Path) -> CampaignFile:
@@ -179,7 +181,7 @@ def _complaint(detail: ErrorDetails) -> BushfitError:
 
 def _keys(table: type) -> Sequence[str]:
     """The keys that a table of the file may have."""
-    return FIT_KEYS if table is FitSettings else [entry.name for entry in fields(table)]
+    return fit_keys() if table is FitSettings else [entry.name for entry in fields(table)]
 
 
 def _table_at(location: tuple[int | str, ...]) -> type:

@@ -210,7 +210,7 @@ class Model:
     ) -> Array:
         """Force over a displacement history [N or N m], from rest or on the steady cycle."""
         setting = Setting(self.bushing, direction, kind)
-        respond = self._stack_force(setting, self.values if values is None else values)
+        respond = self._stack_force(setting, self.values if values is None else values, self._of(Layer))
         return respond(displacement)
 
     def _stack_stiffness(self, setting: Setting, values: Values) -> StiffnessBelow:
@@ -219,19 +219,33 @@ class Model:
             base = self._adjusted(setting, values, omega, amplitude, strain)
             return self._branch_stiffness(setting, values, omega, strain, base)
 
-        def wrap(below: StiffnessBelow, layer: Layer) -> StiffnessBelow:
+        per_sample = {
+            name: value if np.ndim(value) == 0 else np.asarray(value)[..., None] for name, value in values.items()
+        }
+        layers = self._of(Layer)
+
+        def below(count: int) -> StiffnessBelow:
+            def cycle(omega: Array, motion: Array) -> Array:
+                force = self._stack_force(setting, per_sample, layers[:count])
+                return force(History.steady(motion, cast(float, omega[..., None] / (2.0 * np.pi))))
+
+            if count == 0:
+                return StiffnessBelow(rubber, cycle)
+            layer, inner = layers[count - 1], below(count - 1)
             own = self._own(layer, values, _base_values(values))
-            return lambda omega, amplitude: layer.stiffness(own, below, omega, amplitude, setting)
+            return StiffnessBelow(
+                lambda omega, amplitude: layer.stiffness(own, inner, omega, amplitude, setting), cycle
+            )
 
-        return reduce(wrap, self._of(Layer), cast(StiffnessBelow, rubber))
+        return below(len(layers))
 
-    def _stack_force(self, setting: Setting, values: Values) -> ForceBelow:
+    def _stack_force(self, setting: Setting, values: Values, layers: Sequence[Layer]) -> ForceBelow:
         per_displacement = self.bushing.unit_strain(setting.direction)
         factor = self.bushing.stiffness_per_modulus(setting.direction) / (2.0 * per_displacement)
 
         def rubber(displacement: History) -> Array:
             strain = displacement.scaled(per_displacement)
-            omega = np.full((1,), displacement.omega)
+            omega = np.atleast_1d(displacement.omega)
             base = self._adjusted(setting, values, omega, displacement.amplitude, strain.amplitude)
             stresses = (branch.stress(self._own(branch, values, base), strain) for branch in self._of(Branch))
             return factor * sum(stresses, start=np.zeros(1))
@@ -240,7 +254,7 @@ class Model:
             own = self._own(layer, values, _base_values(values))
             return lambda displacement: layer.force(own, below, displacement, setting)
 
-        return reduce(wrap, self._of(Layer), cast(ForceBelow, rubber))
+        return reduce(wrap, layers, cast(ForceBelow, rubber))
 
     def _branch_stiffness(self, setting: Setting, values: Values, omega: Array, strain: Array, base: Values) -> Array:
         moduli = (branch.modulus(self._own(branch, values, base), omega, strain) for branch in self._of(Branch))

@@ -89,7 +89,7 @@ def read_loop(
     if "time" in table.roles:
         wanted["time"] = table.column("time", "s")
     elif rate is None and frequency is None:
-        raise table.missing("time", hint='or state rate = "10 mm/min", or frequency and waveform, in the campaign')
+        raise table.missing("time", "s", hint='or state rate = "10 mm/min", or frequency and waveform, in the campaign')
     values = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
 
     displacement, force = values["displacement"], force_sign * values["force"]
@@ -158,7 +158,7 @@ def read_sweep(
 
     for role in {"frequency", "amplitude", "stiffness", "storage_stiffness"} & set(values):
         label = role.replace("_", " ")
-        table.refuse(values[role] <= 0.0, wanted[role], f"the {label} is not positive", f"a {label} above zero")
+        table.refuse(values[role] <= 0.0, wanted[role], f"the {label} is not positive", "a number above zero")
     stiffness, loss_factor = _complex_stiffness(pair, values[pair[0]], values[pair[1]])
     low, high = _LOSS_FACTOR_RANGE
     table.refuse(
@@ -180,6 +180,7 @@ def _check_not_swapped(table: Table, direction: Direction) -> None:
         displacement, force = (table.roles[role].header for role in ("displacement", "force"))
         raise table.error(
             "displacement and force are swapped",
+            line=table.header_line,
             found=f'"{displacement}" and "{force}"',
             expected="a displacement in units of displacement, and a force in units of force",
             hint="correct the header, or name the columns in the campaign: columns = "

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from functools import cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -15,16 +16,12 @@ from bushfit.errors import BushfitError, CampaignError
 from bushfit.geometry import Direction
 from bushfit.measurement import Waveform
 from bushfit.reading import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
-from bushfit.units import any_quantity, quantity
-
-#: The paper's parameters and their SI units; m is in Pa s^alpha. Those of an added effect are "<effect>.<name>".
-PARAMETER_UNITS = {"mu": "Pa", "m": "Pa", "alpha": "1", "sigma_fmax": "Pa", "eps_half": "1"}
-
-FIT_KEYS = ("dynamic_amplitudes", "residuals", *PARAMETER_UNITS)
+from bushfit.units import quantity
 
 Residuals = Literal["complex", "magnitude_loss_factor"]
 
 _LARGEST_GRID = 100_000
+_LARGEST_NUMBER = 1e100
 _S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
 
 
@@ -74,18 +71,32 @@ def _frequencies(raw: object, _: ValidationInfo) -> object:
     return [f"{value!r} Hz" for value in (start + step * np.arange(count)).tolist()]
 
 
-def _parameter(name: str, raw: object) -> float:
-    """The SI value of a model parameter."""
-    if name not in PARAMETER_UNITS:
-        if "." in name:
-            return any_quantity(raw)
-        raise unknown_key(name, PARAMETER_UNITS)
-    unit = PARAMETER_UNITS[name]
-    if unit == "1" and isinstance(raw, int | float):
-        return any_quantity(raw)
-    if name == "m" and isinstance(raw, str):
-        raw = _S_TO_ALPHA.sub("", raw)
-    return quantity(raw, unit)
+@cache
+def _parameter_units() -> dict[str, str]:
+    """SI unit of each parameter of the library by name; the s^alpha of m is left out."""
+    from bushfit.effects import LIBRARY, qualified
+
+    return {
+        qualified(effect, parameter): _S_TO_ALPHA.sub("", parameter.unit)
+        for effect in LIBRARY.values()
+        for parameter in effect.parameters
+    }
+
+
+def fit_keys() -> list[str]:
+    """The keys that [fit] may have."""
+    return ["dynamic_amplitudes", "residuals", *_parameter_units()]
+
+
+def _parameter(name: str, raw: Any) -> float:
+    """The SI value of a model parameter; ratios, and parameters of added effects, may be plain numbers."""
+    units = _parameter_units()
+    if name not in units:
+        raise unknown_key(name, units)
+    is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
+    if is_number and (units[name] == "1" or "." in name) and abs(raw) <= _LARGEST_NUMBER:
+        return float(raw)
+    return quantity(_S_TO_ALPHA.sub("", raw) if name == "m" and isinstance(raw, str) else raw, units[name])
 
 
 def _placed(place: str, name: str, raw: object) -> float:
@@ -98,6 +109,18 @@ def _placed(place: str, name: str, raw: object) -> float:
 
 def _parameters(raw: object, _: ValidationInfo) -> object:
     return {name: _placed(name, name, value) for name, value in raw.items()} if isinstance(raw, dict) else raw
+
+
+def _effects(raw: object, _: ValidationInfo) -> object:
+    """Parameters by effect, in SI."""
+    if not isinstance(raw, dict):
+        return raw
+    return {
+        effect: {key: _placed(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in table.items()}
+        if isinstance(table, dict)
+        else table
+        for effect, table in raw.items()
+    }
 
 
 def _parameter_settings(raw: object, _: ValidationInfo) -> object:
@@ -122,11 +145,10 @@ def _fit_table(raw: object, _: ValidationInfo) -> object:
     """Gather [fit.mu], [fit."inertia.mass"] and the like under one key."""
     if not isinstance(raw, dict):
         return raw
-    parameters = {name: table for name, table in raw.items() if name in PARAMETER_UNITS or "." in name}
-    others = {key: value for key, value in raw.items() if key not in parameters}
-    if "parameters" in others:
-        raise unknown_key("parameters", FIT_KEYS)
-    return {**others, "parameters": parameters}
+    if "parameters" in raw:
+        raise unknown_key("parameters", fit_keys())
+    settings = {key: value for key, value in raw.items() if key not in _parameter_units()}
+    return {**settings, "parameters": {key: value for key, value in raw.items() if key not in settings}}
 
 
 def _roles(known: Iterable[str]) -> BeforeValidator:
@@ -262,9 +284,7 @@ class SimulateSettings:
     """
 
     parameters: Annotated[Mapping[str, float], _converted(_parameters)] = field(default_factory=dict)
-    effects: Mapping[str, Mapping[str, Annotated[float, _converted(lambda raw, _: any_quantity(raw))]]] = field(
-        default_factory=dict
-    )
+    effects: Annotated[Mapping[str, Mapping[str, float]], _converted(_effects)] = field(default_factory=dict)
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
     repeats: Count = 1
     noise: Share = 0.0

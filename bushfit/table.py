@@ -22,7 +22,9 @@ from bushfit.files import read_utf8
 from bushfit.measurement import Floats
 
 _DELIMITERS = (";", "\t", ",")
-_LONGEST_FOUND = 60
+_LONGEST_FOUND = 200
+_LONGEST_HEADER = 10_000
+_EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,14 @@ class Table:
         lines = enumerate(_text(data), start=1)
         filled = ((number, line) for number, line in lines if line.strip(" \t\r\n,;") and not line.startswith("#"))
         header_line, header = next(filled, (1, ""))
+        if len(header) > _LONGEST_HEADER:
+            raise MeasurementError(
+                "the header is too long",
+                file=file,
+                place=f"line {header_line}",
+                found=f"{len(header)} characters",
+                expected=_EXPECTED_HEADER,
+            )
         delimiter = max(_DELIMITERS, key=lambda mark: len(_cells(header, mark)))
         headers = tuple(cell.strip() for cell in _cells(header, delimiter))
         table = cls(file, data, delimiter, headers, header_line, header_line, {})
@@ -99,7 +109,7 @@ class Table:
             UnitError: no unit, an unknown one, or one of another dimension.
         """
         if role not in self.roles:
-            raise self.missing(role)
+            raise self.missing(role, expected)
         column = self.roles[role]
         if column.unit is None and expected != "1":
             example = units.example(expected)
@@ -169,13 +179,13 @@ class Table:
         column = self.roles.get(role)
         return column is not None and column.unit is not None and units.agrees(column.unit, expected)
 
-    def missing(self, role: str, hint: str | None = None) -> MeasurementError:
-        """The error for a role without a column."""
+    def missing(self, role: str, expected: str, hint: str | None = None) -> MeasurementError:
+        """The error for a role without a column, whose SI unit would be `expected`."""
         return self.error(
             f"there is no column for the {_label(role)}",
             line=self.header_line,
             found=", ".join(self.headers),
-            expected=f'a header such as "{_label(role)}"',
+            expected=f'a header such as "{_label(role)} [{units.example(expected)}]"',
             hint=f'name the column in the campaign: columns = {{ {role} = "..." }}' + (f", {hint}" if hint else ""),
         )
 
@@ -199,17 +209,16 @@ class Table:
         return ", ".join(part for part in parts if part) or None
 
     def _check_header(self) -> None:
-        expected = 'a header row such as "time [s],displacement [mm],force [N]"'
         if len(self.headers) < 2:
             raise self.error(
                 "there is only one column",
                 line=self.header_line,
                 found=self.headers[0] if self.headers else "nothing",
-                expected=f"{expected}, separated by comma, semicolon or tab",
+                expected=f"{_EXPECTED_HEADER}, separated by comma, semicolon or tab",
             )
         if all(units.is_number(cell) for cell in self.headers):
             raise self.error(
-                "there is no header", line=self.header_line, found=", ".join(self.headers), expected=expected
+                "there is no header", line=self.header_line, found=", ".join(self.headers), expected=_EXPECTED_HEADER
             )
 
     def _recognise(
@@ -270,9 +279,11 @@ class Table:
                     return self.error(
                         "the row does not match the header",
                         line=line,
-                        found=f"{len(cells)} cells",
+                        found=f"{len(cells)} cell" + "s" * (len(cells) != 1),
                         expected=f"{len(self.headers)} cells",
-                        hint="write numbers with a decimal point, without thousands separators",
+                        hint="write numbers with a decimal point, without thousands separators"
+                        if len(cells) > len(self.headers)
+                        else None,
                     )
                 for column in wanted.values():
                     cell = cells[column.index].strip()

@@ -99,27 +99,19 @@ def quantity(value: object, *expected: str) -> float:
     return _si(number, factor(unit, fitting))
 
 
-def any_quantity(value: object) -> float:
-    """The SI value of a plain number (taken as SI) or of a text with a unit of any dimension.
-
-    Raises:
-        UnitError: neither of the two.
-    """
-    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
-        return float(value)
-    number, unit = _split_quantity(value, "1")
-    return _si(number, _resolve(unit)[0])
-
-
 def describe(expected: str) -> str:
     """An expected SI unit in words: "a length, such as mm"."""
-    kind, example = _KINDS[expected]
+    kind, example = _kind(expected)
     return f"{kind}, such as {example}"
 
 
 def example(expected: str) -> str:
     """A unit that a user would write where the SI unit `expected` is meant."""
-    return _KINDS[expected][1]
+    return _kind(expected)[1]
+
+
+def _kind(expected: str) -> tuple[str, str]:
+    return _KINDS.get(expected, ("a quantity", expected))
 
 
 def _si(number: float, scale: float) -> float:
@@ -128,7 +120,7 @@ def _si(number: float, scale: float) -> float:
 
 
 def _split_quantity(value: object, expected: str) -> tuple[float, str]:
-    kind, unit = _KINDS[expected]
+    kind, unit = _kind(expected)
     wanted = f'{kind} with its unit, such as "10 {unit}"'
     text = str(value).strip()
     number = _NUMBER.match(text)

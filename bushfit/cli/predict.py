@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -60,7 +60,7 @@ def command(
 
     result = load_result(model)
     loaded = load_campaign(campaign) if campaign else None
-    asked = {
+    asked: dict[str, Any] = {
         "frequencies": parse_grid(frequencies, "--frequencies", "Hz"),
         "amplitudes": parse_grid(amplitudes, "--amplitudes", "m"),
         "torsion_amplitudes": parse_grid(torsion_amplitudes, "--torsion-amplitudes", "rad"),

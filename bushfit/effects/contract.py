@@ -28,10 +28,25 @@ Value = Any
 Values = Mapping[str, Value]
 Array = NDArray[Any]
 
-#: (omega [rad/s], amplitude [m or rad]) -> complex dynamic stiffness.
-StiffnessBelow = Callable[[Array, Array], Array]
 #: displacement history -> force [N or N m].
 ForceBelow = Callable[[History], Array]
+
+
+@dataclass(frozen=True)
+class StiffnessBelow:
+    """The response below a layer in the frequency face.
+
+    Args:
+        stiffness: (omega [rad/s], amplitude [m or rad]) -> complex dynamic stiffness.
+        cycle: (omega, one steady cycle of motion per operating point, (..., n, samples)) -> force of the
+            same shape, for the layers that bend the waveform.
+    """
+
+    stiffness: Callable[[Array, Array], Array]
+    cycle: Callable[[Array, Array], Array]
+
+    def __call__(self, omega: Array, amplitude: Array) -> Array:
+        return self.stiffness(omega, amplitude)
 
 
 class Level(IntEnum):

@@ -21,7 +21,7 @@ class History:
         step: time between samples [s].
         periodic: True where the samples are whole cycles of a steady state (the next sample is the
             first again), False where the motion starts from rest before the first sample.
-        frequency: frequency of the excitation [Hz].
+        frequency: frequency of the excitation [Hz]; like the step, it may differ between variants, (..., 1).
         driver: the motion that drives this one, where something that yields lies between the two.
     """
 
@@ -62,13 +62,13 @@ class History:
     @property
     def cycles(self) -> int:
         """Cycles of the excitation in the samples, to the nearest whole one."""
-        return round(self.value.shape[-1] * self.step * self.frequency)
+        return round(self.value.shape[-1] * float(np.max(self.step * self.frequency)))
 
     @property
     def sense(self) -> Array:
-        """Sign of the rate, 0 at rest; where another motion drives this one, the driver's sign while this one moves."""
-        own = np.sign(self.rate)
-        return own if self.driver is None else np.sign(self.with_value(self.driver).rate) * (own != 0.0)
+        """Sign of the rate, 0 at rest: of the driver's, where another motion drives this one."""
+        leading = self if self.driver is None else self.with_value(self.driver)
+        return np.sign(leading.rate)
 
     @property
     def acceleration(self) -> Array:

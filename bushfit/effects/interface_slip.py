@@ -1,4 +1,4 @@
-"""Interface slip: dry friction at the bonded or pressed face of the bushing."""
+"""Interface slip: dry friction at the bonded or pressed face of the bushing, over its play too if there is any."""
 
 from __future__ import annotations
 

@@ -196,3 +196,18 @@ def test_nothing_happens_within_the_gap(amplitude: float) -> None:
     assert np.array_equal(stop.stiffness("axial", 50.0, amplitude), PLAIN.stiffness("axial", 50.0, amplitude))
     loose = PLAIN.with_effect("clearance", {"clearance.delta": 1e-4})
     assert np.all(loose.stiffness("axial", 50.0, amplitude) == 0.0)
+
+
+@pytest.mark.parametrize("ratio", [0.01, 0.1, 0.25, 0.5])
+@pytest.mark.parametrize("direction", ["axial", "radial"])
+def test_play_bends_the_waveform_and_friction_answers_to_it(direction: Direction, ratio: float) -> None:
+    """The stated error, where the describing function alone would be wrong by up to a hundred times as much."""
+    amplitude, samples = 2e-4, 2**14
+    model = PLAIN.with_effect("clearance", {"clearance.delta": ratio * amplitude})
+    sine = History.steady(amplitude * np.cos(2.0 * np.pi * np.arange(samples) / samples), 20.0)
+    exact = 2.0 * np.fft.rfft(model.force(direction, sine))[1] / (samples * amplitude)
+    peak = PLAIN.stiffness(direction, 20.0, amplitude * (1.0 - ratio)) * first_harmonic(np.array(1.0), ratio)
+    found = model.stiffness(direction, 20.0, amplitude)
+    error = np.abs(found / exact - 1.0).max()
+    print(f"{direction}, delta/X = {ratio}: {error:.1e}; at the peak alone {np.abs(peak / exact - 1.0).max():.1e}")
+    assert error < model.records[-1].harmonic_error
