@@ -144,9 +144,12 @@ def read_sweep(
     table = Table.open(file, SWEEP_COLUMNS, columns, units)
     pair = next((pair for pair in STIFFNESS_PAIRS if set(pair) <= set(table.roles)), None)
     if pair is None:
-        pairs = ", or ".join(" and ".join(pair) for pair in STIFFNESS_PAIRS).replace("_", " ")
         raise table.error(
-            "no pair of columns gives a complex stiffness", found=", ".join(table.headers), expected=pairs
+            "no pair of columns gives a complex stiffness",
+            line=table.header_line,
+            found=", ".join(table.headers),
+            expected=", or ".join(" and ".join(pair) for pair in STIFFNESS_PAIRS).replace("_", " "),
+            hint='correct the header, or name the columns in the campaign: columns = { stiffness = "..." }',
         )
     expected = {"frequency": "Hz", "amplitude": direction.displacement_unit, "loss_factor": "1", "phase": "rad"}
     roles = ["frequency", "amplitude", *pair, *(["repeat"] if "repeat" in table.roles else [])]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cache
@@ -20,16 +20,18 @@ from bushfit.units import quantity
 
 Residuals = Literal["complex", "magnitude_loss_factor"]
 
+_MOST_LISTED = 12
 _LARGEST_GRID = 100_000
 _LARGEST_NUMBER = 1e100
 _S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
 
 
-def unknown_key(key: str, known: Iterable[str]) -> CampaignError:
+def unknown_key(key: str, known: Collection[str]) -> CampaignError:
     """The error for a key that is none of the known ones."""
     near = get_close_matches(key, known, n=1, cutoff=0.5)
     hint = f'did you mean "{near[0]}"?' if near else None
-    return CampaignError("unknown key", found=f'"{key}"', expected="one of " + ", ".join(known), hint=hint)
+    expected = "one of " + ", ".join([*known][:_MOST_LISTED]) + (", ..." if len(known) > _MOST_LISTED else "")
+    return CampaignError("unknown key", found=f'"{key}"', expected=expected, hint=hint)
 
 
 def _converted(convert: Callable[[Any, ValidationInfo], Any]) -> BeforeValidator:
@@ -151,7 +153,7 @@ def _fit_table(raw: object, _: ValidationInfo) -> object:
     return {**settings, "parameters": {key: value for key, value in raw.items() if key not in settings}}
 
 
-def _roles(known: Iterable[str]) -> BeforeValidator:
+def _roles(known: Collection[str]) -> BeforeValidator:
     def check_keys(raw: object, _: ValidationInfo) -> object:
         for role in raw if isinstance(raw, dict) else ():
             if role not in known:
