@@ -1,0 +1,66 @@
+"""What the tests share: the paper's bushing and model, other bushings, and where the data lie."""
+
+from __future__ import annotations
+
+import os
+
+# Small matrices, and a worker a core: threads of the linear algebra would only stand in each other's way.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from pathlib import Path
+
+import pytest
+
+from bushfit.effects import BASE
+from bushfit.geometry import Bushing
+from bushfit.model import Model
+
+ROOT = Path(__file__).parents[1]
+TABLE_1 = {"mu": 1.09e6, "m": 2.0e5, "alpha": 0.24, "sigma_fmax": 1.46e4, "eps_half": 1.3e-2}
+CMP_15961 = Bushing("CMP 15 961", 0.010, 0.018, 0.034)
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    """The repository."""
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def bushing() -> Bushing:
+    """The bushing of the paper."""
+    return CMP_15961
+
+
+@pytest.fixture(scope="session")
+def table_1() -> dict[str, float]:
+    """Table 1 of the paper."""
+    return dict(TABLE_1)
+
+
+@pytest.fixture(scope="session")
+def paper_model() -> Model:
+    """The paper's bushing with the parameters of Table 1."""
+    return Model(CMP_15961, BASE, TABLE_1)
+
+
+@pytest.fixture(scope="session")
+def other_models() -> dict[str, Model]:
+    """Bushings unlike the paper's: soft and long, stiff and thin, strongly filled."""
+    return {
+        "soft and long": Model(
+            Bushing("soft and long", 0.012, 0.028, 0.080),
+            BASE,
+            {"mu": 4.5e5, "m": 3.0e4, "alpha": 0.31, "sigma_fmax": 5.0e3, "eps_half": 1.0e-2},
+        ),
+        "stiff and thin": Model(
+            Bushing("stiff and thin", 0.015, 0.019, 0.025),
+            BASE,
+            {"mu": 1.9e6, "m": 4.0e5, "alpha": 0.19, "sigma_fmax": 3.0e4, "eps_half": 2.0e-2},
+        ),
+        "strongly filled": Model(
+            Bushing("strongly filled", 0.009, 0.020, 0.040),
+            BASE,
+            {"mu": 1.3e6, "m": 4.5e5, "alpha": 0.21, "sigma_fmax": 6.0e4, "eps_half": 9.0e-3},
+        ),
+    }
