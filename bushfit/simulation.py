@@ -39,6 +39,16 @@ _RUN_IN_CYCLES = 12
 
 
 @dataclass(frozen=True, eq=False)
+class Undisturbed:
+    """What a rig without error writes: each loop with its record, each sweep with its stiffness over levels and
+    frequencies."""
+
+    truth: Model
+    loops: tuple[tuple[SimulatedLoop, rig.Record], ...]
+    sweeps: tuple[tuple[SimulatedSweep, Array], ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Simulated:
     """A simulated campaign: the true model, the plan, and what the rig wrote."""
 
@@ -89,19 +99,35 @@ def simulate(truth: Model, plan: SimulateSettings) -> Simulated:
         truth: bushing and effects, those of the rig included.
         plan: tests, repeats, noise and seed; the paper's tests where it names none.
     """
-    random = np.random.default_rng(plan.seed)
+    return measure(undisturbed(truth, plan), plan)
+
+
+def undisturbed(truth: Model, plan: SimulateSettings) -> Undisturbed:
+    """What the rig would write if it measured without error: the slow part of a simulation."""
     tests = (plan.loops, plan.sweeps) if plan.loops or plan.sweeps else (PAPER_LOOPS, PAPER_SWEEPS)
-    loops = tuple(_loop(truth, test, number, plan, random) for number, test in enumerate(tests[0], start=1))
-    names = _names([f"sweep_{test.direction}" for test in tests[1]])
-    sweeps = tuple(_sweep(truth, test, name, plan, random) for name, test in zip(names, tests[1], strict=True))
-    return Simulated(truth, plan, loops, sweeps)
+    return Undisturbed(
+        truth,
+        tuple((test, _clean_loop(truth, test)) for test in tests[0]),
+        tuple((test, _clean_sweep(truth, test)) for test in tests[1]),
+    )
+
+
+def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
+    """The same tests as measured with the plan's noise, repeats and seed: quick, for many seeds."""
+    random = np.random.default_rng(plan.seed)
+    loops = tuple(_loop(test, force, number, plan, random) for number, (test, force) in enumerate(clean.loops, start=1))
+    names = _names([f"sweep_{test.direction}" for test, _ in clean.sweeps])
+    sweeps = tuple(
+        _sweep(test, stiffness, name, plan, random) for name, (test, stiffness) in zip(names, clean.sweeps, strict=True)
+    )
+    return Simulated(clean.truth, plan, loops, sweeps)
 
 
 def _names(stems: Sequence[str]) -> list[str]:
     return [stem if stems.count(stem) == 1 else f"{stem}_{number}" for number, stem in enumerate(stems, start=1)]
 
 
-def _loop(truth: Model, test: SimulatedLoop, number: int, plan: SimulateSettings, random: Generator) -> Loop:
+def _clean_loop(truth: Model, test: SimulatedLoop) -> rig.Record:
     measured = rig.record(
         truth,
         test.direction,
@@ -114,20 +140,27 @@ def _loop(truth: Model, test: SimulatedLoop, number: int, plan: SimulateSettings
         kind="loop",
     )
     rows = slice(None, None, _STEPS_PER_ROW)
-    force, displacement = measured.force[rows], measured.displacement[rows]
-    half_range = np.ptp(force) / 2.0
+    return rig.Record(measured.time[rows], measured.displacement[rows], measured.force[rows])
+
+
+def _clean_sweep(truth: Model, test: SimulatedSweep) -> Array:
+    """Complex stiffness, (levels, frequencies)."""
+    levels, steps = np.meshgrid(test.amplitudes, test.frequencies, indexing="ij")
+    return rig.dynamic_stiffness(truth, test.direction, steps.ravel(), levels.ravel()).reshape(levels.shape)
+
+
+def _loop(test: SimulatedLoop, clean: rig.Record, number: int, plan: SimulateSettings, random: Generator) -> Loop:
+    half_range = np.ptp(clean.force) / 2.0
     return Loop(
         f"loop_{test.direction}_{number}",
         test.direction,
-        measured.time[rows],
-        displacement + plan.displacement_noise * test.amplitude * random.standard_normal(force.size),
-        force + plan.force_noise * half_range * random.standard_normal(force.size),
+        clean.time,
+        clean.displacement + plan.displacement_noise * test.amplitude * random.standard_normal(clean.time.size),
+        clean.force + plan.force_noise * half_range * random.standard_normal(clean.time.size),
     )
 
 
-def _sweep(truth: Model, test: SimulatedSweep, name: str, plan: SimulateSettings, random: Generator) -> Sweep:
-    levels, steps = np.meshgrid(test.amplitudes, test.frequencies, indexing="ij")
-    clean = rig.dynamic_stiffness(truth, test.direction, steps.ravel(), levels.ravel()).reshape(levels.shape)
+def _sweep(test: SimulatedSweep, clean: Array, name: str, plan: SimulateSettings, random: Generator) -> Sweep:
     measured = np.stack([_with_noise(clean, plan, random) for _ in range(plan.repeats)], axis=1)
     shape = measured.shape
 
