@@ -17,6 +17,8 @@ from bushfit.errors import ModelError
 #: Inner over outer radius, and length over outer radius, for which Eqs. 11 and 12 were checked.
 RADIUS_RATIO_RANGE = (0.1, 0.97)
 SLENDERNESS_RANGE = (0.05, 100.0)
+#: 1.8 mm over 18 mm is not quite 0.1 in binary.
+_ROUNDING = 1e-9
 
 
 class Direction(StrEnum):
@@ -142,10 +144,7 @@ class Bushing:
         both long and thin, over the checked range.
         """
         a, b = self.inner_radius, self.outer_radius
-        if not (
-            RADIUS_RATIO_RANGE[0] <= a / b <= RADIUS_RATIO_RANGE[1]
-            and SLENDERNESS_RANGE[0] <= self.length / b <= SLENDERNESS_RANGE[1]
-        ):
+        if not (_within(a / b, RADIUS_RATIO_RANGE) and _within(self.length / b, SLENDERNESS_RANGE)):
             raise ModelError(
                 "the radial formula (Eqs. 11, 12) was not checked for this shape",
                 place="inner_radius, outer_radius, length",
@@ -165,3 +164,7 @@ class Bushing:
         )
         denominator = inner * outer * (b**2 + a**2) * (i1b * k1a - i1a * k1b * twice)
         return 3.5 * self._log_ratio - 1.5 * self._q + float(numerator / denominator)
+
+
+def _within(value: float, limits: tuple[float, float]) -> bool:
+    return limits[0] * (1.0 - _ROUNDING) <= value <= limits[1] * (1.0 + _ROUNDING)
