@@ -1,0 +1,137 @@
+"""The friction branch against many-digit arithmetic and against a walk of Eq. 5 from point to point."""
+
+from __future__ import annotations
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+from bushfit.effects import History
+from bushfit.effects.friction import harmonic_shape, modulus, reversals, stress, stress_sensitivities
+
+VALUES = {"sigma_fmax": 1.46e4, "eps_half": 1.3e-2}
+X = np.concatenate([np.logspace(-8, 6, 561), [0.025, 0.02565, 0.026, 1.0]])
+
+
+def exact_shape(x: float) -> tuple[mpmath.mpf, mpmath.mpf]:
+    """(A, B)/(2 e0) with sigma_fmax = eps_half = 1, as model form."""
+    x = mpmath.mpf(x)
+    y = (mpmath.sqrt(x**2 + 6 * x + 1) - x - 1) / 2
+    s = c = 1 + y
+    big = 1 + c / x
+    in_phase = 2 * s * (c / x) * (big / mpmath.sqrt(big**2 - 1) - 1)
+    quadrature = 2 / mpmath.pi * (2 - s * (c / x) * mpmath.log((big + 1) / (big - 1)))
+    return in_phase / (2 * x), quadrature / (2 * x)
+
+
+def relative_error(found: float, exact: mpmath.mpf) -> float:
+    return abs(float(mpmath.mpf(float(found)) / exact - 1))
+
+
+def test_modulus_has_ten_digits_from_1e_8_to_1e6() -> None:
+    found, _ = harmonic_shape(X)
+    with mpmath.workdps(60):
+        exact = [exact_shape(x) for x in X]
+        worst = [
+            max((relative_error(value, e[part]), x) for value, e, x in zip(side, exact, X, strict=True))
+            for part, side in enumerate((found.real, found.imag))
+        ]
+    for part, (error, x) in zip(("storage", "loss"), worst, strict=True):
+        print(f"friction modulus, {part}: {-math.log10(error):.1f} digits at worst, at e0/eps_half = {x:.3g}")
+    assert max(worst)[0] <= 1e-10
+
+
+def test_derivative_of_the_modulus() -> None:
+    _, slope = harmonic_shape(X)
+    with mpmath.workdps(60):
+        exact = [
+            [mpmath.diff(lambda t, i=i: exact_shape(t)[i], mpmath.mpf(x), h=mpmath.mpf(x) / 10**15) for i in (0, 1)]
+            for x in X[::5]
+        ]
+        worst = max(
+            max(abs(s.real - float(e[0])), abs(s.imag - float(e[1]))) / abs(complex(e[0], e[1]))
+            for s, e in zip(slope[::5], exact, strict=True)
+        )
+    print(f"derivative of the friction modulus: {-math.log10(worst):.1f} digits at worst")
+    assert worst <= 1e-9
+
+
+def test_limits_of_small_and_large_strain() -> None:
+    half = VALUES["sigma_fmax"] / (2.0 * VALUES["eps_half"])
+    omega = np.ones(1)
+    assert modulus(VALUES, omega, np.zeros(1))[0] == half + 0j
+    assert modulus(VALUES, omega, np.array([1e-12]))[0] == pytest.approx(half, rel=1e-9)
+    assert abs(modulus(VALUES, omega, np.array([1e6 * VALUES["eps_half"]]))[0]) < 1e-2 * half / 1e3
+    large, _ = harmonic_shape(np.array([1e9, 1e6]))
+    assert large.imag[0] * 1e9 == pytest.approx(2.0 / np.pi, rel=1e-6)  # a square wave of height sigma_fmax
+    assert np.all(np.isfinite(large))
+
+
+def walk(strain: np.ndarray, sigma: float, eps_half: float) -> np.ndarray:
+    """Eq. 5 as it is written, from rest, sample by sample."""
+    stress_now, turn, turn_stress, sense, out = 0.0, 0.0, 0.0, 0.0, []
+    previous = 0.0
+    for e in strain:
+        move = np.sign(e - previous)
+        if move and move != sense:
+            turn, turn_stress, sense = previous, stress_now, move
+        if sense:
+            denominator = eps_half * (1.0 - sense * turn_stress / sigma) + sense * (e - turn)
+            stress_now = turn_stress + (e - turn) * (sigma - sense * turn_stress) / denominator
+        out.append(stress_now)
+        previous = e
+    return np.array(out)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_stress_from_rest_is_eq_5(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    strain = np.cumsum(np.repeat(rng.normal(size=60), 7)) * 2e-3
+    strain[100:110] = strain[100]  # a stretch at rest
+    found = stress(VALUES, History(strain, 1e-3, periodic=False, frequency=1.0))
+    expected = walk(strain, *VALUES.values())
+    assert np.max(np.abs(found - expected)) < 1e-12 * VALUES["sigma_fmax"]
+
+
+@pytest.mark.parametrize("x", [1e-4, 0.5, 3.8, 200.0])
+def test_steady_loop_is_where_the_walk_ends(x: float) -> None:
+    """Amplitude y, first harmonic and dissipation of the closed form, from many cycles of Eq. 5."""
+    amplitude, samples = x * VALUES["eps_half"], 4096
+    cycle = -amplitude * np.cos(2.0 * np.pi * np.arange(samples) / samples)
+    steady = stress(VALUES, History.steady(cycle, 1.0))
+    if x >= 0.5:  # less strain takes thousands of cycles to settle
+        rested = walk(np.tile(cycle, 200), *VALUES.values())[-samples:]
+        assert np.max(np.abs(rested - steady)) < 1e-5 * VALUES["sigma_fmax"]
+    y = (math.sqrt(x * x + 6.0 * x + 1.0) - x - 1.0) / 2.0
+    assert steady.max() / VALUES["sigma_fmax"] == pytest.approx(y, abs=1e-11)
+    assert steady.min() / VALUES["sigma_fmax"] == pytest.approx(-y, abs=1e-11)
+    harmonic = np.fft.rfft(steady)[1] / np.fft.rfft(cycle)[1] / 2.0
+    closed = modulus(VALUES, np.ones(1), np.array([amplitude]))[0]
+    print(f"e0/eps_half = {x}: walk and closed form differ by {abs(harmonic / closed - 1.0):.1e}")
+    assert harmonic == pytest.approx(closed, rel=1e-5)
+
+
+def test_sensitivities_along_a_loop() -> None:
+    cycle = 0.03 * np.sin(2.0 * np.pi * np.arange(512) / 512) + 0.01 * np.sin(6.0 * np.pi * np.arange(512) / 512)
+    for history in (History.steady(cycle, 1.0), History(cycle, 1e-3, periodic=False, frequency=1.0)):
+        slopes = stress_sensitivities(VALUES, history)
+        for name, value in VALUES.items():
+            step = 1e-6 * value
+            high, low = (stress({**VALUES, name: value + sign * step}, history) for sign in (1, -1))
+            error = np.max(np.abs(slopes[name] - (high - low) / (2.0 * step))) * value
+            assert error < 1e-7 * VALUES["sigma_fmax"]
+
+
+def test_a_motion_that_never_turns_rubs_once() -> None:
+    ramp = np.linspace(0.0, 1.0, 50)
+    found = stress(VALUES, History(ramp, 1e-3, periodic=False, frequency=1.0))
+    np.testing.assert_allclose(found, VALUES["sigma_fmax"] * ramp / (VALUES["eps_half"] + ramp), rtol=1e-13)
+    still = stress(VALUES, History.steady(np.full(16, 0.3), 1.0))
+    assert np.array_equal(still, np.zeros(16))
+
+
+def test_reversals_ignore_rests() -> None:
+    value = np.array([0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 1.0, 1.5])
+    assert np.flatnonzero(reversals(value)).tolist() == [5, 6]
