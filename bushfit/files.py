@@ -34,7 +34,7 @@ def read_utf8(file: Path, kind: type[BushfitError]) -> bytes:
         data = file.read_bytes()
     except OSError as error:
         raise kind("the file cannot be read", file=file, found=error.strerror or str(error)) from error
-    if not data.strip():
+    if not data or data.isspace():
         raise kind("the file is empty", file=file, expected="text", hint="export it again")
     _check_utf8(data, file, kind)
     return data

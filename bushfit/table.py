@@ -233,7 +233,7 @@ class Table:
                     hint=f'choose it in the campaign: columns = {{ {role} = "{self.headers[hits[0][0]]}" }}',
                 )
             if not hits and role in columns:
-                near = get_close_matches(columns[role], self.headers, n=1)
+                near = get_close_matches(columns[role], self.headers, n=1, cutoff=0.4)
                 raise self.error(
                     f'there is no column "{columns[role]}"',
                     line=self.header_line,

@@ -1,0 +1,102 @@
+"""Units: known ones convert, others are refused, nothing is guessed."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bushfit import units
+from bushfit.errors import UnitError
+
+
+@pytest.mark.parametrize(
+    ("text", "expected", "value"),
+    [
+        ("10 mm", "m", 0.01),
+        ("18mm", "m", 0.018),
+        ("-1e2 µm", "m", -1e-4),
+        ("0.5 deg", "rad", math.radians(0.5)),
+        ("2 °", "rad", math.radians(2)),
+        ("0.5 %", "1", 0.005),
+        ("3 -", "1", 3.0),
+        ("5 Hz", "Hz", 5.0),
+        ("60 1/min", "Hz", 1.0),
+        ("10 mm/min", "m/s", 1e-2 / 60),
+        ("1.2 kN", "N", 1200.0),
+        ("3 Nm", "N*m", 3.0),
+        ("3 kNmm", "N*m", 3.0),
+        ("1 kN·mm⁻¹", "N/m", 1e6),
+        ("1 N mm^-1", "N/m", 1e3),
+        ("1 Nm/deg", "N*m/rad", math.degrees(1)),
+        ("1.09 MPa", "Pa", 1.09e6),
+    ],
+)
+def test_quantity_in_si(text: str, expected: str, value: float) -> None:
+    assert units.quantity(text, expected) == pytest.approx(value, rel=1e-14)
+
+
+def test_quantity_takes_the_unit_that_fits() -> None:
+    assert units.quantity("1 mm", "m", "rad") == 0.001
+    assert units.quantity("180 deg", "m", "rad") == pytest.approx(math.pi)
+
+
+@pytest.mark.parametrize(
+    ("value", "expected", "words"),
+    [
+        (10, "m", ["without a unit", "10 mm"]),
+        ("10", "m", ["without a unit", 'write "10 mm"']),
+        (0.5, "1", ["without a unit", "%"]),
+        (True, "m", ["no quantity", "True"]),
+        (None, "m", ["no quantity", "10 mm"]),
+        ("mm", "m", ["no quantity", "mm"]),
+        ("10,5 mm", "m", ["no quantity", "decimal point"]),
+        ("10 kg", "m", ["does not fit", "kg", "a length"]),
+        ("10 deg", "1", ["does not fit", "a ratio"]),
+        ("10 %", "rad", ["does not fit", "an angle"]),
+        ("10 rad/s", "Hz", ["does not fit", "a frequency"]),
+        ("10 N m", "N*m/rad", ["does not fit", "a torsional stiffness"]),
+        ("10 dB", "1", ["unknown unit", "dB"]),
+        ("10 degC", "1", ["unknown unit", "degC"]),
+        ("10 foo", "m", ["unknown unit", "foo"]),
+        ("10 mm + 3 mm", "m", ["unknown unit"]),
+        ("10 mm^9^9^9", "m", ["unknown unit"]),
+        ("1e999 m", "m", ["too large"]),
+    ],
+)
+def test_what_is_no_quantity_is_refused(value: object, expected: str, words: list[str]) -> None:
+    with pytest.raises(UnitError) as caught:
+        units.quantity(value, expected)
+    assert all(word in str(caught.value) for word in words), str(caught.value)
+
+
+@given(st.text(max_size=60))
+def test_any_text_is_a_unit_or_a_unit_error(text: str) -> None:
+    try:
+        scale = units.factor(text, "N/m")
+    except UnitError:
+        return
+    assert math.isfinite(scale)
+
+
+@given(st.floats(-1e12, 1e12), st.sampled_from([("mm", "m", 1e-3), ("kN", "N", 1e3), ("MPa", "Pa", 1e6)]))
+def test_quantity_is_number_times_unit(number: float, unit: tuple[str, str, float]) -> None:
+    text, si, scale = unit
+    assert units.quantity(f"{number!r} {text}", si) == pytest.approx(number * scale, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("header", "parts"),
+    [
+        ("force [N]", ("force", "N")),
+        (" force (kN) ", ("force", "kN")),
+        ("loss factor [-]", ("loss factor", "-")),
+        ("force_N", ("force_N", None)),
+        ("force", ("force", None)),
+        ("force (cell 2) [N]", ("force (cell 2)", "N")),
+    ],
+)
+def test_split_header(header: str, parts: tuple[str, str | None]) -> None:
+    assert units.split_header(header) == parts
