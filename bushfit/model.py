@@ -198,7 +198,9 @@ class Model:
         respond = self._stack_stiffness(
             Setting(self.bushing, direction, kind), self.values if values is None else values
         )
-        return respond(omega, amplitude) + np.zeros(omega.shape)
+        points = np.atleast_1d(omega)
+        stiffness = respond(points, np.atleast_1d(amplitude)) + np.zeros(points.shape)
+        return stiffness if omega.ndim else stiffness[..., 0]
 
     def force(
         self,
@@ -232,7 +234,7 @@ class Model:
             if count == 0:
                 return StiffnessBelow(rubber, cycle)
             layer, inner = layers[count - 1], below(count - 1)
-            own = self._own(layer, values, _base_values(values))
+            own = self.seen_by(layer, values)
             return StiffnessBelow(
                 lambda omega, amplitude: layer.stiffness(own, inner, omega, amplitude, setting), cycle
             )
@@ -247,17 +249,17 @@ class Model:
             strain = displacement.scaled(per_displacement)
             omega = np.atleast_1d(displacement.omega)
             base = self._adjusted(setting, values, omega, displacement.amplitude, strain.amplitude)
-            stresses = (branch.stress(self._own(branch, values, base), strain) for branch in self._of(Branch))
+            stresses = (branch.stress(self.seen_by(branch, values, base), strain) for branch in self._of(Branch))
             return factor * sum(stresses, start=np.zeros(1))
 
         def wrap(below: ForceBelow, layer: Layer) -> ForceBelow:
-            own = self._own(layer, values, _base_values(values))
+            own = self.seen_by(layer, values)
             return lambda displacement: layer.force(own, below, displacement, setting)
 
         return reduce(wrap, layers, cast(ForceBelow, rubber))
 
     def _branch_stiffness(self, setting: Setting, values: Values, omega: Array, strain: Array, base: Values) -> Array:
-        moduli = (branch.modulus(self._own(branch, values, base), omega, strain) for branch in self._of(Branch))
+        moduli = (branch.modulus(self.seen_by(branch, values, base), omega, strain) for branch in self._of(Branch))
         return self.bushing.stiffness_per_modulus(setting.direction) * sum(moduli, start=np.zeros(1))
 
     def _adjusted(self, setting: Setting, values: Values, omega: Array, amplitude: Array, strain: Array) -> Values:
@@ -266,15 +268,16 @@ class Model:
         stiffness = partial(self._branch_stiffness, setting, values, omega, strain)
         condition = Condition(setting, omega, amplitude, strain, stiffness)
         for modifier in self._of(Modifier):
-            base = {**base, **modifier.adjust(self._own(modifier, values, base), condition)}
+            base = {**base, **modifier.adjust(self.seen_by(modifier, values, base), condition)}
         return base
 
     def _of(self, kind: type[E]) -> list[E]:
         return [effect for effect in self.records if isinstance(effect, kind)]
 
     @staticmethod
-    def _own(effect: Effect, values: Values, base: Values) -> Values:
-        """What an effect sees: the paper's parameters, and its own under their short names."""
+    def seen_by(effect: Effect, values: Values, base: Values | None = None) -> Values:
+        """What an effect sees: the paper's parameters (as modifiers left them), and its own by their short names."""
+        base = _base_values(values) if base is None else base
         if effect.name in BASE:
             return base
         return {**base, **{parameter.name: values[qualified(effect, parameter)] for parameter in effect.parameters}}

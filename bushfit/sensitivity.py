@@ -1,17 +1,19 @@
 """Derivatives of a model's response with respect to its parameters.
 
-Analytic where every effect brings its own (the paper's three branches); else central differences, all of
+Where branches stand alone their slopes add up: the paper's three bring their own, the others are differenced one by
+one. Modifiers and layers mix everything, so there the whole response is differenced: central differences, all of
 them in one call with the values laid along a leading axis.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import cast
 
 import numpy as np
 
-from bushfit.effects import Branch, Parameter
+from bushfit.effects import Branch, Parameter, qualified
 from bushfit.effects.contract import Array, Value, Values
 from bushfit.effects.history import History
 from bushfit.geometry import Direction
@@ -20,44 +22,72 @@ from bushfit.model import Kind, Model
 #: Step of the differences, relative to the value (log parameters) or to the typical size (linear ones).
 _STEP = 1e-6
 
+#: From a branch to its analytic slopes at a test, where it has them, and to its response for any values.
+Slopes = Callable[[Branch], dict[str, Array] | None]
+Response = Callable[[Branch, Values], Array]
+
 
 def stiffness_jacobian(
     model: Model, direction: Direction, frequency: Array, amplitude: Array, names: Sequence[str], kind: Kind = "sweep"
 ) -> Array:
     """dK/dp of the complex dynamic stiffness, (len(names), n)."""
-    branches = [effect for effect in model.records if isinstance(effect, Branch)]
-    if len(branches) == len(model.records) and all(branch.modulus_sensitivities for branch in branches):
-        omega = 2.0 * np.pi * frequency
-        strain = amplitude * model.bushing.unit_strain(direction)
-        slopes: dict[str, Array] = {}
-        for branch in branches:
-            slopes |= branch.modulus_sensitivities(model.values, omega, strain)  # type: ignore[misc]
-        factor = model.bushing.stiffness_per_modulus(direction)
-        return _stack(slopes, names, factor, frequency)
-    return differences(
-        model, names, lambda values: model.stiffness(direction, frequency, amplitude, kind=kind, values=values)
-    )
+    if not _only_branches(model):
+        return differences(
+            model, names, lambda values: model.stiffness(direction, frequency, amplitude, kind=kind, values=values)
+        )
+    omega = 2.0 * np.pi * frequency
+    strain = amplitude * model.bushing.unit_strain(direction)
+
+    def slopes(branch: Branch) -> dict[str, Array] | None:
+        known = branch.modulus_sensitivities
+        return known(model.values, omega, strain) if known else None
+
+    def response(branch: Branch, values: Values) -> Array:
+        return branch.modulus(model.seen_by(branch, values), omega, strain)
+
+    summed = _summed(model, names, slopes, response, frequency.size, complex)
+    return model.bushing.stiffness_per_modulus(direction) * summed
 
 
 def force_jacobian(
     model: Model, direction: Direction, displacement: History, names: Sequence[str], kind: Kind = "loop"
 ) -> Array:
     """dF/dp along a displacement history, (len(names), n)."""
-    branches = [effect for effect in model.records if isinstance(effect, Branch)]
-    analytic = all(branch.stress_sensitivities for branch in branches) and displacement.periodic
-    if analytic and len(branches) == len(model.records):
-        per_displacement = model.bushing.unit_strain(direction)
-        strain = displacement.scaled(per_displacement)
-        slopes: dict[str, Array] = {}
-        for branch in branches:
-            slopes |= branch.stress_sensitivities(model.values, strain)  # type: ignore[misc]
-        factor = model.bushing.stiffness_per_modulus(direction) / (2.0 * per_displacement)
-        return _stack(slopes, names, factor, displacement.value)
-    return differences(model, names, lambda values: model.force(direction, displacement, kind=kind, values=values))
+    if not (_only_branches(model) and displacement.periodic):
+        return differences(model, names, lambda values: model.force(direction, displacement, kind=kind, values=values))
+    per_displacement = model.bushing.unit_strain(direction)
+    strain = displacement.scaled(per_displacement)
+
+    def slopes(branch: Branch) -> dict[str, Array] | None:
+        return branch.stress_sensitivities(model.values, strain) if branch.stress_sensitivities else None
+
+    def response(branch: Branch, values: Values) -> Array:
+        return branch.stress(model.seen_by(branch, values), strain)
+
+    summed = _summed(model, names, slopes, response, displacement.value.shape[-1], float)
+    return model.bushing.stiffness_per_modulus(direction) / (2.0 * per_displacement) * summed
 
 
-def _stack(slopes: Mapping[str, Array], names: Sequence[str], factor: float, like: Array) -> Array:
-    return factor * np.stack([np.broadcast_to(slopes[name], like.shape) for name in names])
+def _only_branches(model: Model) -> bool:
+    return all(isinstance(effect, Branch) for effect in model.records)
+
+
+def _summed(
+    model: Model, names: Sequence[str], slopes: Slopes, response: Response, size: int, kind: type[float] | type[complex]
+) -> Array:
+    """Slopes of all branches together, (len(names), size)."""
+    total = {name: np.zeros(size, dtype=kind) for name in names}
+    for branch in model.records:
+        assert isinstance(branch, Branch)
+        known = slopes(branch)
+        if known is None:
+            own = [qualified(branch, parameter) for parameter in branch.parameters]
+            moved = [name for name in (*own, *branch.uses) if name in total]
+            rows = differences(model, moved, partial(response, branch)) if moved else ()
+            known = dict(zip(moved, rows, strict=True))
+        for name in known.keys() & total.keys():
+            total[name] = total[name] + known[name]
+    return np.stack([total[name] for name in names])
 
 
 def differences(model: Model, names: Sequence[str], respond: Callable[[Values], Array]) -> Array:
@@ -72,8 +102,8 @@ def differences(model: Model, names: Sequence[str], respond: Callable[[Values], 
         stacked[name] = column
         widths[i] = high - low
     both = respond(cast(Values, stacked))
-    widths = widths.reshape(count, *([1] * (both.ndim - 1)))
-    return (both[:count] - both[count:]) / widths
+    both = np.broadcast_to(both, (2 * count, both.shape[-1]))
+    return (both[:count] - both[count:]) / widths[:, None]
 
 
 def _around(parameter: Parameter, value: float) -> tuple[float, float]:

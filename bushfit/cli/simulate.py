@@ -83,28 +83,27 @@ def _with_options(plan: SimulateSettings, settings: dict[str, Any]) -> SimulateS
 
 
 def _with_effect(model: Model, text: str) -> Model:
-    from bushfit.errors import ModelError
-    from bushfit.units import any_quantity
+    from bushfit.effects import effect_named
+    from bushfit.errors import BushfitError, ModelError
+    from bushfit.units import is_number, quantity
 
-    name, found, value = text.partition("=")
-    effect, dot, _ = name.strip().partition(".")
-    if not (found and dot):
+    name, found, value = text.replace(" ", "").partition("=")
+    effect, dot, short = name.partition(".")
+    parameters = {parameter.name: parameter for parameter in effect_named(effect).parameters}
+    if not (found and dot and short in parameters):
         raise ModelError(
-            "not an effect with a value", place="--effect", found=repr(text), expected='such as "inertia.mass=0.1 kg"'
+            "not an effect with a value",
+            place="--effect",
+            found=repr(text),
+            expected='such as "inertia.mass=0.1 kg"; parameters of ' + f"{effect}: {', '.join(parameters)}",
         )
-    number = value.strip()
-    size = float(number) if _is_number(number) else any_quantity(number)
-    if effect in model.effects:
-        return model.with_values({name.strip(): size})
-    return model.with_effect(effect, {name.strip(): size})
-
-
-def _is_number(text: str) -> bool:
+    unit = parameters[short].unit
     try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+        size = float(value) if is_number(value) and unit == "1" else quantity(text.partition("=")[2].strip(), unit)
+    except BushfitError as error:
+        error.place = "--effect"
+        raise
+    return model.with_values({name: size}) if effect in model.effects else model.with_effect(effect, {name: size})
 
 
 def _slug(model: Model) -> str:

@@ -28,7 +28,16 @@ EFFECT = Layer(
     equation="K + stiffness N(gap/X)",
     level=Level.COMPONENT,
     parameters=(
-        Parameter("gap", "m", (1e-6, 0.1), None, 3e-4, log=True, meaning="travel until the stop is met, both ways"),
+        Parameter(
+            "gap",
+            "m",
+            (1e-6, 0.1),
+            None,
+            3e-4,
+            log=True,
+            meaning="travel until the stop is met, both ways",
+            scale="displacement",
+        ),
         Parameter("stiffness", "N/m", (0.0, 1e10), 0.0, 1e5, log=False, meaning="stiffness of the stop"),
     ),
     source="A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B",

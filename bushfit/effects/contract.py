@@ -72,6 +72,8 @@ class Parameter:
         typical: a usual size; the scale on which a fit moves a linear parameter.
         log: whether a fit moves its logarithm (strictly positive parameters).
         meaning: what it is, in a few words.
+        scale: what of the tests its size goes with, so that a search knows where to start: "period",
+            "frequency", "displacement" or "strain"; none where `typical` is good for any test.
     """
 
     name: str
@@ -81,6 +83,7 @@ class Parameter:
     typical: float
     log: bool
     meaning: str
+    scale: Literal["period", "frequency", "displacement", "strain"] | None = None
 
 
 @dataclass(frozen=True)
@@ -135,6 +138,7 @@ class Effect:
 class Branch(Effect):
     """A stress in parallel with the others: modulus = s~ / (2 e~) [Pa], stress [Pa].
 
+    `uses` names the paper's parameters that it reads besides its own.
     modulus_sensitivities and stress_sensitivities return the derivative with respect to each own
     parameter; where they are None the model differentiates numerically.
     """
@@ -143,6 +147,7 @@ class Branch(Effect):
     stress: Callable[[Values, History], Array]
     modulus_sensitivities: Callable[[Values, Array, Array], dict[str, Array]] | None = None
     stress_sensitivities: Callable[[Values, History], dict[str, Array]] | None = None
+    uses: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -69,7 +69,9 @@ EFFECT = Layer(
     level=Level.INSTRUMENT,
     parameters=(
         Parameter("mass", "kg", (0.0, 100.0), 0.0, 0.05, log=False, meaning="moving mass of the mode"),
-        Parameter("frequency", "Hz", (10.0, 1e4), None, 300.0, log=True, meaning="frequency of the mode"),
+        Parameter(
+            "frequency", "Hz", (10.0, 1e4), None, 300.0, log=True, meaning="frequency of the mode", scale="frequency"
+        ),
         Parameter("damping", "1", (1e-3, 1.0), None, 0.03, log=True, meaning="damping ratio of the mode"),
     ),
     source="D. J. Ewins, Modal Testing, 2nd ed., 2000, ch. 2 (one mode, driven at its base)",

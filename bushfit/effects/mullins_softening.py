@@ -35,6 +35,7 @@ EFFECT = Branch(
     ),
     source="L. Mullins, Rubber Chem. Technol. 42 (1969) 339",
     settles=True,
+    uses=("mu",),
     modulus=modulus,
     stress=stress,
 )

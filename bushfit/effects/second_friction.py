@@ -13,7 +13,14 @@ EFFECT = Branch(
     parameters=(
         Parameter("sigma_fmax", "Pa", (0.0, 1e8), 0.0, 2e3, log=False, meaning="largest stress of this friction"),
         Parameter(
-            "eps_half", "1", (1e-6, 1.0), None, 1e-3, log=True, meaning="strain that develops half of that stress"
+            "eps_half",
+            "1",
+            (1e-6, 1.0),
+            None,
+            1e-3,
+            log=True,
+            meaning="strain that develops half of that stress",
+            scale="strain",
         ),
     ),
     source="Garcia Tarrago et al. 2007, Eq. 5, once more; friction elements in parallel as in Iwan 1966",

@@ -25,6 +25,7 @@ EFFECT = Branch(
     level=Level.MATERIAL,
     parameters=(Parameter("c3", "1", (0.0, 1e5), 0.0, 20.0, log=False, meaning="cubic stress coefficient over mu"),),
     source="second term of O. H. Yeoh, Rubber Chem. Technol. 66 (1993) 754, in simple shear",
+    uses=("mu",),
     modulus=modulus,
     stress=stress,
 )

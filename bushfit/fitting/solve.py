@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 Bounds = Mapping[str, tuple[float | None, float | None]]
 
-_TOLERANCE = 1e-10
+_TOLERANCE = 1e-9
 _MOST_EVALUATIONS = 400
 
 
@@ -88,8 +88,27 @@ def jacobian(model: Model, terms: Sequence[Term], names: Sequence[str]) -> Array
     return by_value * slopes[:, None]
 
 
-def solve(model: Model, terms: Sequence[Term], names: Sequence[str], bounds: Bounds | None = None) -> Solution:
+def solve(
+    model: Model,
+    terms: Sequence[Term],
+    names: Sequence[str],
+    bounds: Bounds | None = None,
+    *,
+    evaluations: int = _MOST_EVALUATIONS,
+    strict: bool = True,
+) -> Solution:
     """Least squares over the named parameters, the others held, from the model's own values.
+
+    Trust-region reflective Levenberg-Marquardt by way of lmfit: bounds are walls, not a transformation, so a
+    parameter may come to rest on one.
+
+    Args:
+        model: where to start.
+        terms: the data.
+        names: parameters to move.
+        bounds: limits inside the parameters' own.
+        evaluations: most evaluations of the model.
+        strict: False takes the best point reached as it is when those are used up.
 
     Raises:
         FitError: fewer data than parameters, or no convergence.
@@ -108,16 +127,17 @@ def solve(model: Model, terms: Sequence[Term], names: Sequence[str], bounds: Bou
     fit = lmfit.minimize(
         lambda parameters: residual(at(parameters), terms),
         start,
-        method="leastsq",
-        max_nfev=_MOST_EVALUATIONS,
-        Dfun=lambda parameters: jacobian(at(parameters), terms, coordinates.names),
-        col_deriv=1,
+        method="least_squares",
+        max_nfev=evaluations,
+        jac=lambda parameters: jacobian(at(parameters), terms, coordinates.names).T,
+        x_scale="jac",
         ftol=_TOLERANCE,
         xtol=_TOLERANCE,
+        gtol=None,
         calc_covar=False,
     )
     best = at(fit.params)
-    if not fit.success:
+    if fit.aborted and strict:
         raise FitError(
             "the fit did not converge",
             found=str(fit.message),

@@ -155,8 +155,16 @@ class SweepTerm:
         return np.concatenate(([0], 1 + np.flatnonzero(np.any(np.diff(label), axis=0))))
 
     def stiffness(self, model: Model, values: Values | None = None) -> Array:
-        """Model stiffness at the points, sorted by block."""
-        return model.stiffness(self.sweep.direction, self.frequency, self.amplitude, values=values)
+        """Model stiffness at the points, sorted by block; what repeats is computed once."""
+        frequency, amplitude, place = self._distinct
+        return model.stiffness(self.sweep.direction, frequency, amplitude, values=values)[..., place]
+
+    @cached_property
+    def _distinct(self) -> tuple[Array, Array, Array]:
+        """Frequency and amplitude of the distinct operating points, and the place of each point among them."""
+        points = np.stack((self.frequency, self.amplitude))
+        distinct, place = np.unique(points, axis=1, return_inverse=True)
+        return distinct[0], distinct[1], place.ravel()
 
     def relative(self, model: Model) -> Array:
         """|K - K_meas| / |K_meas| per point, for NRMSE."""
@@ -172,7 +180,8 @@ class SweepTerm:
 
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
         """(len(names), 2 n)"""
-        slopes = stiffness_jacobian(model, self.sweep.direction, self.frequency, self.amplitude, names)
+        frequency, amplitude, place = self._distinct
+        slopes = stiffness_jacobian(model, self.sweep.direction, frequency, amplitude, names)[:, place]
         if self.residuals == "complex":
             return self.whiten(slopes / self.measured)
         stiffness = self.stiffness(model)
