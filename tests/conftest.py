@@ -32,7 +32,7 @@ def bushing() -> Bushing:
     return CMP_15961
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture
 def table_1() -> dict[str, float]:
     """Table 1 of the paper."""
     return dict(TABLE_1)
