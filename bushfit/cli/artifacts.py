@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from bushfit.fitting.terms import LoopTerm, SweepTerm
     from bushfit.model import Model
     from bushfit.prediction import Prediction
+    from bushfit.results import Result
 
 
 def loop_files(model: Model, terms: Sequence[LoopTerm], *, plots: bool) -> dict[str, bytes]:
@@ -38,16 +39,23 @@ def sweep_files(model: Model, terms: Sequence[SweepTerm], *, plots: bool) -> dic
 
 
 def prediction_files(
-    predictions: Sequence[Prediction], measured: Sequence[SweepTerm], title: str, *, plots: bool
+    result: Result, predictions: Sequence[Prediction], measured: Sequence[SweepTerm], *, plots: bool
 ) -> dict[str, bytes]:
     """`<direction>.csv` and `<direction>.png` of each prediction, the measured points over the model."""
     files = {f"{p.direction}.csv": sheets.to_csv(sheets.prediction_table(p)) for p in predictions}
-    if plots:
-        from bushfit.plots import prediction_figure, to_png
+    if not plots:
+        return files
+    from bushfit.plots import fine_grid, prediction_figure, to_png
+    from bushfit.prediction import left_out, predict
 
-        for prediction in predictions:
-            over = [term for term in measured if term.direction is prediction.direction]
-            files[f"{prediction.direction}.png"] = to_png(prediction_figure(prediction, over, title))
+    for prediction in predictions:
+        over = [term for term in measured if term.direction is prediction.direction]
+        curves = predict(result, prediction.direction, *fine_grid(prediction))
+        note = ". ".join(filter(None, (left_out(result), *prediction.warnings)))
+        title = result.model.bushing.name
+        files[f"{prediction.direction}.png"] = to_png(
+            prediction_figure(prediction, over, title, curves=curves, note=note)
+        )
     return files
 
 

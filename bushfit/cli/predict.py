@@ -77,7 +77,7 @@ def command(
     options.require_free(folder, names)
     measured = sweep_terms(loaded.sweeps) if loaded else []
     tell_predictions(options, result, predictions)
-    files = prediction_files(predictions, measured, result.model.bushing.name, plots=options.plots)
+    files = prediction_files(result, predictions, measured, plots=options.plots)
     options.write(folder, files)
     options.tell(to_document(predictions))
 

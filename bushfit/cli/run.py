@@ -74,7 +74,7 @@ def command(campaign: Path, max_nrmse: float | None, options: Options) -> None:
         **{f"{name}.json": to_json(document) for name, document in json_documents.items()},
         **loop_files(joint.model, data.loops, plots=options.plots),
         **sweep_files(joint.model, data.sweeps, plots=options.plots),
-        **prediction_files(predictions, data.sweeps, loaded.bushing.name, plots=options.plots),
+        **prediction_files(joint, predictions, data.sweeps, plots=options.plots),
     }
     options.write(folder, files)
     options.tell(json_documents)

@@ -121,15 +121,16 @@ def drive_of(loop: Loop) -> Drive:
 
 
 def _fundamental(loop: Loop) -> tuple[float, float]:
-    """Frequency [Hz] and number of cycles: from upward crossings, refined by Gauss-Newton on the motion."""
+    """Frequency [Hz] and number of cycles: from crossings in one sense, refined by Gauss-Newton on the motion."""
     x = loop.displacement - (loop.displacement.max() + loop.displacement.min()) / 2.0
     band = 0.1 * np.ptp(x)
     state = np.where(x > band, 1, np.where(x < -band, -1, 0))
     marks = np.flatnonzero(state)
-    ups = marks[1:][(state[marks[1:]] == 1) & (state[marks[:-1]] == -1)]
+    turns = marks[1:][state[marks[1:]] != state[marks[:-1]]]
+    crossings = max((turns[state[turns] == sense] for sense in (1, -1)), key=len)
     duration = float(loop.time[-1] - loop.time[0])
     closed = duration * loop.time.size / (loop.time.size - 1)
-    if ups.size < 2:
+    if crossings.size < 2:
         if abs(x[-1] - x[0]) > band:
             unit = loop.direction.displacement_unit
             raise FitError(
@@ -139,8 +140,10 @@ def _fundamental(loop: Loop) -> tuple[float, float]:
                 expected="at least one closed cycle",
                 hint="export the whole cycle, or several",
             )
-        return 1.0 / closed, 1.0
-    frequency = (ups.size - 1) / float(loop.time[ups[-1]] - loop.time[ups[0]])
+        stride = (abs(x[1] - x[0]) + abs(x[-1] - x[-2])) / 2.0
+        period = duration if abs(x[-1] - x[0]) < 0.5 * stride else closed
+        return 1.0 / period, closed / period
+    frequency = (crossings.size - 1) / float(loop.time[crossings[-1]] - loop.time[crossings[0]])
     order = _order(loop.time.size / (closed * frequency), _CLOCK_HARMONICS)
     sample = slice(None, None, max(1, x.size // 2000))
     time, motion = loop.time[sample] - loop.time[0], x[sample]
