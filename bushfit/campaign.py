@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
@@ -16,6 +17,7 @@ from bushfit.errors import BushfitError, CampaignError, ModelError
 from bushfit.files import read_utf8
 from bushfit.geometry import Bushing
 from bushfit.measurement import Loop, Sweep
+from bushfit.output import folder_name
 from bushfit.reading import read_loop, read_sweep
 from bushfit.schema import (
     CampaignFile,
@@ -29,8 +31,6 @@ from bushfit.schema import (
 )
 
 _LARGEST_BYTES = 1_000_000
-_UNSAFE_IN_FOLDERS = re.compile(r'[\x00-\x1f\x7f/\\:*?"<>|]+')
-_LONGEST_FOLDER = 60
 _UNKNOWN = "unexpected_keyword_argument"
 #: pydantic's names for what has the wrong shape, in the words of TOML.
 _SHAPES = {
@@ -70,8 +70,8 @@ class Campaign:
 
     @property
     def slug(self) -> str:
-        """The name as that of one folder: it never leads out of the folder it is put in, and is never empty."""
-        return _UNSAFE_IN_FOLDERS.sub("_", self.name)[:_LONGEST_FOLDER].strip(" .") or "campaign"
+        """The name as that of one folder; it never leads out of the folder it is put in."""
+        return folder_name(self.name)
 
 
 def load_campaign(path: str | Path) -> Campaign:
@@ -92,31 +92,35 @@ def load_campaign(path: str | Path) -> Campaign:
             expected="[[loops]] or [[sweeps]] tables, or a [simulate] table",
             hint='add [[loops]] with file = "..." and direction = "axial"',
         )
-    files = [(kind, test.file) for kind in ("loops", "sweeps") for test in getattr(content, kind)]
-    for number, (kind, file) in enumerate(files):
-        if (kind, file) in files[:number]:
-            raise CampaignError("a file is listed twice", file=path, place=kind, found=file, expected="each file once")
     try:
         bushing = Bushing(**vars(content.bushing))
     except ModelError as error:
         error.file = path
         raise
-    folder = path.parent
     return Campaign(
         content.name or bushing.name,
         path,
         bushing,
-        tuple(read_loop(folder / t.file, t.direction, name=t.file, **_options(t)) for t in content.loops),
-        tuple(read_sweep(folder / t.file, t.direction, name=t.file, **_options(t)) for t in content.sweeps),
+        tuple(read_loop(**keywords) for keywords in _keywords(path, content.loops)),
+        tuple(read_sweep(**keywords) for keywords in _keywords(path, content.sweeps)),
         content.fit,
         content.predict,
         content.simulate,
     )
 
 
-def _options(test: LoopFile | SweepFile) -> dict[str, Any]:
-    """What the campaign says of a file, as the reader's keywords."""
-    return {key: value for key, value in vars(test).items() if key not in ("file", "direction") and value is not None}
+def _keywords(campaign: Path, tests: Sequence[LoopFile | SweepFile]) -> Iterator[dict[str, Any]]:
+    """The reader's keywords for each file; it is named by its stem, or as the campaign lists it where stems agree."""
+    stems = [Path(test.file).stem for test in tests]
+    seen = set()
+    for test, stem in zip(tests, stems, strict=True):
+        file = campaign.parent / test.file
+        if (place := os.path.normpath(file)) in seen:
+            raise CampaignError("a file is listed twice", file=campaign, found=test.file, expected="each file once")
+        seen.add(place)
+        stated = {key: value for key, value in vars(test).items() if value is not None}
+        name = stem if stems.count(stem) == 1 else test.file
+        yield {**stated, "file": file, "name": name, "listed_as": Path(test.file)}
 
 
 def _parse(path: Path) -> dict[str, Any]:

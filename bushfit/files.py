@@ -18,19 +18,12 @@ def read_utf8(file: Path, kind: type[BushfitError]) -> bytes:
     Raises:
         kind: the file is missing, no regular file, not readable, empty, or not UTF-8 text.
     """
-    if not file.exists():
-        siblings = [path.name for path in file.parent.iterdir()] if file.parent.is_dir() else []
-        near = get_close_matches(file.name, siblings, n=1)
-        raise kind(
-            "there is no such file",
-            file=file,
-            expected="an existing file; a relative path counts from the folder of the file that names it",
-            hint=f'did you mean "{near[0]}"?' if near else "check the path for a typing error",
-        )
-    if not file.is_file():
-        found = "a folder" if file.is_dir() else "a device"
-        raise kind("this is not a file", file=file, found=found, expected="a file")
     try:
+        if not file.exists():
+            raise _missing(file, kind)
+        if not file.is_file():
+            found = "a folder" if file.is_dir() else "a device"
+            raise kind("this is not a file", file=file, found=found, expected="a file")
         data = file.read_bytes()
     except OSError as error:
         raise kind("the file cannot be read", file=file, found=error.strerror or str(error)) from error
@@ -38,6 +31,17 @@ def read_utf8(file: Path, kind: type[BushfitError]) -> bytes:
         raise kind("the file is empty", file=file, expected="text", hint="export it again")
     _check_utf8(data, file, kind)
     return data
+
+
+def _missing(file: Path, kind: type[BushfitError]) -> BushfitError:
+    siblings = [path.name for path in file.parent.iterdir()] if file.parent.is_dir() else []
+    near = get_close_matches(file.name, siblings, n=1)
+    return kind(
+        "there is no such file",
+        file=file,
+        expected="an existing file; a relative path counts from the folder of the file that names it",
+        hint=f'did you mean "{near[0]}"?' if near else "check the path for a typing error",
+    )
 
 
 def _check_utf8(data: bytes, file: Path, kind: type[BushfitError]) -> None:

@@ -55,6 +55,7 @@ def read_loop(
     direction: Direction,
     *,
     name: str | None = None,
+    listed_as: Path | None = None,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
     force_sign: Literal[1, -1] = 1,
@@ -68,7 +69,8 @@ def read_loop(
     Args:
         file: a table with columns time (optional), displacement and force.
         direction: direction of the test, which settles the units that fit.
-        name: of the loop and its provenance; default the name of the file.
+        name: of the loop; default the stem of the file.
+        listed_as: the file as the campaign names it, for provenance; default its name.
         columns: header of a role (a key of LOOP_COLUMNS), where it is not the usual one.
         units: unit of a role, where the file does not carry it.
         force_sign: -1 turns the recorded force around.
@@ -112,8 +114,8 @@ def read_loop(
         )
     else:
         time = rebuild_time(displacement, rate=rate, frequency=frequency, waveform=waveform)
-    source = Source(Path(name or file.name), table.sha256)
-    return Loop(name or file.name, direction, time, displacement, force, noise, source)
+    source = Source(listed_as or Path(file.name), table.sha256)
+    return Loop(name or file.stem, direction, time, displacement, force, noise, source)
 
 
 def read_sweep(
@@ -121,6 +123,7 @@ def read_sweep(
     direction: Direction,
     *,
     name: str | None = None,
+    listed_as: Path | None = None,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
     amplitude: AmplitudeConvention = "zero-to-peak",
@@ -132,7 +135,8 @@ def read_sweep(
         file: a table with columns frequency, amplitude, one of STIFFNESS_PAIRS, and repeat (optional: without it,
             an operating point that occurs again is a repeat).
         direction: direction of the test, which settles the units that fit.
-        name: of the sweep and its provenance; default the name of the file.
+        name: of the sweep; default the stem of the file.
+        listed_as: the file as the campaign names it, for provenance; default its name.
         columns: header of a role (a key of SWEEP_COLUMNS), where it is not the usual one.
         units: unit of a role, where the file does not carry it.
         amplitude: how the file counts amplitudes; the sweep has them zero-to-peak.
@@ -173,8 +177,8 @@ def read_sweep(
     )
     zero_to_peak = values["amplitude"] * (0.5 if amplitude == "peak-to-peak" else 1.0)
     repeat = _repeats(table, wanted, values)
-    source = Source(Path(name or file.name), table.sha256)
-    return Sweep(name or file.name, direction, values["frequency"], zero_to_peak, stiffness, repeat, noise, source)
+    source = Source(listed_as or Path(file.name), table.sha256)
+    return Sweep(name or file.stem, direction, values["frequency"], zero_to_peak, stiffness, repeat, noise, source)
 
 
 def _check_not_swapped(table: Table, direction: Direction) -> None:

@@ -55,8 +55,8 @@ def test_a_plain_campaign(folder: Path) -> None:
     campaign = campaign_from(BUSHING + TESTS, folder)
     assert campaign.name == "CMP 15 961"
     assert campaign.bushing == Bushing("CMP 15 961", 0.010, 0.018, 0.034)
-    assert [(loop.name, loop.direction) for loop in campaign.loops] == [("loop.csv", Direction.AXIAL)]
-    assert [(sweep.name, sweep.direction) for sweep in campaign.sweeps] == [("sweep.csv", Direction.RADIAL)]
+    assert [(loop.name, loop.direction) for loop in campaign.loops] == [("loop", Direction.AXIAL)]
+    assert [(sweep.name, sweep.direction) for sweep in campaign.sweeps] == [("sweep", Direction.RADIAL)]
     assert campaign.loops[0].source is not None
     assert campaign.loops[0].source.file == Path("loop.csv")
     assert campaign.fit.parameters == {}
@@ -88,6 +88,13 @@ noise = "1 %"
     assert campaign.loops[0].noise == 0.005
     assert campaign.loops[0].force.max() == pytest.approx(1000.0, rel=1e-2)
     assert campaign.sweeps[0].amplitude[0] == pytest.approx(0.05e-3)
+
+
+def test_names_of_tests_differ(folder: Path) -> None:
+    (folder / "more").mkdir()
+    (folder / "more/loop.csv").write_text(LOOP)
+    campaign = campaign_from(BUSHING + TESTS + '[[loops]]\nfile = "more/loop.csv"\ndirection = "axial"\n', folder)
+    assert [loop.name for loop in campaign.loops] == ["loop.csv", "more/loop.csv"]
 
 
 def test_settings_arrive_in_si(folder: Path) -> None:
@@ -162,7 +169,9 @@ BAD: list[tuple[type[BushfitError], str, list[str]]] = [
     (CampaignError, BUSHING + TESTS.replace("loop.csv", ""), ["loops #1.file", "not empty"]),
     (MeasurementError, BUSHING + TESTS.replace("loop.csv", "lop.csv"), ["lop.csv", "no such file", 'mean "loop.csv"']),
     (MeasurementError, BUSHING + TESTS.replace("loop.csv", "sweep.csv"), ["sweep.csv, line 1", "no column"]),
-    (CampaignError, BUSHING + TESTS + TESTS, ["listed twice", "loop.csv"]),
+    (CampaignError, BUSHING + TESTS + TESTS.replace("loop.csv", "./loop.csv"), ["listed twice", "./loop.csv"]),
+    (MeasurementError, BUSHING + TESTS.replace("loop.csv", "x" * 5000), ["cannot be read", "too long"]),
+    (MeasurementError, BUSHING + TESTS.replace("loop.csv", "\\u0000"), ["no such file"]),
     (CampaignError, BUSHING + TESTS + 'noice = "1 %"', ["sweeps #1.noice", 'mean "noise"']),
     (UnitError, BUSHING + TESTS + "noise = 0.5", ["sweeps #1.noise", "without a unit", "%"]),
     (CampaignError, BUSHING + TESTS + 'noise = "120 %"', ["sweeps #1.noise", "less than 1"]),
