@@ -94,7 +94,7 @@ def sweep_noise(sweeps: Sequence[Sweep]) -> SweepNoise:
     stated = {sweep.name: sweep.noise for sweep in sweeps if sweep.noise is not None}
     random = {}
     for key, variance in variances.items():
-        gain, phase = np.maximum(stated.get(key[0], np.sqrt(variance)), FLOOR)
+        gain, phase = np.maximum(np.broadcast_to(stated.get(key[0], np.sqrt(variance)), 2), FLOOR)
         random[key] = (float(gain), float(phase))
     if repeated:
         shared = np.concatenate([levels[key].shared for key in repeated]).mean(axis=0)
