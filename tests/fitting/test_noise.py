@@ -1,0 +1,124 @@
+"""Noise from repeats: what scatters and what a block shares are told apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bushfit.fitting.noise import ASSUMED_SHARED, sweep_noise
+from bushfit.geometry import Direction
+from bushfit.measurement import Sweep
+from bushfit.model import Model
+
+FREQUENCIES = np.arange(5.0, 156.0, 10.0)
+AMPLITUDES = (1e-4, 2e-4, 5e-4)
+
+
+@pytest.fixture
+def noisy_sweep(paper_model: Model) -> Callable[..., Sweep]:
+    """Sweep(seed, random, gain, phase, repeats): errors of each kind, relative and [rad]."""
+
+    def draw(
+        seed: int,
+        random: float = 5e-3,
+        gain: float = 0.0,
+        phase: float = 0.0,
+        repeats: int = 3,
+        loss: float | None = None,
+    ) -> Sweep:
+        rng = np.random.default_rng(seed)
+        level, repeat, f = (
+            axis.ravel() for axis in np.meshgrid(AMPLITUDES, np.arange(1, repeats + 1), FREQUENCIES, indexing="ij")
+        )
+        block = np.repeat(rng.standard_normal((2, 3 * repeats)), FREQUENCIES.size, axis=1)
+        scatter = rng.standard_normal((2, level.size)) * np.array([[random], [random if loss is None else loss]])
+        error = gain * block[0] + scatter[0] + 1j * (phase * block[1] + scatter[1])
+        clean = paper_model.stiffness(Direction.AXIAL, f, level)
+        return Sweep("sweep", Direction.AXIAL, f, level, clean * np.exp(error), repeat)
+
+    return draw
+
+
+@pytest.mark.parametrize(
+    ("random", "gain", "phase"), [(5e-3, 0.0, 0.0), (5e-3, 4e-3, 3.5e-3), (1e-3, 8e-3, 1e-3), (1e-2, 3e-3, 6e-3)]
+)
+def test_both_parts_are_recovered(noisy_sweep: Callable[..., Sweep], random: float, gain: float, phase: float) -> None:
+    found = [sweep_noise([noisy_sweep(seed, random, gain, phase)]) for seed in range(200)]
+    scatter = np.sqrt(np.mean([np.square(list(noise.random.values())) for noise in found], axis=(0, 1)))
+    shared = np.sqrt(np.mean([np.square(noise.shared) for noise in found], axis=0))
+    print(f"true {random} {gain} {phase}: scatter {scatter}, shared {shared}")
+    assert {noise.origin for noise in found} == {"repeats"}
+    assert found[0].freedom == 6
+    np.testing.assert_allclose(scatter, random, rtol=0.05)
+    # a variance of nothing is estimated as nothing or a little, never as less
+    np.testing.assert_allclose(shared, [gain, phase], rtol=0.1, atol=0.25 * random)
+
+
+def test_scatter_of_gain_and_phase_need_not_be_alike(noisy_sweep: Callable[..., Sweep]) -> None:
+    found = [sweep_noise([noisy_sweep(seed, 2e-3, loss=8e-3)]) for seed in range(50)]
+    scatter = np.sqrt(np.mean([np.square(list(noise.random.values())) for noise in found], axis=(0, 1)))
+    np.testing.assert_allclose(scatter, [2e-3, 8e-3], rtol=0.05)
+
+
+def test_a_noisier_level_keeps_noise_of_its_own(noisy_sweep: Callable[..., Sweep]) -> None:
+    quiet, loud = noisy_sweep(1, 1e-3), noisy_sweep(2, 2e-2)
+    mixed = replace(quiet, stiffness=np.where(quiet.amplitude == 5e-4, loud.stiffness, quiet.stiffness))
+    random = sweep_noise([mixed]).random
+    assert random["sweep", 5e-4][0] == pytest.approx(2e-2, rel=0.4)
+    assert random["sweep", 1e-4][0] == pytest.approx(1e-3, rel=0.4)
+    same = sweep_noise([quiet]).random
+    assert len(set(same.values())) == 1
+
+
+def test_missing_points_do_not_matter(noisy_sweep: Callable[..., Sweep]) -> None:
+    whole = noisy_sweep(3, 5e-3, 4e-3, 3e-3)
+    keep = np.random.default_rng(0).random(whole.frequency.size) > 0.15
+    part = replace(
+        whole,
+        frequency=whole.frequency[keep],
+        amplitude=whole.amplitude[keep],
+        stiffness=whole.stiffness[keep],
+        repeat=whole.repeat[keep],
+    )
+    one, other = sweep_noise([whole]), sweep_noise([part])
+    np.testing.assert_allclose(other.shared, one.shared, rtol=0.3)
+    np.testing.assert_allclose(other.random["sweep", 1e-4], one.random["sweep", 1e-4], rtol=0.3)
+    assert other.origin == "repeats"
+
+
+def test_no_repeats_fall_back_to_a_smooth_curve_and_an_assumption(noisy_sweep: Callable[..., Sweep]) -> None:
+    found = [sweep_noise([noisy_sweep(seed, 5e-3, repeats=1)]) for seed in range(50)]
+    scatter = np.sqrt(np.mean([np.square(list(noise.random.values())) for noise in found], axis=(0, 1)))
+    print(f"no repeats: scatter {scatter} about the smooth curve, true 5e-3")
+    np.testing.assert_allclose(scatter, 5e-3, rtol=0.1)
+    assert {noise.shared for noise in found} == {ASSUMED_SHARED}
+    assert {noise.origin for noise in found} == {"assumed"}
+    assert "assumed" in found[0].describe()
+
+
+def test_the_smooth_curve_bends_enough_for_the_model(noisy_sweep: Callable[..., Sweep]) -> None:
+    clean = sweep_noise([noisy_sweep(0, 0.0, repeats=1)])
+    assert max(max(pair) for pair in clean.random.values()) <= 2e-4
+
+
+def test_stated_noise_replaces_the_random_part(noisy_sweep: Callable[..., Sweep]) -> None:
+    stated = sweep_noise([replace(noisy_sweep(0, repeats=1), noise=7e-3)])
+    assert stated.origin == "stated"
+    assert set(stated.random.values()) == {(7e-3, 7e-3)}
+    assert stated.shared == (0.0, 0.0)
+
+
+def test_tiny_sweeps_do_not_break_it(noisy_sweep: Callable[..., Sweep]) -> None:
+    whole = noisy_sweep(0)
+    for rows in (slice(0, 1), slice(0, 2), slice(0, 3)):
+        part = Sweep("s", Direction.AXIAL, whole.frequency[rows], whole.amplitude[rows], whole.stiffness[rows])
+        noise = sweep_noise([part])
+        assert all(np.isfinite(pair).all() and min(pair) > 0.0 for pair in noise.random.values())
+
+
+def test_equal_repeats_do_not_give_a_noise_of_zero(noisy_sweep: Callable[..., Sweep]) -> None:
+    noise = sweep_noise([noisy_sweep(0, 0.0, repeats=3)])
+    assert all(min(pair) > 0.0 for pair in noise.random.values())
