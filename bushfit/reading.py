@@ -46,6 +46,7 @@ SWEEP_COLUMNS = {
 STIFFNESS_PAIRS = (("stiffness", "loss_factor"), ("stiffness", "phase"), ("storage_stiffness", "loss_stiffness"))
 _FEWEST_LOOP_ROWS = 10
 _FEWEST_SWEEP_ROWS = 3
+_MOST_REPEATS = 1_000_000
 #: Noise may push a loss factor below zero; what lies outside these limits is no measured bushing.
 _LOSS_FACTOR_RANGE = (-0.5, 5.0)
 
@@ -166,7 +167,8 @@ def read_sweep(
     for role in {"frequency", "amplitude", "stiffness", "storage_stiffness"} & set(values):
         label = role.replace("_", " ")
         table.refuse(values[role] <= 0.0, wanted[role], f"the {label} is not positive", "a number above zero")
-    stiffness, loss_factor = _complex_stiffness(pair, values[pair[0]], values[pair[1]])
+    with np.errstate(over="ignore"):
+        stiffness, loss_factor = _complex_stiffness(pair, values[pair[0]], values[pair[1]])
     low, high = _LOSS_FACTOR_RANGE
     table.refuse(
         ~((loss_factor >= low) & (loss_factor <= high)),
@@ -210,7 +212,8 @@ def _repeats(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Fl
     """The repeat column, or else the count of earlier rows at the same frequency and amplitude, from 1."""
     if "repeat" in values:
         repeat = values["repeat"]
-        table.refuse(repeat != np.round(repeat), wanted["repeat"], "this is no repeat number", "a whole number")
+        is_count = (repeat == np.round(repeat)) & (repeat >= 0) & (repeat < _MOST_REPEATS)
+        table.refuse(~is_count, wanted["repeat"], "this is no repeat number", "a whole number")
         return repeat.astype(np.int64)
     import pandas as pd
 

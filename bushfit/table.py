@@ -24,6 +24,8 @@ from bushfit.measurement import Floats
 _DELIMITERS = (";", "\t", ",")
 _LONGEST_FOUND = 200
 _LONGEST_HEADER = 100_000
+#: In SI; far beyond every rig, and its square is still a number.
+_LARGEST = 1e100
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
 
 
@@ -146,11 +148,12 @@ class Table:
             frame = pd.DataFrame({index: np.empty(0) for index in numeric})
         except (ValueError, pd.errors.ParserWarning) as error:
             raise self._unreadable(wanted, str(error)) from error
-        values = {role: frame[column.index].to_numpy() * column.scale for role, column in wanted.items()}
-        if not all(np.isfinite(series).all() for series in values.values()):
-            raise self._unreadable(wanted, "a number that is not finite")
         if len(frame) < fewest_rows:
             raise self.error("too few rows", found=f"{len(frame)}", expected=f"at least {fewest_rows}")
+        with np.errstate(over="ignore"):
+            values = {role: frame[column.index].to_numpy() * column.scale for role, column in wanted.items()}
+        if not all(series.min() >= -_LARGEST and series.max() <= _LARGEST for series in values.values()):
+            raise self._unreadable(wanted, "a number that is not finite")
         return values
 
     def refuse(
@@ -279,7 +282,7 @@ class Table:
                     )
                 for column in wanted.values():
                     cell = cells[column.index].strip()
-                    if not (units.is_number(cell) and np.isfinite(float(cell))):
+                    if not (units.is_number(cell) and abs(float(cell) * column.scale) <= _LARGEST):
                         return self.error(
                             "this is no finite number" if cell else "the cell is empty",
                             line=line,

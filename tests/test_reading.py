@@ -177,6 +177,7 @@ BAD_LOOPS: list[tuple[str, str | bytes, list[str]]] = [
     ("empty cell", with_line(LOOP, 5, "0.3,,3"), ["line 5", '"displacement [mm]"', "empty"]),
     ("nan", with_line(LOOP, 5, "0.3,nan,3"), ["line 5", '"nan"']),
     ("inf", with_line(LOOP, 5, "0.3,3,-inf"), ["line 5", '"-inf"']),
+    ("huge", with_line(LOOP, 5, "0.3,3,1e300"), ["line 5", '"1e300"']),
     ("overflow", with_line(LOOP, 5, "0.3,3,1e999"), ["line 5", '"1e999"']),
     ("decimal comma", with_line(LOOP.replace(",", ";"), 5, "0.3;0,5;3"), ["line 5", '"0,5"', "decimal point"]),
     ("short row", with_line(LOOP, 5, "0.3,1"), ["line 5", "2 cells", "3 cells"]),
@@ -215,6 +216,17 @@ BAD_SWEEPS = [
     ("negative loss", with_line(SWEEP, 3, "15,0.1,600,-0.9"), ["line 3", "loss factor", "-0.5 to 5", '"-0.9"']),
     ("percent as ratio", with_line(SWEEP, 3, "15,0.1,600,11"), ["line 3", "%", '"11"']),
     ("phase over 90", with_line(SWEEP.replace("loss factor [-]", "phase [deg]"), 3, "15,0.1,600,95"), ["line 3", "95"]),
+    (
+        "tiny storage",
+        with_line(
+            SWEEP.replace("loss factor [-]", "loss stiffness [N/mm]").replace(
+                "stiffness [N/mm],l", "storage stiffness [N/mm],l"
+            ),
+            3,
+            "15,0.1,1e-320,600",
+        ),
+        ["line 3", "loss"],
+    ),
     ("repeat", SWEEP.replace("0.1\n", "0.1,1.5\n").replace("[-]", "[-],repeat"), ["line 2", "no repeat", '"1.5"']),
     ("few rows", "\n".join(SWEEP.splitlines()[:3]), ["too few rows", "2", "3"]),
 ]
