@@ -27,6 +27,8 @@ _CLOCK_HARMONICS = 15
 _SIGNIFICANT = 4.0
 #: Share of the half range below which both first displacement and first force count as a start from rest.
 _AT_REST = 0.02
+#: Share of the amplitude by which a motion may lie off zero before its middle is taken for unknown.
+_CENTRED = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +45,8 @@ class Drive:
         weight: rows behind each entry of force, (n,).
         noise: standard deviation of one row's force [N or N m].
         coefficients: complex harmonics of the displacement, mean first.
+        datum: mean of the measured force where the motion lies off zero, else None. Whether a sensor's zero or
+            a preload put it there is not known, so such a loop counts from its own middle.
     """
 
     loop: Loop
@@ -54,6 +58,7 @@ class Drive:
     weight: Array
     noise: float
     coefficients: Array
+    datum: float | None = None
 
     @property
     def half_range(self) -> float:
@@ -88,7 +93,11 @@ class Drive:
 
     @cached_property
     def _cycle(self) -> Array:
-        return self.displacement(np.arange(GRID) / GRID)
+        return self.displacement(np.arange(GRID) / GRID) - self.coefficients[0].real
+
+    def from_datum(self, response: Array) -> Array:
+        """A response over `history`, less its mean where the loop counts from its own middle."""
+        return response if self.datum is None else response - response.mean(axis=-1, keepdims=True)
 
     def at_rows(self, response: Array) -> Array:
         """A response over `history`, linearly interpolated at the rows: (..., n)."""
@@ -110,14 +119,16 @@ def drive_of(loop: Loop) -> Drive:
     frequency, cycles = _fundamental(loop)
     phase = (loop.time - loop.time[0]) * frequency
     half_motion, half_force = np.ptp(loop.displacement) / 2.0, np.ptp(loop.force) / 2.0
-    motion, force_noise = _harmonics(phase, loop)
+    motion, force_mean, force_noise = _harmonics(phase, loop)
     noise = loop.noise * half_force if loop.noise is not None else force_noise
     from_rest = abs(loop.displacement[0]) < _AT_REST * half_motion and abs(loop.force[0]) < _AT_REST * half_force
     force, weight = loop.force, np.ones(loop.force.size)
     if loop.force.size > MOST_ROWS and not from_rest:
         phase, force, weight = _binned(phase, loop.force)
     noise = max(noise, FLOOR * half_force)
-    return Drive(loop, frequency, cycles, bool(from_rest), phase, force, weight, noise, motion)
+    off_zero = not from_rest and abs(motion[0]) > _CENTRED * half_motion
+    datum = force_mean if off_zero else None
+    return Drive(loop, frequency, cycles, bool(from_rest), phase, force, weight, noise, motion, datum)
 
 
 def _fundamental(loop: Loop) -> tuple[float, float]:
@@ -179,8 +190,8 @@ def _turned(solution: Array) -> Array:
     return np.concatenate(([0.0], number * -solution[order + 1 :], number * solution[1 : order + 1]))
 
 
-def _harmonics(phase: Array, loop: Loop) -> tuple[Array, float]:
-    """Significant harmonics of the displacement, and the force's scatter about its own harmonics.
+def _harmonics(phase: Array, loop: Loop) -> tuple[Array, float, float]:
+    """Significant harmonics of the displacement, and the force's mean and scatter about its own harmonics.
 
     The scatter holds what does not repeat from cycle to cycle and what is too fast for the rubber.
     """
@@ -196,7 +207,8 @@ def _harmonics(phase: Array, loop: Loop) -> tuple[Array, float]:
     coefficients = np.concatenate((motion[:1], motion[1 : order + 1] + 1j * motion[order + 1 :]))
     keep = np.abs(coefficients) > _SIGNIFICANT * motion_noise * np.sqrt(2.0 / phase.size)
     keep[:2] = True
-    return np.where(keep, coefficients, 0.0)[: int(np.flatnonzero(keep)[-1]) + 1], float(force_noise)
+    motion = np.where(keep, coefficients, 0.0)[: int(np.flatnonzero(keep)[-1]) + 1]
+    return motion, float(solution[0, 1]), float(force_noise)
 
 
 def _binned(phase: Array, force: Array) -> tuple[Array, Array, Array]:

@@ -69,7 +69,8 @@ class LoopTerm:
     def force(self, model: Model, values: Values | None = None) -> Array:
         """Model force at the rows [N or N m]."""
         history = self.drive.history(_settles(model))
-        return self.drive.at_rows(model.force(self.loop.direction, history, kind="loop", values=values))
+        force = model.force(self.loop.direction, history, kind="loop", values=values)
+        return self.drive.at_rows(self.drive.from_datum(force)) + (self.drive.datum or 0.0)
 
     def residual(self, model: Model, values: Values | None = None) -> Array:
         """(..., n)"""
@@ -78,7 +79,12 @@ class LoopTerm:
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
         """(len(names), n)"""
         history = self.drive.history(_settles(model))
-        return self.drive.at_rows(force_jacobian(model, self.loop.direction, history, names)) * self._per_noise
+        slopes = force_jacobian(model, self.loop.direction, history, names)
+        return self.drive.at_rows(self.drive.from_datum(slopes)) * self._per_noise
+
+    def noise_free(self, model: Model) -> LoopTerm:
+        """The same test as the model would have it, without noise."""
+        return replace(self, drive=replace(self.drive, force=self.force(model)))
 
     def relative(self, model: Model) -> Array:
         """Difference relative to half the force range, for NRMSE."""
@@ -130,6 +136,12 @@ class SweepTerm:
             repeat=self.sweep.repeat[kept],
         )
         return replace(self, sweep=part)
+
+    def noise_free(self, model: Model) -> SweepTerm:
+        """The same test as the model would have it, without noise."""
+        stiffness = np.empty_like(self.sweep.stiffness)
+        stiffness[self.order] = self.stiffness(model)
+        return replace(self, sweep=replace(self.sweep, stiffness=stiffness))
 
     @cached_property
     def order(self) -> Array:
