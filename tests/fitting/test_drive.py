@@ -1,0 +1,154 @@
+"""Loops made ready: the motion behind a noisy displacement, whatever its waveform, sampling and length."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bushfit import rig
+from bushfit.errors import FitError
+from bushfit.fitting.drive import MOST_ROWS, drive_of
+from bushfit.fitting.terms import LoopTerm
+from bushfit.geometry import Direction
+from bushfit.measurement import Loop
+from bushfit.model import Model
+
+FREQUENCY, AMPLITUDE = 0.1, 1e-3
+
+
+def measured(
+    model: Model,
+    *,
+    waveform: str = "sine",
+    cycles: float = 1.0,
+    start: float = 0.0,
+    rows: int = 1000,
+    uneven: bool = False,
+    noise: float = 3e-3,
+    jitter: float = 1e-3,
+    offset: float = 0.0,
+    preload: float = 0.0,
+    seed: int = 0,
+) -> Loop:
+    """A settled loop: displacement noise `jitter` of the amplitude, force noise `noise` of the half range."""
+    whole = rig.record(model, Direction.AXIAL, FREQUENCY, AMPLITUDE, cycles=6, run_in=8, waveform=waveform, kind="loop")
+    rng = np.random.default_rng(seed)
+    count = round(rows * cycles)
+    share = np.sort(rng.random(count)) if uneven else np.arange(count) / count
+    time = (start + cycles * share) / FREQUENCY
+    motion, force = (np.interp(time, whole.time, column) for column in (whole.displacement, whole.force))
+    return Loop(
+        "loop",
+        Direction.AXIAL,
+        time - time[0],
+        motion + offset + jitter * AMPLITUDE * rng.standard_normal(count),
+        force + preload + noise * np.ptp(force) / 2.0 * rng.standard_normal(count),
+    )
+
+
+CASES = {
+    "sine": {},
+    "triangle": {"waveform": "triangle"},
+    "several": {"cycles": 4.0},
+    "fractional": {"cycles": 2.37, "start": 0.11},
+    "starts at a peak": {"start": 0.25},
+    "uneven": {"uneven": True, "cycles": 2.0},
+    "uneven triangle": {"uneven": True, "cycles": 3.0, "waveform": "triangle", "start": 0.4},
+    "coarse": {"rows": 40, "cycles": 3.0},
+    "offset": {"offset": 2e-4, "cycles": 2.0},
+    "preloaded": {"offset": -2e-4, "preload": -80.0, "cycles": 2.0},
+    "very noisy displacement": {"jitter": 1e-2, "cycles": 3.0},
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_turning_points_are_those_of_the_motion(paper_model: Model, case: str) -> None:
+    """One peak and one trough a cycle, where the motion has them, although the sensor turns at every other row."""
+    loop = measured(paper_model, **CASES[case])  # type: ignore[arg-type]
+    drive = drive_of(loop)
+    cycle = drive.history(settles=False).value
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(np.append(cycle, cycle[0])))) != 0)
+    noisy = np.count_nonzero(np.diff(np.sign(np.diff(loop.displacement))) != 0)
+    high, low = cycle.max(), cycle.min()
+    print(
+        f"{case}: f {drive.frequency:.6f} Hz, turns {turns.size} of {noisy} in the record, "
+        f"peak {100 * (high / AMPLITUDE - 1):+.2f} %, trough {100 * (-low / AMPLITUDE - 1):+.2f} %"
+    )
+    assert drive.frequency == pytest.approx(FREQUENCY, rel=2e-3)
+    large = [t for t in turns if min(abs(cycle[t] - cycle.max()), abs(cycle[t] - cycle.min())) < 0.05 * AMPLITUDE]
+    assert len(large) >= 1
+    spurious = [t for t in turns if t not in large]
+    assert not spurious
+    assert high == pytest.approx(AMPLITUDE, rel=1.5e-2)
+    assert -low == pytest.approx(AMPLITUDE, rel=1.5e-2)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_true_model_leaves_only_noise(paper_model: Model, case: str) -> None:
+    loop = measured(paper_model, **CASES[case])  # type: ignore[arg-type]
+    term = LoopTerm(drive_of(loop))
+    residual = term.residual(paper_model)
+    reduced = float(residual @ residual) / residual.size
+    print(f"{case}: reduced chi-square of the true model {reduced:.3f} over {residual.size} rows")
+    assert term.relative_noise == pytest.approx(3e-3, rel=0.35)
+    assert reduced < 1.0 + 6.0 * np.sqrt(2.0 / residual.size) + 0.1
+
+
+def test_from_rest_the_virgin_curve_is_followed(paper_model: Model) -> None:
+    whole = rig.record(paper_model, Direction.AXIAL, FREQUENCY, AMPLITUDE, cycles=3, steps_per_cycle=1000)
+    loop = Loop("loop", Direction.AXIAL, whole.time, whole.displacement, whole.force)
+    drive = drive_of(loop)
+    assert drive.from_rest
+    assert not drive.history(settles=False).periodic
+    gap = np.max(np.abs(LoopTerm(drive).force(paper_model) - loop.force)) / drive.half_range
+    print(f"from rest: model within {gap:.1e} of the record")
+    assert gap < 2e-3
+    settled = drive_of(measured(paper_model))
+    assert not settled.from_rest
+
+
+def test_many_rows_are_binned_without_loss(paper_model: Model) -> None:
+    loop = measured(paper_model, cycles=5.0, rows=40_000)
+    drive = drive_of(loop)
+    assert drive.force.size <= 5 * 1024 + 1
+    assert drive.weight.sum() == loop.force.size > MOST_ROWS
+    residual = LoopTerm(drive).residual(paper_model)
+    reduced = float(residual @ residual) / residual.size
+    print(f"{loop.force.size} rows in {drive.force.size} bins: reduced chi-square {reduced:.3f}")
+    assert 0.9 < reduced < 1.15
+    few = drive_of(measured(paper_model, cycles=5.0, rows=500))
+    assert drive.first_harmonic() == pytest.approx(few.first_harmonic(), rel=2e-3)
+
+
+def test_first_harmonic_is_the_stiffness_of_the_loop(paper_model: Model) -> None:
+    found = drive_of(measured(paper_model, noise=0.0, jitter=0.0)).first_harmonic()
+    assert found == pytest.approx(complex(paper_model.stiffness("axial", FREQUENCY, AMPLITUDE)), rel=1e-3)
+
+
+def test_a_wrong_zero_of_the_load_cell_alone_stays_visible(paper_model: Model) -> None:
+    """Only where the displacement is off zero too is the mean force taken for unknown."""
+    term = LoopTerm(drive_of(measured(paper_model, preload=5.0)))
+    assert np.mean(term.drive.force - term.force(paper_model)) == pytest.approx(5.0, abs=0.3)
+
+
+def test_jacobian_of_an_offset_loop(paper_model: Model) -> None:
+    term = LoopTerm(drive_of(measured(paper_model, offset=3e-4, preload=40.0)))
+    names = ("mu", "eps_half")
+    for name, row in zip(names, term.jacobian(paper_model, names), strict=True):
+        value = paper_model.values[name]
+        high, low = (term.residual(paper_model.with_values({name: value * (1.0 + s)})) for s in (1e-5, -1e-5))
+        np.testing.assert_allclose(row * value, (high - low) / 2e-5, atol=1e-4)
+
+
+def test_stated_noise_is_taken(paper_model: Model) -> None:
+    term = LoopTerm(drive_of(replace(measured(paper_model), noise=0.02)))
+    assert term.relative_noise == pytest.approx(0.02)
+
+
+def test_half_a_cycle_is_refused(paper_model: Model) -> None:
+    loop = measured(paper_model, cycles=0.6)
+    with pytest.raises(FitError, match="does not hold a whole cycle") as caught:
+        drive_of(loop)
+    assert "at least one closed cycle" in str(caught.value)
