@@ -20,6 +20,16 @@ SHARED_NOISE = replace(PAPER_NOISE, gain_error=4e-3, phase_error=3.5e-3)
 Rig = Callable[..., Campaign]
 
 
+@pytest.fixture
+def paper_noise() -> SimulateSettings:
+    return PAPER_NOISE
+
+
+@pytest.fixture
+def shared_noise() -> SimulateSettings:
+    return SHARED_NOISE
+
+
 @pytest.fixture(scope="session")
 def rig() -> Rig:
     """rig(model, noise, seed): the paper's tests of a model; without noise what an ideal rig writes."""
