@@ -86,6 +86,10 @@ class LoopTerm:
         """The same test as the model would have it, without noise."""
         return replace(self, drive=replace(self.drive, force=self.force(model)))
 
+    def change(self, one: Model, other: Model) -> float:
+        """Largest difference between two models, relative to half the force range."""
+        return float(np.max(np.abs(self.force(one) - self.force(other)))) / self.drive.half_range
+
     def relative(self, model: Model) -> Array:
         """Difference relative to half the force range, for NRMSE."""
         return (self.force(model) - self.drive.force) / self.drive.half_range
@@ -181,6 +185,10 @@ class SweepTerm:
     def relative(self, model: Model) -> Array:
         """|K - K_meas| / |K_meas| per point, for NRMSE."""
         return np.abs(self.stiffness(model) / self.measured - 1.0)
+
+    def change(self, one: Model, other: Model) -> float:
+        """Largest difference between two models, relative to |K| as measured."""
+        return float(np.max(np.abs((self.stiffness(one) - self.stiffness(other)) / self.measured)))
 
     def deviation(self, model: Model, values: Values | None = None) -> Array:
         """Residual before whitening: gain in the real, phase (or loss factor) in the imaginary part, (..., n)."""

@@ -1,0 +1,98 @@
+"""A fitted model as evidence: its residuals, and what any direction orthogonal to its own parameters would gain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.fitting.solve import Bounds, Solution, solve
+from bushfit.fitting.terms import SweepTerm, Term
+from bushfit.model import Model
+
+#: Evaluations after which a candidate that fits badly is taken as it is.
+_EVALUATIONS = 60
+#: Share of a direction's length that must be left beside the model's own parameters to count as visible.
+_VISIBLE = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """A model fitted to all tests of a campaign."""
+
+    solution: Solution
+    terms: tuple[Term, ...]
+
+    @property
+    def model(self) -> Model:
+        return self.solution.model
+
+    @property
+    def residual(self) -> Array:
+        """Whitened residuals, model less measured, (n,)."""
+        return self.solution.residual
+
+    @property
+    def chi_square(self) -> float:
+        return self.solution.chi_square
+
+    @property
+    def parameters(self) -> int:
+        return len(self.solution.coordinates.names)
+
+    @property
+    def penalty(self) -> float:
+        """Price of one parameter by the Bayesian information criterion: ln of the number of residuals."""
+        return float(np.log(self.residual.size))
+
+    @property
+    def bic(self) -> float:
+        """chi-square + parameters ln n; lower is better."""
+        return self.chi_square + self.parameters * self.penalty
+
+    @cached_property
+    def _span(self) -> Array:
+        """Orthonormal basis of what the model's own parameters can absorb, (n, k)."""
+        basis, size, _ = np.linalg.svd(self.solution.jacobian.T, full_matrices=False)
+        return basis[:, size > 1e-10 * size[0]]
+
+    def beside(self, columns: Array) -> Array:
+        """Columns (c, n) less what the model's own parameters absorb of them; 0 where nothing visible is left."""
+        left = columns - (columns @ self._span) @ self._span.T
+        lengths = np.linalg.norm(columns, axis=1)
+        visible = np.linalg.norm(left, axis=1) > _VISIBLE * np.where(lengths > 0.0, lengths, 1.0)
+        return np.where(visible[:, None], left, 0.0)
+
+    @cached_property
+    def slices(self) -> list[slice]:
+        """Where each term's residuals stand."""
+        ends = np.cumsum([term.size for term in self.terms])
+        return [slice(int(end - term.size), int(end)) for end, term in zip(ends, self.terms, strict=True)]
+
+    @cached_property
+    def blocks(self) -> list[Array]:
+        """Indices of the residuals of each block and part (gain, phase) of the sweeps, which share an error."""
+        groups = []
+        for term, place in zip(self.terms, self.slices, strict=True):
+            if not isinstance(term, SweepTerm):
+                continue
+            count = term.frequency.size
+            edges = [*term.block_starts.tolist(), count]
+            for part in (place.start, place.start + count):
+                groups += [part + np.arange(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        return groups
+
+    @property
+    def shared_freedom(self) -> int:
+        """Degrees of freedom behind the errors that blocks share; 0 where these are not measured."""
+        sweeps = [term for term in self.terms if isinstance(term, SweepTerm)]
+        return sweeps[0].noise.freedom if sweeps else 0
+
+
+def fit(model: Model, terms: Sequence[Term], held: Sequence[str], bounds: Bounds) -> Evidence:
+    """Fit every parameter of a model but the held ones, from its own values."""
+    names = [name for name in model.parameters if name not in held]
+    return Evidence(solve(model, terms, names, bounds, evaluations=_EVALUATIONS, strict=False), tuple(terms))

@@ -1,0 +1,109 @@
+"""Held-out data: does what was added also close the gap where it was not fitted?
+
+An amplitude level, the top third of the frequencies, a direction and a loop are held out in turn. Refitting without
+a part is one Gauss-Newton step from the full fit, which is exact where the model is linear over that step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.effects.contract import Array
+from bushfit.fitting.terms import LoopTerm, SweepTerm
+
+#: Parts without which some parameter's variance would grow by more than this say nothing about a prediction.
+_MOST_GROWTH = 100.0
+#: A gap of at most this many units of noise, or shrunk to less than this share, is closed.
+_CLOSED, _SHRUNK = 1.2, 0.5
+#: No part may get worse by more than this factor.
+_WORSE = 1.1
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Root mean square residual of one part, in units of noise, predicted from the other parts."""
+
+    part: str
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class HoldOut:
+    """All parts held out in turn, and the verdict."""
+
+    parts: tuple[HeldOut, ...]
+    before: float
+    after: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether the gap shrinks where it was not fitted, and nowhere grows."""
+        closed = self.after <= max(_CLOSED, _SHRUNK * self.before)
+        return closed and all(part.after <= max(_WORSE * part.before, _CLOSED) for part in self.parts)
+
+
+def hold_out(before: Evidence, after: Evidence) -> HoldOut:
+    """Compare two models of the same tests on every part that both can predict from the rest."""
+    parts, sums = [], np.zeros(3)
+    for name, chosen in _parts(after):
+        gaps = [_predicted(evidence, chosen) for evidence in (before, after)]
+        if any(gap is None for gap in gaps):
+            continue
+        squares = [float(np.mean(np.square(gap))) for gap in gaps if gap is not None]
+        parts.append(HeldOut(name, float(np.sqrt(squares[0])), float(np.sqrt(squares[1]))))
+        sums += np.array([*squares, 1.0]) * np.count_nonzero(chosen)
+    if not parts:
+        rms = [float(np.sqrt(np.mean(evidence.residual**2))) for evidence in (before, after)]
+        return HoldOut((), rms[0], rms[1])
+    return HoldOut(tuple(parts), float(np.sqrt(sums[0] / sums[2])), float(np.sqrt(sums[1] / sums[2])))
+
+
+def _predicted(evidence: Evidence, chosen: Array) -> Array | None:
+    """Residuals of the chosen rows with the model fitted to the others; None where those leave it open."""
+    jacobian, residual = evidence.solution.jacobian, evidence.residual
+    rest, full = jacobian[:, ~chosen] @ jacobian[:, ~chosen].T, jacobian @ jacobian.T
+    moving = np.diag(full) > 0.0
+    rest, full = rest[np.ix_(moving, moving)], full[np.ix_(moving, moving)]
+    if np.linalg.cond(rest) > 1e14:
+        return None
+    inverse = np.linalg.inv(rest)
+    if np.any(np.diag(inverse) > _MOST_GROWTH * np.diag(np.linalg.inv(full))):
+        return None
+    step = -inverse @ (jacobian[moving][:, ~chosen] @ residual[~chosen])
+    return residual[chosen] + step @ jacobian[moving][:, chosen]
+
+
+def _parts(evidence: Evidence) -> Iterator[tuple[str, Array]]:
+    """Name and rows of each part: levels, the top third of the frequencies, directions, loops."""
+    pairs = list(zip(evidence.terms, evidence.slices, strict=True))
+    sweeps = [(term, place) for term, place in pairs if isinstance(term, SweepTerm)]
+    loops = [(term, place) for term, place in pairs if isinstance(term, LoopTerm)]
+    ranks = [np.unique(term.amplitude, return_inverse=True)[1] for term, _ in sweeps]
+    for rank in range(max((int(r.max()) + 1 for r in ranks), default=0)):
+        picked = [(place, np.tile(r == rank, 2)) for (_, place), r in zip(sweeps, ranks, strict=True)]
+        yield f"amplitude level {rank + 1}", _rows(evidence, picked)
+    if sweeps:
+        top = np.quantile(np.concatenate([term.frequency for term, _ in sweeps]), 2.0 / 3.0)
+        yield (
+            "top third of the frequencies",
+            _rows(evidence, [(place, np.tile(term.frequency > top, 2)) for term, place in sweeps]),
+        )
+    for direction in dict.fromkeys(term.direction for term, _ in pairs):
+        whole = [(place, np.ones(term.size, dtype=bool)) for term, place in pairs if term.direction is direction]
+        if len(whole) < len(pairs):
+            yield f"{direction} direction", _rows(evidence, whole)
+    if len(loops) > 1:
+        for term, place in loops:
+            yield f"loop {term.loop.name}", _rows(evidence, [(place, np.ones(term.size, dtype=bool))])
+
+
+def _rows(evidence: Evidence, picked: Sequence[tuple[slice, Array]]) -> Array:
+    chosen = np.zeros(evidence.residual.size, dtype=bool)
+    for place, rows in picked:
+        chosen[place] = rows
+    return chosen

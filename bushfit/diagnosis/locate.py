@@ -1,0 +1,224 @@
+"""Where model and measurement disagree: smooth misfit per level and part, ranked, and put into words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.record import Where
+from bushfit.effects.contract import Array
+from bushfit.fitting.terms import LoopTerm, SweepTerm
+from bushfit.sheets import display_units
+
+#: Smooth misfit: Legendre polynomials up to this degree in ln f, harmonics of a loop up to this number.
+_DEGREE, _HARMONICS = 3, 5
+#: A region is worth a line when its smooth misfit is this many times what noise makes of it.
+_WORTH_A_LINE = 2.5
+_MOST_LINES = 6
+_PARTS = ("storage", "loss")
+
+
+@dataclass(frozen=True, eq=False)
+class _Level:
+    """Mean misfit of one amplitude of one sweep over its repeats: measured over model less 1, complex, (n,)."""
+
+    term: SweepTerm
+    amplitude: float
+    frequency: Array
+    misfit: Array
+    noise: tuple[float, float]
+
+
+def contrasts(evidence: Evidence) -> Array:
+    """Whitened columns of everything smooth: per level and part a polynomial in ln f, per loop its harmonics, (c, n)."""
+    rows = []
+    for term, place in zip(evidence.terms, evidence.slices, strict=True):
+        if isinstance(term, LoopTerm):
+            rows += [_row(evidence, place, column) for column in _loop_columns(term)]
+            continue
+        for level in np.unique(term.amplitude):
+            chosen = term.amplitude == level
+            basis = _polynomials(term.frequency[chosen])
+            for column in basis.T:
+                values = np.zeros(chosen.size, dtype=complex)
+                values[chosen] = column
+                rows += [_row(evidence, place, term.whiten(unit * values)) for unit in (1.0, 1.0j)]
+    return np.array(rows)
+
+
+def _row(evidence: Evidence, place: slice, values: Array) -> Array:
+    row = np.zeros(evidence.residual.size)
+    row[place] = values
+    return row
+
+
+def _loop_columns(term: LoopTerm) -> Iterator[Array]:
+    scale = np.sqrt(term.drive.weight) / term.drive.noise * term.drive.half_range
+    angle = 2.0 * np.pi * term.drive.phase
+    yield scale
+    for order in range(1, _HARMONICS + 1):
+        yield scale * np.cos(order * angle)
+        yield scale * np.sin(order * angle)
+
+
+def _polynomials(frequency: Array) -> Array:
+    x = np.log(frequency)
+    distinct = np.unique(x).size
+    unit = 2.0 * (x - x.min()) / max(float(np.ptp(x)), 1e-300) - 1.0
+    return np.polynomial.legendre.legvander(unit, min(_DEGREE, distinct - 1))
+
+
+def largest_smooth_misfit(evidence: Evidence) -> float:
+    """Largest smooth misfit anywhere, relative to |K| or to half a loop's force range."""
+    sizes = [float(np.abs(_smooth(level)).max()) for level in _levels(evidence)]
+    for term, place in zip(evidence.terms, evidence.slices, strict=True):
+        if isinstance(term, LoopTerm):
+            columns = np.array(list(_loop_columns(term)))
+            fitted = np.linalg.lstsq(columns.T, evidence.residual[place], rcond=None)[0] @ columns
+            scale = term.drive.noise / (term.drive.half_range * np.sqrt(term.drive.weight))
+            sizes.append(float(np.abs(fitted * scale).max()))
+    return max(sizes, default=0.0)
+
+
+def locate(evidence: Evidence) -> tuple[Where, ...]:
+    """Regions of smooth misfit, the worst first."""
+    found = [*_sweep_regions(evidence), *_loop_regions(evidence)]
+    worth = [where for where in found if where.excess > _WORTH_A_LINE]
+    return tuple(sorted(worth, key=lambda where: -where.excess)[:_MOST_LINES])
+
+
+def _levels(evidence: Evidence) -> list[_Level]:
+    levels = []
+    for term in evidence.terms:
+        if not isinstance(term, SweepTerm):
+            continue
+        ratio = term.measured / term.stiffness(evidence.model) - 1.0
+        for amplitude in np.unique(term.amplitude):
+            chosen = term.amplitude == amplitude
+            frequency, place = np.unique(term.frequency[chosen], return_inverse=True)
+            counts = np.bincount(place)
+            values = ratio[chosen]
+            mean = (np.bincount(place, values.real) + 1j * np.bincount(place, values.imag)) / counts
+            repeats = float(np.median(counts))
+            random = term.noise.random[term.sweep.name, float(amplitude)]
+            gain, phase = (
+                float(np.sqrt((r**2 + s**2) / repeats)) for r, s in zip(random, term.noise.shared, strict=True)
+            )
+            levels.append(_Level(term, float(amplitude), frequency, mean, (gain, phase)))
+    return levels
+
+
+def _smooth(level: _Level) -> Array:
+    basis = _polynomials(level.frequency)
+    return basis @ np.linalg.lstsq(basis.astype(complex), level.misfit, rcond=None)[0]
+
+
+def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
+    levels = _levels(evidence)
+    for direction in dict.fromkeys(level.term.direction for level in levels):
+        mine = [level for level in levels if level.term.direction is direction]
+        for part, name in enumerate(_PARTS):
+            pieces = [(np.real if part == 0 else np.imag)(_smooth(level)) for level in mine]
+            sizes = [piece / level.noise[part] for piece, level in zip(pieces, mine, strict=True)]
+            excess = float(np.sqrt(np.mean(np.square(np.concatenate(sizes)))))
+            strongest = max(float(np.abs(size).max()) for size in sizes)
+            touched = [i for i, size in enumerate(sizes) if np.abs(size).max() > 0.5 * strongest]
+            band = _band([mine[i] for i in touched], [sizes[i] for i in touched], strongest)
+            yield Where(
+                str(direction),
+                "sweep",
+                band,
+                (mine[touched[0]].amplitude, mine[touched[-1]].amplitude),
+                name,
+                excess,
+                _read_sweep(name, direction, mine, pieces, touched, band),
+            )
+
+
+def _band(levels: Sequence[_Level], sizes: Sequence[Array], strongest: float) -> tuple[float, float]:
+    strong = [level.frequency[np.abs(size) > 0.5 * strongest] for level, size in zip(levels, sizes, strict=True)]
+    together = np.concatenate(strong)
+    return float(together.min()), float(together.max())
+
+
+def _read_sweep(
+    part: str,
+    direction: object,
+    levels: Sequence[_Level],
+    pieces: Sequence[Array],
+    touched: Sequence[int],
+    band: tuple[float, float],
+) -> str:
+    """A sentence: which way, how much, how it goes with frequency and with amplitude."""
+    what = "stiffness" if part == "storage" else "loss"
+    largest = max((pieces[i] for i in touched), key=lambda piece: float(np.abs(piece).max()))
+    at = int(np.argmax(np.abs(largest)))
+    unit, factor = display_units(levels[0].term.direction)["length"]
+    size = f"{100 * abs(largest[at]):.2g} % of |K| {'above' if largest[at] > 0 else 'below'} the model"
+    if len(touched) == len(levels):
+        level = "at every amplitude"
+    else:
+        level = "at " + ", ".join(f"{levels[i].amplitude * factor:.3g}" for i in touched) + f" {unit}"
+    trend = _trend(levels[touched[0]].frequency, largest)
+    changes = "" if len(touched) < len(levels) else _over_amplitude(pieces)
+    span = f"{band[0]:.3g} to {band[1]:.3g} Hz"
+    return f"measured {direction} {what} is up to {size}, {trend} ({span}), {level}{changes}"
+
+
+def _trend(frequency: Array, misfit: Array) -> str:
+    """How a misfit goes with frequency: the shape that leaves the least."""
+    shapes = {
+        "much the same at every frequency": [np.ones_like(frequency)],
+        "changing with the logarithm of frequency": [np.ones_like(frequency), np.log(frequency)],
+        "changing in proportion to frequency": [np.ones_like(frequency), frequency],
+        "changing with the square of frequency": [np.ones_like(frequency), frequency**2],
+    }
+    left = {}
+    for words, columns in shapes.items():
+        basis = np.stack(columns, axis=1)
+        rest = misfit - basis @ np.linalg.lstsq(basis, misfit, rcond=None)[0]
+        left[words] = float(rest @ rest)
+    flat = "much the same at every frequency"
+    best = min(left, key=lambda words: left[words])
+    return flat if left[flat] < 0.2 * float(misfit @ misfit) else best
+
+
+def _over_amplitude(pieces: Sequence[Array]) -> str:
+    means = [float(np.mean(piece)) for piece in pieces]
+    if len(means) < 2 or np.ptp(means) < 0.5 * max(abs(mean) for mean in means):
+        return ""
+    return ", rising with amplitude" if means[-1] > means[0] else ", falling with amplitude"
+
+
+def _loop_regions(evidence: Evidence) -> Iterator[Where]:
+    for term, place in zip(evidence.terms, evidence.slices, strict=True):
+        if not isinstance(term, LoopTerm):
+            continue
+        columns = np.array(list(_loop_columns(term)))
+        unit = columns / np.linalg.norm(columns, axis=1)[:, None]
+        amounts = -(unit @ evidence.residual[place])
+        sizes = np.concatenate(([abs(amounts[0])], np.hypot(amounts[1::2], amounts[2::2])))
+        order = int(np.argmax(sizes))
+        share = np.sqrt(2.0) * sizes[order] / np.sqrt(term.size) * term.drive.noise / term.drive.half_range
+        names = {
+            0: "a constant force",
+            1: "its first harmonic (slope or area)",
+            2: "its second harmonic (one way stiffer than the other)",
+            3: "its third harmonic (a bend at the ends)",
+        }
+        words = names.get(order, f"harmonic {order}")
+        unit_name, factor = display_units(term.direction)["length"]
+        amplitude = term.drive.amplitude
+        yield Where(
+            str(term.direction),
+            "loop",
+            (term.drive.frequency,) * 2,
+            (amplitude,) * 2,
+            "force",
+            float(np.sqrt(np.mean(np.square(amounts)))),
+            f"the {term.direction} loop of {amplitude * factor:.3g} {unit_name} departs from the model most in {words}: "
+            f"{100 * share:.2g} % of half its force range",
+        )

@@ -1,0 +1,126 @@
+"""Which effect is missing: every effect of the library proposes itself with evidence, and the best are refitted.
+
+A score test ranks them all: residuals projected on the candidate's sensitivity beside the model's own parameters.
+The few best are then fitted together with all parameters of the model, from the amounts the score suggests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from bushfit.diagnosis.calibrate import gain, orthonormal
+from bushfit.diagnosis.evidence import Evidence, fit
+from bushfit.effects import LIBRARY, Effect, Parameter, qualified
+from bushfit.effects.contract import Array
+from bushfit.errors import FitError
+from bushfit.fitting.solve import Bounds, jacobian
+from bushfit.fitting.terms import Term
+from bushfit.model import Model
+
+#: Candidates that are refitted in each round, the best scores first.
+REFITTED = 6
+_PROBES = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """One effect's claim before any refit.
+
+    Args:
+        name: the effect.
+        model: the model with the effect at the amount the score suggests.
+        score: what it would take off chi-square if everything were linear.
+        direction: its sensitivity beside the model's own parameters, orthonormal, (1, n) or (0, n).
+        sense: +1 where only positive amounts are physical, 0 where both signs are.
+    """
+
+    name: str
+    model: Model
+    score: float
+    direction: Array
+    sense: int
+
+    @property
+    def visible(self) -> bool:
+        """Whether these tests could show the effect at all, beside the model's own parameters."""
+        return self.direction.shape[0] > 0
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One effect refitted together with everything else."""
+
+    name: str
+    evidence: Evidence
+    gain: float
+
+
+def proposals(evidence: Evidence, excluded: Collection[str]) -> list[Proposal]:
+    """Every effect of the library that is not yet in the model, best score first."""
+    found = [_propose(evidence, effect) for name, effect in LIBRARY.items() if _free(evidence.model, name, excluded)]
+    return sorted(found, key=lambda proposal: -proposal.score)
+
+
+def _free(model: Model, name: str, excluded: Collection[str]) -> bool:
+    return name not in model.effects and name not in excluded
+
+
+def _propose(evidence: Evidence, effect: Effect) -> Proposal:
+    """The best of an effect's probes: its shape parameters on a grid that the tests suggest, its amount by score."""
+    amount = next(parameter for parameter in effect.parameters if parameter.neutral is not None)
+    name = qualified(effect, amount)
+    sense = 1 if amount.neutral == amount.bounds[0] else 0
+    best: Proposal | None = None
+    for shape in _shapes(evidence.terms, evidence.model, effect):
+        model = evidence.model.with_effect(effect.name, shape)
+        column = jacobian(model, evidence.terms, [name])
+        direction = orthonormal(evidence, column)
+        score = gain(direction, evidence.residual, sense)
+        if best is None or score > best.score:
+            left = evidence.beside(column)[0]
+            step = float(-(left @ evidence.residual) / max(float(left @ left), 1e-300)) * amount.typical
+            step = float(np.clip(step, *amount.bounds)) if score > 0.0 else 0.0
+            best = Proposal(effect.name, model.with_values({name: step}), score, direction, sense)
+    assert best is not None
+    return best
+
+
+def _shapes(terms: Sequence[Term], model: Model, effect: Effect) -> list[Mapping[str, float]]:
+    """Values of the parameters that have no neutral value, on a grid scaled by the tests."""
+    axes = {
+        qualified(effect, parameter): _probes(terms, model, parameter)
+        for parameter in effect.parameters
+        if parameter.neutral is None
+    }
+    return [dict(zip(axes, point, strict=True)) for point in product(*axes.values())]
+
+
+def _probes(terms: Sequence[Term], model: Model, parameter: Parameter) -> Array:
+    frequencies = np.concatenate([term.frequency for term in terms])
+    match parameter.scale:
+        case "period":
+            low, high = 0.1 / (2.0 * np.pi * frequencies.max()), 2.0 / (2.0 * np.pi * np.median(frequencies))
+        case "frequency":
+            low, high = 0.7 * frequencies.max(), 4.0 * frequencies.max()
+        case "displacement":
+            amplitudes = np.concatenate([term.amplitude for term in terms])
+            low, high = 0.8 * amplitudes.min(), 0.95 * amplitudes.max()
+        case "strain":
+            strains = [term.amplitude * model.bushing.unit_strain(term.direction) for term in terms]
+            low, high = 0.03 * np.concatenate(strains).min(), np.concatenate(strains).max()
+        case None:
+            return np.array([parameter.typical])
+    return np.clip(np.geomspace(low, high, _PROBES), *parameter.bounds)
+
+
+def refit(evidence: Evidence, proposal: Proposal, held: Sequence[str], bounds: Bounds) -> Candidate | None:
+    """The proposal fitted together with the model; None where the fit fails."""
+    try:
+        fitted = fit(proposal.model, evidence.terms, held, bounds)
+    except FitError:
+        return None
+    return Candidate(proposal.name, fitted, evidence.chi_square - fitted.chi_square)

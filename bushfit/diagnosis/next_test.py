@@ -1,0 +1,126 @@
+"""The measurement that would decide: for a set of look-alikes, the menu's entry that parts them best per effort."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from bushfit.effects import effect_named
+from bushfit.effects.contract import Array, Level
+from bushfit.fitting.terms import Term
+from bushfit.geometry import Direction
+from bushfit.model import Model
+
+#: Relative noise of one point of a test that does not exist yet.
+_NOISE = 5e-3
+
+
+@dataclass(frozen=True)
+class MenuEntry:
+    """A test a lab can do.
+
+    Args:
+        words: what to do.
+        effort: in units of one more sweep.
+        direction: of the test, None for all.
+        frequencies: [Hz]; None for those of the campaign.
+        amplitudes: relative to the campaign's largest; None for its own.
+        without_rig: True where the test removes or knows what belongs to the rig.
+    """
+
+    words: str
+    effort: float
+    direction: Direction | None = None
+    frequencies: tuple[float, ...] | None = None
+    amplitudes: tuple[float, ...] | None = None
+    without_rig: bool = False
+
+
+MENU = (
+    MenuEntry("run the empty fixture, or add a known mass, at the same frequencies", 0.5, without_rig=True),
+    MenuEntry(
+        "put a steel dummy in place of the bushing: it shows the rig's compliance, delay and gain",
+        0.5,
+        without_rig=True,
+    ),
+    MenuEntry("sweep from 0.05 to 5 Hz at the same amplitudes", 1.5, frequencies=(0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)),
+    MenuEntry("sweep to twice the highest frequency", 1.0, frequencies=(160.0, 200.0, 250.0, 300.0)),
+    MenuEntry("sweep at a fifth and a tenth of the smallest amplitude", 1.0, amplitudes=(-0.1, -0.2)),
+    MenuEntry("sweep at one and a half and twice the largest amplitude", 1.0, amplitudes=(1.5, 2.0)),
+    MenuEntry("sweep in the radial direction at the same amplitudes", 1.0, direction=Direction.RADIAL),
+    MenuEntry("sweep in the axial direction at the same amplitudes", 1.0, direction=Direction.AXIAL),
+    MenuEntry("sweep in torsion", 2.0, direction=Direction.TORSION, amplitudes=(1.0,)),
+)
+
+#: What confirms an effect that acts on waveforms or over time, which stiffness alone cannot show.
+CONFIRM = {
+    "asymmetry": "repeat the loop with a static offset to either side",
+    "force_offset": "read the load cell with no bushing mounted",
+    "mullins_softening": "repeat the loop at once, without a rest: the first cycles must not stiffen again",
+    "self_heating": "hold one point for 30 s and for 10 min: heating shows as drift",
+    "interface_slip": "store the raw force waveforms: slip makes odd harmonics at the smallest amplitude",
+    "clearance": "sweep at a third of the smallest amplitude: play takes away most there",
+    "amplitude_rolloff": "log the displacement really reached at every frequency",
+    "inertia": "add a known mass between bushing and load cell, or run the empty fixture",
+    "fixture_resonance": "tap the fixture, or run it empty to three times the highest frequency",
+    "rig_compliance": "put a steel dummy in place of the bushing",
+    "delay": "put a steel dummy in place of the bushing: its loss factor must be zero",
+    "force_gain": "hang a known weight on the load cell in both chains",
+}
+
+
+def deciding_test(models: Sequence[Model], terms: Sequence[Term]) -> str:
+    """The entry with the largest predicted distance between any two of the models, in noise per effort.
+
+    The distance is that of complex stiffness over the test's points, less what a common gain could explain; a test
+    without the rig parts an instrument effect from any other by all of its size.
+    """
+    if len(models) < 2:
+        return ""
+    scored = [(_distance(entry, models, terms) / entry.effort, entry.words) for entry in MENU]
+    best, words = max(scored)
+    return words if best > 0.0 else ""
+
+
+def confirming_test(name: str) -> str:
+    """A test that would confirm one named effect, or ""."""
+    return CONFIRM.get(name, "")
+
+
+def _distance(entry: MenuEntry, models: Sequence[Model], terms: Sequence[Term]) -> float:
+    frequency, amplitude, direction = _points(entry, terms)
+    if entry.without_rig:
+        kinds = [{effect_named(name).level for name in model.effects} for model in models]
+        if len({Level.INSTRUMENT in kind for kind in kinds}) < 2:
+            return 0.0
+        frequency, amplitude, direction = _points(MenuEntry("", 1.0), terms)
+        responses = [_rig_share(model, direction, frequency, amplitude) for model in models]
+    else:
+        responses = [np.log(model.stiffness(direction, frequency, amplitude)) for model in models]
+    return min(_apart(one, other) for one, other in combinations(responses, 2))
+
+
+def _rig_share(model: Model, direction: Direction, frequency: Array, amplitude: Array) -> Array:
+    bare = model.without(Level.INSTRUMENT)
+    return np.log(model.stiffness(direction, frequency, amplitude) / bare.stiffness(direction, frequency, amplitude))
+
+
+def _apart(one: Array, other: Array) -> float:
+    difference = one - other
+    return float(np.sum(np.abs(difference) ** 2)) / _NOISE**2
+
+
+def _points(entry: MenuEntry, terms: Sequence[Term]) -> tuple[Array, Array, Direction]:
+    direction = entry.direction or terms[-1].direction
+    same = [term for term in terms if term.direction is direction] or list(terms)
+    amplitudes = np.unique(np.concatenate([term.amplitude for term in same]))
+    if direction is Direction.TORSION and same[0].direction is not Direction.TORSION:
+        amplitudes = np.array([0.02])
+    if entry.amplitudes:
+        amplitudes = np.array([amplitudes.min() * -x if x < 0 else amplitudes.max() * x for x in entry.amplitudes])
+    frequencies = entry.frequencies or np.unique(np.concatenate([term.frequency for term in terms]))
+    f, x = np.meshgrid(frequencies, amplitudes)
+    return f.ravel(), x.ravel(), direction

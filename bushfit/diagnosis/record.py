@@ -1,0 +1,181 @@
+"""What a diagnosis found, frozen, and as JSON in the schema bushfit/diagnosis/1."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.holdout import HoldOut
+from bushfit.effects import effect_named
+from bushfit.results import Result
+
+SCHEMA = "bushfit/diagnosis/1"
+Verdict = Literal["consistent", "named", "ambiguous", "partly", "unexplained"]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to diagnose.
+
+    Args:
+        max_effects: effects added in turn at the most.
+        tolerance: gaps below this share of |K| (or of half a loop's force range) do not count.
+        adopt: effects to add by hand, whatever the evidence.
+        without: effects not to consider.
+    """
+
+    max_effects: int = 3
+    tolerance: float = 0.01
+    adopt: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Where:
+    """One region in which model and measurement disagree.
+
+    Args:
+        direction: axial, radial or torsion.
+        kind: "sweep" or "loop".
+        frequency: lowest and highest [Hz].
+        amplitude: lowest and highest [m or rad].
+        component: "storage", "loss" or "force".
+        excess: root mean square of the smooth misfit there, in units of its own noise.
+        reading: a sentence.
+    """
+
+    direction: str
+    kind: str
+    frequency: tuple[float, float]
+    amplitude: tuple[float, float]
+    component: str
+    excess: float
+    reading: str
+
+
+@dataclass(frozen=True)
+class Named:
+    """An effect that was added, or that leads a set of look-alikes."""
+
+    name: str
+    evidence: str
+    alternatives: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One candidate and why it won or lost."""
+
+    name: str
+    score: float
+    gain: float | None
+    bic: float | None
+    heldout: float | None
+    parameters: Mapping[str, float]
+    why: str
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """The whole finding.
+
+    Args:
+        verdict: consistent, named, ambiguous, partly or unexplained.
+        summary: the finding in one or two sentences.
+        effects: what was added, or the leaders of ambiguous sets.
+        where: regions of disagreement: of the model before where something was added, else of what remains.
+        remainder: regions where the model with its additions still disagrees.
+        holdout: gaps on held-out parts, before and after.
+        next_test: the measurement that would decide or confirm, or "".
+        candidates: every effect of the library, judged.
+        before: the model as it came, refitted to all tests.
+        after: the model with what was added.
+        result: `after` with its uncertainty, ready for `predict`.
+        notes: what a user must know besides.
+    """
+
+    verdict: Verdict
+    summary: str
+    effects: tuple[Named, ...]
+    where: tuple[Where, ...]
+    remainder: tuple[Where, ...]
+    holdout: HoldOut
+    next_test: str
+    candidates: tuple[Judged, ...]
+    before: Evidence
+    after: Evidence
+    result: Result
+    notes: tuple[str, ...] = ()
+
+    @property
+    def calibration(self) -> tuple[float, float]:
+        """Root mean square residual on the data fitted, in units of noise, before and after."""
+        return _rms(self.before), _rms(self.after)
+
+    def to_document(self) -> dict[str, Any]:
+        """JSON-ready data."""
+        before, after = self.calibration
+        return {
+            "schema": SCHEMA,
+            "verdict": self.verdict,
+            "summary": self.summary,
+            "effects": [self._effect(named) for named in self.effects],
+            "where": [_where(where) for where in self.where],
+            "remainder": [_where(where) for where in self.remainder],
+            "gap": {
+                "calibration": {"before": before, "after": after},
+                "heldout": {"before": self.holdout.before, "after": self.holdout.after},
+                "heldout_parts": [vars(part) for part in self.holdout.parts],
+            },
+            "next_test": self.next_test,
+            "warnings": list(self.notes),
+        }
+
+    def _effect(self, named: Named) -> dict[str, Any]:
+        effect = effect_named(named.name)
+        values = {name: value for name, value in self._values(named.name).items() if name.startswith(f"{named.name}.")}
+        return {
+            "name": named.name,
+            "level": str(effect.level),
+            "sentence": effect.sentence,
+            "parameters": {name: self._parameter(name, value) for name, value in values.items()},
+            "evidence": named.evidence,
+            "alternatives": list(named.alternatives),
+        }
+
+    def _values(self, name: str) -> Mapping[str, float]:
+        if name in self.result.model.effects:
+            return self.result.model.values
+        return next((judged.parameters for judged in self.candidates if judged.name == name), {})
+
+    def _parameter(self, name: str, value: float) -> dict[str, Any]:
+        held = name in self.result.model.values
+        interval = self.result.interval(name) if held else None
+        effect, _, short = name.partition(".")
+        unit = next(parameter.unit for parameter in effect_named(effect).parameters if parameter.name == short)
+        return {
+            "value": value,
+            "stderr": self.result.covariance.stderr(name) if held else None,
+            "ci95": None if interval is None else list(interval),
+            "unit": unit,
+        }
+
+
+def _rms(evidence: Evidence) -> float:
+    return float((evidence.chi_square / max(evidence.residual.size, 1)) ** 0.5)
+
+
+def _where(where: Where) -> dict[str, Any]:
+    rotation = where.direction == "torsion"
+    unit, factor = ("deg", 57.29577951308232) if rotation else ("mm", 1e3)
+    return {
+        "direction": where.direction,
+        "kind": where.kind,
+        "frequency_Hz": list(where.frequency),
+        f"amplitude_{unit}": [x * factor for x in where.amplitude],
+        "component": where.component,
+        "excess": where.excess,
+        "reading": where.reading,
+    }

@@ -1,0 +1,221 @@
+"""From what the search found to a verdict, in the order in which a careful engineer doubts it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bushfit.diagnosis.calibrate import gain, largest_by_chance, orthonormal
+from bushfit.diagnosis.close import SAME, Search, Step
+from bushfit.diagnosis.evidence import Evidence, fit
+from bushfit.diagnosis.faults import Fault, Place, faults, places
+from bushfit.diagnosis.holdout import hold_out
+from bushfit.diagnosis.locate import contrasts, largest_smooth_misfit, locate
+from bushfit.diagnosis.next_test import confirming_test, deciding_test
+from bushfit.diagnosis.record import Diagnosis, Judged, Named, Verdict, Where
+from bushfit.errors import FitError
+from bushfit.fitting.assess import Stage, covariance, measured_range, quality
+from bushfit.results import Covariance, Result
+
+#: Probability with which noise alone stays below the thresholds of a remainder and of a fault.
+_LEVEL = 0.998
+#: A remainder that leaves less than this share of the held-out gap counts as partly closed.
+_PARTLY = 0.5
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """A real gap that stays: its words, and the fault that explains it, if one does."""
+
+    words: str
+    fault: Fault | None
+
+
+def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
+    """Doubt the finding: a fault instead, look-alikes, held-out data, what remains."""
+    base = search.base
+    suspects = places(base)
+    if not steps:
+        remainder = find_remainder(search, base, suspects)
+        if remainder is None:
+            words = "nothing is missing beyond noise and tolerance"
+            return _finish(search, "consistent", words, base, ())
+        return _finish(search, "unexplained", remainder.words, base, (), fault=remainder.fault)
+    fault = _worst_fault(search, base, suspects)
+    worth = base.bic - final.bic
+    if fault and fault.worth > worth + SAME:
+        return _finish(search, "unexplained", _fault_words(fault), base, (), fault=fault)
+    if fault and fault.worth > worth - SAME:
+        leaders = [Named(step.name, _evidence(step), (f"fault: {fault.place.words}",)) for step in steps]
+        words = f"{' and '.join(step.name for step in steps)}, or a fault of the measurement: {fault.place.words}"
+        return _finish(search, "ambiguous", f"these tests cannot tell {words}", base, leaders, fault=fault)
+    names = [Named(step.name, _evidence(step), tuple(rival.name for rival in step.rivals)) for step in steps]
+    if not hold_out(base, final).passed:
+        words = f"{_listed(names)} closes the gap only where it was fitted, so the name is taken back"
+        return _finish(search, "unexplained", words, base, (), fault=fault)
+    if any(step.rivals for step in steps):
+        return _ambiguous(search, final, steps, names)
+    remainder = find_remainder(search, final, places(final))
+    if remainder is None:
+        return _finish(search, "named", f"{_listed(names)} closes the gap", final, names)
+    held = hold_out(base, final)
+    if held.after < _PARTLY * held.before:
+        words = f"{_listed(names)} closes part of the gap; {remainder.words}"
+        return _finish(search, "partly", words, final, names, fault=remainder.fault)
+    return _finish(search, "unexplained", remainder.words, base, (), fault=remainder.fault)
+
+
+def _ambiguous(search: Search, final: Evidence, steps: Sequence[Step], names: Sequence[Named]) -> Diagnosis:
+    """Keep what is certain; leave out what has look-alikes."""
+    model = search.base.model
+    for step in steps:
+        if not step.rivals:
+            own = {key: value for key, value in final.model.values.items() if key.startswith(f"{step.name}.")}
+            model = model.with_effect(step.name, own)
+    kept = search.base if model is search.base.model else fit(model, final.terms, search.held, search.bounds)
+    sets = "; ".join(f"{name.name} from {' or '.join(name.alternatives)}" for name in names if name.alternatives)
+    rivals = [[final.model, *(rival.evidence.model for rival in step.rivals)] for step in steps if step.rivals]
+    words = f"these tests cannot tell {sets}"
+    return _finish(search, "ambiguous", words, kept, names, next_test=deciding_test(rivals[0], final.terms))
+
+
+def find_remainder(search: Search, evidence: Evidence, suspects: Sequence[Place]) -> Remainder | None:
+    """What is left beyond noise and tolerance: a fault at one place, or something smooth."""
+    fault = _worst_fault(search, evidence, suspects)
+    if fault:
+        return Remainder(_fault_words(fault), fault)
+    smooth = orthonormal(evidence, contrasts(evidence))
+    real = gain(smooth, evidence.residual) > largest_by_chance(evidence, [smooth], _LEVEL)
+    if real and largest_smooth_misfit(evidence) > search.settings.tolerance:
+        return Remainder("a real gap stays that no known effect closes", None)
+    return None
+
+
+def _worst_fault(search: Search, evidence: Evidence, suspects: Sequence[Place]) -> Fault | None:
+    """The worthiest fault, where it is more than chance, more than its price and larger than the tolerance."""
+    found = faults(evidence, suspects)
+    if not found or found[0].worth < SAME or found[0].size < search.settings.tolerance:
+        return None
+    chance = largest_by_chance(evidence, [fault.directions for fault in found], _LEVEL)
+    return found[0] if found[0].gain > chance else None
+
+
+def _fault_words(fault: Fault) -> str:
+    return f"{fault.place.words} stands out from all other tests: measure it again before looking for physics"
+
+
+def _listed(names: Sequence[Named]) -> str:
+    return " and ".join(named.name for named in names)
+
+
+def _evidence(step: Step) -> str:
+    second = step.tried[1] if len(step.tried) > 1 else None
+    behind = ""
+    if second is not None and step.tried[0].name == step.name:
+        behind = f"; next best {second.name}, {second.evidence.bic - step.tried[0].evidence.bic:.0f} behind by BIC"
+    return f"takes {step.gain:.0f} off chi-square{behind}"
+
+
+def _finish(
+    search: Search,
+    verdict: Verdict,
+    summary: str,
+    after: Evidence,
+    effects: Sequence[Named],
+    *,
+    fault: Fault | None = None,
+    next_test: str = "",
+) -> Diagnosis:
+    base = search.base
+    if fault and not next_test:
+        next_test = f"measure again: {fault.place.words}"
+    elif not next_test and effects:
+        next_test = confirming_test(effects[0].name)
+    where = locate(base)
+    if fault:
+        where = (_fault_where(fault), *where)
+    changed = after is not base
+    return Diagnosis(
+        verdict,
+        summary,
+        tuple(effects),
+        where,
+        locate(after) if changed else where,
+        hold_out(base, after),
+        next_test,
+        tuple(_candidates(search, {named.name for named in effects})),
+        base,
+        after,
+        _result(after),
+        _notes(search, after),
+    )
+
+
+def _fault_where(fault: Fault) -> Where:
+    place = fault.place
+    kind = "loop" if place.kind == "loop" else "sweep"
+    component = "force" if kind == "loop" else "storage"
+    excess = float(np.sqrt(fault.gain / max(len(fault.directions), 1)))
+    reading = f"{place.words} departs by {100 * fault.size:.2g} % from what all other tests say"
+    return Where(place.direction, kind, place.frequency, place.amplitude, component, excess, reading)
+
+
+def _candidates(search: Search, kept: set[str]) -> list[Judged]:
+    """Every effect of the library on the base model: score, refit, and why it won or lost."""
+    base, judged = search.base, []
+    leader = min((c.evidence.bic for c in search.judged.values()), default=base.bic)
+    for proposal in search.proposed:
+        candidate = search.judged.get(proposal.name)
+        if candidate is None:
+            why = "not visible in these tests" if not proposal.visible else "score too small to refit"
+            judged.append(Judged(proposal.name, proposal.score, None, None, None, {}, why))
+            continue
+        bic = candidate.evidence.bic
+        model = candidate.evidence.model
+        own = {name: value for name, value in model.values.items() if name not in base.model.values}
+        if proposal.name in kept:
+            why = "kept"
+        elif candidate.gain < search.critical:
+            why = f"gain below {search.critical:.3g}, which chance alone can make"
+        elif base.bic - bic < SAME:
+            why = "gain below its price in parameters"
+        else:
+            why = f"{bic - leader:.3g} behind the best by BIC"
+        held = hold_out(base, candidate.evidence).after
+        judged.append(Judged(proposal.name, proposal.score, candidate.gain, base.bic - bic, held, own, why))
+    return judged
+
+
+def _result(evidence: Evidence) -> Result:
+    """The model with its uncertainty; a parameter at rest on a bound counts as held there."""
+    model, names = evidence.model, evidence.solution.coordinates.names
+    moving = tuple(name for name in names if name not in evidence.solution.at_bound)
+    try:
+        cov = covariance(model, [Stage(moving, evidence.terms)])
+    except FitError:
+        cov = Covariance()
+    sources = tuple(term.source for term in evidence.terms if term.source is not None)
+    warnings = [f"{name} rests on the edge of what is possible" for name in evidence.solution.at_bound]
+    return Result(
+        model,
+        moving,
+        cov,
+        quality(model, evidence.terms, len(moving)),
+        measured_range(model, evidence.terms),
+        tuple(warnings),
+        sources,
+    )
+
+
+def _notes(search: Search, after: Evidence) -> tuple[str, ...]:
+    """What these tests could not show at all."""
+    blind = [proposal.name for proposal in search.proposed if not proposal.visible]
+    notes = []
+    if blind:
+        notes.append(f"not identifiable from these tests: {', '.join(blind)}")
+    noise = next((term.noise for term in after.terms if hasattr(term, "noise")), None)
+    if noise is not None and noise.origin == "assumed":
+        notes.append("nothing was repeated: errors shared by a block are assumed, 0.5 % gain and 0.25 deg phase")
+    return tuple(notes)

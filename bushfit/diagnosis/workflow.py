@@ -1,0 +1,53 @@
+"""diagnose: from a campaign to a verdict."""
+
+from __future__ import annotations
+
+from bushfit.diagnosis.close import Search
+from bushfit.diagnosis.evidence import fit
+from bushfit.diagnosis.record import Diagnosis, Settings
+from bushfit.diagnosis.verdict import judge
+from bushfit.effects import BASE, effect_named
+from bushfit.errors import FitError
+from bushfit.fitting.data import Data
+from bushfit.fitting.starts import start_values
+from bushfit.model import Model
+
+
+def diagnose(data: Data, model: Model | None = None, settings: Settings | None = None) -> Diagnosis:
+    """Find where model and measurement disagree, name what is missing, add it, and show the gap shrink.
+
+    Args:
+        data: the campaign; all directions are used.
+        model: where to start; the paper's three branches unless told. Its effects are kept, its values refitted.
+        settings: limits, and effects to adopt or to leave out.
+
+    Raises:
+        FitError: no test, or data that cannot support the fit.
+        ModelError: an unknown effect to adopt or to leave out.
+    """
+    settings = settings or Settings()
+    for name in (*settings.adopt, *settings.without):
+        effect_named(name)
+    terms = [*data.loops, *data.sweeps]
+    if not terms:
+        raise FitError(
+            "there is nothing to diagnose",
+            file=data.campaign.path,
+            found="no [[loops]] and no [[sweeps]]",
+            hint="add measured tests to the campaign",
+        )
+    held = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
+    if model is None:
+        start = {**start_values(data.campaign.bushing, terms, {}), **data.given}
+        model = Model.started(data.campaign.bushing, BASE, start)
+    for name in settings.adopt:
+        model = model if name in model.effects else _adopted(model, name)
+    search = Search.start(fit(model, terms, held, data.bounds), settings, held, data.bounds)
+    grown, added = search.grow()
+    return judge(search, *search.reconsider(grown, added))
+
+
+def _adopted(model: Model, name: str) -> Model:
+    """The model with an effect at a tenth of its typical size: at its neutral value a fit may not see it."""
+    amount = next(parameter for parameter in effect_named(name).parameters if parameter.neutral is not None)
+    return model.with_effect(name, {f"{name}.{amount.name}": 0.1 * amount.typical})
