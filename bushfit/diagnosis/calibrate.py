@@ -18,6 +18,9 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.effects.contract import Array
 
 DRAWS = 4000
+#: Share of a unit direction that must be left beside the model's own parameters: of a candidate's sensitivity, and
+#: of a pattern, of which what little remains would be the curvature of the model and the grid of the computation.
+SENSITIVITY_LEFT, PATTERN_LEFT = 1e-4, 0.1
 _SEED = 20260101
 
 
@@ -34,14 +37,19 @@ class Question:
     sense: int = 0
 
 
-def orthonormal(evidence: Evidence, columns: Array) -> Array:
-    """Orthonormal rows that span the columns beside the model's own parameters, (r, n); r may be 0."""
-    left = evidence.beside(columns)
-    if left.shape[0] == 1:
-        length = np.linalg.norm(left)
-        return left / length if length > 0.0 else left[:0]
+def orthonormal(evidence: Evidence, columns: Array, least: float) -> Array:
+    """Orthonormal rows that span what is visible of the columns beside the model's own parameters, (r, n).
+
+    Directions of which less than a share of `least` is left are dropped; r may be 0. A single column keeps its sign.
+    """
+    lengths = np.linalg.norm(columns, axis=1)
+    left = evidence.beside(columns[lengths > 0.0] / lengths[lengths > 0.0][:, None])
+    if not left.size:
+        return left
     _, size, rows = np.linalg.svd(left, full_matrices=False)
-    return rows[size > 1e-6 * max(float(size[0]), 1e-300)]
+    if len(left) == 1:
+        rows = rows * np.sign(rows @ left[0])
+    return rows[size > least]
 
 
 def gain(directions: Array, residual: Array, sense: int = 0) -> float:
@@ -55,7 +63,7 @@ def gain(directions: Array, residual: Array, sense: int = 0) -> float:
 def largest_by_chance(
     evidence: Evidence, groups: Sequence[Array], level: float, senses: Sequence[int] | None = None
 ) -> float:
-    """The gain that the best of several groups of orthonormal directions exceeds by chance with probability 1 - level."""
+    """The gain that the best of several groups of directions exceeds by chance with probability 1 - level."""
     sizes = np.array([len(group) for group in groups])
     if sizes.sum() == 0:
         return np.inf

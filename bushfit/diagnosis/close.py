@@ -98,7 +98,7 @@ class Search:
             steps, swapped = [], False
             for name in names:
                 others = [other for other in names if other != name]
-                reduced = self._without(current, name, others)
+                reduced = self._without(current, others)
                 tried = self._rivals(reduced, others)
                 best = tried[0] if tried else None
                 if best and best.name != name and best.evidence.bic < current.bic - 1e-6:
@@ -115,8 +115,8 @@ class Search:
                 break
         return current, steps
 
-    def _without(self, current: Evidence, name: str, others: Sequence[str]) -> Evidence:
-        """The model less one of the added effects, refitted."""
+    def _without(self, current: Evidence, others: Sequence[str]) -> Evidence:
+        """The model with no more than some of the added effects, refitted."""
         if not others:
             return self.base
         model = self.base.model

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,8 +16,6 @@ from bushfit.model import Model
 
 #: Evaluations after which a candidate that fits badly is taken as it is.
 _EVALUATIONS = 60
-#: Share of a direction's length that must be left beside the model's own parameters to count as visible.
-_VISIBLE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +59,8 @@ class Evidence:
         return basis[:, size > 1e-10 * size[0]]
 
     def beside(self, columns: Array) -> Array:
-        """Columns (c, n) less what the model's own parameters absorb of them; 0 where nothing visible is left."""
-        left = columns - (columns @ self._span) @ self._span.T
-        lengths = np.linalg.norm(columns, axis=1)
-        visible = np.linalg.norm(left, axis=1) > _VISIBLE * np.where(lengths > 0.0, lengths, 1.0)
-        return np.where(visible[:, None], left, 0.0)
+        """Columns (c, n) less what the model's own parameters absorb of them."""
+        return columns - (columns @ self._span) @ self._span.T
 
     @cached_property
     def slices(self) -> list[slice]:
@@ -82,7 +78,7 @@ class Evidence:
             count = term.frequency.size
             edges = [*term.block_starts.tolist(), count]
             for part in (place.start, place.start + count):
-                groups += [part + np.arange(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+                groups += [part + np.arange(a, b) for a, b in pairwise(edges)]
         return groups
 
     @property

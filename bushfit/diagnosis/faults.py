@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bushfit.diagnosis.calibrate import gain, orthonormal
+from bushfit.diagnosis.calibrate import PATTERN_LEFT, gain, orthonormal
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.effects.contract import Array
 from bushfit.fitting.terms import LoopTerm, SweepTerm
@@ -67,7 +67,7 @@ def faults(evidence: Evidence, suspects: Sequence[Place]) -> list[Fault]:
     kinds = {place.kind: sum(other.kind == place.kind for other in suspects) for place in suspects}
     found = []
     for place in suspects:
-        directions = orthonormal(evidence, place.columns)
+        directions = orthonormal(evidence, place.columns, PATTERN_LEFT)
         price = len(directions) * evidence.penalty + 2.0 * np.log(kinds[place.kind])
         left = evidence.beside(place.columns)
         size = np.abs(np.linalg.lstsq(left.T, evidence.residual, rcond=None)[0]).max() if len(directions) else 0.0

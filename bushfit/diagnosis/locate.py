@@ -33,7 +33,7 @@ class _Level:
 
 
 def contrasts(evidence: Evidence) -> Array:
-    """Whitened columns of everything smooth: per level and part a polynomial in ln f, per loop its harmonics, (c, n)."""
+    """Whitened columns of all that is smooth: per level and part a polynomial in ln f, per loop its harmonics."""
     rows = []
     for term, place in zip(evidence.terms, evidence.slices, strict=True):
         if isinstance(term, LoopTerm):
@@ -219,6 +219,6 @@ def _loop_regions(evidence: Evidence) -> Iterator[Where]:
             (amplitude,) * 2,
             "force",
             float(np.sqrt(np.mean(np.square(amounts)))),
-            f"the {term.direction} loop of {amplitude * factor:.3g} {unit_name} departs from the model most in {words}: "
-            f"{100 * share:.2g} % of half its force range",
+            f"the {term.direction} loop of {amplitude * factor:.3g} {unit_name} departs from the model most in "
+            f"{words}: {100 * share:.2g} % of half its force range",
         )

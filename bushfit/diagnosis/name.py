@@ -12,7 +12,7 @@ from itertools import product
 
 import numpy as np
 
-from bushfit.diagnosis.calibrate import gain, orthonormal
+from bushfit.diagnosis.calibrate import SENSITIVITY_LEFT, gain, orthonormal
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.effects import LIBRARY, Effect, Parameter, qualified
 from bushfit.effects.contract import Array
@@ -78,7 +78,7 @@ def _propose(evidence: Evidence, effect: Effect) -> Proposal:
     for shape in _shapes(evidence.terms, evidence.model, effect):
         model = evidence.model.with_effect(effect.name, shape)
         column = jacobian(model, evidence.terms, [name])
-        direction = orthonormal(evidence, column)
+        direction = orthonormal(evidence, column, SENSITIVITY_LEFT)
         score = gain(direction, evidence.residual, sense)
         if best is None or score > best.score:
             left = evidence.beside(column)[0]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bushfit.diagnosis.calibrate import gain, largest_by_chance, orthonormal
+from bushfit.diagnosis.calibrate import PATTERN_LEFT, gain, largest_by_chance, orthonormal
 from bushfit.diagnosis.close import SAME, Search, Step
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.faults import Fault, Place, faults, places
@@ -86,7 +86,7 @@ def find_remainder(search: Search, evidence: Evidence, suspects: Sequence[Place]
     fault = _worst_fault(search, evidence, suspects)
     if fault:
         return Remainder(_fault_words(fault), fault)
-    smooth = orthonormal(evidence, contrasts(evidence))
+    smooth = orthonormal(evidence, contrasts(evidence), PATTERN_LEFT)
     real = gain(smooth, evidence.residual) > largest_by_chance(evidence, [smooth], _LEVEL)
     if real and largest_smooth_misfit(evidence) > search.settings.tolerance:
         return Remainder("a real gap stays that no known effect closes", None)

@@ -10,6 +10,7 @@ from bushfit.effects import BASE, effect_named
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
 from bushfit.fitting.starts import start_values
+from bushfit.fitting.terms import Term
 from bushfit.model import Model
 
 
@@ -28,7 +29,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     settings = settings or Settings()
     for name in (*settings.adopt, *settings.without):
         effect_named(name)
-    terms = [*data.loops, *data.sweeps]
+    terms: list[Term] = [*data.loops, *data.sweeps]
     if not terms:
         raise FitError(
             "there is nothing to diagnose",
