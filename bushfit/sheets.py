@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bushfit.effects import effect_named
 from bushfit.geometry import Direction
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from bushfit.diagnosis.record import Diagnosis
     from bushfit.effects.contract import Array
-    from bushfit.fitting.terms import LoopTerm, SweepTerm
+    from bushfit.fitting.terms import LoopTerm, SweepTerm, Term
     from bushfit.measurement import Loop, Sweep
     from bushfit.model import Model
     from bushfit.prediction import Prediction
@@ -104,6 +106,49 @@ def sweeps_table(model: Model, terms: Sequence[SweepTerm]) -> pd.DataFrame:
             )
         )
     return pd.concat(frames, ignore_index=True)
+
+
+def gap_table(before: Model, after: Model, terms: Sequence[Term]) -> pd.DataFrame:
+    """Every residual of a diagnosis, before and after, in units of noise: a row a sweep point, or a loop's row."""
+    import pandas as pd
+
+    frames = []
+    for term in terms:
+        columns: dict[str, Any] = {"test": term.name, "kind": term.kind, "direction": str(term.direction)}
+        length, factor = display_units(term.direction)["length"]
+        first, second = (term.residual(model) for model in (before, after))
+        if term.kind == "loop":
+            columns |= {"time [s]": term.drive.phase / term.drive.frequency}
+            columns |= {"frequency [Hz]": term.drive.frequency, f"amplitude [{length}]": term.drive.amplitude * factor}
+            columns |= {"force before [noise]": first, "force after [noise]": second}
+        else:
+            columns |= {"frequency [Hz]": term.frequency, f"amplitude [{length}]": term.amplitude * factor}
+            columns |= {"repeat": term.sweep.repeat[term.order]}
+            for name, values in (("before", first), ("after", second)):
+                storage, loss = np.split(values, 2)
+                columns |= {f"storage {name} [noise]": storage, f"loss {name} [noise]": loss}
+        frames.append(pd.DataFrame(columns))
+    return pd.concat(frames, ignore_index=True)
+
+
+def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
+    """Every effect of the library, judged: score, gain, BIC, held-out gap, parameters, and why it won or lost."""
+    import pandas as pd
+
+    rows = [
+        {
+            "effect": judged.name,
+            "level": str(effect_named(judged.name).level),
+            "score": judged.score,
+            "chi-square gain": judged.gain,
+            "BIC gain": judged.bic,
+            "held-out gap [noise]": judged.heldout,
+            "parameters": "; ".join(f"{name} = {value:.6g}" for name, value in judged.parameters.items()),
+            "why": judged.why,
+        }
+        for judged in diagnosis.candidates
+    ]
+    return pd.DataFrame(rows)
 
 
 def raw_loop_table(loop: Loop) -> pd.DataFrame:

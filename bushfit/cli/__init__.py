@@ -19,6 +19,7 @@ _COMMANDS = {
     "fit-dynamic": ("fit_dynamic", "Smallest-amplitude sweep -> m, alpha."),
     "fit": ("fit", "Loops and sweeps -> all five parameters together."),
     "predict": ("predict", "Model -> axial and radial stiffness tables and plots."),
+    "diagnose": ("diagnose", "Where do model and tests disagree? What is missing? Add it, show the gap shrink."),
     "simulate": ("simulate", "Model -> a simulated campaign of raw tests, with noise."),
 }
 

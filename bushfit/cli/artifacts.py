@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from bushfit import sheets
 
 if TYPE_CHECKING:
+    from bushfit.diagnosis.record import Diagnosis
     from bushfit.fitting.terms import LoopTerm, SweepTerm
     from bushfit.model import Model
     from bushfit.prediction import Prediction
@@ -56,6 +57,21 @@ def prediction_files(
         files[f"{prediction.direction}.png"] = to_png(
             prediction_figure(prediction, over, title, curves=curves, note=note)
         )
+    return files
+
+
+def diagnosis_files(diagnosis: Diagnosis, title: str, *, plots: bool) -> dict[str, bytes]:
+    """`gap.csv`, `candidates.csv` and `gap.png` of a diagnosis."""
+    before, after = diagnosis.before, diagnosis.after
+    files = {
+        "gap.csv": sheets.to_csv(sheets.gap_table(before.model, after.model, before.terms)),
+        "candidates.csv": sheets.to_csv(sheets.candidates_table(diagnosis)),
+    }
+    if plots:
+        from bushfit.gap_plot import gap_figure
+        from bushfit.plots import to_png
+
+        files["gap.png"] = to_png(gap_figure(before.model, after.model, before.terms, title, diagnosis.summary))
     return files
 
 

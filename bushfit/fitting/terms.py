@@ -29,6 +29,11 @@ class LoopTerm:
     """Force against time, with the measured displacement driving the model."""
 
     drive: Drive
+    kind: Literal["loop"] = "loop"
+
+    @property
+    def name(self) -> str:
+        return self.loop.name
 
     @property
     def size(self) -> int:
@@ -111,6 +116,11 @@ class SweepTerm:
     sweep: Sweep
     noise: SweepNoise
     residuals: Residuals = "complex"
+    kind: Literal["sweep"] = "sweep"
+
+    @property
+    def name(self) -> str:
+        return self.sweep.name
 
     @property
     def size(self) -> int:

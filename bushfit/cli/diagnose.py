@@ -1,0 +1,120 @@
+"""`bushfit diagnose`: where do model and measurement disagree, and what is missing?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from bushfit.cli.common import (
+    Options,
+    campaign_argument,
+    enforce_nrmse,
+    max_nrmse_option,
+    new_table,
+    number,
+    parameter_table,
+    shared_options,
+    to_json,
+    warn,
+)
+
+if TYPE_CHECKING:
+    from bushfit.diagnosis.record import Diagnosis
+
+_COLOURS = {"consistent": "green", "named": "green", "ambiguous": "yellow", "partly": "yellow", "unexplained": "red"}
+
+
+@click.command("diagnose")
+@campaign_argument
+@click.option(
+    "--model",
+    type=click.Path(path_type=Path),
+    help="Start from this model's effects [the paper's three]; its values are fitted anew.",
+)
+@click.option("--adopt", multiple=True, metavar="EFFECT", help="Add this effect by hand; may be given again.")
+@click.option("--without", multiple=True, metavar="EFFECT", help="Do not consider this effect; may be given again.")
+@click.option("--max-effects", type=click.IntRange(0, 5), default=3, show_default=True, help="Effects to add at most.")
+@click.option("--tolerance", default="1 %", show_default=True, help="Gaps below this share of |K| do not count.")
+@max_nrmse_option
+@shared_options
+def command(
+    campaign: Path,
+    model: Path | None,
+    adopt: tuple[str, ...],
+    without: tuple[str, ...],
+    max_effects: int,
+    tolerance: str,
+    max_nrmse: float | None,
+    options: Options,
+) -> None:
+    """Find where the model and the tests of CAMPAIGN disagree, name the missing effect, add it, show the gap shrink.
+
+    All tests are used, in every direction. The verdict is one of: consistent (nothing is missing), named (what was
+    added closes the gap), ambiguous (look-alikes: all are listed, none is added), partly (a remainder stays) or
+    unexplained (no known effect closes the gap; the model is left as it was).
+
+    Writes diagnosis.json, model.json with what was added, gap.csv, candidates.csv and gap.png.
+    """
+    from bushfit.campaign import load_campaign
+    from bushfit.cli.artifacts import artifact_names, diagnosis_files
+    from bushfit.diagnosis.record import Settings
+    from bushfit.diagnosis.workflow import diagnose
+    from bushfit.fitting.data import Data
+    from bushfit.results import load_result
+    from bushfit.units import quantity
+
+    settings = Settings(max_effects, quantity(tolerance, "1"), adopt, without)
+    start = load_result(model).model if model else None
+    loaded = load_campaign(campaign)
+    folder = options.folder(loaded.slug)
+    names = ["diagnosis.json", "model.json", "candidates.csv", *artifact_names(["gap"], plots=options.plots)]
+    options.require_free(folder, names)
+    diagnosis = diagnose(Data.of(loaded), start, settings)
+    tell_diagnosis(options, loaded.name, diagnosis)
+    document = diagnosis.to_document()
+    files = {
+        "diagnosis.json": to_json(document),
+        "model.json": to_json(diagnosis.result.to_document()),
+        **diagnosis_files(diagnosis, loaded.name, plots=options.plots),
+    }
+    options.write(folder, files)
+    options.tell(document)
+    enforce_nrmse(diagnosis.result, max_nrmse)
+
+
+def tell_diagnosis(options: Options, name: str, diagnosis: Diagnosis) -> None:
+    """The finding at a glance: verdict, names with sizes, gap before and after, where, and what to do next."""
+    from rich.markup import escape
+
+    console = options.console
+    colour = _COLOURS[diagnosis.verdict]
+    console.print(f"[bold]{escape(name)}:[/bold] [bold {colour}]{diagnosis.verdict}[/bold {colour}]")
+    console.print(f"  {escape(diagnosis.summary)}")
+    for effect in diagnosis.to_document()["effects"]:
+        console.print(f"  [bold]{effect['name']}[/bold] ({effect['level']}): {escape(effect['sentence'])}")
+        for parameter, entry in effect["parameters"].items():
+            interval = entry["ci95"]
+            span = f", 95 % {number(interval[0], 3)} to {number(interval[1], 3)}" if interval else ""
+            console.print(f"    {parameter} = {number(entry['value'], 4)} {entry['unit']}{span}")
+        console.print(f"    {escape(effect['evidence'])}")
+        if effect["alternatives"]:
+            console.print(f"    cannot be told from: {escape(', '.join(effect['alternatives']))}")
+    table = new_table("gap, in units of noise (1 is the floor)", "", "before", "after")
+    for words, pair in (
+        ("data fitted", diagnosis.calibration),
+        ("held out", (diagnosis.holdout.before, diagnosis.holdout.after)),
+    ):
+        table.add_row(words, *(f"{value:.2f}" for value in pair))
+    console.print(table)
+    for title, regions in (("where", diagnosis.where), ("what remains", diagnosis.remainder)):
+        if regions and not (title == "what remains" and diagnosis.remainder == diagnosis.where):
+            console.print(f"  [bold]{title}[/bold]")
+            for where in regions:
+                console.print(f"    {where.excess:5.1f} x noise: {escape(where.reading)}")
+    if diagnosis.next_test:
+        console.print(f"  [bold]next test:[/bold] {escape(diagnosis.next_test)}")
+    if diagnosis.verdict in ("named", "partly") or options.verbose:
+        console.print(parameter_table("model with what was added", diagnosis.result))
+    warn(options, (*diagnosis.notes, *diagnosis.result.warnings))
