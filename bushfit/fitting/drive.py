@@ -25,6 +25,8 @@ MOST_ROWS = 4 * GRID
 _HARMONICS = 60
 _CLOCK_HARMONICS = 15
 _SIGNIFICANT = 4.0
+#: A motion is a triangle where that leaves no more than this times what free harmonics leave.
+_ALIKE = 1.02
 #: Share of the half range below which both first displacement and first force count as a start from rest.
 _AT_REST = 0.02
 #: Share of the amplitude by which a motion may lie off zero before its middle is taken for unknown.
@@ -72,8 +74,7 @@ class Drive:
 
     def displacement(self, phase: Array) -> Array:
         """The motion at any phase [cycles], noise removed."""
-        order = np.arange(self.coefficients.size)
-        return np.real(np.exp(2j * np.pi * np.outer(phase, order)) @ self.coefficients)
+        return series(self.coefficients, phase)
 
     def first_harmonic(self) -> complex:
         """Complex stiffness of the loop's fundamental, force over displacement [N/m or N m/rad]."""
@@ -108,6 +109,14 @@ class Drive:
         index = np.minimum(position.astype(np.intp), response.shape[-1] - 2)
         part = position - index
         return response[..., index] * (1.0 - part) + response[..., index + 1] * part
+
+
+def series(coefficients: Array, phase: Array) -> Array:
+    """Re sum_k c_k exp(2 pi i k phase) at any phase [cycles], (n,)."""
+    turn, value = np.exp(2j * np.pi * phase), np.zeros(phase.shape, dtype=complex)
+    for coefficient in coefficients[::-1]:
+        value = value * turn + coefficient
+    return value.real
 
 
 def drive_of(loop: Loop) -> Drive:
@@ -208,7 +217,20 @@ def _harmonics(phase: Array, loop: Loop) -> tuple[Array, float, float]:
     keep = np.abs(coefficients) > _SIGNIFICANT * motion_noise * np.sqrt(2.0 / phase.size)
     keep[:2] = True
     motion = np.where(keep, coefficients, 0.0)[: int(np.flatnonzero(keep)[-1]) + 1]
+    triangle = _triangle(motion[0], motion[1])
+    if np.std(loop.displacement[::step] - series(triangle, phase)) < _ALIKE * motion_noise:
+        motion = triangle
     return motion, float(solution[0, 1]), float(force_noise)
+
+
+def _triangle(mean: complex, fundamental: complex) -> Array:
+    """Harmonics of the triangle of that mean and fundamental: c_k falls as 1/k^2, so its corners need them all."""
+    order = np.arange(1, GRID // 2, 2)
+    turn = 1j * fundamental / abs(fundamental)
+    coefficients = np.zeros(GRID // 2, dtype=complex)
+    coefficients[0] = mean
+    coefficients[order] = -1j * abs(fundamental) * (-1.0) ** (order // 2) / order**2 * turn**order
+    return coefficients
 
 
 def _binned(phase: Array, force: Array) -> tuple[Array, Array, Array]:
