@@ -106,14 +106,14 @@ def predict(
     )
     stiffness = model.stiffness(direction, frequency, amplitude)
     names = [name for name in result.covariance.names if name in model.values]
-    matrix = result.covariance.restricted(names).matrix
+    root = result.covariance.restricted(names).root()
     if names:
         slopes = stiffness_jacobian(model, direction, frequency, amplitude, names)
     else:
-        slopes, matrix = np.zeros((1, frequency.size), dtype=complex), np.zeros((1, 1))
+        slopes, root = np.zeros((1, frequency.size), dtype=complex), np.zeros((1, 1))
 
     def band(value: Array, slope: Array) -> Band:
-        half = Z95 * np.sqrt(np.einsum("in,ij,jn->n", slope, matrix, slope))
+        half = Z95 * np.linalg.norm(root.T @ slope, axis=0)
         return Band(value, value - half, value + half)
 
     relative = slopes / stiffness

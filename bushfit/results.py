@@ -37,6 +37,13 @@ class Covariance:
         i = self.names.index(name)
         return float(np.sqrt(self.matrix[i, i]))
 
+    def root(self) -> Array:
+        """B with B B^T the covariance, so that |B^T slope| is a standard error however ill-conditioned it is."""
+        sigma = np.sqrt(np.diag(self.matrix))
+        safe = np.where(sigma > 0.0, sigma, 1.0)
+        values, vectors = np.linalg.eigh(self.matrix / np.outer(safe, safe))
+        return sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+
     def correlations(self) -> list[tuple[str, str, float]]:
         """All pairs, the most correlated first."""
         sigma = np.sqrt(np.diag(self.matrix))
@@ -102,14 +109,17 @@ class Result:
     inputs: tuple[Source, ...] = ()
 
     def interval(self, name: str) -> tuple[float, float] | None:
-        """95 % interval of a parameter: symmetric in the logarithm for strictly positive ones."""
+        """95 % interval of a parameter, within its bounds: symmetric in the logarithm for strictly positive ones."""
         stderr, value = self.covariance.stderr(name), self.model.values[name]
         if stderr is None:
             return None
-        if self.model.parameters[name].log and value > 0.0:
-            factor = float(np.exp(min(Z95 * stderr / value, 700.0)))
-            return value / factor, value * factor
-        return value - Z95 * stderr, value + Z95 * stderr
+        parameter = self.model.parameters[name]
+        low, high = value - Z95 * stderr, value + Z95 * stderr
+        if parameter.log and value > 0.0:
+            factor = float(np.exp(min(Z95 * stderr / value, 300.0)))
+            low, high = value / factor, value * factor
+        least, most = parameter.bounds
+        return max(low, min(least, value)), min(high, max(most, value))
 
     def to_document(self) -> dict[str, Any]:
         """JSON-ready data in the schema bushfit/model/1."""

@@ -34,10 +34,10 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
     """Covariance of everything a procedure estimated, each stage holding what the others found.
 
     Each stage solves J_own (J_own^T d_own + J_rest^T d_rest + noise) = 0 for its own parameters while the rest
-    carry their own errors. Stacked over the stages this is M d = b with cov(b) block diagonal, so that
-    cov(d) = M^-1 cov(b) M^-T. A joint fit is the one-stage case, cov = (J J^T)^-1. Parameters `held` with a
-    known covariance enter as they are. Where a stage's residuals exceed its noise, its share is inflated by
-    the reduced chi-square.
+    carry their own errors. With J_own^T = Q R this is Q^T J^T d = b, cov(b) = 1, which never squares the Jacobian.
+    Stacked over the stages it is M d = b, so that cov(d) = (M^-1 B) (M^-1 B)^T with cov(b) = B B^T. A joint fit is
+    the one-stage case, cov = (J J^T)^-1. Parameters `held` with a known covariance enter as they are. Where a
+    stage's residuals exceed its noise, its share is inflated by the reduced chi-square.
 
     Raises:
         FitError: the data leave some combination of the parameters wholly open.
@@ -45,25 +45,26 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
     held = held or Covariance()
     names = (*held.names, *(name for stage in stages for name in stage.names))
     slopes = Coordinates.of(model, names).slopes(model.values)
-    system, scatter = np.eye(len(names)), np.zeros((len(names), len(names)))
+    system, root = np.eye(len(names)), np.zeros((len(names), len(names)))
     begin = len(held.names)
-    scatter[:begin, :begin] = held.matrix / np.outer(slopes[:begin], slopes[:begin])
+    root[:begin, :begin] = held.root() / slopes[:begin, None]
     for stage in stages:
         own = slice(begin, begin + len(stage.names))
         slope = jacobian(model, stage.terms, names)
-        system[own] = slope[own] @ slope.T
-        scatter[own, own] = system[own, own] * _inflation(residual(model, stage.terms), len(stage.names))
+        system[own] = np.linalg.qr(slope[own].T)[0].T @ slope.T
+        inflation = _inflation(residual(model, stage.terms), len(stage.names))
+        root[own, own] = np.sqrt(inflation) * np.eye(len(stage.names))
         begin = own.stop
     try:
-        inverse = np.linalg.inv(system)
+        answer = np.linalg.solve(system, root)
     except np.linalg.LinAlgError:
         raise FitError(
             "the data leave a combination of parameters wholly open",
             found="a singular Jacobian in " + ", ".join(names),
             hint="hold one of them with vary = false in [fit], or measure another amplitude, frequency or rate",
         ) from None
-    by_coordinate = inverse @ scatter @ inverse.T
-    return Covariance(names, by_coordinate * np.outer(slopes, slopes))
+    by_value = answer * slopes[:, None]
+    return Covariance(names, by_value @ by_value.T)
 
 
 def _inflation(residuals: Array, parameters: int) -> float:
@@ -104,7 +105,8 @@ def cautions(solution: Solution, terms: Sequence[Term], cov: Covariance) -> list
         if name in solution.at_bound:
             lines.append(f"{name} ended at the edge of what is possible: the data do not determine it{reason}")
         elif stderr is not None and stderr > _UNDETERMINED * scale:
-            lines.append(f"{name} is not determined: standard error {100 * stderr / scale:.0f} %{reason}")
+            size = f"{100 * stderr / scale:.0f} %" if stderr < 10.0 * scale else "beyond 1000 %"
+            lines.append(f"{name} is not determined: standard error {size}{reason}")
     for one, other, value in cov.correlations():
         if abs(value) > _TRADE_OFF and {one, other} <= set(names):
             reason = _pair_reason(one, other, model, reach)
@@ -116,8 +118,8 @@ def _reason(name: str, model: Model, reach: Range) -> str:
     eps_half = model.values.get("eps_half", 0.0)
     if name in ("sigma_fmax", "eps_half") and reach.strain[1] < eps_half:
         return f"; amplitudes stop at {reach.strain[1] / eps_half:.2g} of eps_half, so only sigma_fmax/eps_half shows"
-    if name in ("m", "alpha") and reach.frequency[1] < 3.0 * reach.frequency[0]:
-        return f"; all tests run near {reach.frequency[0]:.2g} Hz, too slow and too alike to show the springpot"
+    if name in ("mu", "m", "alpha") and "alpha" in model.values and reach.frequency[1] < 3.0 * reach.frequency[0]:
+        return f"; all tests run near {reach.frequency[0]:.2g} Hz, too alike in rate to tell springpot from elasticity"
     if name in ("mu", "sigma_fmax", "eps_half") and reach.strain[1] < 1.5 * reach.strain[0]:
         return "; one amplitude alone cannot tell friction from elasticity"
     return ""

@@ -124,18 +124,19 @@ def solve(
     def at(parameters: lmfit.Parameters) -> Model:
         return model.with_values(coordinates.values([parameters[_key(name)].value for name in coordinates.names]))
 
-    fit = lmfit.minimize(
-        lambda parameters: residual(at(parameters), terms),
-        start,
-        method="least_squares",
-        max_nfev=evaluations,
-        jac=lambda parameters: jacobian(at(parameters), terms, coordinates.names).T,
-        x_scale="jac",
-        ftol=_TOLERANCE,
-        xtol=_TOLERANCE,
-        gtol=None,
-        calc_covar=False,
-    )
+    with np.errstate(invalid="ignore", divide="ignore"):  # lmfit takes roots of a covariance nobody asked for
+        fit = lmfit.minimize(
+            lambda parameters: residual(at(parameters), terms),
+            start,
+            method="least_squares",
+            max_nfev=evaluations,
+            jac=lambda parameters: jacobian(at(parameters), terms, coordinates.names).T,
+            x_scale="jac",
+            ftol=_TOLERANCE,
+            xtol=_TOLERANCE,
+            gtol=None,
+            calc_covar=False,
+        )
     best = at(fit.params)
     if fit.aborted and strict:
         raise FitError(
