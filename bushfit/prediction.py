@@ -76,7 +76,7 @@ def default_grid(result: Result, direction: Direction) -> tuple[Array, Array]:
     least, most = (strain / per_displacement for strain in result.measured.strain)
     reached = amplitudes[(amplitudes >= least * (1 - _MARGIN)) & (amplitudes <= most * (1 + _MARGIN))]
     if reached.size < 2:
-        reached = np.unique([float(f"{x:.2g}") for x in np.geomspace(least, most, 3)])
+        reached = np.unique([float(f"{x:.3g}") for x in np.geomspace(least, most, 3)])
     return inside, reached
 
 
