@@ -1,0 +1,151 @@
+"""Prediction: the table of the interface, bands that cover, the rig's faults left out, extrapolation said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bushfit.campaign import Campaign, load_campaign
+from bushfit.errors import ModelError
+from bushfit.fitting.data import Data
+from bushfit.fitting.procedures import fit_joint
+from bushfit.geometry import Direction
+from bushfit.model import FIVE, Model
+from bushfit.prediction import PAPER_AMPLITUDES, PAPER_FREQUENCIES, default_grid, left_out, predict
+from bushfit.results import Covariance, Range, Result
+from bushfit.schema import SimulateSettings
+from bushfit.sheets import prediction_table
+from bushfit.simulation import measure, undisturbed
+
+FREQUENCIES, AMPLITUDES = np.array([155.0, 5.0, 55.0]), np.array([5e-4, 1e-4])
+FOUR = ("stiffness [N/mm]", "loss factor [-]", "storage stiffness [N/mm]", "loss stiffness [N/mm]")
+
+
+@pytest.fixture(scope="module")
+def campaign(root: Path) -> Campaign:
+    return load_campaign(root / "configs/cmp_15961.toml")
+
+
+@pytest.fixture(scope="module")
+def result(campaign: Campaign) -> Result:
+    return fit_joint(Data.of(campaign))
+
+
+def test_table_is_that_of_the_interface(result: Result) -> None:
+    table = prediction_table(predict(result, Direction.AXIAL, FREQUENCIES, AMPLITUDES))
+    bands = [f"{name}, {end}" for name in FOUR for end in ("low", "high")]
+    assert list(table.columns) == ["frequency [Hz]", "amplitude [mm]", *FOUR, *bands]
+    assert table["amplitude [mm]"].tolist() == pytest.approx([0.1] * 3 + [0.5] * 3)
+    assert table["frequency [Hz]"].tolist() == [5.0, 55.0, 155.0] * 2
+    model = result.model.stiffness(
+        "axial", table["frequency [Hz]"].to_numpy(), table["amplitude [mm]"].to_numpy() / 1e3
+    )
+    np.testing.assert_allclose(table[FOUR[0]], np.abs(model) / 1e3)
+    np.testing.assert_allclose(table[FOUR[1]], model.imag / model.real)
+    np.testing.assert_allclose(table[FOUR[2]], model.real / 1e3)
+    np.testing.assert_allclose(table[FOUR[3]], model.imag / 1e3)
+    for name in FOUR:
+        assert (table[f"{name}, low"] < table[name]).all()
+        assert (table[f"{name}, high"] > table[name]).all()
+
+
+def test_torsion_has_its_own_units(result: Result) -> None:
+    table = prediction_table(predict(result, Direction.TORSION, [10.0], np.radians([1.0])))
+    assert list(table.columns[:4]) == ["frequency [Hz]", "amplitude [deg]", "stiffness [N m/rad]", "loss factor [-]"]
+    assert table["amplitude [deg]"].tolist() == pytest.approx([1.0])
+    expected = abs(complex(result.model.stiffness("torsion", 10.0, np.radians(1.0))))
+    assert table["stiffness [N m/rad]"].tolist() == pytest.approx([expected])
+
+
+def test_bands_cover(paper_model: Model) -> None:
+    """95 % bands of all four quantities, axial and radial, over campaigns that differ in their noise only."""
+    plan = SimulateSettings(repeats=3, noise=5e-3, force_noise=3e-3, displacement_noise=2e-4)
+    clean, inside = undisturbed(paper_model, plan), []
+    for seed in range(150):
+        found = fit_joint(Data.of(measure(clean, replace(plan, seed=seed)).campaign()))
+        for direction in (Direction.AXIAL, Direction.RADIAL):
+            prediction = predict(found, direction, FREQUENCIES, AMPLITUDES)
+            truth = paper_model.stiffness(direction, prediction.frequency, prediction.amplitude)
+            quantities = (
+                (prediction.stiffness, np.abs(truth)),
+                (prediction.loss_factor, truth.imag / truth.real),
+                (prediction.storage_stiffness, truth.real),
+                (prediction.loss_stiffness, truth.imag),
+            )
+            inside.append([np.mean((band.low <= true) & (true <= band.high)) for band, true in quantities])
+    each = np.mean(inside, axis=0)
+    print(f"95 % bands cover: stiffness {each[0]:.3f}, loss factor {each[1]:.3f}, K' {each[2]:.3f}, K'' {each[3]:.3f}")
+    np.testing.assert_allclose(each, 0.95, atol=0.03)
+
+
+def test_bands_carry_the_correlation(result: Result) -> None:
+    """Far narrower than if the parameters' errors were independent."""
+    free = replace(result, covariance=Covariance(result.covariance.names, np.diag(np.diag(result.covariance.matrix))))
+    widths = [
+        np.mean(p.stiffness.high - p.stiffness.low)
+        for p in (predict(r, Direction.AXIAL, FREQUENCIES, AMPLITUDES) for r in (result, free))
+    ]
+    assert widths[0] < 0.5 * widths[1]
+
+
+def test_instrument_effects_are_left_out_and_component_ones_kept(paper_model: Model) -> None:
+    rigged = paper_model.with_effect("rig_compliance", {"rig_compliance.compliance": 1e-7}).with_effect(
+        "inertia", {"inertia.mass": 0.2}
+    )
+    names = ("mu", "rig_compliance.compliance")
+    result = Result(rigged, names, Covariance(names, np.diag([1e6, 1e-18])), measured=Range((5.0, 155.0), (1e-3, 0.1)))
+    plain = predict(Result(paper_model), Direction.AXIAL, FREQUENCIES, AMPLITUDES)
+    cleaned = predict(result, Direction.AXIAL, FREQUENCIES, AMPLITUDES)
+    np.testing.assert_allclose(cleaned.stiffness.value, plain.stiffness.value)
+    assert "rig_compliance, inertia" in (left_out(result) or "") or "inertia, rig_compliance" in (
+        left_out(result) or ""
+    )
+    assert left_out(Result(paper_model)) is None
+    stop = paper_model.with_effect("bump_stop", {"bump_stop.gap": 2e-4, "bump_stop.stiffness": 1e6})
+    kept = predict(Result(stop), Direction.AXIAL, FREQUENCIES, AMPLITUDES)
+    assert kept.stiffness.value[-1] > 1.1 * plain.stiffness.value[-1]
+
+
+def test_extrapolation_is_said(result: Result) -> None:
+    inside = predict(result, Direction.AXIAL, [5.0, 155.0], [1e-4, 5e-4])
+    assert inside.warnings == ()
+    high = predict(result, Direction.AXIAL, [5.0, 400.0], [1e-4])
+    assert high.warnings == ("axial: frequencies 5 to 400 Hz leave the measured 0.1 to 155 Hz",)
+    far = predict(result, Direction.AXIAL, [5.0], [5e-3])
+    assert len(far.warnings) == 1
+    assert "strains 31 to 31 % leave the measured" in far.warnings[0]
+    assert len(predict(result, Direction.AXIAL, [0.01], [1e-6]).warnings) == 2
+
+
+def test_a_model_given_by_hand_has_no_bands_and_says_so(paper_model: Model) -> None:
+    prediction = predict(Result(paper_model), Direction.RADIAL, FREQUENCIES, AMPLITUDES)
+    assert np.array_equal(prediction.stiffness.low, prediction.stiffness.high)
+    assert any("no uncertainty" in line for line in prediction.warnings)
+
+
+def test_default_grid_is_the_papers_within_the_measured_range(result: Result) -> None:
+    frequencies, amplitudes = default_grid(result, Direction.AXIAL)
+    assert tuple(frequencies) == PAPER_FREQUENCIES
+    assert tuple(amplitudes) == PAPER_AMPLITUDES
+    narrow = replace(result, measured=Range((20.0, 80.0), result.measured.strain))  # type: ignore[union-attr]
+    assert default_grid(narrow, Direction.AXIAL)[0].tolist() == [25.0, 35.0, 45.0, 55.0, 65.0, 75.0]
+    tiny = replace(result, measured=Range((5.0, 155.0), (1e-6, 1e-5)))
+    own = default_grid(tiny, Direction.AXIAL)[1]
+    assert own.size == 3
+    assert predict(tiny, Direction.AXIAL, *default_grid(tiny, Direction.AXIAL)).warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "amplitudes"),
+    [([0.0], [1e-4]), ([-5.0], [1e-4]), ([5.0], [0.0]), ([np.nan], [1e-4]), ([5.0], [np.inf]), ([], [1e-4])],
+)
+def test_impossible_requests(result: Result, frequencies: list[float], amplitudes: list[float]) -> None:
+    with pytest.raises(ModelError, match=r"impossible (frequency|amplitude) to predict at"):
+        predict(result, Direction.AXIAL, frequencies, amplitudes)
+
+
+def test_all_five_parameters_have_a_share_in_the_bands(result: Result) -> None:
+    assert set(result.covariance.names) == set(FIVE)
