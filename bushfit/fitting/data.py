@@ -45,12 +45,24 @@ class Data:
         return tuple(name for name in names if name not in settings or settings[name].vary)
 
     def chosen(self, directions: Sequence[Direction] | None) -> list[Term]:
-        """Terms of the given directions; by default the axial ones, as in the paper, or all where none is."""
+        """Terms of the given directions; by default the axial ones, as in the paper, or all where none is.
+
+        Raises:
+            FitError: there is none.
+        """
         terms: list[Term] = [*self.loops, *self.sweeps]
         if directions is None:
             axial = [term for term in terms if term.direction is Direction.AXIAL]
             return axial or terms
-        return [term for term in terms if term.direction in directions]
+        chosen = [term for term in terms if term.direction in directions]
+        if not chosen:
+            raise FitError(
+                "no test in the directions asked for",
+                file=self.campaign.path,
+                found=", ".join(sorted({str(term.direction) for term in terms})) or "no tests",
+                expected=", ".join(str(direction) for direction in directions),
+            )
+        return chosen
 
     def static_terms(self) -> list[Term]:
         """The loops `fit-static` uses: the axial ones, or all where none is axial.
