@@ -1,0 +1,346 @@
+"""The commands as typed: files, exit statuses, what goes to which stream, and one error for what is wrong."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from unittest import mock
+
+import pandas as pd
+import pytest
+
+from bushfit.cli import main
+
+
+@dataclass(frozen=True)
+class Done:
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+Run = Callable[..., Done]
+CAMPAIGN_FILES = {
+    "fit-static": {"static.json", "loops.csv", "loops.png"},
+    "fit-dynamic": {"dynamic.json", "sweeps.csv", "sweeps.png"},
+    "fit": {"model.json", "loops.csv", "loops.png", "sweeps.csv", "sweeps.png"},
+}
+
+
+@pytest.fixture(scope="module")
+def work(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a copy of the campaign and, under `model`, its joint fit."""
+    folder = tmp_path_factory.mktemp("work")
+    shutil.copytree(root / "data/cmp_15961", folder / "data/cmp_15961")
+    (folder / "configs").mkdir()
+    shutil.copy(root / "configs/cmp_15961.toml", folder / "configs")
+    done = call(folder, "fit", "configs/cmp_15961.toml", "-o", "model", "--no-plots")
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def call(folder: Path, *arguments: str) -> Done:
+    """The entry point in this process; what it would do in its own, less the time to start."""
+    out, err = io.StringIO(), io.StringIO()
+    with (
+        contextlib.chdir(folder),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+        mock.patch.object(sys, "argv", ["bushfit", *arguments]),
+        pytest.raises(SystemExit) as left,
+    ):
+        main()
+    return Done(int(left.value.code or 0), out.getvalue(), err.getvalue())
+
+
+@pytest.fixture
+def bushfit(work: Path) -> Run:
+    return lambda *arguments: call(work, *arguments)
+
+
+CAMPAIGN = "configs/cmp_15961.toml"
+
+
+@pytest.mark.parametrize("command", CAMPAIGN_FILES)
+def test_fits_write_the_files_of_the_interface(bushfit: Run, tmp_path: Path, command: str) -> None:
+    done = bushfit(command, CAMPAIGN, "-o", str(tmp_path / "x"))
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == ""
+    assert {file.name for file in (tmp_path / "x").iterdir()} == CAMPAIGN_FILES[command]
+    for word in ("parameter", "std error", "95 % interval", "unit", "NRMSE", "correlation"):
+        assert word in done.stderr
+
+
+def test_run_does_the_whole_chain_and_says_what_two_steps_cost(bushfit: Run, tmp_path: Path) -> None:
+    done = bushfit("run", CAMPAIGN, "-o", str(tmp_path / "x"))
+    assert done.returncode == 0, done.stderr
+    named = {file.name for file in (tmp_path / "x").iterdir()}
+    tables = {f"{kind}.{end}" for kind in ("loops", "sweeps", "axial", "radial") for end in ("csv", "png")}
+    assert {"static.json", "dynamic.json", "model.json"} | tables <= named
+    assert "pass by pass" in done.stderr
+    assert "what the two-step procedure costs" in done.stderr
+    assert "springpot was left out" in done.stderr
+    radial = pd.read_csv(tmp_path / "x" / "radial.csv")
+    assert list(radial.columns[:2]) == ["frequency [Hz]", "amplitude [mm]"]
+    assert len(radial) == 48
+    ordered = radial.sort_values(["amplitude [mm]", "frequency [Hz]"], ignore_index=True)
+    pd.testing.assert_frame_equal(radial, ordered)
+
+
+def test_the_paper_s_order_by_hand(bushfit: Run, tmp_path: Path) -> None:
+    """fit-static, fit-dynamic --static, predict: each takes what the one before wrote."""
+    s, d, p = (str(tmp_path / name) for name in "sdp")
+    assert bushfit("fit-static", CAMPAIGN, "-o", s, "--no-plots").returncode == 0
+    assert bushfit("fit-dynamic", CAMPAIGN, "--static", f"{s}/static.json", "-o", d, "--no-plots").returncode == 0
+    done = bushfit("predict", f"{d}/dynamic.json", "-o", p, "--no-plots", "--direction", "torsion")
+    assert done.returncode == 0, done.stderr
+    assert [file.name for file in Path(p).iterdir()] == ["torsion.csv"]
+    again = bushfit("fit-static", CAMPAIGN, "--dynamic", f"{d}/dynamic.json", "-o", str(tmp_path / "s2"), "--no-plots")
+    assert "left out" not in again.stderr
+
+
+def test_predict_lays_measurements_over_and_takes_grids(bushfit: Run, tmp_path: Path) -> None:
+    done = bushfit(
+        "predict", "model/model.json", "--campaign", CAMPAIGN, "-o", str(tmp_path / "x"),
+        "--frequencies", "10:30:10 Hz", "--amplitudes", "0.1, 0.3 mm",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert {file.name for file in (tmp_path / "x").iterdir()} == {
+        f"{d}.{end}" for d in ("axial", "radial") for end in ("csv", "png")
+    }
+    table = pd.read_csv(tmp_path / "x" / "axial.csv")
+    assert table["frequency [Hz]"].tolist() == [10, 20, 30] * 2
+    assert table["amplitude [mm]"].tolist() == [0.1] * 3 + [0.3] * 3
+
+
+def test_simulate_writes_a_campaign_that_run_takes(bushfit: Run, tmp_path: Path) -> None:
+    at = str(tmp_path / "sim")
+    one = bushfit("simulate", "model/model.json", "--seed", "7", "--noise", "0.5 %", "-o", at)
+    assert one.returncode == 0, one.stderr
+    assert {"campaign.toml", "truth.json", "loop_axial_1.csv", "sweep_axial.csv", "sweep_radial.csv"} == {
+        file.name for file in Path(at).iterdir()
+    }
+    bushfit("simulate", "model/model.json", "--seed", "7", "--noise", "0.5 %", "-o", f"{at}2")
+    bushfit("simulate", "model/model.json", "--seed", "8", "--noise", "0.5 %", "-o", f"{at}3")
+    same, other = ((Path(at + n) / "sweep_axial.csv").read_text() for n in ("2", "3"))
+    assert (Path(at) / "sweep_axial.csv").read_text() == same != other
+    fitted = bushfit("fit", f"{at}/campaign.toml", "-o", str(tmp_path / "fit"), "--no-plots", "--json")
+    truth = json.loads((Path(at) / "truth.json").read_text())["parameters"]
+    for name, entry in json.loads(fitted.stdout)["parameters"].items():
+        assert entry["value"] == pytest.approx(truth[name]["value"], rel=0.06)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("fit-static", CAMPAIGN),
+        ("fit-dynamic", CAMPAIGN),
+        ("fit", CAMPAIGN),
+        ("run", CAMPAIGN),
+        ("predict", "model/model.json"),
+        ("simulate", "model/model.json"),
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_json_alone_on_standard_output_and_quiet_is_quiet(
+    bushfit: Run, tmp_path: Path, arguments: tuple[str, ...]
+) -> None:
+    done = bushfit(*arguments, "-o", str(tmp_path / "x"), "--json", "-q", "--no-plots")
+    assert done.returncode == 0, done.stderr
+    assert isinstance(json.loads(done.stdout), dict)
+    assert done.stderr == ""
+    assert not list((tmp_path / "x").glob("*.png"))
+    loud = bushfit(*arguments, "-o", str(tmp_path / "y"), "-v", "--no-plots")
+    assert loud.stdout == ""
+    assert "wrote " in loud.stderr
+
+
+def test_json_is_the_file(bushfit: Run, tmp_path: Path) -> None:
+    done = bushfit("fit", CAMPAIGN, "-o", str(tmp_path / "x"), "--json", "--no-plots")
+    assert done.stdout == (tmp_path / "x" / "model.json").read_text(encoding="utf-8")
+
+
+def test_results_are_not_replaced_unasked(bushfit: Run, tmp_path: Path) -> None:
+    folder = tmp_path / "x"
+    folder.mkdir()
+    (folder / "static.json").write_text("mine")
+    refused = bushfit("fit-static", CAMPAIGN, "-o", str(folder), "--no-plots")
+    assert refused.returncode == 2
+    assert "--force" in refused.stderr
+    assert "static.json" in refused.stderr
+    assert [file.name for file in folder.iterdir()] == ["static.json"]
+    assert (folder / "static.json").read_text() == "mine"
+    forced = bushfit("fit-static", CAMPAIGN, "-o", str(folder), "--no-plots", "--force")
+    assert forced.returncode == 0
+    assert (folder / "static.json").read_text() != "mine"
+
+
+@pytest.mark.parametrize("command", ["fit-static", "fit-dynamic", "fit", "run"])
+def test_a_missed_limit_is_status_1_with_the_results_written(bushfit: Run, tmp_path: Path, command: str) -> None:
+    missed = bushfit(command, CAMPAIGN, "-o", str(tmp_path / "x"), "--no-plots", "--max-nrmse", "1e-4")
+    assert missed.returncode == 1
+    assert "is above --max-nrmse 0.0001" in missed.stderr
+    assert list((tmp_path / "x").glob("*.json"))
+    met = bushfit(command, CAMPAIGN, "-o", str(tmp_path / "y"), "--no-plots", "--max-nrmse", "0.05")
+    assert met.returncode == 0
+
+
+BAD_MODELS = {
+    "absent.json": None,
+    "empty.json": "",
+    "list.json": "[]",
+    "other.json": '{"schema": "bushfit/model/9"}',
+    "half.json": '{"schema": "bushfit/model/1", "bushing": {',
+}
+BAD_CAMPAIGNS = {
+    "absent.toml": None,
+    "empty.toml": "",
+    "broken.toml": "[bushing",
+    "typo.toml": '[bushing]\nname = "x"\ninner_radius = "10 mm"\nouter_radius = "18 mm"\nlenght = "34 mm"\n',
+    "bare.toml": '[bushing]\nname = "x"\ninner_radius = 10\nouter_radius = "18 mm"\nlength = "34 mm"\n',
+    "lost.toml": (
+        '[bushing]\nname = "x"\ninner_radius = "10 mm"\nouter_radius = "18 mm"\nlength = "34 mm"\n'
+        '[[loops]]\nfile = "lost.csv"\ndirection = "axial"\n'
+    ),
+    "swapped.toml": (
+        '[bushing]\nname = "x"\ninner_radius = "18 mm"\nouter_radius = "10 mm"\nlength = "34 mm"\n'
+        '[[loops]]\nfile = "../data/cmp_15961/loop_axial_1.csv"\ndirection = "axial"\n'
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def bad(work: Path) -> Path:
+    folder = work / "bad"
+    folder.mkdir()
+    for name, text in (BAD_MODELS | BAD_CAMPAIGNS).items():
+        if text is not None:
+            (folder / name).write_text(text)
+    return folder
+
+
+def assert_one_error(done: Done, folder: Path, *words: str) -> None:
+    assert done.returncode == 2, done.stderr
+    assert done.stdout == ""
+    assert "Traceback" not in done.stderr
+    assert "fault in bushfit" not in done.stderr
+    assert done.stderr.count("error: ") == 1 or done.stderr.startswith("Usage: "), done.stderr
+    for word in words:
+        assert word in done.stderr, done.stderr
+    assert not folder.exists()
+
+
+@pytest.mark.parametrize("name", BAD_CAMPAIGNS)
+@pytest.mark.parametrize("command", ["fit-static", "fit-dynamic", "fit", "run", "simulate"])
+def test_bad_campaigns(bushfit: Run, bad: Path, tmp_path: Path, command: str, name: str) -> None:
+    done = bushfit(command, f"bad/{name}", "-o", str(tmp_path / "x"))
+    assert_one_error(done, tmp_path / "x", "lost.csv" if name == "lost.toml" else name)
+
+
+@pytest.mark.parametrize("name", BAD_MODELS)
+@pytest.mark.parametrize("command", ["predict", "simulate", "fit-dynamic --static", "fit-static --dynamic"])
+def test_bad_models(bushfit: Run, bad: Path, tmp_path: Path, command: str, name: str) -> None:
+    verb, *option = command.split()
+    arguments = (verb, CAMPAIGN, *option, f"bad/{name}") if option else (verb, f"bad/{name}")
+    assert_one_error(bushfit(*arguments, "-o", str(tmp_path / "x")), tmp_path / "x", name)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("fit", CAMPAIGN, "--effect", "inertai"), ("inertai", "did you mean inertia?")),
+        (("fit", CAMPAIGN, "--direction", "sideways"), ("sideways",)),
+        (("fit", CAMPAIGN, "--direction", "torsion"), ("torsion",)),
+        (("fit", CAMPAIGN, "--max-nrmse", "-1"), ("--max-nrmse",)),
+        (("fit",), ("CAMPAIGN",)),
+        (("fitt", CAMPAIGN), ("fitt",)),
+        (("fit", CAMPAIGN, "--colour"), ("--colour",)),
+        (("fit", CAMPAIGN, "extra"), ("extra",)),
+        (("fit", "data/cmp_15961/sweep_axial.csv"), ("sweep_axial.csv",)),
+        (("predict", CAMPAIGN), ("cmp_15961.toml",)),
+        (("predict", "model/model.json", "--frequencies", "5:155:10"), ("--frequencies", "unit")),
+        (("predict", "model/model.json", "--frequencies", "155:5:10 Hz"), ("--frequencies",)),
+        (("predict", "model/model.json", "--frequencies", "0 Hz"), ("frequency",)),
+        (("predict", "model/model.json", "--amplitudes", "1 Hz"), ("--amplitudes",)),
+        (("predict", "model/model.json", "--amplitudes", "a few mm"), ("--amplitudes",)),
+        (("predict", "model/model.json", "--direction", "up"), ("up",)),
+        (("simulate", "model/model.json", "--noise", "0.5 mm"), ("--noise",)),
+        (("simulate", "model/model.json", "--noise", "300 %"), ("--noise",)),
+        (("simulate", "model/model.json", "--seed", "-1"), ("--seed",)),
+        (("simulate", "model/model.json", "--repeats", "0"), ("--repeats",)),
+        (("simulate", "model/model.json", "--effect", "inertia"), ("--effect",)),
+        (("simulate", "model/model.json", "--effect", "inertia.mass=0.1 s"), ("--effect", "kg")),
+        (("simulate", "model/model.json", "--effect", "inertia.weight=1 kg"), ("inertia.weight",)),
+        (("simulate", CAMPAIGN), ("nothing says what to simulate",)),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
+)
+def test_wrong_usage(bushfit: Run, tmp_path: Path, arguments: tuple[str, ...], words: tuple[str, ...]) -> None:
+    assert_one_error(bushfit(*arguments, "-o", str(tmp_path / "x")), tmp_path / "x", *words)
+
+
+def test_output_that_cannot_be(bushfit: Run, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    done = bushfit("fit-static", CAMPAIGN, "-o", str(tmp_path / "file"), "--force")
+    assert done.returncode == 2
+    assert "not a folder" in done.stderr
+
+
+def test_results_go_to_a_folder_of_the_campaign_by_default(work: Path, tmp_path: Path) -> None:
+    done = call(tmp_path, "fit-static", str(work / CAMPAIGN), "--no-plots")
+    assert done.returncode == 0
+    assert (tmp_path / "results" / "CMP 15 961" / "static.json").exists()
+
+
+def test_one_loop_alone_is_fitted_and_what_it_leaves_open_is_named(work: Path, tmp_path: Path) -> None:
+    text = (work / CAMPAIGN).read_text()
+    (work / "configs/loop.toml").write_text(text[: text.index("[[sweeps]]")])
+    done = call(work, "run", "configs/loop.toml", "-o", str(tmp_path / "x"), "--no-plots")
+    assert done.returncode == 0, done.stderr
+    assert "no sweeps: the two-step procedure is passed over" in done.stderr
+    for name in ("m", "alpha"):
+        assert f"{name} is not determined" in done.stderr
+
+
+def test_the_installed_command(work: Path, tmp_path: Path) -> None:
+    """In a process of its own, with warnings as errors."""
+    command = [sys.executable, "-W", "error", str(Path(sys.executable).with_name("bushfit"))]
+    folder = tmp_path / "x"
+    done = subprocess.run(
+        [*command, "fit", CAMPAIGN, "-o", str(folder), "--json", "--no-plots"],
+        cwd=work, capture_output=True, text=True, check=False, encoding="utf-8",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == (folder / "model.json").read_text(encoding="utf-8")
+    assert "CMP 15 961: joint fit" in done.stderr
+
+
+@pytest.mark.parametrize("arguments", [("--help",), ("--version",), ("-h",)])
+def test_help_is_instant(arguments: tuple[str, ...]) -> None:
+    """Neither NumPy nor pandas nor any other slow package is imported to print it."""
+    code = (
+        "import sys\nfrom bushfit.cli import cli\n"
+        f"cli.main({list(arguments)!r}, standalone_mode=False)\n"
+        "slow = {'numpy', 'pandas', 'scipy', 'matplotlib', 'lmfit', 'pint', 'pydantic', 'rich'} & set(sys.modules)\n"
+        "assert not slow, slow\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+
+
+@pytest.mark.parametrize("command", ["run", "fit-static", "fit-dynamic", "fit", "predict", "simulate"])
+def test_every_command_has_help_that_names_its_files(bushfit: Run, command: str) -> None:
+    done = bushfit(command, "--help")
+    assert done.returncode == 0
+    assert "Writes" in done.stdout
+    for option in ("-o, --output", "-v, --verbose", "-q, --quiet", "--json", "--no-plots", "--force"):
+        assert option in done.stdout
+    assert f"  {command} " in bushfit("--help").stdout
