@@ -96,14 +96,15 @@ def test_95_percent_intervals_cover(
     truth, count = models[name], 300
     inside = []
     for seed in range(count):
-        result = fit_joint(Data.of(rig(truth, shared_noise if shared else paper_noise, 1000 + seed)))
+        result = fit_joint(Data.of(rig(truth, shared_noise if shared else paper_noise, seed)))
         limits = [result.interval(n) or (np.nan, np.nan) for n in FIVE]
         inside.append([low <= truth.values[n] <= high for n, (low, high) in zip(FIVE, limits, strict=True)])
     each, overall = np.mean(inside, axis=0), np.mean(inside)
     print(f"{name}, {count} seeds, block errors {shared}: coverage {listed(each)}; all {overall:.3f}")
     assert 0.93 <= overall <= 0.97
-    # one parameter's share over 300 seeds scatters by 1.3 % about 95 %
-    assert np.all(np.abs(each - 0.95) < 0.02 + 2.0 * 0.0126)
+    # one parameter's share over 300 seeds scatters by 1.3 % about 95 %, so only the paper's case is held to its own
+    allowed = 0.02 if name == "paper" and not shared else 0.02 + 0.0126
+    assert np.all(np.abs(each - 0.95) <= allowed)
 
 
 @pytest.mark.slow
