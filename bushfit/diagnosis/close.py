@@ -5,7 +5,7 @@ Nowhere does it ask for an effect by name: effects propose themselves with evide
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from bushfit.diagnosis.calibrate import largest_by_chance
@@ -24,6 +24,8 @@ _PLAIN = 60.0
 #: A richer rival that meets a simpler model's prediction this closely contains it.
 _CONTAINS = 1.0
 _MOST_SWAPS = 4
+#: Candidates with less than this share of the best score are not refitted.
+_PROMISING = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +45,7 @@ class Search:
     Args:
         base: the model as it came, refitted.
         settings: of the user.
+        start: values of the paper's parameters read off the data.
         held: parameters the campaign holds.
         bounds: limits the campaign sets.
         proposed: every effect's claim on the base model.
@@ -52,6 +55,7 @@ class Search:
 
     base: Evidence
     settings: Settings
+    start: Mapping[str, float]
     held: tuple[str, ...]
     bounds: Bounds
     proposed: tuple[Proposal, ...] = ()
@@ -59,16 +63,20 @@ class Search:
     critical: float = 0.0
 
     @classmethod
-    def start(cls, base: Evidence, settings: Settings, held: Sequence[str], bounds: Bounds) -> Search:
+    def begin(
+        cls, base: Evidence, settings: Settings, start: Mapping[str, float], held: Sequence[str], bounds: Bounds
+    ) -> Search:
+        """Ask every effect of the library, and refit the best."""
         proposed = tuple(proposals(base, settings.without))
-        search = cls(base, settings, tuple(held), bounds, proposed, {}, critical_gain(base, proposed))
+        search = cls(base, settings, start, tuple(held), bounds, proposed, {}, critical_gain(base, proposed))
         search.judged.update({candidate.name: candidate for candidate in search.refitted(base, proposed)})
         return search
 
     def refitted(self, evidence: Evidence, proposed: Sequence[Proposal]) -> list[Candidate]:
         """The best scores refitted, best by BIC first."""
-        promising = [proposal for proposal in proposed if proposal.score > evidence.penalty / 2.0][:REFITTED]
-        fits = [refit(evidence, proposal, self.held, self.bounds) for proposal in promising]
+        least = max(evidence.penalty / 2.0, _PROMISING * max((proposal.score for proposal in proposed), default=0.0))
+        promising = [proposal for proposal in proposed if proposal.score > least][:REFITTED]
+        fits = [refit(evidence, proposal, self.start, self.held, self.bounds) for proposal in promising]
         return sorted((fit for fit in fits if fit is not None), key=lambda fit: fit.evidence.bic)
 
     def grow(self) -> tuple[Evidence, list[str]]:

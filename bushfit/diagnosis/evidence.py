@@ -14,8 +14,8 @@ from bushfit.fitting.solve import Bounds, Solution, solve
 from bushfit.fitting.terms import SweepTerm, Term
 from bushfit.model import Model
 
-#: Evaluations after which a candidate that fits badly is taken as it is.
-_EVALUATIONS = 60
+#: Evaluations after which a candidate that fits badly is taken as it is, and where a better one may stop.
+_EVALUATIONS, _TOLERANCE = 40, 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +41,11 @@ class Evidence:
     @property
     def parameters(self) -> int:
         return len(self.solution.coordinates.names)
+
+    @property
+    def reduced(self) -> float:
+        """Mean square residual; 1 where only noise is left."""
+        return self.chi_square / max(self.residual.size - self.parameters, 1)
 
     @property
     def penalty(self) -> float:
@@ -91,4 +96,6 @@ class Evidence:
 def fit(model: Model, terms: Sequence[Term], held: Sequence[str], bounds: Bounds) -> Evidence:
     """Fit every parameter of a model but the held ones, from its own values."""
     names = [name for name in model.parameters if name not in held]
-    return Evidence(solve(model, terms, names, bounds, evaluations=_EVALUATIONS, strict=False), tuple(terms))
+    return Evidence(
+        solve(model, terms, names, bounds, evaluations=_EVALUATIONS, tolerance=_TOLERANCE, strict=False), tuple(terms)
+    )

@@ -24,6 +24,8 @@ from bushfit.model import Model
 #: Candidates that are refitted in each round, the best scores first.
 REFITTED = 6
 _PROBES = 5
+#: Reduced chi-square beyond which a model's own values are no place to start from.
+_BENT = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,10 +119,17 @@ def _probes(terms: Sequence[Term], model: Model, parameter: Parameter) -> Array:
     return np.clip(np.geomspace(low, high, _PROBES), *parameter.bounds)
 
 
-def refit(evidence: Evidence, proposal: Proposal, held: Sequence[str], bounds: Bounds) -> Candidate | None:
-    """The proposal fitted together with the model; None where the fit fails."""
+def refit(
+    evidence: Evidence, proposal: Proposal, start: Mapping[str, float], held: Sequence[str], bounds: Bounds
+) -> Candidate | None:
+    """The proposal fitted together with the model; None where the fit fails.
+
+    A model that lacks something large has bent its own parameters to make up for it: then they begin at the start
+    values read off the data, and only else where the model ended.
+    """
+    model = proposal.model if evidence.reduced < _BENT else proposal.model.with_values(start)
     try:
-        fitted = fit(proposal.model, evidence.terms, held, bounds)
+        fitted = fit(model, evidence.terms, held, bounds)
     except FitError:
         return None
     return Candidate(proposal.name, fitted, evidence.chi_square - fitted.chi_square)

@@ -38,12 +38,12 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
             hint="add measured tests to the campaign",
         )
     held = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
-    if model is None:
-        start = {**start_values(data.campaign.bushing, terms, {}), **data.given}
-        model = Model.started(data.campaign.bushing, BASE, start)
+    start = {**start_values(data.campaign.bushing, terms, {}), **data.given}
+    model = model or Model.started(data.campaign.bushing, BASE, start)
+    start = {name: value for name, value in start.items() if name in model.values and name not in held}
     for name in settings.adopt:
         model = model if name in model.effects else _adopted(model, name)
-    search = Search.start(fit(model, terms, held, data.bounds), settings, held, data.bounds)
+    search = Search.begin(fit(model, terms, held, data.bounds), settings, start, held, data.bounds)
     grown, added = search.grow()
     return judge(search, *search.reconsider(grown, added))
 

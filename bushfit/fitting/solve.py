@@ -95,6 +95,7 @@ def solve(
     bounds: Bounds | None = None,
     *,
     evaluations: int = _MOST_EVALUATIONS,
+    tolerance: float = _TOLERANCE,
     strict: bool = True,
 ) -> Solution:
     """Least squares over the named parameters, the others held, from the model's own values.
@@ -108,6 +109,7 @@ def solve(
         names: parameters to move.
         bounds: limits inside the parameters' own.
         evaluations: most evaluations of the model.
+        tolerance: relative change of chi-square and of the point at which the fit stops.
         strict: False takes the best point reached as it is when those are used up.
 
     Raises:
