@@ -184,10 +184,11 @@ def test_either_waveform_gives_the_truth(
         loops=(SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=2, waveform=waveform),),  # type: ignore[arg-type]
         sweeps=(SimulatedSweep(Direction.AXIAL, (1e-4, 5e-4), tuple(np.arange(5.0, 156.0, 10.0))),),
     )
-    result = fit_joint(Data.of(rig(paper_model, plan, 3)))
-    found = errors(result, paper_model.values)
-    print(f"{waveform}: {shown(found)}, reduced chi-square {result.quality.reduced_chi_square:.3f}")  # type: ignore[union-attr]
-    assert np.max(np.abs(found)) < 0.05
+    found = np.mean(
+        [errors(fit_joint(Data.of(rig(paper_model, plan, seed))), paper_model.values) for seed in range(20)], axis=0
+    )
+    print(f"{waveform}, 20 seeds: {shown(found)}")
+    assert np.max(np.abs(found)) < 0.015
 
 
 def test_passes_agree_and_settle_where_plain_passes_would(measured: Data) -> None:
