@@ -35,6 +35,7 @@ PAPER_SWEEPS = tuple(
 )
 _ROWS_PER_CYCLE = 1000
 _STEPS_PER_ROW = 2
+#: A loop is recorded once it has settled, unless settling is what there is to see.
 _RUN_IN_CYCLES = 12
 
 
@@ -134,7 +135,7 @@ def _clean_loop(truth: Model, test: SimulatedLoop) -> rig.Record:
         test.frequency,
         test.amplitude,
         cycles=test.cycles,
-        run_in=_RUN_IN_CYCLES,
+        run_in=0 if any(effect.settles for effect in truth.records) else _RUN_IN_CYCLES,
         steps_per_cycle=_ROWS_PER_CYCLE * _STEPS_PER_ROW,
         waveform=test.waveform,
         kind="loop",

@@ -24,6 +24,8 @@ GRID = 1024
 MOST_ROWS = 4 * GRID
 _HARMONICS = 60
 _CLOCK_HARMONICS = 15
+#: Harmonics of one cycle that count as slow, when the scatter between cycles is taken.
+_SLOW_HARMONICS = 3
 _SIGNIFICANT = 4.0
 #: A motion is a triangle where that leaves no more than this times what free harmonics leave.
 _ALIKE = 1.02
@@ -130,14 +132,27 @@ def drive_of(loop: Loop) -> Drive:
     half_motion, half_force = np.ptp(loop.displacement) / 2.0, np.ptp(loop.force) / 2.0
     motion, force_mean, force_noise = _harmonics(phase, loop)
     noise = loop.noise * half_force if loop.noise is not None else force_noise
-    from_rest = abs(loop.displacement[0]) < _AT_REST * half_motion and abs(loop.force[0]) < _AT_REST * half_force
+    from_rest = _from_rest(loop, phase, half_motion, half_force)
     force, weight = loop.force, np.ones(loop.force.size)
     if loop.force.size > MOST_ROWS and not from_rest:
         phase, force, weight = _binned(phase, loop.force)
     noise = max(noise, FLOOR * half_force)
     off_zero = not from_rest and abs(motion[0]) > _CENTRED * half_motion
     datum = force_mean if off_zero else None
-    return Drive(loop, frequency, cycles, bool(from_rest), phase, force, weight, noise, motion, datum)
+    return Drive(loop, frequency, cycles, from_rest, phase, force, weight, noise, motion, datum)
+
+
+def _from_rest(loop: Loop, phase: Array, half_motion: float, half_force: float) -> bool:
+    """Whether the record begins with nothing moved, no force, and a force that does not come back a cycle later.
+
+    A settled loop may pass the origin too, where its load cell is off zero, but then it passes it every cycle.
+    """
+    later = float(np.interp(1.0, phase, loop.force))
+    return bool(
+        abs(loop.displacement[0]) < _AT_REST * half_motion
+        and abs(loop.force[0]) < _AT_REST * half_force
+        and abs(later - loop.force[0]) > 2.0 * _AT_REST * half_force
+    )
 
 
 def _fundamental(loop: Loop) -> tuple[float, float]:
@@ -202,7 +217,8 @@ def _turned(solution: Array) -> Array:
 def _harmonics(phase: Array, loop: Loop) -> tuple[Array, float, float]:
     """Significant harmonics of the displacement, and the force's mean and scatter about its own harmonics.
 
-    The scatter holds what does not repeat from cycle to cycle and what is too fast for the rubber.
+    The scatter holds what does not repeat from cycle to cycle and what is too fast for the rubber, but not what
+    changes slowly from one cycle to the next, which is settling or drift.
     """
     step = max(1, phase.size // MOST_ROWS)
     values = np.column_stack((loop.displacement, loop.force))[::step]
@@ -211,7 +227,9 @@ def _harmonics(phase: Array, loop: Loop) -> tuple[Array, float, float]:
     basis = _basis(phase, order)
     solution = _solve(basis, values)
     freedom = max(phase.size - 2 * order - 1, 1)
-    motion_noise, force_noise = np.sqrt(np.sum(np.square(values - basis @ solution), axis=0) / freedom)
+    left = values - basis @ solution
+    motion_noise = np.sqrt(np.sum(np.square(left[:, 0])) / freedom)
+    force_noise = _scatter(phase, left[:, 1], freedom)
     motion = solution[:, 0]
     coefficients = np.concatenate((motion[:1], motion[1 : order + 1] + 1j * motion[order + 1 :]))
     keep = np.abs(coefficients) > _SIGNIFICANT * motion_noise * np.sqrt(2.0 / phase.size)
@@ -220,7 +238,21 @@ def _harmonics(phase: Array, loop: Loop) -> tuple[Array, float, float]:
     triangle = _triangle(motion[0], motion[1])
     if np.std(loop.displacement[::step] - series(triangle, phase)) < _ALIKE * motion_noise:
         motion = triangle
-    return motion, float(solution[0, 1]), float(force_noise)
+    return motion, float(solution[0, 1]), force_noise
+
+
+def _scatter(phase: Array, left: Array, freedom: int) -> float:
+    """Standard deviation of what is left of the force once each cycle has given up its own slow part."""
+    number = np.floor(phase).astype(np.intp)
+    order = 2 * _SLOW_HARMONICS + 1
+    left = left.copy()
+    for cycle in np.unique(number):
+        rows = np.flatnonzero(number == cycle)
+        if rows.size > 4 * order:
+            slow = _basis(phase[rows], _SLOW_HARMONICS)
+            left[rows] -= slow @ np.linalg.lstsq(slow, left[rows], rcond=None)[0]
+            freedom -= order
+    return float(np.sqrt(np.sum(np.square(left)) / max(freedom, 1)))
 
 
 def _triangle(mean: complex, fundamental: complex) -> Array:
