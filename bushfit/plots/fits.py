@@ -1,0 +1,129 @@
+"""A fit against its tests: sweeps and loops with the model over them, and what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from bushfit.effects.contract import Array
+from bushfit.fitting.terms import LoopTerm, SweepTerm
+from bushfit.geometry import Direction
+from bushfit.model import Model
+from bushfit.plots.points import SECTORS, Points, means, over_sectors, turn
+from bushfit.plots.prediction import FINE, draw, points_note
+from bushfit.plots.style import (
+    DOT,
+    INK,
+    ROW,
+    dress,
+    explain,
+    legend,
+    new_figure,
+    noise_band,
+    prefixed,
+    readable,
+    styles,
+)
+from bushfit.prediction import Band
+from bushfit.sheets import display_units
+
+_STRIP = 2.6 / 2.54
+_MOST_ROWS = 1600
+_RESIDUALS = "Residuals: model less measured in units of noise; 95 % of them should lie in the grey."
+_MEANS = f"Lines there: means over {360 // SECTORS} deg."
+
+
+def sweeps_figure(model: Model, terms: Sequence[SweepTerm], title: str) -> Figure:
+    """Magnitude and loss factor over frequency, measured and modelled, a row per direction; their residuals below.
+
+    The model keeps the effects of the rig, since sweeps hold them. At least one term; the title names the bushing.
+    """
+    directions = list(dict.fromkeys(term.direction for term in terms))
+    figure = new_figure(title, (ROW + _STRIP) * len(directions))
+    grid = figure.subplots(2 * len(directions), 2, squeeze=False, height_ratios=[ROW, _STRIP] * len(directions))
+    for direction, pair, strips in zip(directions, grid[::2], grid[1::2], strict=True):
+        mine = [term for term in terms if term.direction is direction]
+        points = means(mine)
+        levels = np.unique(points.amplitude)
+        draw(pair, direction, _model_lines(model, direction, points), points, "frequency", levels)
+        for term in mine:
+            for strip, residual in zip(strips, term.residual(model).reshape(2, -1), strict=True):
+                for style, level in zip(styles(levels.size, "amplitude"), levels, strict=True):
+                    at = term.amplitude == level
+                    strip.plot(term.frequency[at], residual[at], style.marker, color=style.color, alpha=0.8, **DOT)
+        for panel, strip, name in zip(pair, strips, ("gain", "phase"), strict=True):
+            strip.sharex(panel)
+            dress(strip, panel.get_xlabel(), f"{name} residual\n/ noise")
+            readable(strip, points.frequency)
+            panel.tick_params(labelbottom=False)
+            panel.set_xlabel("")
+            noise_band(strip)
+    explain(figure, "Lines: model.", points_note(terms), _RESIDUALS)
+    return figure
+
+
+def loops_figure(model: Model, terms: Sequence[LoopTerm], title: str) -> Figure:
+    """Force over displacement, measured and modelled, and residuals over the phase of the cycle; a row per direction.
+
+    The model keeps the effects of the rig, since loops hold them. At least one term; of each at most 1600 rows, from
+    the first and last two cycles, are drawn. The title names the bushing.
+    """
+    directions = list(dict.fromkeys(term.direction for term in terms))
+    figure = new_figure(title, 1.25 * ROW * len(directions))
+    grid = figure.subplots(len(directions), 2, squeeze=False, width_ratios=[1.15, 1.0])
+    for direction, (loop_panel, phase_panel) in zip(directions, grid, strict=True):
+        mine = [term for term in terms if term.direction is direction]
+        units, turns = display_units(direction), direction is Direction.TORSION
+        unit, length = units["length"]
+        force_unit, force = prefixed(units["force"], max(float(np.abs(term.drive.force).max()) for term in mine))
+        motion_name, force_name = ("rotation", "moment") if turns else ("displacement", "force")
+        dress(loop_panel, f"{motion_name} [{unit}]", f"{direction} {force_name} [{force_unit}]")
+        dress(phase_panel, "phase after the upper turn [deg]", "residual / noise")
+        for term, style in zip(mine, styles(len(mine), "loop"), strict=True):
+            drive, rows = term.drive, _drawn_rows(term)
+            phase, residual = drive.phase[rows], term.residual(model)
+            motion, modelled = length * drive.displacement(phase), force * term.force(model)[rows]
+            modelled[1:][np.diff(phase) > 0.5] = np.nan  # the cycles between, which are not drawn
+            loop_panel.plot(motion, force * drive.force[rows], "o", color=style.color, alpha=0.5, **DOT)
+            loop_panel.plot(motion, modelled, color=INK, lw=0.8)
+            phase_panel.plot(turn(term)[rows], residual[rows], ".", color=style.color, alpha=0.4, **DOT)
+            middle, mean, _ = over_sectors(term, residual)
+            phase_panel.plot(middle, mean, color=style.color, ls=style.dashes, lw=1.4)
+        noise_band(phase_panel)
+        phase_panel.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
+        loops_legend(phase_panel, mine, Line2D([], [], color=INK, lw=0.8))
+    explain(figure, "Left: measured force over the motion cleared of noise; black: model.", _RESIDUALS, _MEANS)
+    return figure
+
+
+def loops_legend(axes: Axes, terms: Sequence[LoopTerm], model: Line2D | None = None) -> None:
+    """Names the loops of a panel over the phase by amplitude and frequency, and by file where that leaves twins."""
+    unit, length = display_units(terms[0].direction)["length"]
+    labels = [f"{length * term.amplitude[0]:.3g} {unit}, {term.frequency[0]:.3g} Hz" for term in terms]
+    if len(set(labels)) < len(labels):
+        names = [term.loop.name.replace("$", r"\$") for term in terms]
+        labels = [f"{label}\n{name}" for label, name in zip(labels, names, strict=True)]
+    handles = [style.handle(False) for style in styles(len(terms), "loop")]
+    legend(axes, [*handles, *([model] if model else [])], [*labels, *(["model"] if model else [])], "loop")
+
+
+def _model_lines(model: Model, direction: Direction, points: Points) -> Points:
+    """The model over the frequencies of each measured level."""
+    levels = np.unique(points.amplitude)
+    spans = [points.frequency[points.amplitude == level] for level in levels]
+    frequency = np.concatenate([np.geomspace(span.min(), span.max(), FINE) for span in spans])
+    amplitude = np.repeat(levels, FINE)
+    stiffness = model.stiffness(direction, frequency, amplitude)
+    magnitude, loss_factor = np.abs(stiffness), stiffness.imag / stiffness.real
+    return Points(frequency, amplitude, Band(*3 * [magnitude]), Band(*3 * [loss_factor]))
+
+
+def _drawn_rows(term: LoopTerm) -> Array:
+    """Rows of the first and last two cycles, thinned to what an eye can tell apart."""
+    phase = term.drive.phase
+    rows = np.flatnonzero((phase < 2.0) | (phase > phase[-1] - 2.0))
+    return rows[:: max(1, -(-rows.size // _MOST_ROWS))]
