@@ -134,8 +134,8 @@ def solve(
             max_nfev=evaluations,
             jac=lambda parameters: jacobian(at(parameters), terms, coordinates.names).T,
             x_scale="jac",
-            ftol=_TOLERANCE,
-            xtol=_TOLERANCE,
+            ftol=tolerance,
+            xtol=tolerance,
             gtol=None,
             calc_covar=False,
         )
