@@ -53,7 +53,7 @@ def force_jacobian(
     model: Model, direction: Direction, displacement: History, names: Sequence[str], kind: Kind = "loop"
 ) -> Array:
     """dF/dp along a displacement history, (len(names), n)."""
-    if not (_only_branches(model) and displacement.periodic):
+    if not _only_branches(model):
         return differences(model, names, lambda values: model.force(direction, displacement, kind=kind, values=values))
     per_displacement = model.bushing.unit_strain(direction)
     strain = displacement.scaled(per_displacement)

@@ -36,7 +36,7 @@ PAPER_SWEEPS = tuple(
 _ROWS_PER_CYCLE = 1000
 _STEPS_PER_ROW = 2
 #: A loop is recorded once it has settled, unless settling is what there is to see.
-_RUN_IN_CYCLES = 12
+_RUN_IN_CYCLES = 40
 
 
 @dataclass(frozen=True, eq=False)

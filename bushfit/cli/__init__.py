@@ -20,6 +20,7 @@ _COMMANDS = {
     "fit": ("fit", "Loops and sweeps -> all five parameters together."),
     "predict": ("predict", "Model -> axial and radial stiffness tables and plots."),
     "diagnose": ("diagnose", "Where do model and tests disagree? What is missing? Add it, show the gap shrink."),
+    "scorecard": ("scorecard", "How often is diagnose right? Judged on hidden campaigns."),
     "simulate": ("simulate", "Model -> a simulated campaign of raw tests, with noise."),
 }
 

@@ -68,8 +68,7 @@ def diagnosis_files(diagnosis: Diagnosis, title: str, *, plots: bool) -> dict[st
         "candidates.csv": sheets.to_csv(sheets.candidates_table(diagnosis)),
     }
     if plots:
-        from bushfit.gap_plot import gap_figure
-        from bushfit.plots import to_png
+        from bushfit.plots import gap_figure, to_png
 
         files["gap.png"] = to_png(gap_figure(before.model, after.model, before.terms, title, diagnosis.summary))
     return files

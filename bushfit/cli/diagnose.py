@@ -101,6 +101,10 @@ def tell_diagnosis(options: Options, name: str, diagnosis: Diagnosis) -> None:
         console.print(f"    {escape(effect['evidence'])}")
         if effect["alternatives"]:
             console.print(f"    cannot be told from: {escape(', '.join(effect['alternatives']))}")
+        if effect["richer"]:
+            console.print(
+                f"    the simpler name; a limit of {', '.join(effect['richer'])}, which these tests do not show"
+            )
     table = new_table("gap, in units of noise (1 is the floor)", "", "before", "after")
     for words, pair in (
         ("data fitted", diagnosis.calibration),

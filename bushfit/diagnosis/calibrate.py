@@ -1,16 +1,17 @@
 """How large a gain noise alone makes: a parametric bootstrap in the space of the questions asked.
 
-A question is a group of directions in residual space (a candidate's sensitivity, a fault's pattern, smooth contrasts).
-Noise is drawn as the campaign has it: independent residuals, and blocks whose shared variance was itself estimated
-from a few repeats, which makes the tails of what acts on whole blocks heavier. Only the directions' inner products
-enter, so thousands of draws cost one small matrix product; the draws depend on their number alone and are kept.
+A question is a group of columns in residual space that one answer would use together: a candidate's sensitivity, a
+fault's pattern, smooth contrasts. Noise is drawn as the campaign has it: independent residuals, and blocks whose
+shared variance was itself estimated from a few repeats, which makes the tails of what acts on whole blocks heavier.
+Only the columns' inner products enter, so thousands of draws cost one small matrix product; the underlying draws
+depend on their number alone and are kept.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -18,63 +19,83 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.effects.contract import Array
 
 DRAWS = 4000
-#: Share of a unit direction that must be left beside the model's own parameters: of a candidate's sensitivity, and
-#: of a pattern, of which what little remains would be the curvature of the model and the grid of the computation.
-SENSITIVITY_LEFT, PATTERN_LEFT = 1e-4, 0.1
 _SEED = 20260101
+#: Share of a unit column that must be left beside the model's own parameters: of a candidate's sensitivity, and of a
+#: pattern, of which what little remains would be the curvature of the model and the grid of the computation.
+SENSITIVITY_LEFT, PATTERN_LEFT = 1e-4, 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
-    """Directions in residual space, (c, n), that one answer would use together.
+class Questions:
+    """Groups of columns, asked of one fitted model.
 
     Args:
-        columns: the directions, as the model's residuals would move.
-        sense: +1 or -1 where physics allows only one sign of the answer, 0 where both.
+        evidence: the fitted model.
+        columns: whitened residuals that a unit of each answer would make, (c, n).
+        groups: indices of the columns that each question uses together.
+        least: share of a unit column that must be left beside the model's own parameters.
     """
 
+    evidence: Evidence
     columns: Array
-    sense: int = 0
+    groups: Sequence[Array]
+    least: float
 
+    @cached_property
+    def _lengths(self) -> Array:
+        lengths = np.linalg.norm(self.columns, axis=1)
+        return np.where(lengths > 0.0, lengths, 1.0)
 
-def orthonormal(evidence: Evidence, columns: Array, least: float) -> Array:
-    """Orthonormal rows that span what is visible of the columns beside the model's own parameters, (r, n).
+    @cached_property
+    def _left(self) -> Array:
+        """Unit columns less what the model's own parameters absorb."""
+        return self.evidence.beside(self.columns / self._lengths[:, None])
 
-    Directions of which less than a share of `least` is left are dropped; r may be 0. A single column keeps its sign.
-    """
-    lengths = np.linalg.norm(columns, axis=1)
-    left = evidence.beside(columns[lengths > 0.0] / lengths[lengths > 0.0][:, None])
-    if not left.size:
-        return left
-    _, size, rows = np.linalg.svd(left, full_matrices=False)
-    if len(left) == 1:
-        rows = rows * np.sign(rows @ left[0])
-    return rows[size > least]
+    @cached_property
+    def _roots(self) -> list[Array]:
+        """Per question a matrix that makes its columns orthonormal, those all but absorbed dropped, (k, r)."""
+        gram = self._left @ self._left.T
+        roots = []
+        for group in self.groups:
+            size, vectors = np.linalg.eigh(gram[np.ix_(group, group)])
+            kept = size > self.least**2
+            roots.append(vectors[:, kept] / np.sqrt(size[kept]))
+        return roots
 
+    @property
+    def sizes(self) -> list[int]:
+        """Number of columns of each question that are visible."""
+        return [root.shape[1] for root in self._roots]
 
-def gain(directions: Array, residual: Array, sense: int = 0) -> float:
-    """What a group of orthonormal directions would take off chi-square."""
-    amounts = directions @ residual
-    if sense:
-        return float(max(-sense * amounts[0], 0.0) ** 2) if amounts.size else 0.0
-    return float(amounts @ amounts)
+    def gains(self) -> list[float]:
+        """What each question would take off chi-square."""
+        amounts = self._left @ self.evidence.residual
+        pairs = zip(self.groups, self._roots, strict=True)
+        return [float(np.sum(np.square(amounts[group] @ root))) for group, root in pairs]
 
+    def answers(self) -> list[Array]:
+        """Least-squares amounts of each question's columns, in their own units; 0 for what is not visible."""
+        amounts = self._left @ self.evidence.residual
+        pairs = zip(self.groups, self._roots, strict=True)
+        return [-(root @ (root.T @ amounts[group])) / self._lengths[group] for group, root in pairs]
 
-def largest_by_chance(
-    evidence: Evidence, groups: Sequence[Array], level: float, senses: Sequence[int] | None = None
-) -> float:
-    """The gain that the best of several groups of directions exceeds by chance with probability 1 - level."""
-    sizes = np.array([len(group) for group in groups])
-    if sizes.sum() == 0:
-        return np.inf
-    rows = np.concatenate(groups)
-    amounts = _draw(evidence, rows)
-    if senses is not None:
-        sided = np.repeat(senses, sizes)[:, None]
-        amounts = np.where(sided == 0, amounts, np.maximum(-sided * amounts, 0.0))
-    starts = np.concatenate(([0], np.cumsum(sizes[sizes > 0])[:-1]))
-    gains = np.add.reduceat(amounts**2, starts, axis=0)
-    return float(np.quantile(gains.max(axis=0), level))
+    def largest_by_chance(self, level: float, senses: Sequence[int] | None = None) -> float:
+        """The gain that the best question exceeds by chance with probability 1 - level.
+
+        Args:
+            level: probability, such as 0.995.
+            senses: per question +1 where only positive answers are physical, 0 where both signs are.
+        """
+        drawn = _draw(self.evidence, self._left)
+        best = np.zeros(DRAWS)
+        for number, (group, root) in enumerate(zip(self.groups, self._roots, strict=True)):
+            if not root.size:
+                continue
+            amounts = root.T @ drawn[group]
+            if senses is not None and senses[number]:
+                amounts = np.maximum(-senses[number] * np.sign(root[0, 0]) * amounts, 0.0)
+            best = np.maximum(best, np.sum(np.square(amounts), axis=0))
+        return float(np.quantile(best, level)) if best.any() else np.inf
 
 
 def _draw(evidence: Evidence, rows: Array) -> Array:

@@ -8,7 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from bushfit.diagnosis.calibrate import largest_by_chance
+import numpy as np
+
+from bushfit.diagnosis.calibrate import SENSITIVITY_LEFT, Questions
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.name import REFITTED, Candidate, Proposal, proposals, refit
 from bushfit.diagnosis.record import Settings
@@ -30,12 +32,21 @@ _PROMISING = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One effect of the model, its rivals in that place, and the best refit of each candidate."""
+    """One effect of the model.
+
+    Args:
+        name: the effect.
+        gain: chi-square that it takes off, all others refitted without it.
+        rivals: candidates in its place that these tests cannot tell from it.
+        richer: candidates that contain it as a limit.
+        tried: best refit of every candidate in its place.
+    """
 
     name: str
     gain: float
-    rivals: tuple[Candidate, ...] = ()
-    tried: tuple[Candidate, ...] = ()
+    rivals: tuple[Candidate, ...]
+    richer: tuple[Candidate, ...]
+    tried: tuple[Candidate, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +60,7 @@ class Search:
         held: parameters the campaign holds.
         bounds: limits the campaign sets.
         proposed: every effect's claim on the base model.
-        judged: best refit of every candidate on the base model, by name.
+        rounds: per set of added effects the refitted model and the best refit of each candidate beside it.
         critical: gain on the base model that noise alone exceeds with probability 1 - _LEVEL.
     """
 
@@ -59,7 +70,7 @@ class Search:
     held: tuple[str, ...]
     bounds: Bounds
     proposed: tuple[Proposal, ...] = ()
-    judged: dict[str, Candidate] = field(default_factory=dict)
+    rounds: dict[frozenset[str], tuple[Evidence, list[Candidate]]] = field(default_factory=dict)
     critical: float = 0.0
 
     @classmethod
@@ -69,8 +80,13 @@ class Search:
         """Ask every effect of the library, and refit the best."""
         proposed = tuple(proposals(base, settings.without))
         search = cls(base, settings, start, tuple(held), bounds, proposed, {}, critical_gain(base, proposed))
-        search.judged.update({candidate.name: candidate for candidate in search.refitted(base, proposed)})
+        search.rounds[frozenset()] = base, search.refitted(base, proposed)
         return search
+
+    @property
+    def judged(self) -> dict[str, Candidate]:
+        """Best refit of every candidate on the base model, by name."""
+        return {candidate.name: candidate for candidate in self.rounds[frozenset()][1]}
 
     def refitted(self, evidence: Evidence, proposed: Sequence[Proposal]) -> list[Candidate]:
         """The best scores refitted, best by BIC first."""
@@ -82,7 +98,7 @@ class Search:
     def grow(self) -> tuple[Evidence, list[str]]:
         """Add the best effect, look again, and stop when what is left is chance or too small to matter."""
         current, added = self.base, list[str]()
-        proposed, tried, critical = self.proposed, list(self.judged.values()), self.critical
+        tried, critical = self.rounds[frozenset()][1], self.critical
         while len(added) < self.settings.max_effects:
             best = min(tried, key=lambda candidate: candidate.evidence.bic, default=None)
             if best is None or not self.convincing(current, best, critical):
@@ -90,6 +106,7 @@ class Search:
             current, added = best.evidence, [*added, best.name]
             proposed = tuple(proposals(current, self.settings.without))
             tried = self.refitted(current, proposed)
+            self.rounds[frozenset(added)] = current, tried
             critical = critical_gain(current, proposed)
         return current, added
 
@@ -106,8 +123,7 @@ class Search:
             steps, swapped = [], False
             for name in names:
                 others = [other for other in names if other != name]
-                reduced = self._without(current, others)
-                tried = self._rivals(reduced, others)
+                reduced, tried = self._place(current, others)
                 best = tried[0] if tried else None
                 if best and best.name != name and best.evidence.bic < current.bic - 1e-6:
                     names[names.index(name)] = best.name
@@ -117,41 +133,42 @@ class Search:
                     names.remove(name)
                     current, swapped = reduced, True
                     break
-                rivals = tuple(rival for rival in tried if rival.name != name and self._same(current, rival))
-                steps.append(Step(name, reduced.chi_square - current.chi_square, rivals, tuple(tried)))
+                steps.append(self._step(name, current, reduced, tried))
             if not swapped:
                 break
         return current, steps
 
-    def _without(self, current: Evidence, others: Sequence[str]) -> Evidence:
-        """The model with no more than some of the added effects, refitted."""
-        if not others:
-            return self.base
-        model = self.base.model
-        for other in others:
-            own = {key: value for key, value in current.model.values.items() if key.startswith(f"{other}.")}
-            model = model.with_effect(other, own)
-        start = {key: value for key, value in current.model.values.items() if key in model.values}
-        return fit(model.with_values(start), current.terms, self.held, self.bounds)
+    def _step(self, name: str, current: Evidence, reduced: Evidence, tried: Sequence[Candidate]) -> Step:
+        """Sort an effect's rivals: those these tests cannot tell from it, and those that contain it.
 
-    def _rivals(self, reduced: Evidence, others: Sequence[str]) -> list[Candidate]:
-        if not others:
-            return sorted(self.judged.values(), key=lambda candidate: candidate.evidence.bic)
-        return self.refitted(reduced, proposals(reduced, (*self.settings.without, *others)))
-
-    def _same(self, current: Evidence, rival: Candidate) -> bool:
-        """Whether these tests could not tell a rival from the model.
-
-        Within SAME by BIC, or nearer than APART to the model's own noise-free prediction. A richer rival that meets
-        this prediction contains the model: then the simpler name stands.
+        A rival is the same within SAME by BIC, or nearer than APART to the model's own noise-free prediction. A richer
+        one that meets this prediction contains the model: then the simpler name stands.
         """
-        behind = rival.evidence.bic - current.bic
-        if rival.evidence.chi_square - current.chi_square > _PLAIN:
-            return False
-        distance = self._distance(current, rival)
-        if distance < _CONTAINS and rival.evidence.parameters > current.parameters:
-            return False
-        return behind < SAME or distance < APART
+        rivals, richer = [], []
+        for rival in tried:
+            if rival.name == name or rival.evidence.chi_square - current.chi_square > _PLAIN:
+                continue
+            distance = self._distance(current, rival)
+            if distance < _CONTAINS and rival.evidence.parameters > current.parameters:
+                richer.append(rival)
+            elif rival.evidence.bic - current.bic < SAME or distance < APART:
+                rivals.append(rival)
+        gain = reduced.chi_square - current.chi_square
+        return Step(name, gain, tuple(rivals), tuple(richer), tuple(tried))
+
+    def _place(self, current: Evidence, others: Sequence[str]) -> tuple[Evidence, list[Candidate]]:
+        """The model with no more than some of the added effects, refitted, and its candidates; each set once."""
+        key = frozenset(others)
+        if key not in self.rounds:
+            model = self.base.model
+            for other in others:
+                own = {name: value for name, value in current.model.values.items() if name.startswith(f"{other}.")}
+                model = model.with_effect(other, own)
+            start = {name: value for name, value in current.model.values.items() if name in model.values}
+            reduced = fit(model.with_values(start), current.terms, self.held, self.bounds)
+            proposed = proposals(reduced, (*self.settings.without, *others))
+            self.rounds[key] = reduced, self.refitted(reduced, proposed)
+        return self.rounds[key]
 
     def _distance(self, current: Evidence, rival: Candidate) -> float:
         """Chi-square of the rival, fitted to what the model itself would have measured without noise."""
@@ -164,9 +181,9 @@ class Search:
 
 def critical_gain(evidence: Evidence, proposed: Sequence[Proposal]) -> float:
     """The gain that the best of all candidates makes of noise alone, with probability 1 - _LEVEL."""
-    visible = [proposal for proposal in proposed if proposal.visible]
-    groups = [proposal.direction for proposal in visible]
-    return largest_by_chance(evidence, groups, _LEVEL, [proposal.sense for proposal in visible])
+    columns = np.array([proposal.column for proposal in proposed])
+    questions = Questions(evidence, columns, [np.array([i]) for i in range(len(proposed))], SENSITIVITY_LEFT)
+    return questions.largest_by_chance(_LEVEL, [proposal.sense for proposal in proposed])
 
 
 def footprint(before: Evidence, after: Evidence) -> float:

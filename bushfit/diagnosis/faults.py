@@ -5,12 +5,13 @@ Each suspect place may deviate freely in gain and phase; what that takes off chi
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from bushfit.diagnosis.calibrate import PATTERN_LEFT, gain, orthonormal
+from bushfit.diagnosis.calibrate import PATTERN_LEFT, Questions
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.effects.contract import Array
 from bushfit.fitting.terms import LoopTerm, SweepTerm
@@ -18,6 +19,10 @@ from bushfit.sheets import display_units
 
 #: A disturbance covers at most this many neighbouring frequencies.
 _WIDEST = 3
+
+
+#: Points that deviate together: per sweep term its place among the residuals and the points touched.
+Together = Sequence[tuple[SweepTerm, slice, Array]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,14 +33,14 @@ class Place:
         words: where, for the user: which rows to measure again.
         kind: "frequency", "level", "repeat" or "loop".
         columns: whitened residuals that a unit deviation of each kind makes, (2 k, n).
-        direction: of the first sweep touched.
+        direction: of the first test touched.
         frequency: lowest and highest [Hz].
         amplitude: lowest and highest [m or rad].
     """
 
     words: str
     kind: str
-    columns: Array
+    columns: Sequence[Array]
     direction: str
     frequency: tuple[float, float]
     amplitude: tuple[float, float]
@@ -43,11 +48,18 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Fault:
-    """A place, what letting it deviate would take off chi-square, its price in free parameters, and how far it
-    departs, relative to |K| or to half a loop's force range."""
+    """A place that may be at fault.
+
+    Args:
+        place: where.
+        columns: free deviations it was given.
+        gain: what letting it deviate would take off chi-square.
+        price: of those deviations, and of having looked in so many places.
+        size: how far it departs, relative to |K| or to half a loop's force range.
+    """
 
     place: Place
-    directions: Array
+    columns: int
     gain: float
     price: float
     size: float
@@ -57,22 +69,30 @@ class Fault:
         return self.gain - self.price
 
 
-def places(evidence: Evidence) -> list[Place]:
-    """Every single place of the campaign that could be at fault."""
-    return [*_frequencies(evidence), *_levels(evidence), *_repeats(evidence), *_loops(evidence)]
-
-
-def faults(evidence: Evidence, suspects: Sequence[Place]) -> list[Fault]:
-    """Every suspect's gain, the worthiest first. The price is that of its parameters and of having looked there."""
-    kinds = {place.kind: sum(other.kind == place.kind for other in suspects) for place in suspects}
-    found = []
-    for place in suspects:
-        directions = orthonormal(evidence, place.columns, PATTERN_LEFT)
-        price = len(directions) * evidence.penalty + 2.0 * np.log(kinds[place.kind])
-        left = evidence.beside(place.columns)
-        size = np.abs(np.linalg.lstsq(left.T, evidence.residual, rcond=None)[0]).max() if len(directions) else 0.0
-        found.append(Fault(place, directions, gain(directions, evidence.residual), float(price), float(size)))
-    return sorted(found, key=lambda fault: -fault.worth)
+def faults(evidence: Evidence, level: float) -> tuple[list[Fault], float]:
+    """Every single place that could be at fault, and the gain that the best of them exceeds by chance with
+    probability 1 - level."""
+    suspects = [*_frequencies(evidence), *_levels(evidence), *_repeats(evidence), *_loops(evidence)]
+    if not suspects:
+        return [], np.inf
+    columns = {id(column): column for place in suspects for column in place.columns}
+    index = {key: number for number, key in enumerate(columns)}
+    groups = [np.array([index[id(column)] for column in place.columns]) for place in suspects]
+    questions = Questions(evidence, np.array(list(columns.values())), groups, PATTERN_LEFT)
+    looked = Counter(place.kind for place in suspects)
+    found = [
+        Fault(
+            place,
+            size,
+            gain,
+            size * evidence.penalty + 2.0 * float(np.log(looked[place.kind])),
+            float(np.abs(answer).max()),
+        )
+        for place, size, gain, answer in zip(
+            suspects, questions.sizes, questions.gains(), questions.answers(), strict=True
+        )
+    ]
+    return found, questions.largest_by_chance(level)
 
 
 def _sweeps(evidence: Evidence) -> list[tuple[SweepTerm, slice]]:
@@ -80,16 +100,15 @@ def _sweeps(evidence: Evidence) -> list[tuple[SweepTerm, slice]]:
     return [(term, place) for term, place in pairs if isinstance(term, SweepTerm)]
 
 
-def _columns(evidence: Evidence, touched: Sequence[Sequence[tuple[SweepTerm, slice, Array]]]) -> Array:
-    """A gain and a phase column for each set of points that deviates as one, whitened, (2 k, n)."""
-    rows = []
-    for together in touched:
-        for unit in (1.0, 1.0j):
-            row = np.zeros(evidence.residual.size)
-            for term, place, chosen in together:
-                row[place] = term.whiten(unit * chosen.astype(complex))
-            rows.append(row)
-    return np.array(rows)
+def _columns(evidence: Evidence, together: Together) -> list[Array]:
+    """A gain and a phase column of points that deviate as one, whitened."""
+    columns = []
+    for unit in (1.0, 1.0j):
+        column = np.zeros(evidence.residual.size)
+        for term, place, chosen in together:
+            column[place] = term.whiten(unit * chosen.astype(complex))
+        columns.append(column)
+    return columns
 
 
 def _frequencies(evidence: Evidence) -> Iterator[Place]:
@@ -98,17 +117,17 @@ def _frequencies(evidence: Evidence) -> Iterator[Place]:
     steps = np.unique(np.concatenate([term.frequency for term, _ in sweeps])) if sweeps else np.empty(0)
     if steps.size < 5:
         return
-    scopes = [[pair] for pair in sweeps] + ([sweeps] if len(sweeps) > 1 else [])
-    for scope in scopes:
+    for scope in [[pair] for pair in sweeps] + ([sweeps] if len(sweeps) > 1 else []):
+        touched = [[(term, place, term.frequency == f) for term, place in scope] for f in steps]
+        columns = [_columns(evidence, together) for together in touched]
+        where = scope[0][0].direction if len(scope) == 1 else "all directions"
         for width in range(1, _WIDEST + 1):
             for first in range(steps.size - width + 1):
-                window = steps[first : first + width]
-                touched = [[(term, place, term.frequency == f) for term, place in scope] for f in window]
-                if not all(chosen.any() for together in touched for _, _, chosen in together):
-                    continue
-                where = scope[0][0].direction if len(scope) == 1 else "all directions"
-                words = f"{_span(window, 'Hz')} in {where}, at every amplitude"
-                yield _place(words, "frequency", evidence, touched)
+                window = slice(first, first + width)
+                if all(chosen.any() for together in touched[window] for _, _, chosen in together):
+                    words = f"{_span(steps[window], 'Hz')} in {where}, at every amplitude"
+                    parts = [part for together in touched[window] for part in together]
+                    yield _place(words, "frequency", [c for pair in columns[window] for c in pair], parts)
 
 
 def _levels(evidence: Evidence) -> Iterator[Place]:
@@ -119,7 +138,8 @@ def _levels(evidence: Evidence) -> Iterator[Place]:
             continue
         for level in levels:
             words = f"the {term.direction} level {_amplitude(term, level)}"
-            yield _place(words, "level", evidence, [[(term, place, term.amplitude == level)]])
+            together = [(term, place, term.amplitude == level)]
+            yield _place(words, "level", _columns(evidence, together), together)
 
 
 def _repeats(evidence: Evidence) -> Iterator[Place]:
@@ -131,9 +151,9 @@ def _repeats(evidence: Evidence) -> Iterator[Place]:
             if numbers.size < 3:
                 continue
             for number in numbers:
-                chosen = (term.amplitude == level) & (repeat == number)
+                together = [(term, place, (term.amplitude == level) & (repeat == number))]
                 words = f"repeat {number} of the {term.direction} level {_amplitude(term, level)}"
-                yield _place(words, "repeat", evidence, [[(term, place, chosen)]])
+                yield _place(words, "repeat", _columns(evidence, together), together)
 
 
 def _loops(evidence: Evidence) -> Iterator[Place]:
@@ -146,19 +166,16 @@ def _loops(evidence: Evidence) -> Iterator[Place]:
         scale = np.sqrt(term.drive.weight) / term.drive.noise
         columns[0, place], columns[1, place] = term.drive.force * scale, term.drive.half_range * scale
         ends = (term.drive.frequency,) * 2, (term.drive.amplitude,) * 2
-        yield Place(f"the loop {term.loop.name}", "loop", columns, str(term.direction), *ends)
+        yield Place(f"the loop {term.loop.name}", "loop", list(columns), str(term.direction), *ends)
 
 
-def _place(
-    words: str, kind: str, evidence: Evidence, touched: Sequence[Sequence[tuple[SweepTerm, slice, Array]]]
-) -> Place:
-    parts = [part for together in touched for part in together]
+def _place(words: str, kind: str, columns: Sequence[Array], parts: Together) -> Place:
     frequency = np.concatenate([term.frequency[chosen] for term, _, chosen in parts])
     amplitude = np.concatenate([term.amplitude[chosen] for term, _, chosen in parts])
     return Place(
         words,
         kind,
-        _columns(evidence, touched),
+        columns,
         str(parts[0][0].direction),
         (float(frequency.min()), float(frequency.max())),
         (float(amplitude.min()), float(amplitude.max())),

@@ -31,7 +31,9 @@ _NOISE = (0.003, 0.006)
 _FORCE_NOISE = (0.002, 0.004)
 _SHARED = (0.004, float(np.radians(0.2)))
 _FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
-_TRIES = 12
+_TRIES = 30
+#: No effect is larger than this many times its typical size.
+_LARGEST = 30.0
 
 
 @dataclass(frozen=True)
@@ -155,7 +157,7 @@ def _sized(
         value = -value
     size = 0.0
     for _ in range(4):
-        if not amount.bounds[0] <= value <= amount.bounds[1]:
+        if not (amount.bounds[0] <= value <= amount.bounds[1] and abs(value) <= _LARGEST * amount.typical):
             return None, 0.0
         size = _visible(plain, plain.with_effect(effect.name, {**values, name: value}), plan)
         if size <= 0.0:
@@ -193,10 +195,10 @@ def _terms(model: Model, plan: SimulateSettings) -> list[Term]:
     from bushfit.measurement import Loop, Sweep
 
     sweeps = []
-    for number, test in enumerate(plan.sweeps):
-        frequency, amplitude = (x.ravel() for x in np.meshgrid(test.frequencies, test.amplitudes))
-        stiffness = model.stiffness(test.direction, frequency, amplitude)
-        sweeps.append(Sweep(str(number), test.direction, frequency, amplitude, stiffness, noise=5e-3))
+    for number, swept in enumerate(plan.sweeps):
+        frequency, amplitude = (x.ravel() for x in np.meshgrid(swept.frequencies, swept.amplitudes))
+        stiffness = model.stiffness(swept.direction, frequency, amplitude)
+        sweeps.append(Sweep(str(number), swept.direction, frequency, amplitude, stiffness, noise=5e-3))
     loops = []
     for number, test in enumerate(plan.loops):
         phase = np.arange(600) / 200.0

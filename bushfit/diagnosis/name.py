@@ -12,7 +12,7 @@ from itertools import product
 
 import numpy as np
 
-from bushfit.diagnosis.calibrate import SENSITIVITY_LEFT, gain, orthonormal
+from bushfit.diagnosis.calibrate import SENSITIVITY_LEFT, Questions
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.effects import LIBRARY, Effect, Parameter, qualified
 from bushfit.effects.contract import Array
@@ -36,20 +36,17 @@ class Proposal:
         name: the effect.
         model: the model with the effect at the amount the score suggests.
         score: what it would take off chi-square if everything were linear.
-        direction: its sensitivity beside the model's own parameters, orthonormal, (1, n) or (0, n).
+        column: its sensitivity, whitened, (n,).
         sense: +1 where only positive amounts are physical, 0 where both signs are.
+        visible: whether these tests could show the effect at all, beside the model's own parameters.
     """
 
     name: str
     model: Model
     score: float
-    direction: Array
+    column: Array
     sense: int
-
-    @property
-    def visible(self) -> bool:
-        """Whether these tests could show the effect at all, beside the model's own parameters."""
-        return self.direction.shape[0] > 0
+    visible: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,19 +73,17 @@ def _propose(evidence: Evidence, effect: Effect) -> Proposal:
     amount = next(parameter for parameter in effect.parameters if parameter.neutral is not None)
     name = qualified(effect, amount)
     sense = 1 if amount.neutral == amount.bounds[0] else 0
-    best: Proposal | None = None
-    for shape in _shapes(evidence.terms, evidence.model, effect):
-        model = evidence.model.with_effect(effect.name, shape)
-        column = jacobian(model, evidence.terms, [name])
-        direction = orthonormal(evidence, column, SENSITIVITY_LEFT)
-        score = gain(direction, evidence.residual, sense)
-        if best is None or score > best.score:
-            left = evidence.beside(column)[0]
-            step = float(-(left @ evidence.residual) / max(float(left @ left), 1e-300)) * amount.typical
-            step = float(np.clip(step, *amount.bounds)) if score > 0.0 else 0.0
-            best = Proposal(effect.name, model.with_values({name: step}), score, direction, sense)
-    assert best is not None
-    return best
+    models = [
+        evidence.model.with_effect(effect.name, shape) for shape in _shapes(evidence.terms, evidence.model, effect)
+    ]
+    columns = np.concatenate([jacobian(model, evidence.terms, [name]) for model in models])
+    questions = Questions(evidence, columns, [np.array([i]) for i in range(len(models))], SENSITIVITY_LEFT)
+    amounts = np.array([float(answer[0]) for answer in questions.answers()])
+    scores = np.where((amounts > 0.0) | (sense == 0), questions.gains(), 0.0)
+    best = int(np.argmax(scores))
+    step = float(np.clip(amounts[best] * amount.typical, *amount.bounds)) if scores[best] > 0.0 else 0.0
+    model = models[best].with_values({name: step})
+    return Proposal(effect.name, model, float(scores[best]), columns[best], sense, questions.sizes[best] > 0)
 
 
 def _shapes(terms: Sequence[Term], model: Model, effect: Effect) -> list[Mapping[str, float]]:

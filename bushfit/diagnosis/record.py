@@ -57,11 +57,19 @@ class Where:
 
 @dataclass(frozen=True)
 class Named:
-    """An effect that was added, or that leads a set of look-alikes."""
+    """An effect that was added, or that leads a set of look-alikes.
+
+    Args:
+        name: the effect.
+        evidence: in words.
+        alternatives: effects these tests cannot tell from it.
+        richer: effects that contain it as a limit, and whose further parameters these tests do not show.
+    """
 
     name: str
     evidence: str
     alternatives: tuple[str, ...] = ()
+    richer: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -143,6 +151,7 @@ class Diagnosis:
             "parameters": {name: self._parameter(name, value) for name, value in values.items()},
             "evidence": named.evidence,
             "alternatives": list(named.alternatives),
+            "richer": list(named.richer),
         }
 
     def _values(self, name: str) -> Mapping[str, float]:

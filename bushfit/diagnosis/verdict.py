@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bushfit.diagnosis.calibrate import PATTERN_LEFT, gain, largest_by_chance, orthonormal
+from bushfit.diagnosis.calibrate import PATTERN_LEFT, Questions
 from bushfit.diagnosis.close import SAME, Search, Step
 from bushfit.diagnosis.evidence import Evidence, fit
-from bushfit.diagnosis.faults import Fault, Place, faults, places
+from bushfit.diagnosis.faults import Fault, faults
 from bushfit.diagnosis.holdout import hold_out
 from bushfit.diagnosis.locate import contrasts, largest_smooth_misfit, locate
 from bushfit.diagnosis.next_test import confirming_test, deciding_test
@@ -36,28 +36,27 @@ class Remainder:
 def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
     """Doubt the finding: a fault instead, look-alikes, held-out data, what remains."""
     base = search.base
-    suspects = places(base)
     if not steps:
-        remainder = find_remainder(search, base, suspects)
+        remainder = find_remainder(search, base)
         if remainder is None:
             words = "nothing is missing beyond noise and tolerance"
             return _finish(search, "consistent", words, base, ())
         return _finish(search, "unexplained", remainder.words, base, (), fault=remainder.fault)
-    fault = _worst_fault(search, base, suspects)
+    fault = _worst_fault(search, base)
     worth = base.bic - final.bic
     if fault and fault.worth > worth + SAME:
         return _finish(search, "unexplained", _fault_words(fault), base, (), fault=fault)
     if fault and fault.worth > worth - SAME:
-        leaders = [Named(step.name, _evidence(step), (f"fault: {fault.place.words}",)) for step in steps]
+        leaders = [replace(_named(step), alternatives=(f"fault: {fault.place.words}",)) for step in steps]
         words = f"{' and '.join(step.name for step in steps)}, or a fault of the measurement: {fault.place.words}"
         return _finish(search, "ambiguous", f"these tests cannot tell {words}", base, leaders, fault=fault)
-    names = [Named(step.name, _evidence(step), tuple(rival.name for rival in step.rivals)) for step in steps]
+    names = [_named(step) for step in steps]
     if not hold_out(base, final).passed:
         words = f"{_listed(names)} closes the gap only where it was fitted, so the name is taken back"
         return _finish(search, "unexplained", words, base, (), fault=fault)
     if any(step.rivals for step in steps):
         return _ambiguous(search, final, steps, names)
-    remainder = find_remainder(search, final, places(final))
+    remainder = find_remainder(search, final)
     if remainder is None:
         return _finish(search, "named", f"{_listed(names)} closes the gap", final, names)
     held = hold_out(base, final)
@@ -81,25 +80,28 @@ def _ambiguous(search: Search, final: Evidence, steps: Sequence[Step], names: Se
     return _finish(search, "ambiguous", words, kept, names, next_test=deciding_test(rivals[0], final.terms))
 
 
-def find_remainder(search: Search, evidence: Evidence, suspects: Sequence[Place]) -> Remainder | None:
+def find_remainder(search: Search, evidence: Evidence) -> Remainder | None:
     """What is left beyond noise and tolerance: a fault at one place, or something smooth."""
-    fault = _worst_fault(search, evidence, suspects)
+    fault = _worst_fault(search, evidence)
     if fault:
         return Remainder(_fault_words(fault), fault)
-    smooth = orthonormal(evidence, contrasts(evidence), PATTERN_LEFT)
-    real = gain(smooth, evidence.residual) > largest_by_chance(evidence, [smooth], _LEVEL)
-    if real and largest_smooth_misfit(evidence) > search.settings.tolerance:
+    columns = contrasts(evidence)
+    smooth = Questions(evidence, columns, [np.arange(len(columns))], PATTERN_LEFT)
+    if (
+        smooth.gains()[0] > smooth.largest_by_chance(_LEVEL)
+        and largest_smooth_misfit(evidence) > search.settings.tolerance
+    ):
         return Remainder("a real gap stays that no known effect closes", None)
     return None
 
 
-def _worst_fault(search: Search, evidence: Evidence, suspects: Sequence[Place]) -> Fault | None:
+def _worst_fault(search: Search, evidence: Evidence) -> Fault | None:
     """The worthiest fault, where it is more than chance, more than its price and larger than the tolerance."""
-    found = faults(evidence, suspects)
-    if not found or found[0].worth < SAME or found[0].size < search.settings.tolerance:
+    found, chance = faults(evidence, _LEVEL)
+    worst = max(found, key=lambda fault: fault.worth, default=None)
+    if worst is None or worst.worth < SAME or worst.size < search.settings.tolerance:
         return None
-    chance = largest_by_chance(evidence, [fault.directions for fault in found], _LEVEL)
-    return found[0] if found[0].gain > chance else None
+    return worst if worst.gain > chance else None
 
 
 def _fault_words(fault: Fault) -> str:
@@ -108,6 +110,11 @@ def _fault_words(fault: Fault) -> str:
 
 def _listed(names: Sequence[Named]) -> str:
     return " and ".join(named.name for named in names)
+
+
+def _named(step: Step) -> Named:
+    rivals = tuple(rival.name for rival in step.rivals)
+    return Named(step.name, _evidence(step), rivals, tuple(rival.name for rival in step.richer))
 
 
 def _evidence(step: Step) -> str:
@@ -157,7 +164,7 @@ def _fault_where(fault: Fault) -> Where:
     place = fault.place
     kind = "loop" if place.kind == "loop" else "sweep"
     component = "force" if kind == "loop" else "storage"
-    excess = float(np.sqrt(fault.gain / max(len(fault.directions), 1)))
+    excess = float(np.sqrt(fault.gain / max(fault.columns, 1)))
     reading = f"{place.words} departs by {100 * fault.size:.2g} % from what all other tests say"
     return Where(place.direction, kind, place.frequency, place.amplitude, component, excess, reading)
 

@@ -10,6 +10,9 @@ from scipy.signal import fftconvolve
 from bushfit.effects.contract import Array, Branch, Level, Parameter, Values, linear_stress
 from bushfit.effects.history import History
 
+#: Step of the order in differences of the Gruenwald-Letnikov sum.
+_ORDER_STEP = 1e-5
+
 
 def power_of_rate(alpha: Array, omega: Array) -> Array:
     """(i omega)^alpha = omega^alpha exp(i pi alpha / 2); 0 at omega = 0."""
@@ -64,7 +67,12 @@ def stress(p: Values, history: History) -> Array:
 
 
 def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
-    """Steady cycles only: the modulus' sensitivities, harmonic by harmonic."""
+    """By m and by alpha: harmonic by harmonic on a steady cycle, by differences of the order from rest."""
+    if not history.periodic:
+        alpha, step = float(p["alpha"]), history.step
+        ahead, behind = (fractional_derivative(alpha + h, history.value, step) for h in (_ORDER_STEP, -_ORDER_STEP))
+        by_alpha = p["m"] * (ahead - behind) / (2.0 * _ORDER_STEP)
+        return {"m": fractional_derivative(alpha, history.value, step), "alpha": by_alpha}
 
     def by(name: str) -> Array:
         return linear_stress(lambda omega: modulus_sensitivities(p, omega, history.amplitude)[name], history)
