@@ -25,6 +25,8 @@ Bounds = Mapping[str, tuple[float | None, float | None]]
 
 _TOLERANCE = 1e-9
 _MOST_EVALUATIONS = 400
+#: A parameter this close to a bound rests on it, in coordinates, which are of order one however wide the bounds.
+_AT_BOUND = 1e-3
 
 
 @dataclass(frozen=True)
@@ -178,5 +180,5 @@ def _lmfit_parameters(model: Model, coordinates: Coordinates, bounds: Bounds) ->
 
 
 def _at_bound(parameter: lmfit.Parameter) -> bool:
-    near = 1e-4 * (parameter.max - parameter.min)
+    near = _AT_BOUND * min(parameter.max - parameter.min, 1.0)
     return bool(parameter.value - parameter.min < near or parameter.max - parameter.value < near)
