@@ -15,9 +15,9 @@ from bushfit.errors import BushfitError
 #: Command, its module and the line that `bushfit --help` shows: no module is loaded before it is needed.
 _COMMANDS = {
     "run": ("run", "The whole chain: fit-static, fit-dynamic, fit, predict."),
-    "fit-static": ("fit_static", "Loops -> mu, sigma_fmax, eps_half."),
-    "fit-dynamic": ("fit_dynamic", "Smallest-amplitude sweep -> m, alpha."),
-    "fit": ("fit", "Loops and sweeps -> all five parameters together."),
+    "fit-static": ("fit_static", "Loops -> mu, sigma_fmax, eps_half (elasticity and friction)."),
+    "fit-dynamic": ("fit_dynamic", "Smallest-amplitude sweep -> m, alpha (rate dependence)."),
+    "fit": ("fit", "Loops and sweeps -> all five parameters together: the fit to use."),
     "predict": ("predict", "Model -> axial and radial stiffness tables and plots."),
     "diagnose": ("diagnose", "Where do model and tests disagree? What is missing? Add it, show the gap shrink."),
     "scorecard": ("scorecard", "How often is diagnose right? Judged on hidden campaigns."),
@@ -48,12 +48,13 @@ class _Commands(click.Group):
 def cli() -> None:
     """Fit the stiffness and loss of rubber bushings over frequency and amplitude.
 
-    A campaign file (TOML) names a bushing, its hysteresis loops and its stepped-sine sweeps. Start with
+    A CAMPAIGN is a text file (TOML) that names a bushing, its hysteresis loops and its stepped-sine sweeps. Start with
 
         bushfit run CAMPAIGN.toml
 
-    which writes parameters, stiffness tables and plots to results/<campaign name>. Text for people goes to
-    standard error. Exit status: 0 done, 1 done but a stated limit is missed, 2 wrong usage or unusable input.
+    which writes parameters, stiffness tables and plots to results/<campaign name>; `bushfit diagnose` then looks for
+    what the model lacks. `bushfit COMMAND --help` tells more of each. Text for people goes to standard error. Exit
+    status: 0 done, 1 done but a stated limit is missed, 2 wrong usage or unusable input.
     """
 
 

@@ -69,8 +69,10 @@ class Options:
 def shared_options(function: F) -> F:
     """-o, -v, -q, --json, --no-plots, --force, gathered into one `options` argument."""
 
-    @click.option("-o", "--output", type=click.Path(path_type=Path), help="Folder for the results [results/<name>].")
-    @click.option("-v", "--verbose", is_flag=True, help="Say more: noise, correlations, inputs.")
+    @click.option(
+        "-o", "--output", type=click.Path(path_type=Path), help="Folder for the results [results/<campaign name>]."
+    )
+    @click.option("-v", "--verbose", is_flag=True, help="Say more: all correlations, the equation, the files read.")
     @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
     @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on standard output.")
     @click.option("--no-plots", is_flag=True, help="Write no PNG files.")

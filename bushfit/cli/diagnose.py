@@ -33,7 +33,9 @@ _COLOURS = {"consistent": "green", "named": "green", "ambiguous": "yellow", "par
     type=click.Path(path_type=Path),
     help="Start from this model's effects [the paper's three]; its values are fitted anew.",
 )
-@click.option("--adopt", multiple=True, metavar="EFFECT", help="Add this effect by hand; may be given again.")
+@click.option(
+    "--adopt", multiple=True, metavar="EFFECT", help="Add this effect by hand, such as inertia; may be given again."
+)
 @click.option("--without", multiple=True, metavar="EFFECT", help="Do not consider this effect; may be given again.")
 @click.option("--max-effects", type=click.IntRange(0, 5), default=3, show_default=True, help="Effects to add at most.")
 @click.option("--tolerance", default="1 %", show_default=True, help="Gaps below this share of |K| do not count.")
@@ -63,9 +65,8 @@ def command(
     from bushfit.diagnosis.workflow import diagnose
     from bushfit.fitting.data import Data
     from bushfit.results import load_result
-    from bushfit.units import quantity
 
-    settings = Settings(max_effects, quantity(tolerance, "1"), adopt, without)
+    settings = Settings(max_effects, _share(tolerance), adopt, without)
     start = load_result(model).model if model else None
     loaded = load_campaign(campaign)
     folder = options.folder(loaded.slug)
@@ -82,6 +83,17 @@ def command(
     options.write(folder, files)
     options.tell(document)
     enforce_nrmse(diagnosis.result, max_nrmse)
+
+
+def _share(text: str) -> float:
+    from bushfit.errors import BushfitError
+    from bushfit.units import quantity
+
+    try:
+        return quantity(text, "1")
+    except BushfitError as error:
+        error.place = "--tolerance"
+        raise
 
 
 def tell_diagnosis(options: Options, name: str, diagnosis: Diagnosis) -> None:

@@ -26,7 +26,13 @@ from bushfit.cli.common import (
     multiple=True,
     help="Tests to fit; may be given again [axial, as in the paper; all where none is axial].",
 )
-@click.option("--effect", "effects", multiple=True, help="Add an effect to the paper's three; may be given again.")
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    metavar="NAME",
+    help="Add an effect to the paper's three, such as inertia; may be given again. A wrong NAME lists them all.",
+)
 @max_nrmse_option
 @shared_options
 def command(

@@ -19,7 +19,7 @@ def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | 
     if text is None:
         return None
     expected = 'such as "5:155:10 Hz" (start:stop:step) or "0.1, 0.2, 0.5 mm", with one unit at the end'
-    parts = re.fullmatch(r"\s*([-+0-9.eE,:\s]*[0-9.])\s*([^\d\s].*)", text)
+    parts = re.fullmatch(r"\s*([-+0-9.eE,:\s]*[0-9.])\s*([^-+\d\s:,.].*)", text)
     if not parts:
         raise UnitError("these are no values with a unit", place=option, found=repr(text), expected=expected)
     numbers, suffix = parts.groups()

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 )
 @click.option("--frequencies", help='Such as "5:155:10 Hz" or "20, 50, 100 Hz" [the paper\'s, as far as measured].')
 @click.option("--amplitudes", help='Zero-to-peak, such as "0.1, 0.2, 0.5 mm" [the paper\'s, as far as measured].')
-@click.option("--torsion-amplitudes", help='Zero-to-peak, such as "0.5, 1, 2 deg".')
+@click.option("--torsion-amplitudes", help='Zero-to-peak rotation, for --direction torsion ["0.5, 1, 2 deg"].')
 @shared_options
 def command(
     model: Path,

@@ -17,20 +17,31 @@ if TYPE_CHECKING:
 
 @click.command("simulate")
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=click.Path(path_type=Path))
-@click.option("--seed", type=click.IntRange(min=0), help="Of the random numbers [0].")
+@click.option(
+    "--seed", type=click.IntRange(min=0), help="Of the random numbers; the same seed gives the same data [0]."
+)
 @click.option("--repeats", type=click.IntRange(1, 1000), help="Of each sweep [1].")
 @click.option("--noise", help='Scatter of a sweep point relative to |K|, such as "0.5 %".')
-@click.option("--force-noise", help="Scatter of a loop's force relative to its half range.")
-@click.option("--displacement-noise", help="Scatter of a loop's displacement relative to its amplitude.")
+@click.option("--force-noise", help='Scatter of a loop\'s force relative to its half range, such as "0.3 %".')
+@click.option(
+    "--displacement-noise", help='Scatter of a loop\'s displacement relative to its amplitude, such as "0.02 %".'
+)
 @click.option("--gain-error", help='Gain error shared by a block (one repeat of one level), such as "0.4 %".')
 @click.option("--phase-error", help='Phase error shared by a block, such as "0.2 deg".')
-@click.option("--effect", "effects", multiple=True, help='Hide an effect, such as "inertia.mass=0.1 kg".')
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    metavar="NAME.PARAMETER=VALUE",
+    help='Hide an effect, such as "inertia.mass=0.1 kg".',
+)
 @shared_options
 def command(source: Path, effects: tuple[str, ...], options: Options, **settings: Any) -> None:
     """Put a model on the virtual rig and write a campaign of simulated raw tests.
 
     The model is MODEL.json, tested as the paper's bushing was, or the [simulate] table of CAMPAIGN with tests of its
-    own. Equations (3) and (5) are stepped through time; the closed form that the fits use is not involved.
+    own. Equations (3) and (5) are stepped through time; the closed form that the fits use is not involved. Noise is
+    that of the [simulate] table, or none; each option replaces one entry of the table.
 
     Writes campaign.toml, the CSV files it names, and truth.json, the model behind them.
     """
