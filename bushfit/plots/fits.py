@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -100,15 +101,17 @@ def loops_figure(model: Model, terms: Sequence[LoopTerm], title: str) -> Figure:
     return figure
 
 
-def loops_legend(axes: Axes, terms: Sequence[LoopTerm], model: Line2D | None = None) -> None:
-    """Names the loops of a panel over the phase by amplitude and frequency, and by file where that leaves twins."""
+def loops_legend(axes: Axes, terms: Sequence[LoopTerm], model: Line2D | None = None, **place: Any) -> None:
+    """Names the loops of a panel by amplitude and frequency, and by file where that leaves twins."""
     unit, length = display_units(terms[0].direction)["length"]
     labels = [f"{length * term.amplitude[0]:.3g} {unit}, {term.frequency[0]:.3g} Hz" for term in terms]
     if len(set(labels)) < len(labels):
         names = [term.loop.name.replace("$", r"\$") for term in terms]
         labels = [f"{label}\n{name}" for label, name in zip(labels, names, strict=True)]
     handles = [style.handle(False) for style in styles(len(terms), "loop")]
-    legend(axes, [*handles, *([model] if model else [])], [*labels, *(["model"] if model else [])], "loop")
+    if model:
+        handles, labels = [*handles, model], [*labels, "model"]
+    legend(axes, handles, labels, "" if place else "loop", **place)
 
 
 def _model_lines(model: Model, direction: Direction, points: Points) -> Points:

@@ -82,18 +82,18 @@ def dress(axes: Axes, x_label: str, y_label: str) -> None:
     axes.yaxis.set_major_formatter(ScalarFormatter(useOffset=False))
 
 
-def spans_decades(values: Array) -> bool:
-    """Whether a logarithmic axis suits positive values."""
-    return bool(values.max() > _LOG_RATIO * values.min())
-
-
 def readable(axes: Axes, values: Array) -> None:
-    """A logarithmic x axis where the values span decades, with plain numbers."""
-    if spans_decades(values):
-        axes.set_xscale("log")
-        axes.xaxis.set_major_locator(LogLocator(subs=(1, 3) if values.max() < _LOG_RATIO**2 * values.min() else (1,)))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axes.xaxis.set_minor_formatter(NullFormatter())
+    """A logarithmic x axis where the values span decades."""
+    if values.max() > _LOG_RATIO * values.min():
+        logarithmic(axes, values)
+
+
+def logarithmic(axes: Axes, values: Array) -> None:
+    """A logarithmic x axis with plain numbers."""
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 3) if values.max() < _LOG_RATIO**2 * values.min() else (1,)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 def least_span(axes: Axes, least: float) -> None:
@@ -110,9 +110,9 @@ def noise_band(axes: Axes) -> None:
     least_span(axes, 7.0)
 
 
-def legend(axes: Axes, handles: Sequence[Line2D], labels: Sequence[str], title: str) -> None:
-    """Right of the panel."""
-    axes.legend(handles, labels, title=title, fontsize=SMALL, title_fontsize=SMALL, **_LEGEND)
+def legend(axes: Axes, handles: Sequence[Line2D], labels: Sequence[str], title: str, **place: Any) -> None:
+    """Right of the panel, or where `place` says in matplotlib's words."""
+    axes.legend(handles, labels, fontsize=SMALL, title_fontsize=SMALL, **(_LEGEND | {"title": title} | place))
 
 
 def explain(figure: Figure, *sentences: str) -> None:

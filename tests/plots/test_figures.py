@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import matplotlib
@@ -11,16 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
-from bushfit import rig
 from bushfit.effects.contract import Array
-from bushfit.fitting.terms import LoopTerm, SweepTerm, loop_terms, sweep_terms
+from bushfit.fitting.terms import LoopTerm, SweepTerm
 from bushfit.geometry import Direction
-from bushfit.measurement import Loop, Sweep
 from bushfit.model import Model
 from bushfit.plots import fine_grid, loops_figure, prediction_figure, sweeps_figure, to_png
 from bushfit.prediction import Prediction, predict
 from bushfit.results import Covariance, Result
 
+Swept = Callable[..., SweepTerm]
+Looped = Callable[..., LoopTerm]
 FREQUENCIES = np.arange(5.0, 156.0, 10.0)
 AMPLITUDES = np.array([1e-4, 2e-4, 5e-4])
 TORSION = np.radians([0.5, 1.0, 2.0])
@@ -37,33 +38,6 @@ def predicted(
     """A prediction and its curves."""
     prediction = predict(fitted(model), direction, frequencies, amplitudes)
     return prediction, predict(fitted(model), direction, *fine_grid(prediction))
-
-
-def swept(
-    model: Model,
-    direction: Direction = Direction.AXIAL,
-    frequencies: Array = FREQUENCIES,
-    amplitudes: Array = AMPLITUDES,
-    repeats: int = 3,
-) -> SweepTerm:
-    noise = np.random.default_rng(7)
-    numbers = np.arange(1, repeats + 1)
-    frequency, amplitude, repeat = (
-        axis.ravel() for axis in np.meshgrid(frequencies, amplitudes, numbers, indexing="ij")
-    )
-    scatter = 0.01 * (noise.normal(size=frequency.size) + 1j * noise.normal(size=frequency.size))
-    stiffness = model.stiffness(direction, frequency, amplitude) * (1.0 + scatter)
-    return sweep_terms([Sweep(f"{direction}.csv", direction, frequency, amplitude, stiffness, repeat)])[0]
-
-
-def looped(
-    model: Model, amplitude: float, *, cycles: int = 3, run_in: int = 0, direction: Direction = Direction.AXIAL
-) -> LoopTerm:
-    record = rig.record(
-        model, direction, 0.1, amplitude, cycles=cycles, run_in=run_in, steps_per_cycle=1024, kind="loop"
-    )
-    force = record.force + 0.005 * np.ptp(record.force) * np.random.default_rng(7).normal(size=record.force.size)
-    return loop_terms([Loop("$ loop $.csv", direction, record.time, record.displacement, force)])[0]
 
 
 def lines(axes: Axes) -> list[Any]:
@@ -84,7 +58,7 @@ def legend(axes: Axes) -> list[str]:
     return [] if box is None else [text.get_text() for text in box.get_texts()]
 
 
-def test_prediction_over_frequency_and_amplitude(paper_model: Model) -> None:
+def test_prediction_over_frequency_and_amplitude(paper_model: Model, swept: Swept) -> None:
     prediction, curves = predicted(paper_model, Direction.AXIAL)
     figure = prediction_figure(prediction, [swept(paper_model)], "CMP 15 961", curves=curves, note="A word more.")
     assert labels(figure) == [
@@ -109,7 +83,7 @@ def test_prediction_over_frequency_and_amplitude(paper_model: Model) -> None:
     assert line.get_ydata()[spot] == pytest.approx(591.0, rel=1e-3)
 
 
-def test_points_are_means_of_repeats_of_the_same_level_and_direction(paper_model: Model) -> None:
+def test_points_are_means_of_repeats_of_the_same_level_and_direction(paper_model: Model, swept: Swept) -> None:
     prediction, _ = predicted(paper_model, Direction.AXIAL, amplitudes=np.array([2e-4, 3e-4]))
     sweeps = [swept(paper_model), swept(paper_model, Direction.RADIAL)]
     axes = prediction_figure(prediction, sweeps, "").axes[0]
@@ -140,7 +114,9 @@ def test_at_most_six_amplitudes_and_four_frequencies(paper_model: Model) -> None
     assert [len(lines(axes)) for axes in figure.axes] == [6, 6, 4, 4]
 
 
-def test_units_follow_direction_and_size(paper_model: Model, other_models: dict[str, Model]) -> None:
+def test_units_follow_direction_and_size(
+    paper_model: Model, other_models: dict[str, Model], swept: Swept, looped: Looped
+) -> None:
     prediction, _ = predicted(paper_model, Direction.TORSION, amplitudes=TORSION)
     figure = prediction_figure(prediction, [swept(paper_model, Direction.TORSION, amplitudes=TORSION)], "torsion")
     assert "torsion stiffness |K| [N m/rad]" in labels(figure)
@@ -152,7 +128,7 @@ def test_units_follow_direction_and_size(paper_model: Model, other_models: dict[
     assert loops[:2] == ["rotation [deg]", "torsion moment [N m]"]
 
 
-def test_sweeps_have_a_row_a_direction_and_residuals(paper_model: Model) -> None:
+def test_sweeps_have_a_row_a_direction_and_residuals(paper_model: Model, swept: Swept) -> None:
     wide = swept(paper_model, Direction.RADIAL, np.geomspace(0.1, 300.0, 12), np.geomspace(1e-5, 5e-4, 5), repeats=1)
     figure = sweeps_figure(paper_model, [swept(paper_model), wide], "CMP 15 961")
     assert labels(figure).count("frequency [Hz]") == 4
@@ -169,7 +145,7 @@ def test_sweeps_have_a_row_a_direction_and_residuals(paper_model: Model) -> None
     assert figure.axes[4].get_xlim() == figure.axes[6].get_xlim()
 
 
-def test_loops_show_model_and_residuals(paper_model: Model) -> None:
+def test_loops_show_model_and_residuals(paper_model: Model, looped: Looped) -> None:
     terms = [looped(paper_model, 1e-3), looped(paper_model, 5e-4, run_in=3)]
     figure = loops_figure(paper_model, terms, "CMP 15 961")
     assert labels(figure) == [
@@ -188,7 +164,7 @@ def test_loops_show_model_and_residuals(paper_model: Model) -> None:
 
 
 @pytest.mark.parametrize("run_in", [0, 5])
-def test_long_loops_are_drawn_thin(paper_model: Model, run_in: int) -> None:
+def test_long_loops_are_drawn_thin(paper_model: Model, run_in: int, looped: Looped) -> None:
     term = looped(paper_model, 1e-3, cycles=40, run_in=run_in)
     assert term.loop.force.size > 40_000
     figure = loops_figure(paper_model, [term], "long")
@@ -198,7 +174,7 @@ def test_long_loops_are_drawn_thin(paper_model: Model, run_in: int) -> None:
     assert np.nanmax(step) < 0.1, "a stroke across the cycles that are left out"
 
 
-def test_same_figure_same_bytes_and_no_trace_of_when_or_with_what(paper_model: Model) -> None:
+def test_same_figure_same_bytes_and_no_trace_of_when_or_with_what(paper_model: Model, swept: Swept) -> None:
     prediction, curves = predicted(paper_model, Direction.AXIAL)
     settings = dict(matplotlib.rcParams)
     pictures = {
@@ -217,7 +193,7 @@ def test_any_name_can_be_a_title(paper_model: Model, title: str) -> None:
     assert to_png(prediction_figure(prediction, [], title))
 
 
-def test_no_text_lies_on_another(paper_model: Model) -> None:
+def test_no_text_lies_on_another(paper_model: Model, swept: Swept, looped: Looped) -> None:
     prediction, curves = predicted(paper_model, Direction.AXIAL, amplitudes=np.geomspace(1e-5, 1e-3, 6))
     for figure in (
         prediction_figure(prediction, [swept(paper_model)], "CMP 15 961", curves=curves),
