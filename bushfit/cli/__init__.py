@@ -14,7 +14,7 @@ from bushfit.errors import BushfitError
 
 #: Command, its module and the line that `bushfit --help` shows: no module is loaded before it is needed.
 _COMMANDS = {
-    "run": ("run", "The whole chain: fit-static, fit-dynamic, fit, predict."),
+    "run": ("run", "The whole chain: fit-static, fit-dynamic, fit, diagnose, predict."),
     "fit-static": ("fit_static", "Loops -> mu, sigma_fmax, eps_half (elasticity and friction)."),
     "fit-dynamic": ("fit_dynamic", "Smallest-amplitude sweep -> m, alpha (rate dependence)."),
     "fit": ("fit", "Loops and sweeps -> all five parameters together: the fit to use."),

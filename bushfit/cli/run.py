@@ -17,9 +17,11 @@ from bushfit.cli.common import (
     report,
     shared_options,
     to_json,
+    warn,
 )
 
 if TYPE_CHECKING:
+    from bushfit.fitting.data import Data
     from bushfit.fitting.procedures import TwoStep
     from bushfit.results import Result
 
@@ -29,56 +31,77 @@ if TYPE_CHECKING:
 @max_nrmse_option
 @shared_options
 def command(campaign: Path, max_nrmse: float | None, options: Options) -> None:
-    """Fit CAMPAIGN in every way and predict from the result.
+    """Fit CAMPAIGN in every way, ask what the model lacks, and predict from the result.
 
     fit-static and fit-dynamic are repeated in turn until they agree (the paper's procedure), with the table of each
-    pass; then all parameters are fitted together, and both results stand side by side. Steps whose tests are missing
-    are passed over, and said.
+    pass; then all parameters are fitted together, and both results stand side by side; then diagnose, on all tests;
+    then predict. Steps whose tests are missing are passed over, and said.
 
-    Writes static.json, dynamic.json, model.json, loops and sweeps (CSV and PNG), axial and radial (CSV and PNG).
+    Writes static.json, dynamic.json, model.json (with what diagnose added; then joint.json is the plain fit),
+    diagnosis.json, candidates.csv, and as CSV and PNG: loops, sweeps, gap, axial and radial.
     """
     from bushfit.campaign import load_campaign
-    from bushfit.cli.artifacts import artifact_names, loop_files, prediction_files, sweep_files
+    from bushfit.cli.artifacts import artifact_names, diagnosis_files, loop_files, prediction_files, sweep_files
+    from bushfit.cli.diagnose import tell_diagnosis
     from bushfit.cli.predict import predict_all, tell_predictions
+    from bushfit.diagnosis.workflow import diagnose
     from bushfit.fitting.data import Data
-    from bushfit.fitting.procedures import fit_joint, fit_static, fit_two_step
+    from bushfit.fitting.procedures import fit_joint, fit_static
 
     loaded = load_campaign(campaign)
     folder = options.folder(loaded.slug)
     kinds = [kind for kind, tests in (("loops", loaded.loops), ("sweeps", loaded.sweeps)) if tests]
-    names = ["model.json", *artifact_names([*kinds, "axial", "radial"], plots=options.plots)]
+    names = ["model.json", "diagnosis.json", *artifact_names([*kinds, "gap", "axial", "radial"], plots=options.plots)]
     options.require_free(folder, names)
     data = Data.of(loaded)
-    documents: dict[str, Result] = {}
-    two_step = None
+    results: dict[str, Result] = {}
     if loaded.loops:
-        documents["static"] = fit_static(data)
-        report(options, f"{loaded.name}: static fit of the loops", documents["static"])
-    if loaded.loops and loaded.sweeps:
-        two_step = fit_two_step(data)
-        documents["dynamic"] = two_step.result
+        results["static"] = fit_static(data)
+        report(options, f"{loaded.name}: static fit of the loops", results["static"])
+    two_step = _two_step(options, data)
+    if two_step:
+        results["dynamic"] = two_step.result
         _tell_passes(options, two_step)
         report(options, f"{loaded.name}: static and dynamic fit in turn", two_step.result)
-    else:
-        missing = "sweeps" if loaded.loops else "loops"
-        options.console.print(f"no {missing}: the two-step procedure is passed over", markup=False)
     joint = fit_joint(data)
-    documents["model"] = joint
     report(options, f"{loaded.name}: joint fit", joint)
     if two_step:
         _tell_cost(options, two_step.result, joint)
-    predictions = predict_all(joint, loaded.predict)
-    tell_predictions(options, joint, predictions)
-    json_documents = {name: result.to_document() for name, result in documents.items()}
+    diagnosis = diagnose(data)
+    tell_diagnosis(options, loaded.name, diagnosis)
+    added = diagnosis.after is not diagnosis.before
+    results |= {"joint": joint, "model": diagnosis.result} if added else {"model": joint}
+    final = results["model"]
+    predictions = predict_all(final, loaded.predict)
+    tell_predictions(options, final, predictions)
+    documents = {name: result.to_document() for name, result in results.items()}
+    documents["diagnosis"] = diagnosis.to_document()
     files = {
-        **{f"{name}.json": to_json(document) for name, document in json_documents.items()},
-        **loop_files(joint.model, data.loops, plots=options.plots),
-        **sweep_files(joint.model, data.sweeps, plots=options.plots),
-        **prediction_files(joint, predictions, data.sweeps, plots=options.plots),
+        **{f"{name}.json": to_json(document) for name, document in documents.items()},
+        **loop_files(final.model, data.loops, plots=options.plots),
+        **sweep_files(final.model, data.sweeps, plots=options.plots),
+        **diagnosis_files(diagnosis, loaded.name, plots=options.plots),
+        **prediction_files(final, predictions, data.sweeps, plots=options.plots),
     }
     options.write(folder, files)
-    options.tell(json_documents)
-    enforce_nrmse(joint, max_nrmse)
+    options.tell(documents)
+    enforce_nrmse(final, max_nrmse)
+
+
+def _two_step(options: Options, data: Data) -> TwoStep | None:
+    """The paper's procedure, or a word on why it is passed over."""
+    from bushfit.errors import FitError
+    from bushfit.fitting.procedures import fit_two_step
+
+    if not (data.loops and data.sweeps):
+        missing = "sweeps" if data.loops else "loops"
+        options.console.print(f"no {missing}: the two-step procedure is passed over", markup=False)
+        return None
+    try:
+        return fit_two_step(data)
+    except FitError as error:
+        warn(options, [f"the two-step procedure is passed over: {error.problem}"])
+        return None
 
 
 def _tell_passes(options: Options, two_step: TwoStep) -> None:

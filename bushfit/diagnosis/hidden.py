@@ -159,7 +159,11 @@ def _sized(
     for _ in range(4):
         if not (amount.bounds[0] <= value <= amount.bounds[1] and abs(value) <= _LARGEST * amount.typical):
             return None, 0.0
-        size = _visible(plain, plain.with_effect(effect.name, {**values, name: value}), plan)
+        model = plain.with_effect(effect.name, {**values, name: value})
+        if not _stiff(model, plan):
+            value *= 0.3
+            continue
+        size = _visible(plain, model, plan)
         if size <= 0.0:
             return None, 0.0
         if abs(np.log(size / wanted)) < 0.15:
@@ -181,6 +185,11 @@ def _shape(plain: Model, plan: SimulateSettings, scale: str | None, typical: flo
         None: (0.7 * typical, 1.4 * typical),
     }
     return float(np.exp(random.uniform(*np.log(ranges[scale]))))
+
+
+def _stiff(model: Model, plan: SimulateSettings) -> bool:
+    """Whether the bushing resists in every test: beyond a clearance as large as the amplitude it does not."""
+    return all(np.all(np.abs(model.stiffness(t.direction, 50.0, np.array(t.amplitudes))) > 0.0) for t in plan.sweeps)
 
 
 def _visible(plain: Model, model: Model, plan: SimulateSettings) -> float:

@@ -142,9 +142,9 @@ def _springpot(data: Data, springpot: Result | None) -> tuple[dict[str, float], 
 def _without_springpot(data: Data, solution: Solution, terms: Sequence[Term]) -> str:
     """What leaving the springpot out did to the static parameters, in words and per cent."""
     found = solution.model.values
-    if data.sweeps:
+    try:
         better, source = fit_two_step(data).result.model.values, "with m and alpha from this campaign's sweep"
-    else:
+    except FitError:  # no sweep, or none that goes with the loops: a typical rubber tells as much as can be told
         ratio, alpha = _TYPICAL_SPRINGPOT
         held = {"m": ratio * found["mu"], "alpha": alpha}
         better = _solve(data, terms, BASE, held).model.values
