@@ -52,16 +52,16 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
         return _finish(search, "ambiguous", f"these tests cannot tell {words}", base, leaders, fault=fault)
     names = [_named(step) for step in steps]
     if not hold_out(base, final).passed:
-        words = f"{_listed(names)} closes the gap only where it was fitted, so the name is taken back"
+        words = f"{_listed(names)} {_verb(names)} the gap only where fitted, so the name is taken back"
         return _finish(search, "unexplained", words, base, (), fault=fault)
     if any(step.rivals for step in steps):
         return _ambiguous(search, final, steps, names)
     remainder = find_remainder(search, final)
     if remainder is None:
-        return _finish(search, "named", f"{_listed(names)} closes the gap", final, names)
+        return _finish(search, "named", f"{_listed(names)} {_verb(names)} the gap", final, names)
     held = hold_out(base, final)
     if held.after < _PARTLY * held.before:
-        words = f"{_listed(names)} closes part of the gap; {remainder.words}"
+        words = f"{_listed(names)} {_verb(names)} part of the gap; {remainder.words}"
         return _finish(search, "partly", words, final, names, fault=remainder.fault)
     return _finish(search, "unexplained", remainder.words, base, (), fault=remainder.fault)
 
@@ -110,6 +110,10 @@ def _fault_words(fault: Fault) -> str:
 
 def _listed(names: Sequence[Named]) -> str:
     return " and ".join(named.name for named in names)
+
+
+def _verb(names: Sequence[Named]) -> str:
+    return "closes" if len(names) == 1 else "close"
 
 
 def _named(step: Step) -> Named:

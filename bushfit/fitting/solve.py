@@ -128,19 +128,26 @@ def solve(
     def at(parameters: lmfit.Parameters) -> Model:
         return model.with_values(coordinates.values([parameters[_key(name)].value for name in coordinates.names]))
 
-    with np.errstate(invalid="ignore", divide="ignore"):  # lmfit takes roots of a covariance nobody asked for
-        fit = lmfit.minimize(
-            lambda parameters: residual(at(parameters), terms),
-            start,
-            method="least_squares",
-            max_nfev=evaluations,
-            jac=lambda parameters: jacobian(at(parameters), terms, coordinates.names).T,
-            x_scale="jac",
-            ftol=tolerance,
-            xtol=tolerance,
-            gtol=None,
-            calc_covar=False,
-        )
+    try:
+        with np.errstate(invalid="ignore", divide="ignore"):  # lmfit takes roots of a covariance nobody asked for
+            fit = lmfit.minimize(
+                lambda parameters: residual(at(parameters), terms),
+                start,
+                method="least_squares",
+                max_nfev=evaluations,
+                jac=lambda parameters: jacobian(at(parameters), terms, coordinates.names).T,
+                x_scale="jac",
+                ftol=tolerance,
+                xtol=tolerance,
+                gtol=None,
+                calc_covar=False,
+            )
+    except ValueError as error:  # lmfit's word for a residual that is not finite
+        raise FitError(
+            "the model has no finite response to these tests",
+            found=", ".join(f"{name} = {value:.4g}" for name, value in model.values.items()),
+            hint="give start values or bounds in [fit] of the campaign",
+        ) from error
     best = at(fit.params)
     if fit.aborted and strict:
         raise FitError(
