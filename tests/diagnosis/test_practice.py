@@ -1,0 +1,132 @@
+"""Sixteen campaigns from another rig's code: what is missing is named, and its size found."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bushfit.campaign import load_campaign
+from bushfit.diagnosis.record import Diagnosis
+from bushfit.diagnosis.workflow import diagnose
+from bushfit.fitting.data import Data
+
+Truths = dict[str, dict[str, Any]]
+
+#: The other code's names for what bushfit calls otherwise: ours, theirs, and theirs in our unit.
+SIZES = {
+    "inertia.mass": ("inertia", "mass"),
+    "delay.tau": ("delay", "tau"),
+    "rig_compliance.compliance": ("rig", "k"),
+    "viscous.eta": ("viscous", "eta"),
+    "strain_stiffening.c3": ("cubic", "c3"),
+    "interface_slip.force": ("coulomb", "Fc"),
+    "rate_dependent_friction.n": ("rate_friction", "n"),
+    "self_heating.beta": ("thermal", "beta"),
+    "clearance.delta": ("clearance", "delta"),
+    "asymmetry.c2": ("quadratic", "c2"),
+    "coupled_breakdown.q": ("coupled", "q"),
+}
+
+
+@pytest.fixture(scope="module")
+def truths(root: Path) -> Truths:
+    return json.loads((root / "data/practice/answers.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def found(root: Path, truths: Truths) -> dict[str, Diagnosis]:
+    """Every case diagnosed, from its files alone."""
+    return {case: diagnose(Data.of(load_campaign(root / "data/practice" / case / "bushing.toml"))) for case in truths}
+
+
+def right(truth: dict[str, Any], diagnosis: Diagnosis) -> bool:
+    """By the rules: named alone or in a set of at most three; nothing invented; the unknown called unknown."""
+    if truth["out_of_library"]:
+        return diagnosis.verdict in ("unexplained", "partly")
+    if not truth["truth"]:
+        return diagnosis.verdict == "consistent"
+    sets = [{effect.name, *effect.alternatives} for effect in diagnosis.effects]
+    everything = all(any(name in members and len(members) <= 3 for members in sets) for name in truth["truth"])
+    return everything and len(sets) == len(truth["truth"]) and diagnosis.verdict in ("named", "ambiguous")
+
+
+def alone(truth: dict[str, Any], diagnosis: Diagnosis) -> bool:
+    return diagnosis.verdict == "named" and {effect.name for effect in diagnosis.effects} == set(truth["truth"])
+
+
+def said(diagnosis: Diagnosis) -> str:
+    sets = [" or ".join((effect.name, *effect.alternatives)) for effect in diagnosis.effects]
+    return f"{diagnosis.verdict}: {' and '.join(sets)}" if sets else diagnosis.verdict
+
+
+def test_at_most_one_of_sixteen_is_wrong(truths: Truths, found: dict[str, Diagnosis]) -> None:
+    print(f"{'case':9} {'truth':32} {'said':38} {'fitted':>12} {'held out':>12}")
+    for case, truth in truths.items():
+        diagnosis = found[case]
+        (before, after), held = diagnosis.calibration, diagnosis.holdout
+        name = " + ".join(truth["truth"]) or truth["out_of_library"] or "none"
+        gaps = f"{before:5.2f} {after:5.2f}  {held.before:5.2f} {held.after:5.2f}"
+        print(f"{case:9} {name:32} {said(diagnosis):38} {gaps} {'' if right(truth, diagnosis) else 'WRONG'}")
+    wrong = [case for case, truth in truths.items() if not right(truth, found[case])]
+    assert len(found) == 16
+    assert len(wrong) <= 1, wrong
+
+
+def test_plain_effects_are_named_alone(truths: Truths, found: dict[str, Diagnosis]) -> None:
+    """From a gain of 200 in chi-square on, a set would be too little."""
+    plain = [
+        case
+        for case, truth in truths.items()
+        if truth["truth"] and found[case].before.chi_square - found[case].after.chi_square >= 200.0
+    ]
+    single = [case for case in plain if alone(truths[case], found[case])]
+    print(f"{len(single)} of {len(plain)} plain cases named alone")
+    assert len(plain) >= 10
+    assert len(single) >= 0.9 * len(plain)
+
+
+def test_no_confident_wrong_name(truths: Truths, found: dict[str, Diagnosis]) -> None:
+    named = {case: {effect.name for effect in d.effects} for case, d in found.items() if d.verdict == "named"}
+    assert named
+    assert [case for case, names in named.items() if names - set(truths[case]["truth"])] == []
+
+
+def test_the_gap_closes_where_it_was_not_fitted(found: dict[str, Diagnosis]) -> None:
+    held = {case: d.holdout.after for case, d in found.items() if d.verdict == "named"}
+    print("held out: " + ", ".join(f"{case} {gap:.2f}" for case, gap in held.items()))
+    assert max(held.values()) <= 1.1
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_sizes(truths: Truths, found: dict[str, Diagnosis], name: str) -> None:
+    effect, (theirs, key) = name.partition(".")[0], SIZES[name]
+    cases = [case for case, truth in truths.items() if truth["truth"] and theirs in truth["effects"]]
+    assert cases
+    for case in cases:
+        result = found[case].result
+        assert effect in result.model.effects
+        truth = truths[case]["effects"][theirs][key]
+        truth = 1.0 / truth if theirs == "rig" else truth
+        value, stderr, ends = result.model.values[name], result.covariance.stderr(name), result.interval(name)
+        assert stderr is not None
+        assert ends is not None
+        z = (value - truth) / stderr
+        print(f"{case} {name} = {value:.5g} +- {stderr:.2g}, truth {truth:.5g}, z {z:+.2f}")
+        assert ends[0] <= truth <= ends[1] or abs(z) <= 3.0
+
+
+def test_the_answers_are_not_needed(root: Path, tmp_path: Path, found: dict[str, Diagnosis]) -> None:
+    """A case copied away from answers.json is diagnosed the same, in seconds."""
+    place = tmp_path / "elsewhere"
+    place.mkdir()
+    for file in (root / "data/practice/case_001").iterdir():
+        (place / file.name).write_bytes(file.read_bytes())
+    started = time.perf_counter()
+    again = diagnose(Data.of(load_campaign(place / "bushing.toml")))
+    print(f"{time.perf_counter() - started:.2f} s")
+    assert said(again) == said(found["case_001"])
+    assert again.after.model.values == found["case_001"].after.model.values
