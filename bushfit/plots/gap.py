@@ -113,9 +113,6 @@ def gap_figure(before: Model, after: Model, terms: Sequence[Term], title: str, s
     body: SubFigure = figure.subfigures(1, 1, squeeze=False)[0, 0]
     body.suptitle("\n".join(lines), fontsize=TEXT, color=INK, family=fonts(), parse_math=False)
     grid = body.subplots(len(heights), len(sides), squeeze=False, height_ratios=heights)
-    for axes, side in zip(grid[0], sides, strict=True):
-        heading = [*textwrap.wrap(side.title, _COLUMN_LETTERS * (3 - len(sides))), f"gap {side.gap:.2f} x noise"]
-        axes.set_title("\n".join(heading), fontsize=TEXT, color=INK, weight="bold", pad=7, parse_math=False)
     if rows:
         scale = _scale(sides)
         for row, (direction, part) in zip(grid, rows, strict=False):
@@ -125,6 +122,7 @@ def gap_figure(before: Model, after: Model, terms: Sequence[Term], title: str, s
         _draw_scale(body, [axes for row in grid[: len(rows)] for axes in row], scale)
     for row, (direction, mine) in zip(grid[len(rows) :], loops.items(), strict=True):
         _draw_loops(row, direction, mine, [side.loops[direction] for side in sides])
+    _head(grid[0], sides)
     explain(figure, *_words(sides[0]))
     return figure
 
@@ -241,7 +239,7 @@ def _cells(frequency: Array, *, logarithmic: bool) -> tuple[Array, Array]:
     left, right = np.concatenate((steps[:1], steps)), np.concatenate((steps, steps[-1:]))
     left, right = np.where(left > _HOLE * right, right, left), np.where(right > _HOLE * left, left, right)
     low, high = x - left / 2.0, x + right / 2.0
-    return (np.exp(low), np.exp(high)) if logarithmic else (low, high)
+    return (np.exp(low), np.exp(high)) if logarithmic else (np.maximum(low, 0.0), high)
 
 
 def _label_maps(row: Sequence[Axes], direction: Direction, part: str, drawn: _Map) -> None:
@@ -258,6 +256,16 @@ def _label_maps(row: Sequence[Axes], direction: Direction, part: str, drawn: _Ma
 def _name(axes: Axes, words: str) -> None:
     """What a row shows, in lines left of its ticks."""
     axes.set_ylabel(words, fontsize=TEXT, color=INK, rotation=0, ha="right", va="center", ma="center")
+
+
+def _head(row: Sequence[Axes], sides: Sequence[_Side]) -> None:
+    """Says above the first row, and above its legend if it has one, what each column shows."""
+    legend = row[0].get_legend()
+    height = legend.get_window_extent().height * 72.0 / row[0].figure.dpi if legend else 0.0
+    for axes, side in zip(row, sides, strict=True):
+        lines = [*textwrap.wrap(side.title, _COLUMN_LETTERS * (3 - len(sides))), f"gap {side.gap:.2f} x noise"]
+        pad = 7.0 + height
+        axes.set_title("\n".join(lines), fontsize=TEXT, color=INK, weight="bold", pad=pad, parse_math=False)
 
 
 def _draw_scale(figure: SubFigure, maps: Sequence[Axes], scale: _Scale) -> None:

@@ -127,6 +127,8 @@ def test_loops_are_means_in_units_of_their_noise(paper_model: Model, looped: Loo
     term = looped(paper_model, 1e-3)
     figure = gap_figure(paper_model, paper_model, [term], "loop", "Nothing is missing.")
     (axes,) = figure.axes
+    figure.draw_without_rendering()
+    assert not overlap(axes.title.get_window_extent(), axes.get_legend().get_window_extent())
     assert name(axes) == "axial loops / noise"
     assert headings(figure)[0].startswith("nothing added\n")
     curve = axes.get_lines()[0]
