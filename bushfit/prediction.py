@@ -14,6 +14,7 @@ from bushfit.effects import Level, effect_named
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction
+from bushfit.measurement import Sweep
 from bushfit.results import Z95, Result
 from bushfit.sensitivity import stiffness_jacobian
 
@@ -59,9 +60,18 @@ class Prediction:
     warnings: tuple[str, ...]
 
 
-def default_grid(result: Result, direction: Direction) -> tuple[Array, Array]:
-    """The paper's frequencies [Hz] and amplitudes [m or rad] as far as they were measured, or an even grid over
-    the measured range where they were not."""
+def default_grid(result: Result, direction: Direction, sweeps: Sequence[Sweep] = ()) -> tuple[Array, Array]:
+    """Frequencies [Hz] and amplitudes [m or rad] to predict at where none are asked for.
+
+    Those of the sweeps in this direction, so that prediction and measurement stand side by side. Without any: the
+    paper's as far as they were measured, or an even grid over the measured range where they were not.
+    """
+    mine = [sweep for sweep in sweeps if sweep.direction is direction]
+    if mine:
+        frequency, amplitude = (
+            _distinct(np.concatenate([getattr(sweep, name) for sweep in mine])) for name in ("frequency", "amplitude")
+        )
+        return frequency, amplitude
     amplitudes = np.array(_TORSION_AMPLITUDES if direction is Direction.TORSION else PAPER_AMPLITUDES)
     frequencies = np.array(PAPER_FREQUENCIES)
     if result.measured is None:
@@ -78,6 +88,15 @@ def default_grid(result: Result, direction: Direction) -> tuple[Array, Array]:
     if reached.size < 2:
         reached = np.unique([float(f"{x:.3g}") for x in np.geomspace(least, most, 3)])
     return inside, reached
+
+
+def _distinct(values: Array) -> Array:
+    """Rising, without those that differ from the last by no more than a rig that misses its set point does."""
+    kept: list[float] = []
+    for value in np.unique(values):
+        if not kept or value > kept[-1] * (1.0 + _MARGIN):
+            kept.append(float(value))
+    return np.array(kept)
 
 
 def predict(

@@ -13,6 +13,7 @@ from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
+from bushfit.measurement import Sweep
 from bushfit.model import FIVE, Model
 from bushfit.prediction import PAPER_AMPLITUDES, PAPER_FREQUENCIES, default_grid, left_out, predict
 from bushfit.results import Covariance, Range, Result
@@ -136,6 +137,17 @@ def test_default_grid_is_the_papers_within_the_measured_range(result: Result) ->
     own = default_grid(tiny, Direction.AXIAL)[1]
     assert own.size == 3
     assert predict(tiny, Direction.AXIAL, *default_grid(tiny, Direction.AXIAL)).warnings == ()
+
+
+def test_default_grid_is_that_of_the_sweeps_in_the_direction_where_there_are_any(result: Result) -> None:
+    stiffness = np.full(4, 1e6 + 1e5j)
+    sweep = Sweep(
+        "s.csv", Direction.RADIAL, np.array([1.0, 80.0, 1.004, 20.0]), np.array([1e-3, 4e-4, 2e-4, 1e-3]), stiffness
+    )
+    frequencies, amplitudes = default_grid(result, Direction.RADIAL, [sweep])
+    assert frequencies.tolist() == [1.0, 20.0, 80.0], "two that miss the same set point are one"
+    assert amplitudes.tolist() == [2e-4, 4e-4, 1e-3]
+    assert tuple(default_grid(result, Direction.AXIAL, [sweep])[1]) == PAPER_AMPLITUDES
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import click
 from bushfit.cli.common import Options, new_table, shared_options, warn
 
 if TYPE_CHECKING:
+    from bushfit.measurement import Sweep
     from bushfit.prediction import Prediction
     from bushfit.results import Result
     from bushfit.schema import PredictSettings
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
     multiple=True,
     help="May be given again [axial and radial].",
 )
-@click.option("--frequencies", help='Such as "5:155:10 Hz" or "20, 50, 100 Hz" [the paper\'s, as far as measured].')
-@click.option("--amplitudes", help='Zero-to-peak, such as "0.1, 0.2, 0.5 mm" [the paper\'s, as far as measured].')
+@click.option("--frequencies", help='Such as "5:155:10 Hz" or "20, 50, 100 Hz" [the campaign\'s].')
+@click.option("--amplitudes", help='Zero-to-peak, such as "0.1, 0.2, 0.5 mm" [the campaign\'s].')
 @click.option("--torsion-amplitudes", help='Zero-to-peak rotation, for --direction torsion ["0.5, 1, 2 deg"].')
 @shared_options
 def command(
@@ -47,7 +48,8 @@ def command(
     """Dynamic stiffness and loss factor of MODEL (a JSON file of fit, fit-dynamic or diagnose) over a grid.
 
     Writes axial.csv and radial.csv (torsion.csv on request) with 95 % bands, and a plot of each. Effects of the rig
-    are left out. A warning names what leaves the measured range of strain or frequency.
+    are left out. Without a grid in the options or the campaign it is that of the campaign's sweeps in each direction,
+    or the paper's as far as it was measured. A warning names what leaves the measured range of strain or frequency.
     """
     from bushfit.campaign import load_campaign
     from bushfit.cli.artifacts import artifact_names, prediction_files
@@ -72,7 +74,7 @@ def command(
     )
     name = loaded.slug if loaded else folder_name(result.model.bushing.name)
     folder = options.folder(name)
-    predictions = predict_all(result, settings)
+    predictions = predict_all(result, settings, loaded.sweeps if loaded else ())
     names = artifact_names([str(prediction.direction) for prediction in predictions], plots=options.plots)
     options.require_free(folder, names)
     measured = sweep_terms(loaded.sweeps) if loaded else []
@@ -82,14 +84,14 @@ def command(
     options.tell(to_document(predictions))
 
 
-def predict_all(result: Result, settings: PredictSettings) -> list[Prediction]:
-    """One prediction a direction, on the grid of the settings or on the default one."""
+def predict_all(result: Result, settings: PredictSettings, sweeps: Sequence[Sweep] = ()) -> list[Prediction]:
+    """One prediction a direction, on the grid of the settings, else at the points of the sweeps, else the default."""
     from bushfit.geometry import Direction
     from bushfit.prediction import default_grid, predict
 
     predictions = []
     for direction in settings.directions or (Direction.AXIAL, Direction.RADIAL):
-        frequencies, amplitudes = default_grid(result, direction)
+        frequencies, amplitudes = default_grid(result, direction, sweeps)
         asked = settings.torsion_amplitudes if direction is Direction.TORSION else settings.amplitudes
         predictions.append(predict(result, direction, settings.frequencies or frequencies, asked or amplitudes))
     return predictions

@@ -72,7 +72,7 @@ def command(campaign: Path, max_nrmse: float | None, options: Options) -> None:
     added = diagnosis.after is not diagnosis.before
     results |= {"joint": joint, "model": diagnosis.result} if added else {"model": joint}
     final = results["model"]
-    predictions = predict_all(final, loaded.predict)
+    predictions = predict_all(final, loaded.predict, loaded.sweeps)
     tell_predictions(options, final, predictions)
     documents = {name: result.to_document() for name, result in results.items()}
     documents["diagnosis"] = diagnosis.to_document()
