@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple, TypeVar
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
@@ -20,7 +20,8 @@ from bushfit.fitting.terms import LoopTerm, SweepTerm, Term
 from bushfit.geometry import Direction
 from bushfit.model import Model
 from bushfit.plots.fits import loops_legend
-from bushfit.plots.points import SECTORS, Repeats, over_sectors
+from bushfit.plots.misfit import Curve, Map, Side, by_direction, columns, has_holes, side_of
+from bushfit.plots.points import SECTORS, Repeats
 from bushfit.plots.style import (
     GREY,
     INK,
@@ -54,23 +55,6 @@ _ABSENT = "#c8c8c8"
 _MOST_LABELS = 10
 _SUMMARY_LETTERS, _COLUMN_LETTERS = 104, 40
 
-_T = TypeVar("_T", SweepTerm, LoopTerm)
-
-
-class _Map(NamedTuple):
-    """Measured less model at each operating point of a direction, over the noise of its mean."""
-
-    points: Repeats
-    storage: Array
-    loss: Array
-
-
-class _Curve(NamedTuple):
-    """Measured less model over the cycle of a loop [deg], over the noise of a sector's mean."""
-
-    phase: Array
-    values: Array
-
 
 class _Scale(NamedTuple):
     """Colours and the values at which they change, in units of noise."""
@@ -78,15 +62,6 @@ class _Scale(NamedTuple):
     edges: Array
     norm: BoundaryNorm
     cmap: ListedColormap
-
-
-class _Side(NamedTuple):
-    """A column: a model's title and all that is drawn of it."""
-
-    title: str
-    gap: float
-    maps: Mapping[Direction, _Map]
-    loops: Mapping[Direction, Sequence[_Curve]]
 
 
 def gap_figure(before: Model, after: Model, terms: Sequence[Term], title: str, summary: str) -> Figure:
@@ -103,9 +78,9 @@ def gap_figure(before: Model, after: Model, terms: Sequence[Term], title: str, s
         title: names the bushing.
         summary: the finding in a sentence or two.
     """
-    sweeps = _by_direction([term for term in terms if isinstance(term, SweepTerm)])
-    loops = _by_direction([term for term in terms if isinstance(term, LoopTerm)])
-    sides = [_side(model, name, terms, sweeps, loops) for model, name in _columns(before, after, terms)]
+    sweeps = by_direction([term for term in terms if isinstance(term, SweepTerm)])
+    loops = by_direction([term for term in terms if isinstance(term, LoopTerm)])
+    sides = [side_of(model, name, terms, sweeps, loops) for model, name in columns(before, after, terms)]
     rows = [(direction, part) for direction in sweeps for part in ("storage", "loss")]
     heights = [_map_height(sides[0].maps[direction]) for direction, _ in rows] + [_LOOPS] * len(loops)
     lines = textwrap.wrap(summary, _SUMMARY_LETTERS)
@@ -127,58 +102,11 @@ def gap_figure(before: Model, after: Model, terms: Sequence[Term], title: str, s
     return figure
 
 
-def _by_direction(terms: Sequence[_T]) -> dict[Direction, list[_T]]:
-    directions = dict.fromkeys(term.direction for term in terms)
-    return {direction: [term for term in terms if term.direction is direction] for direction in directions}
-
-
-def _columns(before: Model, after: Model, terms: Sequence[Term]) -> list[tuple[Model, str]]:
-    if all(np.array_equal(term.residual(before), term.residual(after)) for term in terms):
-        return [(before, "nothing added")]
-    added = [name for name in after.effects if name not in before.effects]
-    return [(before, "before"), (after, f"after adding {' and '.join(added)}" if added else "after")]
-
-
-def _side(
-    model: Model,
-    name: str,
-    terms: Sequence[Term],
-    sweeps: Mapping[Direction, Sequence[SweepTerm]],
-    loops: Mapping[Direction, Sequence[LoopTerm]],
-) -> _Side:
-    gap = float(np.sqrt(np.mean(np.square(np.concatenate([term.residual(model) for term in terms])))))
-    return _Side(
-        name,
-        gap,
-        {direction: _map(model, mine) for direction, mine in sweeps.items()},
-        {direction: [_curve(model, term) for term in mine] for direction, mine in loops.items()},
-    )
-
-
-def _map(model: Model, terms: Sequence[SweepTerm]) -> _Map:
-    """Repeats differ by what scatters from point to point and by what each block shares: both average out."""
-    points = Repeats.of(terms)
-    deviation = -np.concatenate([term.deviation(model) for term in terms])
-    noise = np.array([term.noise.random[term.name, float(x)] for term in terms for x in term.amplitude])
-    shared = np.array([term.noise.shared for term in terms for _ in term.amplitude])
-    variance = np.square(noise) + np.square(shared)
-    storage, loss = (
-        points.summed(part) / np.sqrt(points.summed(square))
-        for part, square in zip((deviation.real, deviation.imag), variance.T, strict=True)
-    )
-    return _Map(points, storage, loss)
-
-
-def _curve(model: Model, term: LoopTerm) -> _Curve:
-    phase, mean, count = over_sectors(term, -term.residual(model))
-    return _Curve(phase, mean * np.sqrt(count))
-
-
-def _map_height(drawn: _Map) -> float:
+def _map_height(drawn: Map) -> float:
     return float(np.clip(_LEVEL * np.unique(drawn.points.amplitude).size, _LEAST_MAP, _LARGEST_MAP))
 
 
-def _scale(sides: Sequence[_Side]) -> _Scale:
+def _scale(sides: Sequence[Side]) -> _Scale:
     """Steps from white (within the noise) to dark; blue where the measurement is below the model, red above."""
     values = np.abs(np.concatenate([part for side in sides for drawn in side.maps.values() for part in drawn[1:]]))
     needed = int(np.searchsorted(_EDGES, np.quantile(values, 1.0 - _BEYOND))) + 1
@@ -190,7 +118,7 @@ def _scale(sides: Sequence[_Side]) -> _Scale:
     return _Scale(both, BoundaryNorm(both, len(colors), extend="both"), ListedColormap(colors))
 
 
-def _draw_map(axes: Axes, drawn: _Map, part: str, scale: _Scale) -> None:
+def _draw_map(axes: Axes, drawn: Map, part: str, scale: _Scale) -> None:
     """A row of cells a level, as wide as the steps of frequency; what was left out stays grey."""
     values: Array = getattr(drawn, part)
     points = drawn.points
@@ -242,7 +170,7 @@ def _cells(frequency: Array, *, logarithmic: bool) -> tuple[Array, Array]:
     return (np.exp(low), np.exp(high)) if logarithmic else (np.maximum(low, 0.0), high)
 
 
-def _label_maps(row: Sequence[Axes], direction: Direction, part: str, drawn: _Map) -> None:
+def _label_maps(row: Sequence[Axes], direction: Direction, part: str, drawn: Map) -> None:
     unit, length = display_units(direction)["length"]
     levels = np.unique(drawn.points.amplitude)
     for axes in row:
@@ -258,7 +186,7 @@ def _name(axes: Axes, words: str) -> None:
     axes.set_ylabel(words, fontsize=TEXT, color=INK, rotation=0, ha="right", va="center", ma="center")
 
 
-def _head(row: Sequence[Axes], sides: Sequence[_Side]) -> None:
+def _head(row: Sequence[Axes], sides: Sequence[Side]) -> None:
     """Says above the first row, and above its legend if it has one, what each column shows."""
     legend = row[0].get_legend()
     height = legend.get_window_extent().height * 72.0 / row[0].figure.dpi if legend else 0.0
@@ -284,7 +212,7 @@ def _draw_scale(figure: SubFigure, maps: Sequence[Axes], scale: _Scale) -> None:
 
 
 def _draw_loops(
-    row: Sequence[Axes], direction: Direction, terms: Sequence[LoopTerm], sides: Sequence[Sequence[_Curve]]
+    row: Sequence[Axes], direction: Direction, terms: Sequence[LoopTerm], sides: Sequence[Sequence[Curve]]
 ) -> None:
     furthest = max(float(np.abs(curve.values).max()) for curves in sides for curve in curves)
     for axes, curves in zip(row, sides, strict=True):
@@ -315,7 +243,7 @@ def _draw_loops(
     )
 
 
-def _words(side: _Side) -> list[str]:
+def _words(side: Side) -> list[str]:
     maps, loops = bool(side.maps), bool(side.loops)
     repeated = any(drawn.points.count.max() > 1 for drawn in side.maps.values())
     within = " and ".join(["within 2 (maps)"] * maps + ["in the grey (loops)"] * loops)
@@ -323,13 +251,8 @@ def _words(side: _Side) -> list[str]:
         "Maps: frequency across, amplitude upwards; white: model and measurement agree within the noise. A bar in a "
         "cell: 3 and more below." * maps,
         "A cell is the mean of its repeats, in units of the noise of that mean." * repeated,
-        "Grey: not measured." * any(_has_holes(drawn) for drawn in side.maps.values()),
+        "Grey: not measured." * any(has_holes(drawn) for drawn in side.maps.values()),
         f"Loops: measured less model over the cycle, means over {360 // SECTORS} deg, in units of the noise of that "
         "mean." * loops,
         f"Where the model is right, 95 % lie {within}.",
     ]
-
-
-def _has_holes(drawn: _Map) -> bool:
-    points = drawn.points
-    return points.frequency.size < np.unique(points.frequency).size * np.unique(points.amplitude).size
