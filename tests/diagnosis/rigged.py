@@ -1,0 +1,55 @@
+"""What the tests of this folder share: the tests of a rig, and campaigns cut down or tampered with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from bushfit.campaign import Campaign
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.record import Diagnosis
+from bushfit.effects.contract import Array
+from bushfit.geometry import Direction
+from bushfit.measurement import Sweep
+from bushfit.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+
+BOTH = [Direction.AXIAL, Direction.RADIAL]
+FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
+LEVELS = (1e-4, 2e-4, 5e-4)
+PLAN = SimulateSettings(
+    repeats=3,
+    noise=5e-3,
+    force_noise=3e-3,
+    displacement_noise=2e-4,
+    loops=tuple(SimulatedLoop(Direction.AXIAL, amplitude, 0.1, cycles=3) for amplitude in (5e-4, 1e-3)),
+    sweeps=tuple(SimulatedSweep(direction, LEVELS, FREQUENCIES) for direction in BOTH),
+)
+#: The same rig with a gain error of 0.4 % and a phase error of 0.2 deg in each block.
+SHARED = replace(PLAN, gain_error=4e-3, phase_error=3.5e-3)
+
+#: Parameters of effects by name: {"inertia": {"mass": 0.1}}.
+Effects = Mapping[str, Mapping[str, float]]
+Measured = Callable[..., Campaign]
+Diagnosed = Callable[..., Diagnosis]
+Fitted = Callable[..., Evidence]
+
+
+def cut(sweep: Sweep, kept: Array) -> Sweep:
+    """The chosen points of a sweep."""
+    columns = ("frequency", "amplitude", "stiffness", "repeat")
+    return replace(sweep, **{name: getattr(sweep, name)[kept] for name in columns})
+
+
+def with_sweep(campaign: Campaign, number: int, sweep: Sweep) -> Campaign:
+    """A campaign with one of its sweeps replaced."""
+    sweeps = list(campaign.sweeps)
+    sweeps[number] = sweep
+    return replace(campaign, sweeps=tuple(sweeps))
+
+
+def changed(campaign: Campaign, number: int, factor: Array | complex) -> Campaign:
+    """A campaign with the stiffness of one sweep multiplied."""
+    sweep = campaign.sweeps[number]
+    return with_sweep(campaign, number, replace(sweep, stiffness=sweep.stiffness * np.asarray(factor)))
