@@ -103,13 +103,19 @@ def simulate(truth: Model, plan: SimulateSettings) -> Simulated:
     return measure(undisturbed(truth, plan), plan)
 
 
-def undisturbed(truth: Model, plan: SimulateSettings) -> Undisturbed:
-    """What the rig would write if it measured without error: the slow part of a simulation."""
+def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 2048) -> Undisturbed:
+    """What the rig would write if it measured without error: the slow part of a simulation.
+
+    Args:
+        truth: bushing and effects.
+        plan: the tests.
+        steps_per_cycle: time steps of the sweeps; the rig's error falls in proportion to them.
+    """
     tests = (plan.loops, plan.sweeps) if plan.loops or plan.sweeps else (PAPER_LOOPS, PAPER_SWEEPS)
     return Undisturbed(
         truth,
         tuple((test, _clean_loop(truth, test)) for test in tests[0]),
-        tuple((test, _clean_sweep(truth, test)) for test in tests[1]),
+        tuple((test, _clean_sweep(truth, test, steps_per_cycle)) for test in tests[1]),
     )
 
 
@@ -144,10 +150,12 @@ def _clean_loop(truth: Model, test: SimulatedLoop) -> rig.Record:
     return rig.Record(measured.time[rows], measured.displacement[rows], measured.force[rows])
 
 
-def _clean_sweep(truth: Model, test: SimulatedSweep) -> Array:
+def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Array:
     """Complex stiffness, (levels, frequencies)."""
     levels, steps = np.meshgrid(test.amplitudes, test.frequencies, indexing="ij")
-    return rig.dynamic_stiffness(truth, test.direction, steps.ravel(), levels.ravel()).reshape(levels.shape)
+    points = steps.ravel(), levels.ravel()
+    clean = rig.dynamic_stiffness(truth, test.direction, *points, steps_per_cycle=steps_per_cycle)
+    return clean.reshape(levels.shape)
 
 
 def _loop(test: SimulatedLoop, clean: rig.Record, number: int, plan: SimulateSettings, random: Generator) -> Loop:

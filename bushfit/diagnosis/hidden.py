@@ -32,6 +32,8 @@ _FORCE_NOISE = (0.002, 0.004)
 _SHARED = (0.004, float(np.radians(0.2)))
 _FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
 _TRIES = 30
+#: Time steps of a cycle: their error is a tenth of the noise.
+_STEPS = 1024
 #: No effect is larger than this many times its typical size.
 _LARGEST = 30.0
 
@@ -76,7 +78,7 @@ def hidden_campaign(seed: int, hidden: Sequence[str], outside: str = "") -> tupl
             break
     else:
         raise RuntimeError(f"no visible size of {', '.join(hidden)} was found for seed {seed}")
-    clean = undisturbed(model, plan)
+    clean = undisturbed(model, plan, steps_per_cycle=_STEPS)
     if outside:
         clean = _disturbed(clean, outside, random)
     sealed = Sealed(tuple(hidden), outside, (), dict(model.values), visible, plan.gain_error > 0.0, seed)
@@ -245,6 +247,7 @@ def _mislabelled(clean: Undisturbed, random: Generator) -> tuple[tuple[Simulated
         test.direction,
         np.array(test.frequencies),
         np.full(len(test.frequencies), factor * test.amplitudes[level]),
+        steps_per_cycle=_STEPS,
     )
     wrong = stiffness.copy()
     wrong[level] = other

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.fft import next_fast_len
 
 from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
 from bushfit.effects.history import History
@@ -54,7 +55,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         return below(history)
     imposed, history = history.value, history.driven()
     count = imposed.shape[-1]
-    length = count if history.periodic else 2 * count
+    length = count if history.periodic else next_fast_len(2 * count, real=True)
     yielding = 1.0 / (1.0 + compliance * _pulse_stiffness(below, history, length))
     size = np.max(np.abs(imposed), axis=-1, keepdims=True)
     reached, felt = imposed, below(history)

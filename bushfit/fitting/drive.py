@@ -31,6 +31,8 @@ _SIGNIFICANT = 4.0
 _ALIKE = 1.02
 #: Share of the half range below which both first displacement and first force count as a start from rest.
 _AT_REST = 0.02
+#: Share of a cycle at its start, and of the half range of the force by which it is another a cycle later.
+_FIRST, _OTHER = 0.02, 5e-3
 #: Share of the amplitude by which a motion may lie off zero before its middle is taken for unknown.
 _CENTRED = 0.01
 
@@ -132,7 +134,7 @@ def drive_of(loop: Loop) -> Drive:
     half_motion, half_force = np.ptp(loop.displacement) / 2.0, np.ptp(loop.force) / 2.0
     motion, force_mean, force_noise = _harmonics(phase, loop)
     noise = loop.noise * half_force if loop.noise is not None else force_noise
-    from_rest = _from_rest(loop, phase, half_motion, half_force)
+    from_rest = _from_rest(loop, phase, half_motion, half_force, noise)
     force, weight = loop.force, np.ones(loop.force.size)
     if loop.force.size > MOST_ROWS and not from_rest:
         phase, force, weight = _binned(phase, loop.force)
@@ -142,17 +144,17 @@ def drive_of(loop: Loop) -> Drive:
     return Drive(loop, frequency, cycles, from_rest, phase, force, weight, noise, motion, datum)
 
 
-def _from_rest(loop: Loop, phase: Array, half_motion: float, half_force: float) -> bool:
-    """Whether the record begins with nothing moved, no force, and a force that does not come back a cycle later.
+def _from_rest(loop: Loop, phase: Array, half_motion: float, half_force: float, noise: float) -> bool:
+    """Whether the record begins with nothing moved, no force, and a force that is another a cycle later.
 
     A settled loop may pass the origin too, where its load cell is off zero, but then it passes it every cycle.
     """
-    later = float(np.interp(1.0, phase, loop.force))
-    return bool(
-        abs(loop.displacement[0]) < _AT_REST * half_motion
-        and abs(loop.force[0]) < _AT_REST * half_force
-        and abs(later - loop.force[0]) > 2.0 * _AT_REST * half_force
-    )
+    if abs(loop.displacement[0]) > _AT_REST * half_motion or abs(loop.force[0]) > _AT_REST * half_force + 3.0 * noise:
+        return False
+    first = phase < _FIRST
+    change = np.interp(phase[first] + 1.0, phase, loop.force) - loop.force[first]
+    chance = 5.0 * noise * np.sqrt(2.0 / np.count_nonzero(first))
+    return bool(abs(change.mean()) > max(chance, _OTHER * half_force))
 
 
 def _fundamental(loop: Loop) -> tuple[float, float]:

@@ -36,11 +36,11 @@ def start_values(bushing: Bushing, terms: Sequence[Term], known: Mapping[str, fl
     sigma_fmax = known.get("sigma_fmax", loss * eps_half / shape[largest].imag)
     friction = sigma_fmax / eps_half * shape
     mu = known.get("mu", max(modulus[largest].real - friction[largest].real, _LEAST_SHARE * abs(modulus[largest])))
-    swept = frequency > frequency.min()
-    if np.unique(frequency).size < 3 or not swept.any():
-        return {"mu": mu, "m": 0.2 * mu, "alpha": 0.25, "sigma_fmax": sigma_fmax, "eps_half": eps_half, **known}
-    smallest = strain <= 1.01 * strain[swept].min()
+    swept = ~slowest
+    smallest = strain <= 1.01 * strain[swept].min(initial=np.inf)
     log_omega = np.log(2.0 * np.pi * frequency[smallest])
+    if not swept.any() or np.ptp(log_omega) < 0.1:
+        return {"mu": mu, "m": 0.2 * mu, "alpha": 0.25, "sigma_fmax": sigma_fmax, "eps_half": eps_half, **known}
     viscous_loss = np.maximum(modulus.imag - friction.imag, _LEAST_SHARE * modulus.imag.clip(min=0.0) + 1e-9 * mu)
     alpha = float(np.clip(np.polyfit(log_omega, np.log(viscous_loss[smallest]), 1)[0], 0.1, 0.6))
     middle = float(np.exp(log_omega.mean()))
