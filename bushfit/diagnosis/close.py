@@ -119,17 +119,17 @@ class Search:
         """Try every added effect's rivals in its place, and dropping it; swap where that is better."""
         names = list(added)
         steps: list[Step] = []
-        for _ in range(_MOST_SWAPS):
+        for swaps_left in range(_MOST_SWAPS, -1, -1):
             steps, swapped = [], False
             for name in names:
                 others = [other for other in names if other != name]
                 reduced, tried = self._place(current, others)
                 best = tried[0] if tried else None
-                if best and best.name != name and best.evidence.bic < current.bic - 1e-6:
+                if swaps_left and best and best.name != name and best.evidence.bic < current.bic - 1e-6:
                     names[names.index(name)] = best.name
                     current, swapped = best.evidence, True
                     break
-                if reduced.bic - current.bic < SAME and others:
+                if swaps_left and reduced.bic - current.bic < SAME and others:
                     names.remove(name)
                     current, swapped = reduced, True
                     break
