@@ -51,6 +51,8 @@ def hold_out(before: Evidence, after: Evidence) -> HoldOut:
     """Compare two models of the same tests on every part that both can predict from the rest."""
     parts, sums = [], np.zeros(3)
     for name, chosen in _parts(after):
+        if not chosen.any():
+            continue
         gaps = [_predicted(evidence, chosen) for evidence in (before, after)]
         if any(gap is None for gap in gaps):
             continue
