@@ -154,7 +154,8 @@ def _read_sweep(
 ) -> str:
     """A sentence: which way, how much, how it goes with frequency and with amplitude."""
     what = "stiffness" if part == "storage" else "loss"
-    largest = max((pieces[i] for i in touched), key=lambda piece: float(np.abs(piece).max()))
+    worst = max(touched, key=lambda i: float(np.abs(pieces[i]).max()))
+    largest = pieces[worst]
     at = int(np.argmax(np.abs(largest)))
     unit, factor = display_units(levels[0].term.direction)["length"]
     size = f"{100 * abs(largest[at]):.2g} % of |K| {'above' if largest[at] > 0 else 'below'} the model"
@@ -162,7 +163,7 @@ def _read_sweep(
         level = "at every amplitude"
     else:
         level = "at " + ", ".join(f"{levels[i].amplitude * factor:.3g}" for i in touched) + f" {unit}"
-    trend = _trend(levels[touched[0]].frequency, largest)
+    trend = _trend(levels[worst].frequency, largest)
     changes = "" if len(touched) < len(levels) else _over_amplitude(pieces)
     span = f"{band[0]:.3g} to {band[1]:.3g} Hz"
     return f"measured {direction} {what} is up to {size}, {trend} ({span}), {level}{changes}"
