@@ -186,7 +186,7 @@ def card(outcomes: Sequence[Outcome]) -> list[Row]:
     named = [outcome for outcome in good if outcome.verdict == "named" and outcome.task.hidden]
     covered = [hit for outcome in good if outcome.exact for hit in outcome.covered]
     clean, outside, lacking = (_kind(good, kind) for kind in ("clean", "outside", "lacking"))
-    hidden = [*single, *_kind(good, "pair"), *outside]
+    strange, hidden = [*outside, *lacking], [*single, *_kind(good, "pair"), *outside]
     seconds = [outcome.seconds for outcome in good]
     shares: list[tuple[str, Sequence[Outcome], Callable[[Outcome], bool], str, float, float]] = [
         ("false alarm on clean campaigns", clean, lambda o: o.verdict != "consistent", "<= 1 %", 0.0, 0.01),
