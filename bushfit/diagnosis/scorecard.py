@@ -196,7 +196,7 @@ def card(outcomes: Sequence[Outcome]) -> list[Row]:
         ("two effects at once, both named", _kind(good, "pair"), lambda o: o.truth_in_sets, ">= 90 %", 0.9, 1.0),
         (
             "outside the list: no confident name",
-            [*outside, *lacking],
+            strange,
             lambda o: o.verdict != "named",
             ">= 90 %",
             0.9,
