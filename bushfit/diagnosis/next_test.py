@@ -80,7 +80,9 @@ def deciding_test(models: Sequence[Model], terms: Sequence[Term]) -> str:
     """
     if len(models) < 2:
         return ""
-    scored = [(_distance(entry, models, terms) / entry.effort, entry.words) for entry in MENU]
+    swept = {term.direction for term in terms if term.kind == "sweep"}
+    menu = [entry for entry in MENU if entry.direction not in swept]
+    scored = [(_distance(entry, models, terms) / entry.effort, entry.words) for entry in menu]
     best, words = max(scored)
     return words if best > 0.0 else ""
 
