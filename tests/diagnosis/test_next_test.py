@@ -1,0 +1,85 @@
+"""The next test is an entry of the menu that parts the models in question, and none where there is nothing to part."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from rigged import Measured
+
+from bushfit.diagnosis.next_test import CONFIRM, MENU, confirming_test, deciding_test
+from bushfit.effects import LIBRARY
+from bushfit.fitting.data import Data
+from bushfit.fitting.terms import Term
+from bushfit.model import Model
+
+WORDS = [entry.words for entry in MENU]
+
+
+@pytest.fixture
+def terms(measured: Measured) -> list[Term]:
+    data = Data.of(measured())
+    return [*data.loops, *data.sweeps]
+
+
+def test_one_model_needs_none(paper_model: Model, terms: list[Term]) -> None:
+    assert deciding_test([paper_model], terms) == ""
+    assert deciding_test([], terms) == ""
+    assert deciding_test([paper_model, paper_model], terms) == ""
+
+
+SLIP = {"interface_slip.force": 2.0}
+SECOND = {"second_friction.sigma_fmax": 2e3, "second_friction.eps_half": 5e-4}
+STOP = {"bump_stop.gap": 4e-4, "bump_stop.stiffness": 1e5}
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "words"),
+    [
+        ({"rig_compliance.compliance": 1e-7}, STOP, ("fixture", "dummy")),
+        ({"inertia.mass": 0.03}, {"viscous.eta": 60.0}, ("fixture", "highest frequency")),
+        ({"viscous.eta": 60.0}, {"maxwell.mu1": 1e5, "maxwell.tau": 6e-4}, ("highest frequency",)),
+        ({"strain_stiffening.c3": 5.0}, {"bump_stop.gap": 4.5e-4, "bump_stop.stiffness": 2e4}, ("largest amplitude",)),
+        (SLIP, SECOND, ("smallest",)),
+    ],
+    ids=lambda value: next(iter(value)).partition(".")[0] if isinstance(value, dict) else "",
+)
+def test_pairs(
+    paper_model: Model, terms: list[Term], one: dict[str, float], other: dict[str, float], words: tuple[str, ...]
+) -> None:
+    models = [paper_model.with_effect(next(iter(values)).partition(".")[0], values) for values in (one, other)]
+    found = deciding_test(models, terms)
+    print(f"{' or '.join(model.effects[-1] for model in models)}: {found}")
+    assert found in WORDS
+    assert any(word in found for word in words)
+    assert deciding_test(models[::-1], terms) == found
+
+
+def test_a_direction_that_is_swept_is_no_next_test(paper_model: Model, measured: Measured) -> None:
+    """Compliance and a softer rubber differ most in the stiff direction: to be swept where it has not been."""
+    models = [
+        paper_model.with_effect("viscous", {"viscous.eta": 100.0}),
+        paper_model.with_effect("interface_slip", {"interface_slip.force": 1.0}),
+    ]
+    campaign = measured()
+    alone = Data.of(replace(campaign, sweeps=campaign.sweeps[:1])).sweeps
+    both = Data.of(campaign).sweeps
+    assert "axial" not in deciding_test(models, alone)
+    assert not any(direction in deciding_test(models, both) for direction in ("axial", "radial"))
+
+
+def test_a_test_without_the_rig_parts_nothing_inside_the_rubber(paper_model: Model, terms: list[Term]) -> None:
+    models = [
+        paper_model.with_effect("viscous", {"viscous.eta": 100.0}),
+        paper_model.with_effect("strain_stiffening", {"strain_stiffening.c3": 20.0}),
+    ]
+    found = deciding_test(models, terms)
+    assert found in WORDS
+    assert "fixture" not in found
+    assert "dummy" not in found
+
+
+def test_confirming_tests_are_of_the_library() -> None:
+    assert set(CONFIRM) <= set(LIBRARY)
+    assert "added mass" in confirming_test("inertia") or "known mass" in confirming_test("inertia")
+    assert confirming_test("viscous") == ""
