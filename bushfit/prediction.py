@@ -79,14 +79,14 @@ def default_grid(result: Result, direction: Direction, sweeps: Sequence[Sweep] =
     low, high = result.measured.frequency
     inside = frequencies[(frequencies >= low * (1 - _MARGIN)) & (frequencies <= high * (1 + _MARGIN))]
     if inside.size < 2:
-        inside = np.unique(np.geomspace(low, high, 9))
+        inside = _distinct(np.geomspace(low, high, 9))
     if direction is Direction.TORSION:
         return inside, amplitudes
     per_displacement = result.model.bushing.unit_strain(Direction.AXIAL)
     least, most = (strain / per_displacement for strain in result.measured.strain)
     reached = amplitudes[(amplitudes >= least * (1 - _MARGIN)) & (amplitudes <= most * (1 + _MARGIN))]
     if reached.size < 2:
-        reached = np.unique([float(f"{x:.3g}") for x in np.geomspace(least, most, 3)])
+        reached = _distinct(np.array([float(f"{x:.3g}") for x in np.geomspace(least, most, 3)]))
     return inside, reached
 
 

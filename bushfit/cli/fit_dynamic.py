@@ -59,8 +59,20 @@ def command(campaign: Path, static: Path | None, max_nrmse: float | None, option
 
 
 def _static(options: Options, data: Data) -> Result:
-    from bushfit.fitting.procedures import fit_static
+    """What to hold where no --static was given: the campaign's own values, or a fit of its loops."""
+    from bushfit.errors import FitError
+    from bushfit.fitting.procedures import fit_static, given_static
 
+    known = given_static(data)
+    if known is not None:
+        return known
+    if not data.loops:
+        raise FitError(
+            "nothing says at which mu, sigma_fmax and eps_half to hold the fit",
+            file=data.campaign.path,
+            found="no --static, no [[loops]], and no values of all three in [fit]",
+            hint="give --static static.json, add a loop, or run bushfit fit for all five parameters together",
+        )
     result = fit_static(data)
     report(options, f"{data.campaign.name}: static fit of the loops, because no --static was given", result)
     return result

@@ -18,6 +18,8 @@ _DEGREE, _HARMONICS = 3, 5
 #: A region is worth a line when its smooth misfit is this many times what noise makes of it.
 _WORTH_A_LINE = 2.5
 _MOST_LINES = 6
+#: And no line for what is smaller than this, relative to |K| or to half a loop's force range.
+_LEAST = 1e-3
 _PARTS = ("storage", "loss")
 
 
@@ -127,6 +129,8 @@ def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
             strongest = max(float(np.abs(size).max()) for size in sizes)
             touched = [i for i, size in enumerate(sizes) if np.abs(size).max() > 0.5 * strongest]
             band = _band([mine[i] for i in touched], [sizes[i] for i in touched], strongest)
+            if max(float(np.abs(piece).max()) for piece in pieces) < _LEAST:
+                continue
             yield Where(
                 str(direction),
                 "sweep",
@@ -213,6 +217,8 @@ def _loop_regions(evidence: Evidence) -> Iterator[Where]:
         words = names.get(order, f"harmonic {order}")
         unit_name, factor = display_units(term.direction)["length"]
         amplitude = term.drive.amplitude
+        if share < _LEAST:
+            continue
         yield Where(
             str(term.direction),
             "loop",

@@ -53,7 +53,7 @@ class Outcome:
         named: effects it named or that lead a set.
         sets: all members of each set, leader first.
         richer: effects that contain what was named as a limit.
-        gain: chi-square taken off by what was named.
+        gain: chi-square that the best single effect takes off, whether it was added or not.
         heldout: gap on held-out data after, in units of noise.
         covered: per hidden effect that was added: whether the 95 % interval of its amount holds the truth.
         seconds: time of the diagnosis.
@@ -160,7 +160,7 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
         tuple(effect.name for effect in diagnosis.effects),
         tuple((effect.name, *effect.alternatives) for effect in diagnosis.effects),
         tuple(name for effect in diagnosis.effects for name in effect.richer),
-        diagnosis.before.chi_square - diagnosis.after.chi_square,
+        max((judged.gain or 0.0 for judged in diagnosis.candidates), default=0.0),
         diagnosis.holdout.after,
         tuple(covered),
         seconds,

@@ -53,7 +53,7 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
     names = [_named(step) for step in steps]
     if not hold_out(base, final).passed:
         words = f"{_listed(names)} {_verb(names)} the gap only where fitted, so the name is taken back"
-        return _finish(search, "unexplained", words, base, (), fault=fault)
+        return _finish(search, "unexplained", words, base, ())
     if any(step.rivals for step in steps):
         return _ambiguous(search, final, steps, names)
     remainder = find_remainder(search, final)

@@ -51,6 +51,13 @@ class Data:
             FitError: there is none.
         """
         terms: list[Term] = [*self.loops, *self.sweeps]
+        if not terms:
+            raise FitError(
+                "there is nothing to fit",
+                file=self.campaign.path,
+                found="no [[loops]] and no [[sweeps]]",
+                hint="add measured tests, or make some with bushfit simulate",
+            )
         if directions is None:
             axial = [term for term in terms if term.direction is Direction.AXIAL]
             return axial or terms

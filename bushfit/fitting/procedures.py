@@ -14,7 +14,7 @@ from bushfit.fitting.assess import Stage, cautions, covariance, measured_range, 
 from bushfit.fitting.data import Data
 from bushfit.fitting.solve import Coordinates, Solution, solve
 from bushfit.fitting.starts import start_values
-from bushfit.fitting.terms import Term
+from bushfit.fitting.terms import SweepTerm, Term
 from bushfit.geometry import Direction
 from bushfit.model import Model
 from bushfit.results import Covariance, Result
@@ -83,6 +83,14 @@ def fit_dynamic(data: Data, static: Result) -> Result:
     solution = _solve(data, terms, BASE, held)
     stages = [Stage(solution.coordinates.names, terms)]
     return _result(solution, terms, stages, static.covariance.restricted(STATIC))
+
+
+def given_static(data: Data) -> Result | None:
+    """mu, sigma_fmax and eps_half as the campaign's [fit] holds them; None where it does not hold all three."""
+    held = {name: data.given[name] for name in STATIC if name in data.given and name not in data.free(STATIC)}
+    if len(held) < len(STATIC):
+        return None
+    return Result(Model.started(data.campaign.bushing, ("elastic", "friction"), held))
 
 
 def fit_two_step(data: Data) -> TwoStep:
@@ -181,6 +189,12 @@ def _result(
         cov,
         quality(solution.model, terms, len(fitted)),
         measured_range(solution.model, terms),
-        (*notes, *cautions(solution, terms, cov)),
+        (*notes, *_assumptions(terms), *cautions(solution, terms, cov)),
         tuple(term.source for term in terms if term.source is not None),
     )
+
+
+def _assumptions(terms: Sequence[Term]) -> list[str]:
+    """What was assumed of the noise because nothing was repeated."""
+    noises = {id(term.noise): term.noise for term in terms if isinstance(term, SweepTerm)}
+    return [f"noise of the sweeps: {noise.describe()}" for noise in noises.values() if noise.origin == "assumed"]
