@@ -90,10 +90,13 @@ def _share(text: str) -> float:
     from bushfit.units import quantity
 
     try:
-        return quantity(text, "1")
+        share = quantity(text, "1")
+        if not 0.0 <= share <= 1.0:
+            raise BushfitError("this is no share of |K|", found=f'"{text}"', expected="0 % to 100 %")
     except BushfitError as error:
         error.place = "--tolerance"
         raise
+    return share
 
 
 def tell_diagnosis(options: Options, name: str, diagnosis: Diagnosis) -> None:
