@@ -1,0 +1,232 @@
+"""`diagnose` and `scorecard` as typed: files, streams, exit statuses, one error for what is wrong."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import shutil
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bushfit.cli import main
+from bushfit.effects import BASE, LIBRARY
+
+
+@dataclass(frozen=True)
+class Done:
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+Run = Callable[..., Done]
+#: An inertia is hidden here.
+CAMPAIGN = "case_001/bushing.toml"
+CLEAN = "case_000/bushing.toml"
+TABLES = {"diagnosis.json", "model.json", "gap.csv", "candidates.csv"}
+
+
+@pytest.fixture(scope="module")
+def work(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("work")
+    for case in ("case_000", "case_001"):
+        shutil.copytree(root / "data/practice" / case, folder / case)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def bushfit(work: Path) -> Run:
+    def call(*arguments: str) -> Done:
+        out, err = io.StringIO(), io.StringIO()
+        with (
+            contextlib.chdir(work),
+            contextlib.redirect_stdout(out),
+            contextlib.redirect_stderr(err),
+            mock.patch.object(sys, "argv", ["bushfit", *arguments]),
+            pytest.raises(SystemExit) as left,
+        ):
+            main()
+        return Done(int(left.value.code or 0), out.getvalue(), err.getvalue())
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def done(bushfit: Run) -> Done:
+    """One diagnosis, its files under `found`."""
+    return bushfit("diagnose", CAMPAIGN, "-o", "found", "--json", "--no-plots")
+
+
+@pytest.fixture(scope="module")
+def found(work: Path, done: Done) -> Path:
+    assert done.returncode == 0, done.stderr
+    return work / "found"
+
+
+def test_files_and_streams(done: Done, found: Path) -> None:
+    assert {file.name for file in found.iterdir()} == TABLES
+    assert done.stdout == (found / "diagnosis.json").read_text(encoding="utf-8")
+    for words in ("case 001: named", "inertia", "95 %", "data fitted", "held out", "where", "next test:", "wrote "):
+        assert words in done.stderr
+
+
+def test_the_document_is_that_of_the_interface(found: Path) -> None:
+    document = json.loads((found / "diagnosis.json").read_text())
+    assert document["schema"] == "bushfit/diagnosis/1"
+    assert {"verdict", "effects", "where", "gap", "next_test"} <= document.keys()
+    assert document["verdict"] == "named"
+    (effect,) = document["effects"]
+    assert {"name", "level", "parameters", "evidence", "alternatives"} <= effect.keys()
+    assert (effect["name"], effect["level"], effect["alternatives"]) == ("inertia", "instrument", [])
+    mass = effect["parameters"]["inertia.mass"]
+    assert mass["unit"] == "kg"
+    assert mass["ci95"][0] < mass["value"] < mass["ci95"][1]
+    for where in document["where"]:
+        keys = {"direction", "kind", "frequency_Hz", "amplitude_mm", "component", "excess", "reading"}
+        assert keys == where.keys()
+        assert len(where["frequency_Hz"]) == len(where["amplitude_mm"]) == 2
+    for pair in (document["gap"]["calibration"], document["gap"]["heldout"]):
+        assert pair["after"] < 1.1 < pair["before"]
+    assert "mass" in document["next_test"]
+
+
+def test_every_residual_is_in_the_table(found: Path) -> None:
+    """Their mean squares are the gaps that the document states."""
+    table = pd.read_csv(found / "gap.csv")
+    gap = json.loads((found / "diagnosis.json").read_text())["gap"]["calibration"]
+    assert {"test", "kind", "direction", "frequency [Hz]", "amplitude [mm]", "repeat", "time [s]"} <= set(table.columns)
+    for when in ("before", "after"):
+        columns = [name for name in table.columns if name.endswith(f"{when} [noise]")]
+        assert len(columns) == 3
+        values = table[columns].to_numpy().ravel()
+        values = values[~np.isnan(values)]
+        print(f"{when}: {np.sqrt(np.mean(values**2)):.4f} over {values.size} residuals")
+        assert np.sqrt(np.mean(values**2)) == pytest.approx(gap[when], rel=1e-5)
+    assert table[table.kind == "sweep"].groupby("test").size().to_dict() == {"sweep_axial": 144, "sweep_radial": 144}
+    assert set(table[table.kind == "loop"].test) == {"loop_axial_1", "loop_axial_2"}
+
+
+def test_every_candidate_is_in_the_table(found: Path) -> None:
+    table = pd.read_csv(found / "candidates.csv")
+    assert set(table.effect) == set(LIBRARY) - set(BASE)
+    assert table.why.notna().all()
+    assert table.set_index("effect").why["inertia"] == "kept"
+    assert table.score.is_monotonic_decreasing
+    refitted = table[table["chi-square gain"].notna()]
+    assert refitted["held-out gap [noise]"].notna().all()
+    assert refitted.parameters.str.contains("=").all()
+
+
+def test_its_own_model_is_consistent_and_predicts_without_the_rig(bushfit: Run, found: Path, tmp_path: Path) -> None:
+    model = str(found / "model.json")
+    again = bushfit("diagnose", CAMPAIGN, "--model", model, "-o", str(tmp_path / "again"), "--json", "-q", "--no-plots")
+    assert again.returncode == 0
+    assert again.stderr == ""
+    assert json.loads(again.stdout)["verdict"] == "consistent"
+    with_added = json.loads((tmp_path / "again" / "model.json").read_text())
+    assert with_added["effects"] == [*BASE, "inertia"]
+    predicted = bushfit("predict", model, "-o", str(tmp_path / "predicted"), "--no-plots")
+    assert predicted.returncode == 0, predicted.stderr
+    assert "inertia" in predicted.stderr
+
+
+def test_options_reach_the_workflow(bushfit: Run, tmp_path: Path) -> None:
+    def document(*options: str) -> dict[str, object]:
+        run = bushfit(
+            "diagnose", CAMPAIGN, *options, "-o", str(tmp_path / "x"), "--force", "--json", "-q", "--no-plots"
+        )
+        assert run.returncode == 0, run.stderr
+        return json.loads(run.stdout)
+
+    assert document("--tolerance", "50 %")["verdict"] == "consistent"
+    assert document("--max-effects", "0")["verdict"] == "unexplained"
+    without = document("--without", "inertia")
+    assert all(effect["name"] != "inertia" for effect in without["effects"])  # type: ignore[attr-defined]
+    assert document("--adopt", "inertia")["verdict"] == "consistent"
+    assert json.loads((tmp_path / "x" / "model.json").read_text())["effects"] == [*BASE, "inertia"]
+
+
+def test_a_clean_campaign(bushfit: Run, tmp_path: Path) -> None:
+    run = bushfit("diagnose", CLEAN, "-o", str(tmp_path / "x"), "--no-plots")
+    assert run.returncode == 0, run.stderr
+    assert run.stdout == ""
+    assert "consistent" in run.stderr
+    assert json.loads((tmp_path / "x" / "diagnosis.json").read_text())["effects"] == []
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--adopt", "inertai"), ("inertai", "inertia")),
+        (("--without", "inertai"), ("inertai", "inertia")),
+        (("--tolerance", "abc"), ("abc",)),
+        (("--tolerance", "1 mm"), ("mm", "ratio")),
+        (("--tolerance", "-1 %"), ("--tolerance", "-1 %")),
+        (("--tolerance", "120 %"), ("--tolerance", "120 %")),
+        (("--tolerance", "nan %"), ("--tolerance", "nan")),
+        (("--max-effects", "-1"), ("--max-effects",)),
+        (("--max-effects", "many"), ("many",)),
+        (("--model", "absent.json"), ("absent.json",)),
+        (("--model", CAMPAIGN), ("bushing.toml",)),
+        (("--max-nrmse", "0"), ("--max-nrmse",)),
+    ],
+    ids=lambda value: " ".join(value) if value and value[0].startswith("--") else "",
+)
+def test_wrong_usage(bushfit: Run, tmp_path: Path, options: tuple[str, ...], words: tuple[str, ...]) -> None:
+    run = bushfit("diagnose", CAMPAIGN, *options, "-o", str(tmp_path / "x"), "--no-plots")
+    print(run.stderr)
+    assert run.returncode == 2
+    assert run.stdout == ""
+    assert "Traceback" not in run.stderr
+    assert "fault in bushfit" not in run.stderr
+    assert run.stderr.count("error: ") + run.stderr.count("Error: ") == 1
+    for word in words:
+        assert word in run.stderr
+    assert not (tmp_path / "x").exists()
+
+
+def test_statuses(bushfit: Run, tmp_path: Path) -> None:
+    missed = bushfit("diagnose", CAMPAIGN, "-o", str(tmp_path / "x"), "--no-plots", "--max-nrmse", "1e-4")
+    assert missed.returncode == 1
+    assert "is above --max-nrmse" in missed.stderr
+    assert {file.name for file in (tmp_path / "x").iterdir()} == TABLES
+    refused = bushfit("diagnose", CAMPAIGN, "-o", str(tmp_path / "x"), "--no-plots")
+    assert refused.returncode == 2
+    assert "--force" in refused.stderr
+
+
+def test_a_small_score_card(bushfit: Run, tmp_path: Path) -> None:
+    run = bushfit("scorecard", "--campaigns", "5", "--jobs", "1", "-o", str(tmp_path / "x"), "--json")
+    assert run.returncode == 0, run.stderr
+    document = json.loads(run.stdout)
+    assert document == json.loads((tmp_path / "x" / "scorecard.json").read_text())
+    assert document["campaigns"] == len(document["outcomes"]) >= 5
+    assert {"card", "confusion", "seed"} <= document.keys()
+    assert "score card:" in run.stderr
+    assert "false alarm on clean campaigns" in run.stderr
+    assert (tmp_path / "x" / "sealed").is_dir()
+
+
+@pytest.mark.parametrize("options", [("--campaigns", "0"), ("--seed", "-1"), ("--jobs", "0"), ("--campaigns", "few")])
+def test_wrong_usage_of_the_score_card(bushfit: Run, options: tuple[str, ...]) -> None:
+    run = bushfit("scorecard", *options)
+    assert run.returncode == 2
+    assert run.stdout == ""
+    assert options[0] in run.stderr
+
+
+def test_the_gap_in_a_picture(bushfit: Run, tmp_path: Path) -> None:
+    run = bushfit("diagnose", CAMPAIGN, "-o", str(tmp_path / "x"))
+    assert run.returncode == 0, run.stderr
+    assert {file.name for file in (tmp_path / "x").iterdir()} == TABLES | {"gap.png"}
+    picture = (tmp_path / "x" / "gap.png").read_bytes()
+    assert picture.startswith(b"\x89PNG")
+    assert len(picture) > 20_000
