@@ -80,8 +80,9 @@ def largest_smooth_misfit(evidence: Evidence) -> float:
         if isinstance(term, LoopTerm):
             columns = np.array(list(_loop_columns(term)))
             fitted = np.linalg.lstsq(columns.T, evidence.residual[place], rcond=None)[0] @ columns
-            scale = term.drive.noise / (term.drive.half_range * np.sqrt(term.drive.weight))
-            sizes.append(float(np.abs(fitted * scale).max()))
+            weighty = term.drive.weight > 0.0
+            scale = term.drive.noise / (term.drive.half_range * np.sqrt(term.drive.weight[weighty]))
+            sizes.append(float(np.abs(fitted[weighty] * scale).max()))
     return max(sizes, default=0.0)
 
 

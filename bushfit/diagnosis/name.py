@@ -104,14 +104,27 @@ def _probes(terms: Sequence[Term], model: Model, parameter: Parameter) -> Array:
         case "frequency":
             low, high = 0.7 * frequencies.max(), 4.0 * frequencies.max()
         case "displacement":
-            amplitudes = np.concatenate([term.amplitude for term in terms])
-            low, high = 0.8 * amplitudes.min(), 0.95 * amplitudes.max()
+            low, high = _stroke(terms)
         case "strain":
             strains = [term.amplitude * model.bushing.unit_strain(term.direction) for term in terms]
             low, high = 0.03 * np.concatenate(strains).min(), np.concatenate(strains).max()
         case None:
             return np.array([parameter.typical])
     return np.clip(np.geomspace(low, high, _PROBES), *parameter.bounds)
+
+
+def _stroke(terms: Sequence[Term]) -> tuple[float, float]:
+    """Displacements that some test reaches and some test just misses [m]."""
+    amplitudes = np.concatenate([term.amplitude for term in terms])
+    return 0.8 * float(amplitudes.min()), 0.95 * float(amplitudes.max())
+
+
+def _within_stroke(terms: Sequence[Term], name: str) -> Bounds:
+    """Limits of an effect's displacements to what the tests can show: a stop that is always met is no stop."""
+    low, high = _stroke(terms)
+    effect = LIBRARY[name]
+    scaled = [parameter for parameter in effect.parameters if parameter.scale == "displacement"]
+    return {qualified(effect, parameter): (low, high) for parameter in scaled}
 
 
 def refit(
@@ -124,7 +137,7 @@ def refit(
     """
     model = proposal.model if evidence.reduced < _BENT else proposal.model.with_values(start)
     try:
-        fitted = fit(model, evidence.terms, held, bounds)
+        fitted = fit(model, evidence.terms, held, {**_within_stroke(evidence.terms, proposal.name), **bounds})
     except FitError:
         return None
     return Candidate(proposal.name, fitted, evidence.chi_square - fitted.chi_square)

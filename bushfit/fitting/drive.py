@@ -7,12 +7,13 @@ turning points that friction needs are those of the motion and not of the sensor
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.effects.friction import reversals
 from bushfit.effects.history import History
 from bushfit.errors import FitError
 from bushfit.fitting.noise import FLOOR
@@ -26,6 +27,8 @@ _HARMONICS = 60
 _CLOCK_HARMONICS = 15
 #: Harmonics of one cycle that count as slow, when the scatter between cycles is taken.
 _SLOW_HARMONICS = 3
+#: Steps of the grid about a turning point in which rows carry no weight.
+_JUMP = 1.5
 _SIGNIFICANT = 4.0
 #: A motion is a triangle where that leaves no more than this times what free harmonics leave.
 _ALIKE = 1.02
@@ -48,7 +51,7 @@ class Drive:
         from_rest: True where the record begins at rest, False where the loop had settled.
         phase: position of each row [cycles from the first row], (n,).
         force: measured force per row, or per bin of phase where the loop is long, (n,).
-        weight: rows behind each entry of force, (n,).
+        weight: rows behind each entry of force, 0 at the turning points, (n,).
         noise: standard deviation of one row's force [N or N m].
         coefficients: complex harmonics of the displacement, mean first.
         datum: mean of the measured force where the motion lies off zero, else None. Whether a sensor's zero or
@@ -141,7 +144,26 @@ def drive_of(loop: Loop) -> Drive:
     noise = max(noise, FLOOR * half_force)
     off_zero = not from_rest and abs(motion[0]) > _CENTRED * half_motion
     datum = force_mean if off_zero else None
-    return Drive(loop, frequency, cycles, from_rest, phase, force, weight, noise, motion, datum)
+    drive = Drive(loop, frequency, cycles, from_rest, phase, force, weight, noise, motion, datum)
+    return replace(drive, weight=np.where(_at_reversal(drive), 0.0, weight))
+
+
+def _at_reversal(drive: Drive) -> Array:
+    """Rows within a step of the model's grid from a turning point, where dry friction jumps and no grid can tell when;
+    they carry no weight."""
+    motion = drive.history(settles=False).value
+    cycle = motion if drive.from_rest else np.concatenate((motion[-1:], motion, motion[:1]))
+    turns = np.flatnonzero(reversals(cycle)) - (0 if drive.from_rest else 1)
+    position = drive.phase * GRID
+    if not turns.size:
+        return np.zeros(position.shape, dtype=bool)
+    if not drive.from_rest:
+        position = position % GRID
+        turns = np.concatenate((turns, turns + GRID, turns - GRID))
+    turns = np.sort(turns)
+    after = np.clip(np.searchsorted(turns, position), 1, turns.size - 1)
+    nearest = np.minimum(np.abs(position - turns[after - 1]), np.abs(turns[after] - position))
+    return nearest < _JUMP
 
 
 def _from_rest(loop: Loop, phase: Array, half_motion: float, half_force: float, noise: float) -> bool:
