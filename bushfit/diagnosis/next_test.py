@@ -55,22 +55,6 @@ MENU = (
     MenuEntry("sweep in torsion", 2.0, direction=Direction.TORSION, amplitudes=(1.0,)),
 )
 
-#: What confirms an effect that acts on waveforms or over time, which stiffness alone cannot show.
-CONFIRM = {
-    "asymmetry": "repeat the loop with a static offset to either side",
-    "force_offset": "read the load cell with no bushing mounted",
-    "mullins_softening": "repeat the loop at once, without a rest: the first cycles must not stiffen again",
-    "self_heating": "hold one point for 30 s and for 10 min: heating shows as drift",
-    "interface_slip": "store the raw force waveforms: slip makes odd harmonics at the smallest amplitude",
-    "clearance": "sweep at a third of the smallest amplitude: play takes away most there",
-    "amplitude_rolloff": "log the displacement really reached at every frequency",
-    "inertia": "add a known mass between bushing and load cell, or run the empty fixture",
-    "fixture_resonance": "tap the fixture, or run it empty to three times the highest frequency",
-    "rig_compliance": "put a steel dummy in place of the bushing",
-    "delay": "put a steel dummy in place of the bushing: its loss factor must be zero",
-    "force_gain": "hang a known weight on the load cell in both chains",
-}
-
 
 def deciding_test(models: Sequence[Model], terms: Sequence[Term]) -> str:
     """The entry with the largest predicted distance between any two of the models, in noise per effort.
@@ -88,8 +72,8 @@ def deciding_test(models: Sequence[Model], terms: Sequence[Term]) -> str:
 
 
 def confirming_test(name: str) -> str:
-    """A test that would confirm one named effect, or ""."""
-    return CONFIRM.get(name, "")
+    """The cheapest test that would prove a named effect."""
+    return effect_named(name).confirmed_by
 
 
 def _distance(entry: MenuEntry, models: Sequence[Model], terms: Sequence[Term]) -> float:

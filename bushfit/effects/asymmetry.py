@@ -27,6 +27,7 @@ EFFECT = Branch(
         Parameter("c2", "1", (-1e3, 1e3), 0.0, 1.0, log=False, meaning="quadratic stress coefficient over mu"),
     ),
     source="quadratic term of a power series of the stress; A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations, 1979",
+    confirmed_by="repeat the loop with a static offset to either side",
     uses=("mu",),
     modulus=modulus,
     stress=stress,

@@ -41,6 +41,7 @@ EFFECT = Layer(
         Parameter("stiffness", "N/m", (0.0, 1e10), 0.0, 1e5, log=False, meaning="stiffness of the stop"),
     ),
     source="A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B",
+    confirmed_by="loop slowly to the largest amplitude: the force must bend up at the gap",
     stiffness=stiffness,
     force=force,
 )

@@ -119,6 +119,7 @@ class Effect:
         level: where it acts.
         parameters: its own parameters.
         source: where the law comes from.
+        confirmed_by: the cheapest test that would prove it.
         harmonic_error: relative error of the first-harmonic face against the time face; 0 where exact.
         settles: True where the response changes from cycle to cycle, so that a loop must be followed
             through all its cycles.
@@ -130,6 +131,7 @@ class Effect:
     level: Level
     parameters: tuple[Parameter, ...]
     source: str
+    confirmed_by: str = ""
     harmonic_error: float = 0.0
     settles: bool = False
 

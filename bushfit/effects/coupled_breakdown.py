@@ -24,5 +24,6 @@ EFFECT = Modifier(
     level=Level.MATERIAL,
     parameters=(Parameter("q", "1", (0.0, 1.0), 0.0, 0.1, log=False, meaning="power of the strain amplitude"),),
     source="rate and amplitude dependence coupled, after A. Lion, C. Kardelky, Int. J. Plasticity 20 (2004) 1313",
+    confirmed_by="sweep from 0.05 to 5 Hz at the smallest and the largest amplitude: their slopes must differ",
     adjust=adjust,
 )

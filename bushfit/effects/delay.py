@@ -36,6 +36,7 @@ EFFECT = Layer(
     level=Level.INSTRUMENT,
     parameters=(Parameter("tau", "s", (0.0, 1e-2), 0.0, 1e-4, log=False, meaning="time by which the force is late"),),
     source="shift theorem of the Fourier transform",
+    confirmed_by="put a steel dummy in place of the bushing: its loss factor must be zero",
     stiffness=stiffness,
     force=force,
 )

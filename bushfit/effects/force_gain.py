@@ -29,6 +29,7 @@ EFFECT = Layer(
         Parameter("gain", "1", (-0.5, 0.5), 0.0, 0.01, log=False, meaning="gain of the loop's chain over the sweep's"),
     ),
     source="sensitivity error of a force transducer, ISO 376:2011",
+    confirmed_by="hang a known weight on the load cell in both chains",
     stiffness=stiffness,
     force=force,
 )

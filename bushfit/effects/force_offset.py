@@ -26,6 +26,7 @@ EFFECT = Layer(
     level=Level.INSTRUMENT,
     parameters=(Parameter("offset", "N", (-1e5, 1e5), 0.0, 5.0, log=False, meaning="reading at zero force"),),
     source="zero error of a force transducer, ISO 376:2011",
+    confirmed_by="read the load cell with no bushing mounted",
     stiffness=stiffness,
     force=force,
 )

@@ -35,6 +35,7 @@ EFFECT = Layer(
     level=Level.COMPONENT,
     parameters=(Parameter("force", "N", (0.0, 1e5), 0.0, 5.0, log=False, meaning="Coulomb force"),),
     source="Coulomb friction; A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B",
+    confirmed_by="store the raw force waveforms: slip makes odd harmonics at the smallest amplitude",
     stiffness=stiffness,
     force=force,
 )

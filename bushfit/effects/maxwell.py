@@ -46,6 +46,7 @@ EFFECT = Branch(
         Parameter("tau", "s", (1e-6, 1e2), None, 2e-3, log=True, meaning="relaxation time", scale="period"),
     ),
     source="Maxwell arm; J. D. Ferry, Viscoelastic Properties of Polymers, 3rd ed., 1980, ch. 3",
+    confirmed_by="sweep a decade below and above the relaxation: the step must level off on both sides",
     modulus=modulus,
     stress=stress,
 )

@@ -34,6 +34,7 @@ EFFECT = Branch(
         Parameter("cycles", "1", (0.1, 100.0), None, 1.0, log=True, meaning="cycles in which it falls to 37 %"),
     ),
     source="L. Mullins, Rubber Chem. Technol. 42 (1969) 339",
+    confirmed_by="repeat the loop at once, without a rest: the first cycles must not stiffen again",
     settles=True,
     uses=("mu",),
     modulus=modulus,

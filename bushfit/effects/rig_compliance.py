@@ -94,6 +94,7 @@ EFFECT = Layer(
         Parameter("compliance", "m/N", (0.0, 1e-5), 0.0, 2e-8, log=False, meaning="give of the rig per force"),
     ),
     source="springs in series; ISO 10846-2:2008",
+    confirmed_by="put a steel dummy in place of the bushing",
     harmonic_error=2e-3,
     stiffness=stiffness,
     force=force,

@@ -24,6 +24,7 @@ EFFECT = Branch(
         ),
     ),
     source="Garcia Tarrago et al. 2007, Eq. 5, once more; friction elements in parallel as in Iwan 1966",
+    confirmed_by="sweep at a fifth and a tenth of the smallest amplitude: stiffness must level off",
     modulus=friction.modulus,
     stress=friction.stress,
 )

@@ -24,5 +24,6 @@ EFFECT = Modifier(
     level=Level.MATERIAL,
     parameters=(Parameter("beta", "1/W", (0.0, 10.0), 0.0, 1e-3, log=False, meaning="softening per watt dissipated"),),
     source="steady heat balance (rise in proportion to the power) and a modulus that falls with temperature",
+    confirmed_by="hold one point for 30 s and for 10 min: heating shows as drift",
     adjust=adjust,
 )
