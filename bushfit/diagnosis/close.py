@@ -12,7 +12,7 @@ import numpy as np
 
 from bushfit.diagnosis.calibrate import SENSITIVITY_LEFT, Questions
 from bushfit.diagnosis.evidence import Evidence, fit
-from bushfit.diagnosis.name import REFITTED, Candidate, Proposal, proposals, refit
+from bushfit.diagnosis.name import REFITTED, Candidate, Proposal, finished, proposals, refit
 from bushfit.diagnosis.record import Settings
 from bushfit.errors import FitError
 from bushfit.fitting.solve import Bounds
@@ -28,6 +28,8 @@ _CONTAINS = 1.0
 _MOST_SWAPS = 4
 #: Candidates with less than this share of the best score are not refitted.
 _PROMISING = 0.1
+#: And those that gained less than this share of the best gain in their first steps are not fitted to their end.
+_CLOSE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +94,14 @@ class Search:
         """The best scores refitted, best by BIC first."""
         least = max(evidence.penalty / 2.0, _PROMISING * max((proposal.score for proposal in proposed), default=0.0))
         promising = [proposal for proposal in proposed if proposal.score > least][:REFITTED]
-        fits = [refit(evidence, proposal, self.start, self.held, self.bounds) for proposal in promising]
-        return sorted((fit for fit in fits if fit is not None), key=lambda fit: fit.evidence.bic)
+        begun = [refit(evidence, proposal, self.start, self.held, self.bounds) for proposal in promising]
+        fits = [candidate for candidate in begun if candidate is not None]
+        reach = _CLOSE * max((candidate.gain for candidate in fits), default=0.0)
+        fits = [
+            finished(evidence, candidate, self.held, self.bounds) if candidate.gain > reach else candidate
+            for candidate in fits
+        ]
+        return sorted(fits, key=lambda candidate: candidate.evidence.bic)
 
     def grow(self) -> tuple[Evidence, list[str]]:
         """Add the best effect, look again, and stop when what is left is chance or too small to matter."""

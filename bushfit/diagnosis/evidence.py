@@ -15,7 +15,7 @@ from bushfit.fitting.terms import SweepTerm, Term
 from bushfit.model import Model
 
 #: Evaluations after which a candidate that fits badly is taken as it is, and where a better one may stop.
-_EVALUATIONS, _TOLERANCE = 40, 1e-7
+EVALUATIONS, _TOLERANCE = 40, 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,9 +93,10 @@ class Evidence:
         return sweeps[0].noise.freedom if sweeps else 0
 
 
-def fit(model: Model, terms: Sequence[Term], held: Sequence[str], bounds: Bounds) -> Evidence:
+def fit(
+    model: Model, terms: Sequence[Term], held: Sequence[str], bounds: Bounds, evaluations: int = EVALUATIONS
+) -> Evidence:
     """Fit every parameter of a model but the held ones, from its own values."""
     names = [name for name in model.parameters if name not in held]
-    return Evidence(
-        solve(model, terms, names, bounds, evaluations=_EVALUATIONS, tolerance=_TOLERANCE, strict=False), tuple(terms)
-    )
+    solution = solve(model, terms, names, bounds, evaluations=evaluations, tolerance=_TOLERANCE, strict=False)
+    return Evidence(solution, tuple(terms))

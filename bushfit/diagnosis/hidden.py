@@ -36,6 +36,7 @@ _TRIES = 30
 _STEPS = 1024
 #: No effect is larger than this many times its typical size.
 _LARGEST = 30.0
+_MOST_LOSS = 1.0
 
 
 @dataclass(frozen=True)
@@ -162,7 +163,7 @@ def _sized(
         if not (amount.bounds[0] <= value <= amount.bounds[1] and abs(value) <= _LARGEST * amount.typical):
             return None, 0.0
         model = plain.with_effect(effect.name, {**values, name: value})
-        if not _stiff(model, plan):
+        if not _plausible(model, plan):
             value *= 0.3
             continue
         size = _visible(plain, model, plan)
@@ -189,9 +190,15 @@ def _shape(plain: Model, plan: SimulateSettings, scale: str | None, typical: flo
     return float(np.exp(random.uniform(*np.log(ranges[scale]))))
 
 
-def _stiff(model: Model, plan: SimulateSettings) -> bool:
-    """Whether the bushing resists in every test: beyond a clearance as large as the amplitude it does not."""
-    return all(np.all(np.abs(model.stiffness(t.direction, 50.0, np.array(t.amplitudes))) > 0.0) for t in plan.sweeps)
+def _plausible(model: Model, plan: SimulateSettings) -> bool:
+    """Whether every test meets a bushing: one that resists, which beyond its clearance it does not, and that does not
+    lose more than it stores."""
+    for test in plan.sweeps:
+        frequency, amplitude = np.meshgrid(test.frequencies, test.amplitudes)
+        stiffness = model.stiffness(test.direction, frequency.ravel(), amplitude.ravel())
+        if not np.all(np.abs(stiffness.imag) < _MOST_LOSS * stiffness.real):
+            return False
+    return True
 
 
 def _visible(plain: Model, model: Model, plan: SimulateSettings) -> float:

@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 
 from bushfit.diagnosis.calibrate import SENSITIVITY_LEFT, Questions
-from bushfit.diagnosis.evidence import Evidence, fit
+from bushfit.diagnosis.evidence import EVALUATIONS, Evidence, fit
 from bushfit.effects import LIBRARY, Effect, Parameter, qualified
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
@@ -24,6 +24,8 @@ from bushfit.model import Model
 #: Candidates that are refitted in each round, the best scores first.
 REFITTED = 6
 _PROBES = 5
+#: Evaluations after which a candidate must show that it is worth more.
+_FIRST = 14
 #: Reduced chi-square beyond which a model's own values are no place to start from.
 _BENT = 1.5
 
@@ -130,14 +132,29 @@ def _within_stroke(terms: Sequence[Term], name: str) -> Bounds:
 def refit(
     evidence: Evidence, proposal: Proposal, start: Mapping[str, float], held: Sequence[str], bounds: Bounds
 ) -> Candidate | None:
-    """The proposal fitted together with the model; None where the fit fails.
+    """The proposal fitted together with the model, for a few steps; None where the fit fails.
 
     A model that lacks something large has bent its own parameters to make up for it: then they begin at the start
     values read off the data, and only else where the model ended.
     """
     model = proposal.model if evidence.reduced < _BENT else proposal.model.with_values(start)
+    return _fitted(evidence, proposal.name, model, held, bounds, _FIRST)
+
+
+def finished(evidence: Evidence, candidate: Candidate, held: Sequence[str], bounds: Bounds) -> Candidate:
+    """A candidate fitted to its end, where it had stopped on its way."""
+    if candidate.evidence.solution.evaluations < _FIRST:
+        return candidate
+    model = candidate.evidence.model
+    return _fitted(evidence, candidate.name, model, held, bounds, EVALUATIONS) or candidate
+
+
+def _fitted(
+    evidence: Evidence, name: str, model: Model, held: Sequence[str], bounds: Bounds, evaluations: int
+) -> Candidate | None:
+    limits = {**_within_stroke(evidence.terms, name), **bounds}
     try:
-        fitted = fit(model, evidence.terms, held, {**_within_stroke(evidence.terms, proposal.name), **bounds})
+        fitted = fit(model, evidence.terms, held, limits, evaluations)
     except FitError:
         return None
-    return Candidate(proposal.name, fitted, evidence.chi_square - fitted.chi_square)
+    return Candidate(name, fitted, evidence.chi_square - fitted.chi_square)

@@ -144,7 +144,7 @@ def work(task: Task, folder: Path) -> Outcome:
         seconds = time.perf_counter() - started
         truth = Sealed(**json.loads(sealed_file.read_text()))
     except Exception as wrong:  # one campaign that fails is one row of the card, and is shown there
-        return Outcome(task, None, "failed", (), (), (), 0.0, np.nan, (), np.nan, f"{type(wrong).__name__}: {wrong}")
+        return Outcome(task, None, "failed", (), (), (), 0.0, 0.0, (), 0.0, f"{type(wrong).__name__}: {wrong}")
     return _outcome(task, truth, diagnosis, seconds)
 
 
