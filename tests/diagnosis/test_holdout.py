@@ -55,6 +55,27 @@ def test_the_gap_is_that_of_a_refit(measured: Measured, fitted: Fitted, which: s
     assert part.after == pytest.approx(expected, rel=0.05)
 
 
+def test_a_model_that_misses_something_is_stepped_to_where_the_rest_would_have_it(
+    measured: Measured, fitted: Fitted
+) -> None:
+    """The plain model has far to go without the top third: by hand, least squares on the other rows."""
+    evidence = fitted(measured(INERTIA, SHARED))
+    (part,) = [part for part in hold_out(evidence, evidence).parts if "third" in part.part]
+    top = np.concatenate(
+        [
+            np.tile(term.frequency > 105.0, 2) if isinstance(term, SweepTerm) else np.zeros(term.size, dtype=bool)
+            for term in evidence.terms
+        ]
+    )
+    slopes, residual = evidence.solution.jacobian, evidence.residual
+    step = np.linalg.lstsq(slopes[:, ~top].T, -residual[~top], rcond=None)[0]
+    expected = np.sqrt(np.mean((residual[top] + step @ slopes[:, top]) ** 2))
+    fit_gap = np.sqrt(np.mean(residual[top] ** 2))
+    print(f"{part.before:.3f}, by hand {expected:.3f}; as fitted {fit_gap:.3f}")
+    assert part.before == pytest.approx(expected, rel=1e-6)
+    assert part.before > 1.1 * fit_gap
+
+
 def test_what_cannot_be_predicted_is_not_held_out(measured: Measured, fitted: Fitted) -> None:
     """Without its own rows nothing is known of a gain that only loops show."""
     campaign = measured()

@@ -11,6 +11,9 @@ import pytest
 from rigged import LEVELS, PLAN, SHARED, Diagnosed, Measured, cut
 
 from bushfit.campaign import Campaign
+from bushfit.diagnosis import verdict
+from bushfit.diagnosis.holdout import HoldOut
+from bushfit.diagnosis.next_test import MENU
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE
@@ -129,6 +132,40 @@ def test_a_gap_within_tolerance_is_no_gap(measured: Measured) -> None:
     assert diagnosis.effects == ()
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_chance_alone_names_nothing_however_small_a_gap_counts(measured: Measured, seed: int) -> None:
+    """The thresholds hold without the tolerance: something always fits noise a little."""
+    diagnosis = asked(measured({}, SHARED, seed), tolerance=0.0)
+    assert max(judged.score for judged in diagnosis.candidates) > 1.0
+    assert diagnosis.effects == ()
+
+
+def test_look_alikes_are_a_set_and_none_is_added(measured: Measured) -> None:
+    """A little viscosity in one direction: sets, and the test that would tell."""
+    diagnosis = asked(one_direction(measured({"viscous": {"eta": 25.0}}, SHARED)))
+    assert diagnosis.verdict == "ambiguous"
+    (leader,) = diagnosis.effects
+    assert "viscous" in (leader.name, *leader.alternatives)
+    assert 1 <= len(leader.alternatives) <= 2
+    assert diagnosis.after is diagnosis.before
+    assert diagnosis.result.model.effects == BASE
+    print(diagnosis.next_test)
+    assert diagnosis.next_test in {entry.words for entry in MENU}
+    assert all(name in diagnosis.summary for name in (leader.name, *leader.alternatives))
+    (entry,) = diagnosis.to_document()["effects"]
+    assert entry["parameters"]
+
+
+def test_a_name_that_does_not_hold_out_is_taken_back(measured: Measured, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(verdict, "hold_out", lambda *_: HoldOut((), 2.0, 1.9))
+    diagnosis = asked(measured(INERTIA, SHARED))
+    assert diagnosis.verdict == "unexplained"
+    assert diagnosis.effects == ()
+    assert diagnosis.after is diagnosis.before
+    assert "inertia" in diagnosis.summary
+    assert "taken back" in diagnosis.summary
+
+
 def no_loops(c: Campaign) -> Campaign:
     return replace(c, loops=())
 
@@ -226,6 +263,13 @@ def test_held_parameters_stay(measured: Measured) -> None:
     assert diagnosis.before.model.values["alpha"] == diagnosis.after.model.values["alpha"] == 0.24
     assert "alpha" not in diagnosis.result.fitted
     assert diagnosis.result.covariance.stderr("alpha") is None
+
+
+def test_a_parameter_held_at_the_value_of_a_model_stays_there(measured: Measured, paper_model: Model) -> None:
+    campaign = held(measured(INERTIA, SHARED), alpha=ParameterSetting(vary=False))
+    diagnosis = asked(campaign, paper_model)
+    assert diagnosis.before.model.values["alpha"] == diagnosis.after.model.values["alpha"] == 0.24
+    assert said(diagnosis) == "named inertia"
 
 
 def test_bounds_hold(measured: Measured) -> None:
