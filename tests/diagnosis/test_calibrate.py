@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rigged import PLAN, SHARED, Fitted, Measured
 
-from bushfit.diagnosis.calibrate import PATTERN_LEFT, SENSITIVITY_LEFT, Questions
+from bushfit.diagnosis.calibrate import PATTERN_LEFT, Questions
 from bushfit.diagnosis.close import critical_gain
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.locate import contrasts
@@ -67,34 +67,25 @@ def test_columns_that_the_model_absorbs_are_not_asked(clean: Evidence) -> None:
     assert questions.largest_by_chance(LEVEL) == np.inf
 
 
-def rate(measured: Measured, fitted: Fitted, plan: SimulateSettings, question: str) -> float:
-    """Share of clean campaigns whose own gain exceeds its own threshold, noise estimated anew from each."""
-    passed = []
+@pytest.mark.slow
+@pytest.mark.parametrize("plan", [PLAN, SHARED], ids=["independent", "shared"])
+def test_clean_campaigns_pass_the_thresholds_at_the_stated_rates(
+    measured: Measured, fitted: Fitted, plan: SimulateSettings
+) -> None:
+    """Whole campaigns, their noise estimated anew from each: smooth misfit, and the best of all candidates."""
+    smooth, candidates = [], []
     for seed in range(SEEDS):
         evidence = fitted(measured(plan=plan, seed=seed))
-        if question == "smooth":
-            columns = contrasts(evidence)
-            questions = Questions(evidence, columns, [np.arange(len(columns))], PATTERN_LEFT)
-            passed.append(questions.gains()[0] > questions.largest_by_chance(LEVEL))
-        else:
-            proposed = proposals(evidence, ())
-            columns = np.array([proposal.column for proposal in proposed])
-            groups = [np.array([i]) for i in range(len(proposed))]
-            questions = Questions(evidence, columns, groups, SENSITIVITY_LEFT)
-            threshold = questions.largest_by_chance(LEVEL, [proposal.sense for proposal in proposed])
-            passed.append(max(proposal.score for proposal in proposed) > threshold)
-    return float(np.mean(passed))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("question", ["smooth", "candidates"])
-@pytest.mark.parametrize("plan", [PLAN, SHARED], ids=["independent", "shared"])
-def test_clean_campaigns_pass_the_threshold_at_the_stated_rate(
-    measured: Measured, fitted: Fitted, plan: SimulateSettings, question: str
-) -> None:
-    share = rate(measured, fitted, plan, question)
-    print(f"{question}: {100 * share:.1f} % of {SEEDS} clean campaigns above the {100 * LEVEL:.0f} % threshold")
-    assert 0.01 < share < 0.09
+        columns = contrasts(evidence)
+        questions = Questions(evidence, columns, [np.arange(len(columns))], PATTERN_LEFT)
+        smooth.append(questions.gains()[0] > questions.largest_by_chance(LEVEL))
+        proposed = proposals(evidence, ())
+        candidates.append(max(proposal.score for proposal in proposed) > critical_gain(evidence, proposed))
+    print(f"{SEEDS} clean campaigns: smooth misfit above its {100 * LEVEL:.0f} % threshold in {np.mean(smooth):.1%}")
+    print(f"best candidate above its 99.5 % threshold in {np.mean(candidates):.1%}")
+    # counts over 300 seeds scatter: 15 +- 4 and 1.5 +- 1.2 are expected
+    assert 0.0 < np.mean(smooth) < 0.09
+    assert np.mean(candidates) < 0.02
 
 
 def blockwise(evidence: Evidence) -> tuple[Array, list[Array]]:
