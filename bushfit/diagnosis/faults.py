@@ -1,4 +1,4 @@
-"""Faults of the measurement: what one frequency, one level, one repeat or one row alone shows is no physics.
+"""Faults of the measurement: what one frequency, level, repeat, loop or row alone shows is no physics.
 
 Each suspect place may deviate freely in gain and phase; what that takes off chi-square competes with the effects.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,8 @@ from bushfit.sheets import display_units
 
 #: A disturbance covers at most this many neighbouring frequencies.
 _WIDEST = 3
+#: A single point is a suspect beyond this many standard deviations.
+_FAR = 4.0
 
 
 #: Points that deviate together: per sweep term its place among the residuals and the points touched.
@@ -31,11 +33,12 @@ class Place:
 
     Args:
         words: where, for the user: which rows to measure again.
-        kind: "frequency", "level", "repeat" or "loop".
+        kind: "frequency", "level", "repeat", "row" or "loop".
         columns: whitened residuals that a unit deviation of each kind makes, (2 k, n).
         direction: of the first test touched.
         frequency: lowest and highest [Hz].
         amplitude: lowest and highest [m or rad].
+        looked: how many places of this kind were looked at, where more than are listed.
     """
 
     words: str
@@ -44,6 +47,7 @@ class Place:
     direction: str
     frequency: tuple[float, float]
     amplitude: tuple[float, float]
+    looked: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +76,8 @@ class Fault:
 def faults(evidence: Evidence, level: float) -> tuple[list[Fault], float]:
     """Every single place that could be at fault, and the gain that the best of them exceeds by chance with
     probability 1 - level."""
-    suspects = [*_frequencies(evidence), *_levels(evidence), *_repeats(evidence), *_loops(evidence)]
+    kinds = (_frequencies, _levels, _repeats, _rows, _loops)
+    suspects = [place for kind in kinds for place in kind(evidence)]
     if not suspects:
         return [], np.inf
     columns = {id(column): column for place in suspects for column in place.columns}
@@ -85,7 +90,7 @@ def faults(evidence: Evidence, level: float) -> tuple[list[Fault], float]:
             place,
             size,
             gain,
-            size * evidence.penalty + 2.0 * float(np.log(looked[place.kind])),
+            size * evidence.penalty + 2.0 * float(np.log(max(place.looked, looked[place.kind]))),
             float(np.abs(answer).max()),
         )
         for place, size, gain, answer in zip(
@@ -154,6 +159,21 @@ def _repeats(evidence: Evidence) -> Iterator[Place]:
                 together = [(term, place, (term.amplitude == level) & (repeat == number))]
                 words = f"repeat {number} of the {term.direction} level {_amplitude(term, level)}"
                 yield _place(words, "repeat", _columns(evidence, together), together)
+
+
+def _rows(evidence: Evidence) -> Iterator[Place]:
+    """Single points of a sweep that lie far out."""
+    for term, place in _sweeps(evidence):
+        residual = evidence.residual[place]
+        count = term.frequency.size
+        far = np.flatnonzero(np.maximum(np.abs(residual[:count]), np.abs(residual[count:])) > _FAR)
+        for row in far:
+            together = [(term, place, np.arange(count) == row)]
+            words = (
+                f"the point at {term.frequency[row]:.4g} Hz, {_amplitude(term, term.amplitude[row])}, "
+                f"repeat {term.sweep.repeat[term.order][row]}, {term.direction}"
+            )
+            yield replace(_place(words, "row", _columns(evidence, together), together), looked=count)
 
 
 def _loops(evidence: Evidence) -> Iterator[Place]:

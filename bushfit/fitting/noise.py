@@ -25,6 +25,9 @@ ASSUMED_SHARED = (5e-3, float(np.radians(0.25)))
 _EQUAL_NOISE_P = 1e-3
 #: Degree in ln f of the smooth curve that stands in for repeats.
 _SMOOTH_DEGREE = 4
+#: A point this many (robust) standard deviations off is wild, and so is a pair of repeats whose shared variance is
+#: this many times the median: noise alone makes the one once in 1e9, the other once in 500 campaigns.
+_WILD_POINT, _WILD_PAIR = 6.0, 100.0
 
 LevelKey = tuple[str, float]
 _ORIGINS = {
@@ -97,7 +100,9 @@ def sweep_noise(sweeps: Sequence[Sweep]) -> SweepNoise:
         gain, phase = np.maximum(np.broadcast_to(stated.get(key[0], np.sqrt(variance)), 2), FLOOR)
         random[key] = (float(gain), float(phase))
     if repeated:
-        shared = np.concatenate([levels[key].shared for key in repeated]).mean(axis=0)
+        pairs = np.concatenate([levels[key].shared for key in repeated])
+        usual = np.abs(pairs) <= _WILD_PAIR * np.median(np.abs(pairs), axis=0)
+        shared = np.where(usual.any(axis=0), np.mean(pairs, axis=0, where=usual), 0.0)
         gain, phase = np.sqrt(np.maximum(shared, 0.0))
         freedom = sum(levels[key].repeats - 1 for key in repeated)
         return SweepNoise(random, (float(gain), float(phase)), "repeats", freedom)
@@ -115,7 +120,7 @@ def _level(sweep: Sweep, amplitude: float) -> _Level:
     scatter, shared = [], []
     for one, other in combinations(table, 2):
         difference = one - other
-        difference = difference[~np.isnan(difference.real)]
+        difference = _without_wild(difference[~np.isnan(difference.real)])
         if difference.size < 3:
             continue
         mean, spread = _parts(difference).mean(axis=0), _parts(difference - difference.mean())
@@ -126,6 +131,14 @@ def _level(sweep: Sweep, amplitude: float) -> _Level:
         return _about_smooth_curve(np.log(frequencies), np.nanmean(table, axis=0))
     freedom = (numbers.size - 1) * (scatter[0].shape[0] - 1)
     return _Level(np.concatenate(scatter), freedom, np.array(shared), int(numbers.size))
+
+
+def _without_wild(difference: Array) -> Array:
+    """Differences of two repeats less single wild points, which are faults and no measure of the noise."""
+    parts = _parts(difference)
+    off = np.abs(parts - np.median(parts, axis=0))
+    scale = 1.4826 * np.median(off, axis=0)
+    return difference[np.all((off <= _WILD_POINT * scale) | (scale == 0.0), axis=1)]
 
 
 def _about_smooth_curve(log_frequency: Array, log_stiffness: Array) -> _Level:

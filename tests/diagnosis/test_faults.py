@@ -65,7 +65,6 @@ def test_the_place_is_named_and_no_effect(measured: Measured, tamper: Tamper, wo
     assert words in diagnosis.where[0].reading
 
 
-@pytest.mark.xfail(strict=True, reason="a repeat that deviates also makes up the error that repeats share: it hides")
 @pytest.mark.parametrize("factor", [1.05, 1.2])
 def test_one_repeat(measured: Measured, factor: float) -> None:
     diagnosis = diagnose(Data.of(repeat_off(measured(plan=SHARED), factor)))
@@ -73,7 +72,6 @@ def test_one_repeat(measured: Measured, factor: float) -> None:
     assert "repeat 2 of the axial level 0.2 mm" in diagnosis.summary
 
 
-@pytest.mark.xfail(strict=True, reason="one row counts as scatter of its level")
 def test_one_row(measured: Measured) -> None:
     campaign = measured(plan=SHARED)
     sweep = campaign.sweeps[0]
