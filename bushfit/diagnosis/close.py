@@ -14,7 +14,7 @@ from bushfit.diagnosis.calibrate import SENSITIVITY_LEFT, Questions
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.name import REFITTED, Candidate, Proposal, finished, proposals, refit
 from bushfit.diagnosis.record import Settings
-from bushfit.errors import FitError
+from bushfit.errors import FitError, ModelError
 from bushfit.fitting.solve import Bounds
 
 #: Probability with which noise alone stays below the threshold of the best candidate.
@@ -119,9 +119,16 @@ class Search:
         return current, added
 
     def convincing(self, current: Evidence, best: Candidate, critical: float) -> bool:
-        """More than chance, more than its price, and large enough to matter."""
-        worth = current.bic - best.evidence.bic
-        return best.gain > critical and worth > SAME and footprint(current, best.evidence) > self.settings.tolerance
+        """Real, and large enough to matter."""
+        large = footprint(current, best.evidence) > self.settings.tolerance
+        return large and _real(current, best, critical)
+
+    def trace(self) -> Candidate | None:
+        """The best candidate on the base model where it is real but too small to matter."""
+        best = min(self.judged.values(), key=lambda candidate: candidate.evidence.bic, default=None)
+        if best is None or not _real(self.base, best, self.critical):
+            return None
+        return None if self.convincing(self.base, best, self.critical) else best
 
     def reconsider(self, current: Evidence, added: Sequence[str]) -> tuple[Evidence, list[Step]]:
         """Try every added effect's rivals in its place, and dropping it; swap where that is better."""
@@ -183,8 +190,13 @@ class Search:
         terms = [term.noise_free(current.model) for term in current.terms]
         try:
             return fit(rival.evidence.model, terms, self.held, self.bounds).chi_square
-        except FitError:
+        except (FitError, ModelError):
             return float("inf")
+
+
+def _real(current: Evidence, best: Candidate, critical: float) -> bool:
+    """More than chance, and more than its price."""
+    return best.gain > critical and current.bic - best.evidence.bic > SAME
 
 
 def critical_gain(evidence: Evidence, proposed: Sequence[Proposal]) -> float:

@@ -16,7 +16,7 @@ from bushfit.diagnosis.calibrate import SENSITIVITY_LEFT, Questions
 from bushfit.diagnosis.evidence import EVALUATIONS, Evidence, fit
 from bushfit.effects import LIBRARY, Effect, Parameter, qualified
 from bushfit.effects.contract import Array
-from bushfit.errors import FitError
+from bushfit.errors import FitError, ModelError
 from bushfit.fitting.solve import Bounds, jacobian
 from bushfit.fitting.terms import Term
 from bushfit.model import Model
@@ -155,6 +155,6 @@ def _fitted(
     limits = {**_within_stroke(evidence.terms, name), **bounds}
     try:
         fitted = fit(model, evidence.terms, held, limits, evaluations)
-    except FitError:
+    except (FitError, ModelError):
         return None
     return Candidate(name, fitted, evidence.chi_square - fitted.chi_square)

@@ -26,7 +26,8 @@ class MenuEntry:
         words: what to do.
         effort: in units of one more sweep.
         direction: of the test, None for all.
-        frequencies: [Hz]; None for those of the campaign.
+        frequencies: [Hz], or multiples of the campaign's highest where `beyond`; None for those of the campaign.
+        beyond: whether the frequencies count from the campaign's highest.
         amplitudes: relative to the campaign's largest; None for its own.
         without_rig: True where the test removes or knows what belongs to the rig.
     """
@@ -35,6 +36,7 @@ class MenuEntry:
     effort: float
     direction: Direction | None = None
     frequencies: tuple[float, ...] | None = None
+    beyond: bool = False
     amplitudes: tuple[float, ...] | None = None
     without_rig: bool = False
 
@@ -47,7 +49,7 @@ MENU = (
         without_rig=True,
     ),
     MenuEntry("sweep from 0.05 to 5 Hz at the same amplitudes", 1.5, frequencies=(0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)),
-    MenuEntry("sweep to twice the highest frequency", 1.0, frequencies=(160.0, 200.0, 250.0, 300.0)),
+    MenuEntry("sweep to twice the highest frequency", 1.0, frequencies=(1.1, 1.4, 1.7, 2.0), beyond=True),
     MenuEntry("sweep at a fifth and a tenth of the smallest amplitude", 1.0, amplitudes=(-0.1, -0.2)),
     MenuEntry("sweep at one and a half and twice the largest amplitude", 1.0, amplitudes=(1.5, 2.0)),
     MenuEntry("sweep in the radial direction at the same amplitudes", 1.0, direction=Direction.RADIAL),
@@ -107,6 +109,9 @@ def _points(entry: MenuEntry, terms: Sequence[Term]) -> tuple[Array, Array, Dire
         amplitudes = np.array([0.02])
     if entry.amplitudes:
         amplitudes = np.array([amplitudes.min() * -x if x < 0 else amplitudes.max() * x for x in entry.amplitudes])
-    frequencies = entry.frequencies or np.unique(np.concatenate([term.frequency for term in terms]))
+    measured = np.unique(np.concatenate([term.frequency for term in terms]))
+    frequencies = np.array(entry.frequencies) if entry.frequencies else measured
+    if entry.beyond:
+        frequencies = frequencies * measured.max()
     f, x = np.meshgrid(frequencies, amplitudes)
     return f.ravel(), x.ravel(), direction

@@ -37,9 +37,11 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
     """Doubt the finding: a fault instead, look-alikes, held-out data, what remains."""
     base = search.base
     if not steps:
-        remainder = find_remainder(search, base)
+        trace = search.trace()
+        remainder = find_remainder(search, trace.evidence if trace else base)
         if remainder is None:
             words = "nothing is missing beyond noise and tolerance"
+            words += f"; what there is of {trace.name} stays below the tolerance" if trace else ""
             return _finish(search, "consistent", words, base, ())
         return _finish(search, "unexplained", remainder.words, base, (), fault=remainder.fault)
     fault = _worst_fault(search, base)

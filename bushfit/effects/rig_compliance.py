@@ -7,10 +7,13 @@ from scipy.fft import next_fast_len
 
 from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
 from bushfit.effects.history import History
+from bushfit.errors import ModelError
 from bushfit.geometry import Direction
 
 #: The iterations stop when the motions balance to this share of the imposed one, or after so many rounds.
 TOLERANCE = 1e-14
+#: And what of it may be left when the rounds are used up.
+_UNSETTLED = 1e-3
 ROUNDS = 60
 
 
@@ -69,6 +72,14 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         change = np.fft.irfft(yielding * np.fft.rfft(missing, n=length), n=length)[..., :count]
         reached = np.clip(reached + pace * change, -2.0 * size, 2.0 * size)
         felt = below(history.with_value(reached))
+    else:
+        if not history.periodic and np.any(off > _UNSETTLED * size):
+            raise ModelError(
+                "the rig gives way too much to be followed through time",
+                place="rig_compliance.compliance",
+                found=f"{float(np.max(compliance)):.3g} m/N",
+                expected="a rig several times stiffer than the bushing",
+            )
     return felt
 
 

@@ -113,7 +113,8 @@ def test_many_rows_are_binned_without_loss(paper_model: Model) -> None:
     loop = measured(paper_model, cycles=5.0, rows=40_000)
     drive = drive_of(loop)
     assert drive.force.size <= 5 * 1024 + 1
-    assert drive.weight.sum() == loop.force.size > MOST_ROWS
+    assert 0.99 * loop.force.size < drive.weight.sum() < loop.force.size  # the turning points carry none
+    assert loop.force.size > MOST_ROWS
     residual = LoopTerm(drive).residual(paper_model)
     reduced = float(residual @ residual) / residual.size
     print(f"{loop.force.size} rows in {drive.force.size} bins: reduced chi-square {reduced:.3f}")
