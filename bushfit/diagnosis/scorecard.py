@@ -208,6 +208,9 @@ def card(outcomes: Sequence[Outcome]) -> list[Row]:
     ]
     rows = [_share(name, [hit(o) for o in over], target, low, high) for name, over, hit, target, low, high in shares]
     rows.append(_share("95 % interval covers the truth, where named", covered, "93 to 97 %", 0.93, 0.97))
+    sizes = [len(members) for outcome in good for members in outcome.sets]
+    members = f"{np.mean(sizes):.2f} / {max(sizes)}" if sizes else "no case"
+    rows.append(Row("size of the sets of names, mean / largest", members, len(sizes), "", None))
     took = f"{np.median(seconds):.1f} s / {max(seconds):.1f} s" if seconds else "no case"
     met = bool(max(seconds) <= _SLOWEST) if seconds else None
     rows.append(Row("time of one diagnosis, median / longest", took, len(seconds), "<= 2 s", met))
