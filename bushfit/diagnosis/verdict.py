@@ -53,7 +53,8 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
         words = f"{' and '.join(step.name for step in steps)}, or a fault of the measurement: {fault.place.words}"
         return _finish(search, "ambiguous", f"these tests cannot tell {words}", base, leaders, fault=fault)
     names = [_named(step) for step in steps]
-    if not hold_out(base, final).passed:
+    held = hold_out(base, final)
+    if not held.passed:
         words = f"{_listed(names)} {_verb(names)} the gap only where fitted, so the name is taken back"
         return _finish(search, "unexplained", words, base, ())
     if any(step.rivals for step in steps):
@@ -61,7 +62,6 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
     remainder = find_remainder(search, final)
     if remainder is None:
         return _finish(search, "named", f"{_listed(names)} {_verb(names)} the gap", final, names)
-    held = hold_out(base, final)
     if held.after < _PARTLY * held.before:
         words = f"{_listed(names)} {_verb(names)} part of the gap; {remainder.words}"
         return _finish(search, "partly", words, final, names, fault=remainder.fault)
