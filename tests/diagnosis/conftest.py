@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 from rigged import PLAN, Diagnosed, Effects, Fitted, Measured
 
@@ -17,6 +19,13 @@ from bushfit.fitting.starts import start_values
 from bushfit.model import Model
 from bushfit.schema import SimulateSettings
 from bushfit.simulation import Undisturbed, measure, undisturbed
+
+
+@pytest.fixture(scope="session")
+def reference_shapes(root: Path) -> dict[tuple[float, ...], float]:
+    """Radial stiffness over modulus [m] from finite elements, by inner radius, outer radius and length [mm]."""
+    table = np.loadtxt(root / "data/reference/radial_fe.csv", delimiter=",", skiprows=1)
+    return {tuple(row[:3]): float(row[3]) for row in table}
 
 
 @pytest.fixture(scope="session")

@@ -160,6 +160,14 @@ def test_force_gain_tells_loops_from_sweeps() -> None:
     np.testing.assert_allclose(model.force("axial", LOOP, kind="loop"), 1.02 * PLAIN.force("axial", LOOP), rtol=1e-15)
 
 
+def test_radial_factor_leaves_the_other_directions_alone() -> None:
+    model = PLAIN.with_effect("radial_factor", {"radial_factor.excess": -0.08})
+    for direction, factor in ((Direction.AXIAL, 1.0), (Direction.RADIAL, 0.92), (Direction.TORSION, 1.0)):
+        plain = PLAIN.stiffness(direction, FREQUENCY, AMPLITUDE)
+        np.testing.assert_allclose(model.stiffness(direction, FREQUENCY, AMPLITUDE), factor * plain, rtol=1e-15)
+        np.testing.assert_allclose(model.force(direction, LOOP), factor * PLAIN.force(direction, LOOP), rtol=1e-14)
+
+
 def test_a_delay_shifts_the_record() -> None:
     shifted = PLAIN.with_effect("delay", {"delay.tau": 3.0 * STARTED.step}).force("axial", STARTED)
     np.testing.assert_allclose(shifted[3:], PLAIN.force("axial", STARTED)[:-3], rtol=0.0, atol=1e-9)
