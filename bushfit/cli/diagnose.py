@@ -112,7 +112,8 @@ def tell_diagnosis(options: Options, name: str, diagnosis: Diagnosis) -> None:
         for parameter, entry in effect["parameters"].items():
             interval = entry["ci95"]
             span = f", 95 % {number(interval[0], 3)} to {number(interval[1], 3)}" if interval else ""
-            console.print(f"    {parameter} = {number(entry['value'], 4)} {entry['unit']}{span}")
+            unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
+            console.print(f"    {parameter} = {number(entry['value'], 4)}{unit}{span}")
         console.print(f"    {escape(effect['evidence'])}")
         if effect["alternatives"]:
             console.print(f"    cannot be told from: {escape(', '.join(effect['alternatives']))}")
