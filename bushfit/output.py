@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from bushfit.errors import OutputError
 
@@ -18,6 +20,11 @@ _LONGEST_FOLDER = 60
 def folder_name(name: str) -> str:
     """A name as that of one folder: it never leads out of the folder it is put in, and is never empty."""
     return _UNSAFE_IN_FOLDERS.sub("_", name)[:_LONGEST_FOLDER].strip(" .") or "campaign"
+
+
+def to_json(document: Mapping[str, Any]) -> bytes:
+    """A document as the bytes of its file."""
+    return (json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
 
 
 def check_free(folder: Path, names: list[str], *, force: bool) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,12 +11,14 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from bushfit.output import check_free, write_files
+from bushfit.output import check_free, to_json, write_files
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from bushfit.jobs import Found, Job
+    from bushfit.jobs.fits import Fitted
     from bushfit.results import Result
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -38,6 +39,11 @@ class Options:
     as_json: bool
     plots: bool
     force: bool
+
+    @property
+    def formats(self) -> tuple[str, ...]:
+        """What to write besides JSON."""
+        return ("csv", "png") if self.plots else ("csv",)
 
     def folder(self, name: str) -> Path:
         """Where results go: --output, or results/<name>."""
@@ -94,8 +100,25 @@ max_nrmse_option = click.option(
 )
 
 
-def to_json(document: Mapping[str, Any]) -> bytes:
-    return (json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
+def perform(
+    options: Options,
+    campaign: Path,
+    job: Job[Found],
+    tell: Callable[[Options, str, Found], None],
+    max_nrmse: float | None,
+) -> None:
+    """What every command on a campaign does: read, refuse to overwrite, work, tell, write, hold to a limit."""
+    from bushfit.campaign import load_campaign
+    from bushfit.fitting.data import Data
+
+    loaded = load_campaign(campaign)
+    folder = options.folder(loaded.slug)
+    options.require_free(folder, job.names(loaded, options.formats))
+    outcome = job.run(Data.of(loaded))
+    tell(options, loaded.name, outcome)
+    options.write(folder, outcome.files(options.formats))
+    options.tell(outcome.document)
+    enforce_nrmse(outcome.result, max_nrmse)
 
 
 def enforce_nrmse(result: Result, limit: float | None) -> None:
@@ -104,6 +127,12 @@ def enforce_nrmse(result: Result, limit: float | None) -> None:
         return
     click.echo(f"bushfit: NRMSE {result.quality.nrmse:.4g} is above --max-nrmse {limit:g}", err=True)
     click.get_current_context().exit(1)
+
+
+def tell_fit(options: Options, name: str, outcome: Fitted) -> None:
+    """Each step of a fit."""
+    for title, result in outcome.reports:
+        report(options, f"{name}: {title}", result)
 
 
 def report(options: Options, title: str, result: Result) -> None:

@@ -10,18 +10,17 @@ import click
 from bushfit.cli.common import (
     Options,
     campaign_argument,
-    enforce_nrmse,
     max_nrmse_option,
     new_table,
     number,
     parameter_table,
+    perform,
     shared_options,
-    to_json,
     warn,
 )
 
 if TYPE_CHECKING:
-    from bushfit.diagnosis.record import Diagnosis
+    from bushfit.jobs.diagnose import Diagnosed
 
 _COLOURS = {"consistent": "green", "named": "green", "ambiguous": "yellow", "partly": "yellow", "unexplained": "red"}
 
@@ -59,30 +58,13 @@ def command(
 
     Writes diagnosis.json, model.json with what was added, gap.csv, candidates.csv and gap.png.
     """
-    from bushfit.campaign import load_campaign
-    from bushfit.cli.artifacts import artifact_names, diagnosis_files
     from bushfit.diagnosis.record import Settings
-    from bushfit.diagnosis.workflow import diagnose
-    from bushfit.fitting.data import Data
+    from bushfit.jobs.diagnose import Diagnose
     from bushfit.results import load_result
 
     settings = Settings(max_effects, _share(tolerance), adopt, without)
-    start = load_result(model).model if model else None
-    loaded = load_campaign(campaign)
-    folder = options.folder(loaded.slug)
-    names = ["diagnosis.json", "model.json", "candidates.csv", *artifact_names(["gap"], plots=options.plots)]
-    options.require_free(folder, names)
-    diagnosis = diagnose(Data.of(loaded), start, settings)
-    tell_diagnosis(options, loaded.name, diagnosis)
-    document = diagnosis.to_document()
-    files = {
-        "diagnosis.json": to_json(document),
-        "model.json": to_json(diagnosis.result.to_document()),
-        **diagnosis_files(diagnosis, loaded.name, plots=options.plots),
-    }
-    options.write(folder, files)
-    options.tell(document)
-    enforce_nrmse(diagnosis.result, max_nrmse)
+    job = Diagnose(settings, load_result(model).model if model else None)
+    perform(options, campaign, job, tell_diagnosis, max_nrmse)
 
 
 def _share(text: str) -> float:
@@ -99,15 +81,15 @@ def _share(text: str) -> float:
     return share
 
 
-def tell_diagnosis(options: Options, name: str, diagnosis: Diagnosis) -> None:
+def tell_diagnosis(options: Options, name: str, outcome: Diagnosed) -> None:
     """The finding at a glance: verdict, names with sizes, gap before and after, where, and what to do next."""
     from rich.markup import escape
 
-    console = options.console
+    console, diagnosis = options.console, outcome.diagnosis
     colour = _COLOURS[diagnosis.verdict]
     console.print(f"[bold]{escape(name)}:[/bold] [bold {colour}]{diagnosis.verdict}[/bold {colour}]")
     console.print(f"  {escape(diagnosis.summary)}")
-    for effect in diagnosis.to_document()["effects"]:
+    for effect in outcome.document["effects"]:
         console.print(f"  [bold]{effect['name']}[/bold] ({effect['level']}): {escape(effect['sentence'])}")
         for parameter, entry in effect["parameters"].items():
             interval = entry["ci95"]

@@ -6,15 +6,7 @@ from pathlib import Path
 
 import click
 
-from bushfit.cli.common import (
-    Options,
-    campaign_argument,
-    enforce_nrmse,
-    max_nrmse_option,
-    report,
-    shared_options,
-    to_json,
-)
+from bushfit.cli.common import Options, campaign_argument, max_nrmse_option, perform, shared_options, tell_fit
 
 
 @click.command("fit")
@@ -47,27 +39,8 @@ def command(
     Writes model.json, and the tables and plots of both: loops.csv, loops.png, sweeps.csv, sweeps.png. Tests in
     directions that were not fitted are shown as predictions.
     """
-    from bushfit.campaign import load_campaign
-    from bushfit.cli.artifacts import artifact_names, loop_files, sweep_files
-    from bushfit.effects import BASE
-    from bushfit.fitting.data import Data
-    from bushfit.fitting.procedures import fit_joint
     from bushfit.geometry import Direction
+    from bushfit.jobs.fits import Fit
 
-    loaded = load_campaign(campaign)
-    folder = options.folder(loaded.slug)
-    kinds = [kind for kind, tests in (("loops", loaded.loops), ("sweeps", loaded.sweeps)) if tests]
-    options.require_free(folder, ["model.json", *artifact_names(kinds, plots=options.plots)])
-    data = Data.of(loaded)
-    chosen = [Direction(direction) for direction in directions] or None
-    result = fit_joint(data, effects=(*BASE, *effects), directions=chosen)
-    document = result.to_document()
-    report(options, f"{loaded.name}: joint fit", result)
-    files = {
-        "model.json": to_json(document),
-        **loop_files(result.model, data.loops, plots=options.plots),
-        **sweep_files(result.model, data.sweeps, plots=options.plots),
-    }
-    options.write(folder, files)
-    options.tell(document)
-    enforce_nrmse(result, max_nrmse)
+    job = Fit(tuple(Direction(direction) for direction in directions), effects)
+    perform(options, campaign, job, tell_fit, max_nrmse)

@@ -6,15 +6,7 @@ from pathlib import Path
 
 import click
 
-from bushfit.cli.common import (
-    Options,
-    campaign_argument,
-    enforce_nrmse,
-    max_nrmse_option,
-    report,
-    shared_options,
-    to_json,
-)
+from bushfit.cli.common import Options, campaign_argument, max_nrmse_option, perform, shared_options, tell_fit
 
 
 @click.command("fit-static")
@@ -34,20 +26,8 @@ def command(campaign: Path, dynamic: Path | None, max_nrmse: float | None, optio
 
     Writes static.json, loops.csv and loops.png.
     """
-    from bushfit.campaign import load_campaign
-    from bushfit.cli.artifacts import artifact_names, loop_files
-    from bushfit.fitting.data import Data
-    from bushfit.fitting.procedures import fit_static
+    from bushfit.jobs.fits import FitStatic
     from bushfit.results import load_result
 
-    loaded = load_campaign(campaign)
-    folder = options.folder(loaded.slug)
-    options.require_free(folder, ["static.json", *artifact_names(["loops"], plots=options.plots)])
-    data = Data.of(loaded)
-    result = fit_static(data, load_result(dynamic) if dynamic else None)
-    document = result.to_document()
-    report(options, f"{loaded.name}: static fit of the loops", result)
-    files = {"static.json": to_json(document), **loop_files(result.model, data.loops, plots=options.plots)}
-    options.write(folder, files)
-    options.tell(document)
-    enforce_nrmse(result, max_nrmse)
+    job = FitStatic(load_result(dynamic) if dynamic else None)
+    perform(options, campaign, job, tell_fit, max_nrmse)

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from bushfit.cli.common import Options, new_table, shared_options, warn
 
 if TYPE_CHECKING:
-    from bushfit.measurement import Sweep
-    from bushfit.prediction import Prediction
-    from bushfit.results import Result
-    from bushfit.schema import PredictSettings
+    from bushfit.jobs.predict import Predicted
 
 
 @click.command("predict")
@@ -52,57 +47,38 @@ def command(
     or the paper's as far as it was measured. A warning names what leaves the measured range of strain or frequency.
     """
     from bushfit.campaign import load_campaign
-    from bushfit.cli.artifacts import artifact_names, prediction_files
     from bushfit.cli.grids import parse_grid
-    from bushfit.fitting.terms import sweep_terms
     from bushfit.geometry import Direction
+    from bushfit.jobs.predict import Predict
     from bushfit.output import folder_name
     from bushfit.results import load_result
     from bushfit.schema import PredictSettings
 
     result = load_result(model)
     loaded = load_campaign(campaign) if campaign else None
-    asked: dict[str, Any] = {
-        "frequencies": parse_grid(frequencies, "--frequencies", "Hz"),
-        "amplitudes": parse_grid(amplitudes, "--amplitudes", "m"),
-        "torsion_amplitudes": parse_grid(torsion_amplitudes, "--torsion-amplitudes", "rad"),
-        "directions": tuple(Direction(direction) for direction in directions) or None,
-    }
-    settings = replace(
-        loaded.predict if loaded else PredictSettings(),
-        **{key: value for key, value in asked.items() if value is not None},
+    job = Predict(
+        PredictSettings(
+            parse_grid(frequencies, "--frequencies", "Hz"),
+            parse_grid(amplitudes, "--amplitudes", "m"),
+            parse_grid(torsion_amplitudes, "--torsion-amplitudes", "rad"),
+            tuple(Direction(direction) for direction in directions) or None,
+        )
     )
-    name = loaded.slug if loaded else folder_name(result.model.bushing.name)
-    folder = options.folder(name)
-    predictions = predict_all(result, settings, loaded.sweeps if loaded else ())
-    names = artifact_names([str(prediction.direction) for prediction in predictions], plots=options.plots)
-    options.require_free(folder, names)
-    measured = sweep_terms(loaded.sweeps) if loaded else []
-    tell_predictions(options, result, predictions)
-    files = prediction_files(result, predictions, measured, plots=options.plots)
-    options.write(folder, files)
-    options.tell(to_document(predictions))
+    folder = options.folder(loaded.slug if loaded else folder_name(result.model.bushing.name))
+    options.require_free(folder, job.names(loaded, options.formats))
+    outcome = job.run(result, loaded)
+    tell_predictions(options, outcome)
+    options.write(folder, outcome.files(options.formats))
+    options.tell(outcome.document)
 
 
-def predict_all(result: Result, settings: PredictSettings, sweeps: Sequence[Sweep] = ()) -> list[Prediction]:
-    """One prediction a direction, on the grid of the settings, else at the points of the sweeps, else the default."""
-    from bushfit.geometry import Direction
-    from bushfit.prediction import default_grid, predict
-
-    predictions = []
-    for direction in settings.directions or (Direction.AXIAL, Direction.RADIAL):
-        frequencies, amplitudes = default_grid(result, direction, sweeps)
-        asked = settings.torsion_amplitudes if direction is Direction.TORSION else settings.amplitudes
-        predictions.append(predict(result, direction, settings.frequencies or frequencies, asked or amplitudes))
-    return predictions
-
-
-def tell_predictions(options: Options, result: Result, predictions: Sequence[Prediction]) -> None:
+def tell_predictions(options: Options, outcome: Predicted) -> None:
     """The corners of each table, and what a user must know before using it."""
     from bushfit.prediction import left_out
     from bushfit.sheets import prediction_table
 
-    for prediction in predictions:
+    result = outcome.result
+    for prediction in outcome.predictions:
         table = prediction_table(prediction)
         shown = new_table(f"{result.model.bushing.name}: {prediction.direction}, corners", *table.columns[:4])
         low, high = table.iloc[:, 0].min(), table.iloc[:, 0].max()
@@ -113,10 +89,3 @@ def tell_predictions(options: Options, result: Result, predictions: Sequence[Pre
     rig_only = left_out(result)
     if rig_only:
         warn(options, [rig_only])
-
-
-def to_document(predictions: Sequence[Prediction]) -> dict[str, object]:
-    """Predictions as JSON, by direction and column."""
-    from bushfit.sheets import prediction_table
-
-    return {str(p.direction): prediction_table(p).to_dict(orient="list") for p in predictions}

@@ -16,7 +16,7 @@ from bushfit.cli.common import (
     number,
     report,
     shared_options,
-    to_json,
+    tell_fit,
     warn,
 )
 
@@ -41,47 +41,48 @@ def command(campaign: Path, max_nrmse: float | None, options: Options) -> None:
     diagnosis.json, candidates.csv, and as CSV and PNG: loops, sweeps, gap, axial and radial.
     """
     from bushfit.campaign import load_campaign
-    from bushfit.cli.artifacts import artifact_names, diagnosis_files, loop_files, prediction_files, sweep_files
     from bushfit.cli.diagnose import tell_diagnosis
-    from bushfit.cli.predict import predict_all, tell_predictions
-    from bushfit.diagnosis.workflow import diagnose
+    from bushfit.cli.predict import tell_predictions
     from bushfit.fitting.data import Data
-    from bushfit.fitting.procedures import fit_joint, fit_static
+    from bushfit.jobs.artifacts import artifact_names, diagnosis_files, loop_files, sweep_files
+    from bushfit.jobs.diagnose import Diagnose
+    from bushfit.jobs.fits import Fit, FitStatic, tests_of
+    from bushfit.jobs.predict import Predict
+    from bushfit.output import to_json
 
     loaded = load_campaign(campaign)
     folder = options.folder(loaded.slug)
-    kinds = [kind for kind, tests in (("loops", loaded.loops), ("sweeps", loaded.sweeps)) if tests]
-    names = ["model.json", "diagnosis.json", *artifact_names([*kinds, "gap", "axial", "radial"], plots=options.plots)]
-    options.require_free(folder, names)
+    names = [*Diagnose().names(loaded, options.formats), *Predict().names(loaded, options.formats)]
+    options.require_free(folder, [*names, *artifact_names(tests_of(loaded), options.formats)])
     data = Data.of(loaded)
     results: dict[str, Result] = {}
     if loaded.loops:
-        results["static"] = fit_static(data)
-        report(options, f"{loaded.name}: static fit of the loops", results["static"])
+        static = FitStatic().run(data)
+        results["static"] = static.result
+        tell_fit(options, loaded.name, static)
     two_step = _two_step(options, data)
     if two_step:
         results["dynamic"] = two_step.result
         _tell_passes(options, two_step)
         report(options, f"{loaded.name}: static and dynamic fit in turn", two_step.result)
-    joint = fit_joint(data)
-    report(options, f"{loaded.name}: joint fit", joint)
+    joint = Fit().run(data)
+    tell_fit(options, loaded.name, joint)
     if two_step:
-        _tell_cost(options, two_step.result, joint)
-    diagnosis = diagnose(data)
-    tell_diagnosis(options, loaded.name, diagnosis)
-    added = diagnosis.after is not diagnosis.before
-    results |= {"joint": joint, "model": diagnosis.result} if added else {"model": joint}
+        _tell_cost(options, two_step.result, joint.result)
+    diagnosed = Diagnose().run(data)
+    tell_diagnosis(options, loaded.name, diagnosed)
+    added = diagnosed.diagnosis.after is not diagnosed.diagnosis.before
+    results |= {"joint": joint.result, "model": diagnosed.result} if added else {"model": joint.result}
     final = results["model"]
-    predictions = predict_all(final, loaded.predict, loaded.sweeps)
-    tell_predictions(options, final, predictions)
-    documents = {name: result.to_document() for name, result in results.items()}
-    documents["diagnosis"] = diagnosis.to_document()
+    predicted = Predict().run(final, loaded)
+    tell_predictions(options, predicted)
+    documents = {**{name: result.to_document() for name, result in results.items()}, "diagnosis": diagnosed.document}
     files = {
         **{f"{name}.json": to_json(document) for name, document in documents.items()},
-        **loop_files(final.model, data.loops, plots=options.plots),
-        **sweep_files(final.model, data.sweeps, plots=options.plots),
-        **diagnosis_files(diagnosis, loaded.name, plots=options.plots),
-        **prediction_files(final, predictions, data.sweeps, plots=options.plots),
+        **loop_files(final.model, data.loops, options.formats),
+        **sweep_files(final.model, data.sweeps, options.formats),
+        **diagnosis_files(diagnosed.diagnosis, loaded.name, options.formats),
+        **predicted.files(options.formats),
     }
     options.write(folder, files)
     options.tell(documents)

@@ -28,8 +28,8 @@ def command(campaigns: int, seed: int, jobs: int, options: Options) -> None:
 
     from rich.progress import Progress
 
-    from bushfit.cli.common import to_json
     from bushfit.diagnosis.scorecard import card, confusion, run, tasks
+    from bushfit.output import to_json
 
     folder = options.output
     if folder:

@@ -1,8 +1,8 @@
-"""The files that commands write, as bytes by name."""
+"""The tables and plots of a result, as bytes by file name; `formats` says which to make: csv, png."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from bushfit import sheets
@@ -15,24 +15,28 @@ if TYPE_CHECKING:
     from bushfit.results import Result
 
 
-def loop_files(model: Model, terms: Sequence[LoopTerm], *, plots: bool) -> dict[str, bytes]:
+def loop_files(model: Model, terms: Sequence[LoopTerm], formats: Collection[str]) -> dict[str, bytes]:
     """`loops.csv` and `loops.png`; nothing where there are no loops."""
     if not terms:
         return {}
-    files = {"loops.csv": sheets.to_csv(sheets.loops_table(model, terms))}
-    if plots:
+    files = {}
+    if "csv" in formats:
+        files["loops.csv"] = sheets.to_csv(sheets.loops_table(model, terms))
+    if "png" in formats:
         from bushfit.plots import loops_figure, to_png
 
         files["loops.png"] = to_png(loops_figure(model, terms, model.bushing.name))
     return files
 
 
-def sweep_files(model: Model, terms: Sequence[SweepTerm], *, plots: bool) -> dict[str, bytes]:
+def sweep_files(model: Model, terms: Sequence[SweepTerm], formats: Collection[str]) -> dict[str, bytes]:
     """`sweeps.csv` and `sweeps.png`; nothing where there are no sweeps."""
     if not terms:
         return {}
-    files = {"sweeps.csv": sheets.to_csv(sheets.sweeps_table(model, terms))}
-    if plots:
+    files = {}
+    if "csv" in formats:
+        files["sweeps.csv"] = sheets.to_csv(sheets.sweeps_table(model, terms))
+    if "png" in formats:
         from bushfit.plots import sweeps_figure, to_png
 
         files["sweeps.png"] = to_png(sweeps_figure(model, terms, model.bushing.name))
@@ -40,11 +44,11 @@ def sweep_files(model: Model, terms: Sequence[SweepTerm], *, plots: bool) -> dic
 
 
 def prediction_files(
-    result: Result, predictions: Sequence[Prediction], measured: Sequence[SweepTerm], *, plots: bool
+    result: Result, predictions: Sequence[Prediction], measured: Sequence[SweepTerm], formats: Collection[str]
 ) -> dict[str, bytes]:
     """`<direction>.csv` and `<direction>.png` of each prediction, the measured points over the model."""
-    files = {f"{p.direction}.csv": sheets.to_csv(sheets.prediction_table(p)) for p in predictions}
-    if not plots:
+    files = {f"{p.direction}.csv": sheets.to_csv(sheets.prediction_table(p)) for p in predictions if "csv" in formats}
+    if "png" not in formats:
         return files
     from bushfit.plots import fine_grid, prediction_figure, to_png
     from bushfit.prediction import left_out, predict
@@ -60,20 +64,20 @@ def prediction_files(
     return files
 
 
-def diagnosis_files(diagnosis: Diagnosis, title: str, *, plots: bool) -> dict[str, bytes]:
+def diagnosis_files(diagnosis: Diagnosis, title: str, formats: Collection[str]) -> dict[str, bytes]:
     """`gap.csv`, `candidates.csv` and `gap.png` of a diagnosis."""
     before, after = diagnosis.before, diagnosis.after
-    files = {
-        "gap.csv": sheets.to_csv(sheets.gap_table(before.model, after.model, before.terms)),
-        "candidates.csv": sheets.to_csv(sheets.candidates_table(diagnosis)),
-    }
-    if plots:
+    files = {}
+    if "csv" in formats:
+        files["gap.csv"] = sheets.to_csv(sheets.gap_table(before.model, after.model, before.terms))
+        files["candidates.csv"] = sheets.to_csv(sheets.candidates_table(diagnosis))
+    if "png" in formats:
         from bushfit.plots import gap_figure, to_png
 
         files["gap.png"] = to_png(gap_figure(before.model, after.model, before.terms, title, diagnosis.summary))
     return files
 
 
-def artifact_names(kinds: Sequence[str], *, plots: bool) -> list[str]:
-    """Names of the tables and plots of some kinds: loops, sweeps, axial, radial, torsion."""
-    return [f"{kind}.{ending}" for kind in kinds for ending in (("csv", "png") if plots else ("csv",))]
+def artifact_names(kinds: Sequence[str], formats: Collection[str]) -> list[str]:
+    """Names of the tables and plots of some kinds: loops, sweeps, gap, axial, radial, torsion."""
+    return [f"{kind}.{ending}" for kind in kinds for ending in ("csv", "png") if ending in formats]

@@ -1,0 +1,61 @@
+"""diagnose: the discrepancy workflow on one campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from bushfit.diagnosis.record import Diagnosis, Settings
+from bushfit.diagnosis.workflow import diagnose
+from bushfit.jobs.artifacts import artifact_names, diagnosis_files
+from bushfit.output import to_json
+
+if TYPE_CHECKING:
+    from bushfit.campaign import Campaign
+    from bushfit.fitting.data import Data
+    from bushfit.model import Model
+    from bushfit.results import Result
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosed:
+    """The outcome of a diagnosis of a campaign of that name."""
+
+    name: str
+    diagnosis: Diagnosis
+
+    @property
+    def result(self) -> Result:
+        return self.diagnosis.result
+
+    @cached_property
+    def document(self) -> Mapping[str, Any]:
+        return self.diagnosis.to_document()
+
+    def files(self, formats: Collection[str]) -> dict[str, bytes]:
+        return {
+            "diagnosis.json": to_json(self.document),
+            "model.json": to_json(self.result.to_document()),
+            **diagnosis_files(self.diagnosis, self.name, formats),
+        }
+
+
+@dataclass(frozen=True)
+class Diagnose:
+    """Where model and tests disagree, and what is missing; starts from the effects of `model` where one is given."""
+
+    settings: Settings = field(default_factory=Settings)
+    model: Model | None = None
+
+    def names(self, campaign: Campaign, formats: Collection[str]) -> list[str]:
+        return [
+            "diagnosis.json",
+            "model.json",
+            *artifact_names(["gap"], formats),
+            *artifact_names(["candidates"], ["csv"]),
+        ]
+
+    def run(self, data: Data) -> Diagnosed:
+        return Diagnosed(data.campaign.name, diagnose(data, self.model, self.settings))

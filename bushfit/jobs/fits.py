@@ -1,0 +1,117 @@
+"""fit-static, fit-dynamic and fit: one frame, three procedures."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from bushfit.effects import BASE
+from bushfit.errors import FitError
+from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, given_static
+from bushfit.jobs.artifacts import artifact_names, loop_files, sweep_files
+from bushfit.output import to_json
+
+if TYPE_CHECKING:
+    from bushfit.campaign import Campaign
+    from bushfit.fitting.data import Data
+    from bushfit.geometry import Direction
+    from bushfit.results import Result
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """The outcome of a fit.
+
+    Args:
+        stem: of the JSON file.
+        kinds: of test whose tables and plots belong to it: loops, sweeps.
+        data: what was fitted.
+        reports: a title and a result for each step, the last one final.
+    """
+
+    stem: str
+    kinds: tuple[str, ...]
+    data: Data
+    reports: tuple[tuple[str, Result], ...]
+
+    @property
+    def result(self) -> Result:
+        return self.reports[-1][1]
+
+    @cached_property
+    def document(self) -> Mapping[str, Any]:
+        return self.result.to_document()
+
+    def files(self, formats: Collection[str]) -> dict[str, bytes]:
+        model = self.result.model
+        files = {f"{self.stem}.json": to_json(self.document)}
+        if "loops" in self.kinds:
+            files |= loop_files(model, self.data.loops, formats)
+        if "sweeps" in self.kinds:
+            files |= sweep_files(model, self.data.sweeps, formats)
+        return files
+
+
+@dataclass(frozen=True)
+class FitStatic:
+    """mu, sigma_fmax and eps_half from the loops, the springpot held at a result where one is given."""
+
+    dynamic: Result | None = None
+
+    def names(self, campaign: Campaign, formats: Collection[str]) -> list[str]:
+        return ["static.json", *artifact_names(["loops"], formats)]
+
+    def run(self, data: Data) -> Fitted:
+        result = fit_static(data, self.dynamic)
+        return Fitted("static", ("loops",), data, (("static fit of the loops", result),))
+
+
+@dataclass(frozen=True)
+class FitDynamic:
+    """m and alpha from the smallest sweep, the rest held at a result, the campaign's values, or a fit of its loops."""
+
+    static: Result | None = None
+
+    def names(self, campaign: Campaign, formats: Collection[str]) -> list[str]:
+        return ["dynamic.json", *artifact_names(["sweeps"], formats)]
+
+    def run(self, data: Data) -> Fitted:
+        static, reports = self.static or given_static(data), []
+        if static is None:
+            static = _static_on_the_spot(data)
+            reports.append(("static fit of the loops, because no --static was given", static))
+        reports.append(("dynamic fit of the smallest sweep", fit_dynamic(data, static)))
+        return Fitted("dynamic", ("sweeps",), data, tuple(reports))
+
+
+def _static_on_the_spot(data: Data) -> Result:
+    if not data.loops:
+        raise FitError(
+            "nothing says at which mu, sigma_fmax and eps_half to hold the fit",
+            file=data.campaign.path,
+            found="no --static, no [[loops]], and no values of all three in [fit]",
+            hint="give --static static.json, add a loop, or run bushfit fit for all five parameters together",
+        )
+    return fit_static(data)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """All parameters together: of the paper's branches and further effects, from the tests of some directions."""
+
+    directions: tuple[Direction, ...] = ()
+    effects: tuple[str, ...] = ()
+
+    def names(self, campaign: Campaign, formats: Collection[str]) -> list[str]:
+        return ["model.json", *artifact_names(tests_of(campaign), formats)]
+
+    def run(self, data: Data) -> Fitted:
+        result = fit_joint(data, effects=(*BASE, *self.effects), directions=self.directions or None)
+        return Fitted("model", tests_of(data.campaign), data, (("joint fit", result),))
+
+
+def tests_of(campaign: Campaign) -> tuple[str, ...]:
+    """The kinds of test that a campaign has: loops, sweeps."""
+    return tuple(kind for kind in ("loops", "sweeps") if getattr(campaign, kind))

@@ -1,0 +1,131 @@
+"""TOML files of the user's: parsed, checked against a schema, and any complaint of pydantic's in our words."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any, TypeVar, get_args, get_type_hints
+
+from pydantic import TypeAdapter, ValidationError
+from pydantic_core import ErrorDetails
+
+from bushfit.errors import BushfitError, CampaignError
+from bushfit.files import read_utf8
+from bushfit.schema import FitSettings, fit_keys, unknown_key
+
+T = TypeVar("T")
+
+_LARGEST_BYTES = 1_000_000
+_UNKNOWN = "unexpected_keyword_argument"
+#: pydantic's names for what has the wrong shape, in the words of TOML.
+_SHAPES = {
+    "dataclass_type": "a table",
+    "dict_type": "a table",
+    "mapping_type": "a table",
+    "tuple_type": "a list",
+    "too_short": "at least one value",
+    "string_type": "a text in quotes",
+    "string_too_short": "a text that is not empty",
+    "bool_type": "true or false",
+    "int_type": "a whole number",
+}
+
+
+def read_toml(path: Path, schema: type[T], *, what: str = "a campaign file", largest: int = _LARGEST_BYTES) -> T:
+    """The content of a TOML file as the dataclass `schema`, all quantities in SI.
+
+    Args:
+        path: the file.
+        schema: a pydantic dataclass, or one of its tables; unknown keys are refused.
+        what: the file in words, for errors.
+        largest: refuse more bytes than this.
+
+    Raises:
+        CampaignError: the file is missing, too large, no TOML, or has keys or values that are not understood.
+        UnitError: a quantity without a unit, or with one that does not fit.
+    """
+    return _check(_parse(path, what, largest), path, schema)
+
+
+def _parse(path: Path, what: str, largest: int) -> dict[str, Any]:
+    data = read_utf8(path, CampaignError)
+    if len(data) > largest:
+        raise CampaignError(
+            f"this is too large for {what}",
+            file=path,
+            found=f"{len(data)} bytes",
+            expected=f"TOML of at most {largest} bytes",
+            hint=f"give {what}, not a measurement",
+        )
+    try:
+        tables = tomllib.loads(data.decode("utf-8-sig"))
+        repr(tables)  # an error may have to quote any part of it
+    except ValueError as error:
+        reason = re.fullmatch(r"(?P<problem>.*) \(at (?P<place>.*)\)", str(error), re.DOTALL)
+        raise CampaignError(
+            "this is not valid TOML",
+            file=path,
+            place=reason["place"] if reason else None,
+            found=reason["problem"] if reason else str(error),
+            expected='lines such as length = "34 mm"',
+            hint="put texts and quantities in quotes",
+        ) from error
+    except RecursionError:
+        tables = None
+    if tables is None:  # outside of `except`: an error of a thousand frames cannot be pickled
+        raise CampaignError("the tables are nested too deeply", file=path, expected="plain tables")
+    return tables
+
+
+def _check(tables: Mapping[str, Any], file: Path, schema: type[T]) -> T:
+    try:
+        return TypeAdapter(schema).validate_python(tables)
+    except ValidationError as error:
+        # a mistyped key is missing and unknown: the latter says more
+        details = sorted(error.errors(include_url=False), key=lambda detail: detail["type"] != _UNKNOWN)
+        complaint = _complaint(details[0], schema)
+    complaint.file = file
+    raise complaint  # outside of `except`: pydantic's error holds ours, and a ring of errors cannot be pickled
+
+
+def _complaint(detail: ErrorDetails, schema: type) -> BushfitError:
+    """One error of pydantic's as one of ours; tables of an array are counted from 1."""
+    location = detail["loc"]
+    place = ".".join(str(key) for key in location)
+    cause = detail.get("ctx", {}).get("error")
+    if isinstance(cause, ValueError) and isinstance(cause.args[0], BushfitError):
+        error = cause.args[0]
+        place = ".".join(part for part in (place, error.place) if part)
+    elif detail["type"] == _UNKNOWN:
+        error = unknown_key(str(location[-1]), _keys(_table_at(schema, location[:-1])))
+    elif detail["type"] == "missing":
+        error = CampaignError("a key is missing", expected=f"{location[-1]} = ...")
+    else:
+        found = str(detail["input"])
+        expected = _SHAPES.get(detail["type"], detail["msg"].removeprefix("Input should be "))
+        error = CampaignError("this value is not understood", found=found, expected=expected)
+    error.place = re.sub(r"\.(\d+)", lambda index: f" #{int(index[1]) + 1}", place.replace("fit.parameters.", "fit."))
+    return error
+
+
+def _keys(table: type) -> Sequence[str]:
+    """The keys that a table of the file may have."""
+    return fit_keys() if table is FitSettings else [entry.name for entry in fields(table)]
+
+
+def _table_at(table: type, location: tuple[int | str, ...]) -> type:
+    """The dataclass of the table at a place below another."""
+    for key in location:
+        if key in (hints := get_type_hints(table)):
+            table = next(part for part in _parts(hints[key]) if isinstance(part, type) and is_dataclass(part))
+    return table
+
+
+def _parts(hint: Any) -> Iterable[Any]:
+    """A type and all that it is made of."""
+    yield hint
+    for part in get_args(hint):
+        yield from _parts(part)
