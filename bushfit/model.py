@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial, reduce
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache, partial, reduce
 from types import MappingProxyType
-from typing import Any, Literal, TypeVar, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 
@@ -29,14 +29,38 @@ from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Direction
 
 Kind = Literal["sweep", "loop"]
-E = TypeVar("E", bound=Effect)
 
 #: Names of the paper's five parameters.
 FIVE = tuple(parameter.name for name in BASE for parameter in effect_named(name).parameters)
 
 
-def _base_values(values: Values) -> Values:
-    return {name: values[name] for name in FIVE if name in values}
+@dataclass(frozen=True)
+class _Structure:
+    """What follows from the names of a model's effects, whatever its values."""
+
+    records: tuple[Effect, ...]
+    parameters: Mapping[str, Parameter]
+    branches: tuple[Branch, ...]
+    modifiers: tuple[Modifier, ...]
+    layers: tuple[Layer, ...]
+
+    @classmethod
+    @lru_cache(maxsize=256)
+    def of(cls, names: tuple[str, ...]) -> _Structure:
+        doubles = {name for name in names if names.count(name) > 1}
+        if doubles:
+            raise ModelError("an effect is listed twice", found=", ".join(sorted(doubles)))
+        place = {name: place for place, name in enumerate(LIBRARY)}
+        records = tuple(sorted(map(effect_named, names), key=lambda effect: (effect.level, place[effect.name])))
+        return cls(
+            records,
+            MappingProxyType(
+                {qualified(effect, parameter): parameter for effect in records for parameter in effect.parameters}
+            ),
+            tuple(effect for effect in records if isinstance(effect, Branch)),
+            tuple(effect for effect in records if isinstance(effect, Modifier)),
+            tuple(effect for effect in records if isinstance(effect, Layer)),
+        )
 
 
 @dataclass(frozen=True)
@@ -60,9 +84,6 @@ class Model:
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", tuple(self.effects))
         object.__setattr__(self, "values", MappingProxyType(dict(self.values)))
-        doubles = {name for name in self.effects if self.effects.count(name) > 1}
-        if doubles:
-            raise ModelError("an effect is listed twice", found=", ".join(sorted(doubles)))
         known = self.parameters
         for name in known.keys() | self.values.keys():
             if name not in self.values:
@@ -85,19 +106,27 @@ class Model:
         return Model, (self.bushing, self.effects, dict(self.values))
 
     @cached_property
+    def _structure(self) -> _Structure:
+        return _Structure.of(self.effects)
+
+    @property
     def records(self) -> tuple[Effect, ...]:
         """The effects' records, from the rubber outward: by level, and within one as the library lists them."""
-        place = {name: place for place, name in enumerate(LIBRARY)}
-        return tuple(sorted(map(effect_named, self.effects), key=lambda effect: (effect.level, place[effect.name])))
+        return self._structure.records
 
-    @cached_property
-    def parameters(self) -> dict[str, Parameter]:
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
         """Every parameter by its name in files and reports."""
-        return {qualified(effect, parameter): parameter for effect in self.records for parameter in effect.parameters}
+        return self._structure.parameters
+
+    @property
+    def only_branches(self) -> bool:
+        """Whether neither modifiers nor layers stand between the branches and the response."""
+        return len(self._structure.branches) == len(self.records)
 
     def with_values(self, values: Mapping[str, float]) -> Model:
         """The same model with some values replaced."""
-        return replace(self, values={**self.values, **values})
+        return Model(self.bushing, self.effects, {**self.values, **values})
 
     @classmethod
     def started(cls, bushing: Bushing, effects: Sequence[str], values: Mapping[str, float]) -> Model:
@@ -125,7 +154,7 @@ class Model:
 
     def equation(self) -> str:
         """The model as text: its first-harmonic stiffness, the rubber inside, layers and modifiers named."""
-        branches = " + ".join(effect.equation for effect in self._of(Branch))
+        branches = " + ".join(effect.equation for effect in self._structure.branches)
         lines = [f"K = G ({branches})"]
         lines += [f"  {effect.name}: {effect.equation}" for effect in self.records if not isinstance(effect, Branch)]
         lines += [f"  {name} = {self.values[name]:.6g} {self.parameters[name].unit}" for name in self.parameters]
@@ -194,12 +223,15 @@ class Model:
         """
         omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
         amplitude = np.asarray(amplitude, dtype=float)
-        omega, amplitude = np.broadcast_arrays(omega, amplitude)
+        if omega.shape != amplitude.shape:
+            omega, amplitude = np.broadcast_arrays(omega, amplitude)
+        points = np.atleast_1d(omega)
         respond = self._stack_stiffness(
             Setting(self.bushing, direction, kind), self.values if values is None else values
         )
-        points = np.atleast_1d(omega)
-        stiffness = respond(points, np.atleast_1d(amplitude)) + np.zeros(points.shape)
+        stiffness = respond(points, np.atleast_1d(amplitude))
+        if stiffness.shape[-points.ndim :] != points.shape:
+            stiffness = stiffness + np.zeros(points.shape)
         return stiffness if omega.ndim else stiffness[..., 0]
 
     def force(
@@ -212,19 +244,21 @@ class Model:
     ) -> Array:
         """Force over a displacement history [N or N m], from rest or on the steady cycle."""
         setting = Setting(self.bushing, direction, kind)
-        respond = self._stack_force(setting, self.values if values is None else values, self._of(Layer))
+        respond = self._stack_force(setting, self.values if values is None else values, self._structure.layers)
         return respond(displacement)
 
-    def _stack_stiffness(self, setting: Setting, values: Values) -> StiffnessBelow:
+    def _stack_stiffness(self, setting: Setting, values: Values) -> Callable[[Array, Array], Array]:
         def rubber(omega: Array, amplitude: Array) -> Array:
             strain = amplitude * self.bushing.unit_strain(setting.direction)
             base = self._adjusted(setting, values, omega, amplitude, strain)
             return self._branch_stiffness(setting, values, omega, strain, base)
 
+        layers = self._structure.layers
+        if not layers:
+            return rubber
         per_sample = {
             name: value if np.ndim(value) == 0 else np.asarray(value)[..., None] for name, value in values.items()
         }
-        layers = self._of(Layer)
 
         def below(count: int) -> StiffnessBelow:
             def cycle(omega: Array, motion: Array) -> Array:
@@ -234,7 +268,7 @@ class Model:
             if count == 0:
                 return StiffnessBelow(rubber, cycle)
             layer, inner = layers[count - 1], below(count - 1)
-            own = self.seen_by(layer, values)
+            own = seen_by(layer, values, values)
             return StiffnessBelow(
                 lambda omega, amplitude: layer.stiffness(own, inner, omega, amplitude, setting), cycle
             )
@@ -249,35 +283,32 @@ class Model:
             strain = displacement.scaled(per_displacement)
             omega = np.atleast_1d(displacement.omega)
             base = self._adjusted(setting, values, omega, displacement.amplitude, strain.amplitude)
-            stresses = (branch.stress(self.seen_by(branch, values, base), strain) for branch in self._of(Branch))
+            stresses = (branch.stress(seen_by(branch, values, base), strain) for branch in self._structure.branches)
             return factor * sum(stresses, start=np.zeros(1))
 
         def wrap(below: ForceBelow, layer: Layer) -> ForceBelow:
-            own = self.seen_by(layer, values)
+            own = seen_by(layer, values, values)
             return lambda displacement: layer.force(own, below, displacement, setting)
 
         return reduce(wrap, layers, cast(ForceBelow, rubber))
 
     def _branch_stiffness(self, setting: Setting, values: Values, omega: Array, strain: Array, base: Values) -> Array:
-        moduli = (branch.modulus(self.seen_by(branch, values, base), omega, strain) for branch in self._of(Branch))
-        return self.bushing.stiffness_per_modulus(setting.direction) * sum(moduli, start=np.zeros(1))
+        moduli = (branch.modulus(seen_by(branch, values, base), omega, strain) for branch in self._structure.branches)
+        return np.atleast_1d(self.bushing.stiffness_per_modulus(setting.direction) * sum(moduli))
 
     def _adjusted(self, setting: Setting, values: Values, omega: Array, amplitude: Array, strain: Array) -> Values:
         """The paper's parameters as the modifiers leave them at an operating condition."""
-        base = _base_values(values)
+        if not self._structure.modifiers:
+            return values
         stiffness = partial(self._branch_stiffness, setting, values, omega, strain)
-        condition = Condition(setting, omega, amplitude, strain, stiffness)
-        for modifier in self._of(Modifier):
-            base = {**base, **modifier.adjust(self.seen_by(modifier, values, base), condition)}
+        condition, base = Condition(setting, omega, amplitude, strain, stiffness), values
+        for modifier in self._structure.modifiers:
+            base = {**base, **modifier.adjust(seen_by(modifier, values, base), condition)}
         return base
 
-    def _of(self, kind: type[E]) -> list[E]:
-        return [effect for effect in self.records if isinstance(effect, kind)]
 
-    @staticmethod
-    def seen_by(effect: Effect, values: Values, base: Values | None = None) -> Values:
-        """What an effect sees: the paper's parameters (as modifiers left them), and its own by their short names."""
-        base = _base_values(values) if base is None else base
-        if effect.name in BASE:
-            return base
-        return {**base, **{parameter.name: values[qualified(effect, parameter)] for parameter in effect.parameters}}
+def seen_by(effect: Effect, values: Values, base: Values) -> Values:
+    """What an effect sees: all values as modifiers left them, and its own by their short names."""
+    if effect.name in BASE:
+        return base
+    return {**base, **{parameter.name: values[qualified(effect, parameter)] for parameter in effect.parameters}}

@@ -17,7 +17,7 @@ from bushfit.effects import Branch, Parameter, qualified
 from bushfit.effects.contract import Array, Value, Values
 from bushfit.effects.history import History
 from bushfit.geometry import Direction
-from bushfit.model import Kind, Model
+from bushfit.model import Kind, Model, seen_by
 
 #: Step of the differences, relative to the value (log parameters) or to the typical size (linear ones).
 _STEP = 1e-6
@@ -31,7 +31,7 @@ def stiffness_jacobian(
     model: Model, direction: Direction, frequency: Array, amplitude: Array, names: Sequence[str], kind: Kind = "sweep"
 ) -> Array:
     """dK/dp of the complex dynamic stiffness, (len(names), n)."""
-    if not _only_branches(model):
+    if not model.only_branches:
         return differences(
             model, names, lambda values: model.stiffness(direction, frequency, amplitude, kind=kind, values=values)
         )
@@ -40,10 +40,10 @@ def stiffness_jacobian(
 
     def slopes(branch: Branch) -> dict[str, Array] | None:
         known = branch.modulus_sensitivities
-        return known(model.values, omega, strain) if known else None
+        return known(seen_by(branch, model.values, model.values), omega, strain) if known else None
 
     def response(branch: Branch, values: Values) -> Array:
-        return branch.modulus(model.seen_by(branch, values), omega, strain)
+        return branch.modulus(seen_by(branch, values, values), omega, strain)
 
     summed = _summed(model, names, slopes, response, frequency.size, complex)
     return model.bushing.stiffness_per_modulus(direction) * summed
@@ -53,41 +53,43 @@ def force_jacobian(
     model: Model, direction: Direction, displacement: History, names: Sequence[str], kind: Kind = "loop"
 ) -> Array:
     """dF/dp along a displacement history, (len(names), n)."""
-    if not _only_branches(model):
+    if not model.only_branches:
         return differences(model, names, lambda values: model.force(direction, displacement, kind=kind, values=values))
     per_displacement = model.bushing.unit_strain(direction)
     strain = displacement.scaled(per_displacement)
 
     def slopes(branch: Branch) -> dict[str, Array] | None:
-        return branch.stress_sensitivities(model.values, strain) if branch.stress_sensitivities else None
+        known = branch.stress_sensitivities
+        return known(seen_by(branch, model.values, model.values), strain) if known else None
 
     def response(branch: Branch, values: Values) -> Array:
-        return branch.stress(model.seen_by(branch, values), strain)
+        return branch.stress(seen_by(branch, values, values), strain)
 
     summed = _summed(model, names, slopes, response, displacement.value.shape[-1], float)
     return model.bushing.stiffness_per_modulus(direction) / (2.0 * per_displacement) * summed
-
-
-def _only_branches(model: Model) -> bool:
-    return all(isinstance(effect, Branch) for effect in model.records)
 
 
 def _summed(
     model: Model, names: Sequence[str], slopes: Slopes, response: Response, size: int, kind: type[float] | type[complex]
 ) -> Array:
     """Slopes of all branches together, (len(names), size)."""
-    total = {name: np.zeros(size, dtype=kind) for name in names}
+    total = np.zeros((len(names), size), dtype=kind)
+    row = {name: i for i, name in enumerate(names)}
     for branch in model.records:
         assert isinstance(branch, Branch)
+        own = {parameter.name: qualified(branch, parameter) for parameter in branch.parameters}
+        moved = [name for name in (*own.values(), *branch.uses) if name in row]
+        if not moved:
+            continue
         known = slopes(branch)
         if known is None:
-            own = [qualified(branch, parameter) for parameter in branch.parameters]
-            moved = [name for name in (*own, *branch.uses) if name in total]
-            rows = differences(model, moved, partial(response, branch)) if moved else ()
-            known = dict(zip(moved, rows, strict=True))
-        for name in known.keys() & total.keys():
-            total[name] = total[name] + known[name]
-    return np.stack([total[name] for name in names])
+            for name, slope in zip(moved, differences(model, moved, partial(response, branch)), strict=True):
+                total[row[name]] += slope
+        else:
+            for short, name in own.items():
+                if name in row:
+                    total[row[name]] += known[short]
+    return total
 
 
 def differences(model: Model, names: Sequence[str], respond: Callable[[Values], Array]) -> Array:

@@ -174,7 +174,7 @@ def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str,
 
 def linear_response(transfer: Callable[[Array], Array], history: History) -> Array:
     """Steady response of a linear system, y_h = H(h omega) x_h for every harmonic h; H(0) must be finite."""
-    return np.fft.irfft(transfer(history.harmonics) * np.fft.rfft(history.value), n=history.value.shape[-1])
+    return np.fft.irfft(transfer(history.harmonics) * history.spectrum, n=history.value.shape[-1])
 
 
 def linear_stress(modulus: Callable[[Array], Array], history: History) -> Array:

@@ -10,25 +10,25 @@ Source: Garcia Tarrago et al. 2007, Eq. 5; M. Berg, Vehicle System Dynamics 30 (
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
-
 import numpy as np
 
 from bushfit.effects.contract import Array, Branch, Level, Parameter, Values
 from bushfit.effects.history import History
 
-#: Below this 2x/(1+y) the logarithm of the quadrature is replaced by its series.
+#: Below this z = 2x/(1 + y) the logarithm of the quadrature is replaced by its series.
 _SERIES_BELOW = 0.05
+#: Less than any x at which the logarithm serves, and more than 0, so that nothing is divided by 0.
+_FAR = 0.01
 _SERIES = np.array([(-1.0) ** k / (k + 3.0) for k in range(12)])
 _SERIES_SLOPE = np.array([(k + 1) * (-1.0) ** (k + 1) / (k + 4.0) for k in range(11)])
 
 
-def harmonic_shape(x: Array) -> tuple[Array, Array]:
-    """First harmonic of the steady friction loop and its derivative, both complex, as functions of x.
+def harmonic_shape(x: Array) -> Array:
+    """First harmonic of the steady friction loop as a function of x, complex.
 
     The friction modulus is (A + iB)/(2 e0) = sigma_fmax/eps_half h(x) with x = e0/eps_half;
-    h(0) = 1/2 and h -> 0 for large x. Returned are h and dh/dx, with the terms that cancel in model
-    form written so that h keeps ten digits from x = 1e-8 to 1e6.
+    h(0) = 1/2 and h -> 0 for large x. The terms that cancel in model form are written so that h keeps
+    ten digits from x = 1e-8 to 1e6.
 
         y = 2x/D, D = s + x + 1, s = sqrt(x^2 + 6x + 1)       friction amplitude over sigma_fmax
         p = 1 + y, q = sqrt(p (p + 2x)), z = 2x/p
@@ -36,61 +36,70 @@ def harmonic_shape(x: Array) -> tuple[Array, Array]:
         Im h = (2 - p^2/x ln(1 + z)) / (pi x)
              = (2 (D - 2)/D - 8x/p T(z)) / pi,  T = 1/3 - z/4 + z^2/5 - ...   (small z)
     """
-    x = np.asarray(x, dtype=float)
+    _, big, p, q, z = _roots(x)
+    shape = np.empty(x.shape, dtype=complex)
+    square = p * p
+    shape.real = square / ((x + p + q) * q)
+    far = np.maximum(x, _FAR)
+    shape.imag = (2.0 - square / far * np.log1p(z)) / (np.pi * far)
+    small = z < _SERIES_BELOW
+    if small.any():
+        x, big, p, z = x[small], big[small], p[small], z[small]
+        series = np.polynomial.polynomial.polyval(z, _SERIES)
+        shape.imag[small] = (2.0 * _less_2(x) / big - 8.0 * x / p * series) / np.pi
+    return shape
+
+
+def harmonic_slope(x: Array, shape: Array) -> Array:
+    """dh/dx of `harmonic_shape`, whose value at x is given."""
+    s, big, p, q, z = _roots(x)
+    slope = np.empty(x.shape, dtype=complex)
+    slope_p = 4.0 / (s * (x + 3.0 + s))
+    slope_q = (slope_p * (p + x) + p) / q
+    slope.real = shape.real * (2.0 * slope_p / p - (1.0 + slope_p + slope_q) / (x + p + q) - slope_q / q)
+    far = np.maximum(x, _FAR)
+    ratio = p * p / far
+    slope_ratio = (2.0 * p * slope_p - ratio) / far
+    slope_z = (2.0 - z * slope_p) / p
+    slope.imag = -((slope_ratio * np.log1p(z) + ratio * slope_z / (1.0 + z)) / np.pi + shape.imag) / far
+    small = z < _SERIES_BELOW
+    if small.any():
+        x, s, big, p, z, slope_p = x[small], s[small], big[small], p[small], z[small], slope_p[small]
+        series = np.polynomial.polynomial.polyval(z, _SERIES)
+        slope_series = np.polynomial.polynomial.polyval(z, _SERIES_SLOPE) * (2.0 - z * slope_p) / p
+        slope_big = (x + 3.0) / s + 1.0
+        bend = (1.0 - x * slope_p / p) * series + x * slope_series
+        slope.imag[small] = (4.0 * slope_big / big**2 - 8.0 / p * bend) / np.pi
+    return slope
+
+
+def _roots(x: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """s, D, p, q and z of `harmonic_shape`."""
+    twice = 2.0 * x
     s = np.sqrt(x * (x + 6.0) + 1.0)
     big = s + x + 1.0
-    big_less_2 = x * (x + 6.0) / (s + 1.0) + x
-    slope_big = (x + 3.0) / s + 1.0
-    p = 1.0 + 2.0 * x / big
-    slope_p = 4.0 / (s * (x + 3.0 + s))
-    q = np.sqrt(p * (p + 2.0 * x))
-    slope_q = (slope_p * (p + x) + p) / q
-    total = x + p + q
-    real = p * p / (total * q)
-    slope_real = real * (2.0 * slope_p / p - (1.0 + slope_p + slope_q) / total - slope_q / q)
+    p = 1.0 + twice / big
+    return s, big, p, np.sqrt(p * (p + twice)), twice / p
 
-    z = 2.0 * x / p
-    slope_z = (2.0 - z * slope_p) / p
-    near = np.minimum(z, _SERIES_BELOW)
-    series = np.polynomial.polynomial.polyval(near, _SERIES)
-    slope_series = np.polynomial.polynomial.polyval(near, _SERIES_SLOPE) * slope_z
-    small = 2.0 * big_less_2 / big - 8.0 * x / p * series
-    slope_small = 4.0 * slope_big / big**2 - 8.0 / p * ((1.0 - x * slope_p / p) * series + x * slope_series)
-    far = np.where(z > _SERIES_BELOW, x, 1.0)
-    ratio, log = p * p / far, np.log1p(2.0 * far / p)
-    large = (2.0 - ratio * log) / far
-    slope_ratio = (2.0 * p * slope_p - ratio) / far
-    slope_large = (-slope_ratio * log - ratio * slope_z / (1.0 + 2.0 * far / p) - large) / far
-    is_small = z <= _SERIES_BELOW
-    imag = np.where(is_small, small, large) / np.pi
-    slope_imag = np.where(is_small, slope_small, slope_large) / np.pi
-    return real + 1j * imag, slope_real + 1j * slope_imag
+
+def _less_2(x: Array) -> Array:
+    """D - 2 of `harmonic_shape`."""
+    return x * (x + 6.0) / (np.sqrt(x * (x + 6.0) + 1.0) + 1.0) + x
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
     """(A + iB)/(2 e0) of the steady loop of strain amplitude e0 [Pa]."""
-    shape, _ = harmonic_shape(strain / p["eps_half"])
-    return p["sigma_fmax"] / p["eps_half"] * shape
+    return p["sigma_fmax"] / p["eps_half"] * harmonic_shape(strain / p["eps_half"])
 
 
 def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, Array]:
     """d/dsigma_fmax = h/eps_half and d/deps_half = -sigma_fmax/eps_half^2 (h + x h')."""
     x = strain / p["eps_half"]
-    shape, slope = harmonic_shape(x)
+    shape = harmonic_shape(x)
     return {
         "sigma_fmax": shape / p["eps_half"],
-        "eps_half": -p["sigma_fmax"] / p["eps_half"] ** 2 * (shape + x * slope),
+        "eps_half": -p["sigma_fmax"] / p["eps_half"] ** 2 * (shape + x * harmonic_slope(x, shape)),
     }
-
-
-def reversals(value: Array) -> Array:
-    """Whether the motion reverses at a sample, (..., n - 1); of level stretches the last sample counts."""
-    step = np.sign(np.diff(value, axis=-1))
-    moving = np.maximum.accumulate(np.where(step != 0.0, np.arange(step.shape[-1]), -1), axis=-1)
-    sense = np.where(moving >= 0, np.take_along_axis(step, np.maximum(moving, 0), axis=-1), 0.0)
-    turned = np.zeros(step.shape, dtype=bool)
-    turned[..., 1:] = sense[..., 1:] * sense[..., :-1] < 0.0
-    return turned
 
 
 def _move(start: Array, sign: float, distance: Array) -> tuple[Array, Array, Array]:
@@ -121,9 +130,14 @@ def _follow(strain: Array, turns: Array, start: Array, slope: Array, eps_half: A
 def _steady_start(levels: Array, eps_half: Array) -> tuple[Array, Array]:
     """u and du/deps_half at the first of the closed sequence of turning points, once it repeats itself.
 
-    Newton on the map of one cycle: its slope is the product of the du/du_s of the pieces.
+    Two turning points have the closed form of `harmonic_shape`, u = y. More take Newton on the map of one cycle,
+    whose slope is the product of the du/du_s of the pieces.
     """
     travel = np.roll(levels, -1, axis=-1) - levels
+    if levels.shape[-1] == 2:
+        x = travel[..., 1:] / (2.0 * eps_half)
+        s = np.sqrt(x * (x + 6.0) + 1.0)
+        return 2.0 * x / (s + x + 1.0), -4.0 * x / (s * (x + 3.0 + s) * eps_half)
     senses, distances = np.sign(travel), np.abs(travel) / eps_half
     u = np.zeros((*distances.shape[:-1], 1))
     forced = np.zeros_like(u)
@@ -159,35 +173,20 @@ def _walk(strain: Array, turns: Array, periodic: bool, eps_half: Array) -> tuple
 def _walk_all(eps_half: Array, history: History) -> tuple[Array, Array]:
     """The walk for one history under many values, or for a stack of histories: those that turn alike at once."""
     eps_half = np.atleast_1d(np.asarray(eps_half, dtype=float))
-    count = history.value.shape[-1]
-    lead = () if history.value.ndim == 1 else np.broadcast_shapes(history.value.shape[:-1], eps_half.shape[:-1])
-    rows = np.broadcast_to(history.value, (*lead, count)).reshape(-1, count)
-    scale = np.broadcast_to(eps_half, (*lead, 1)).reshape(-1, 1) if lead else eps_half
-    if history.periodic:
-        tops = np.argmax(rows, axis=-1, keepdims=True)
-        path = np.take_along_axis(rows, (tops + np.arange(count + 1)) % count, axis=-1)
-        back = (np.arange(count) - tops) % count
-    else:
-        path = np.concatenate([np.zeros((len(rows), 1)), rows], axis=-1)
-        back = np.broadcast_to(np.arange(1, count + 1), rows.shape)
-    turned = reversals(path)
-    if not lead:
-        u, slope = _walk(path[0], np.flatnonzero(turned[0]), history.periodic, scale)
-        return u[..., back[0]], slope[..., back[0]]
-    u, slope = np.empty(path.shape), np.empty(path.shape)
-    for group in _alike(turned):
-        turns = np.flatnonzero(turned[group][0])
-        u[group], slope[group] = _walk(path[group], turns, history.periodic, scale[group])
-    shape = (*lead, count)
-    return np.take_along_axis(u, back, -1).reshape(shape), np.take_along_axis(slope, back, -1).reshape(shape)
-
-
-def _alike(turned: Array) -> list[Any]:
-    """Selections of the rows that are equal."""
-    if np.array_equal(turned, np.broadcast_to(turned[0], turned.shape)):
-        return [slice(None)]
-    _, label = np.unique(np.packbits(turned, axis=-1), axis=0, return_inverse=True)
-    return [label.ravel() == i for i in range(int(label.max()) + 1)]
+    turning, count = history.turning, history.value.shape[-1]
+    if history.value.ndim == 1:
+        u, slope = _walk(turning.path[0], turning.turns[0], history.periodic, eps_half)
+        return u[..., turning.place[0]], slope[..., turning.place[0]]
+    lead = np.broadcast_shapes(history.value.shape[:-1], eps_half.shape[:-1])
+    row = np.broadcast_to(np.arange(turning.label.size).reshape(history.value.shape[:-1]), lead).ravel()
+    scale = np.broadcast_to(eps_half, (*lead, 1)).reshape(-1, 1)
+    u, slope = np.empty((row.size, count)), np.empty((row.size, count))
+    for label, turns in enumerate(turning.turns):
+        group = np.flatnonzero(turning.label[row] == label)
+        chosen = row[group]
+        both = _walk(turning.path[chosen], turns, history.periodic, scale[group])
+        u[group], slope[group] = (np.take_along_axis(one, turning.place[chosen], axis=-1) for one in both)
+    return u.reshape(*lead, count), slope.reshape(*lead, count)
 
 
 def stress(p: Values, history: History) -> Array:

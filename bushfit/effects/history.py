@@ -46,10 +46,31 @@ class History:
         """Half of the range of the values, (..., 1)."""
         return np.ptp(self.value, axis=-1, keepdims=True) / 2.0
 
-    @property
+    @cached_property
     def harmonics(self) -> Array:
         """Angular frequencies of numpy.fft.rfft over the samples [rad/s]."""
         return 2.0 * np.pi * np.fft.rfftfreq(self.value.shape[-1], self.step)
+
+    @cached_property
+    def spectrum(self) -> Array:
+        """numpy.fft.rfft over the samples."""
+        return np.fft.rfft(self.value)
+
+    @cached_property
+    def turning(self) -> Turning:
+        """Where the motion turns."""
+        count = self.value.shape[-1]
+        rows = self.value.reshape(-1, count)
+        if self.periodic:
+            tops = np.argmax(rows, axis=-1, keepdims=True)
+            path = np.take_along_axis(rows, (tops + np.arange(count + 1)) % count, axis=-1)
+            place = (np.arange(count) - tops) % count
+        else:
+            path = np.concatenate([np.zeros((len(rows), 1)), rows], axis=-1)
+            place = np.broadcast_to(np.arange(1, count + 1), rows.shape)
+        turned, label = np.unique(np.packbits(reversals(path), axis=-1), axis=0, return_inverse=True)
+        turns = tuple(np.flatnonzero(np.unpackbits(row, count=count)) for row in turned)
+        return Turning(path, place, label.ravel(), turns)
 
     @cached_property
     def rate(self) -> Array:
@@ -86,4 +107,39 @@ class History:
 
     def scaled(self, factor: float) -> History:
         """All values times a factor, such as strain per displacement."""
-        return self.with_value(self.value * factor)
+        if factor not in self._by_factor:
+            self._by_factor[factor] = self.with_value(self.value * factor)
+        return self._by_factor[factor]
+
+    @cached_property
+    def _by_factor(self) -> dict[float, History]:
+        """A fit asks for the same strain again and again."""
+        return {}
+
+
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """The turning points of a history's rows.
+
+    Args:
+        path: each row from where its memory begins, (rows, n + 1): from the rest before the first sample, or once
+            around the steady cycle from its top.
+        place: where on the path each sample lies, (rows, n).
+        label: which set of turning points a row has, (rows,).
+        turns: the sets, as places on the path.
+    """
+
+    path: Array
+    place: Array
+    label: Array
+    turns: tuple[Array, ...]
+
+
+def reversals(value: Array) -> Array:
+    """Whether the motion reverses at a sample, (..., n - 1); of level stretches the last sample counts."""
+    step = np.sign(np.diff(value, axis=-1))
+    moving = np.maximum.accumulate(np.where(step != 0.0, np.arange(step.shape[-1]), -1), axis=-1)
+    sense = np.where(moving >= 0, np.take_along_axis(step, np.maximum(moving, 0), axis=-1), 0.0)
+    turned = np.zeros(step.shape, dtype=bool)
+    turned[..., 1:] = sense[..., 1:] * sense[..., :-1] < 0.0
+    return turned

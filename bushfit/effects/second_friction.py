@@ -27,4 +27,6 @@ EFFECT = Branch(
     confirmed_by="sweep at a fifth and a tenth of the smallest amplitude: stiffness must level off",
     modulus=friction.modulus,
     stress=friction.stress,
+    modulus_sensitivities=friction.modulus_sensitivities,
+    stress_sensitivities=friction.stress_sensitivities,
 )

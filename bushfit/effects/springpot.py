@@ -16,7 +16,7 @@ _ORDER_STEP = 1e-5
 
 def power_of_rate(alpha: Array, omega: Array) -> Array:
     """(i omega)^alpha = omega^alpha exp(i pi alpha / 2); 0 at omega = 0."""
-    return np.power(omega, alpha) * np.exp(0.5j * np.pi * np.asarray(alpha))
+    return np.power(omega, alpha) * np.exp(0.5j * np.pi * alpha)
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
@@ -27,7 +27,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, Array]:
     """d/dm = (i omega)^alpha / 2 and d/dalpha = m/2 (i omega)^alpha ln(i omega)."""
     by_m = modulus({"m": 1.0, "alpha": p["alpha"]}, omega, strain)
-    safe = np.where(np.asarray(omega) > 0.0, omega, 1.0)
+    safe = np.where(omega > 0.0, omega, 1.0)
     return {"m": by_m, "alpha": p["m"] * by_m * (np.log(safe) + 0.5j * np.pi)}
 
 
@@ -74,10 +74,10 @@ def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
         by_alpha = p["m"] * (ahead - behind) / (2.0 * _ORDER_STEP)
         return {"m": fractional_derivative(alpha, history.value, step), "alpha": by_alpha}
 
-    def by(name: str) -> Array:
-        return linear_stress(lambda omega: modulus_sensitivities(p, omega, history.amplitude)[name], history)
-
-    return {"m": by("m"), "alpha": by("alpha")}
+    names = ("m", "alpha")
+    slopes = modulus_sensitivities(p, history.harmonics, history.amplitude)
+    both = linear_stress(lambda _: np.stack([slopes[name] for name in names]), history)
+    return dict(zip(names, both, strict=True))
 
 
 EFFECT = Branch(

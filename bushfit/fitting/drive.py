@@ -13,8 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.effects.friction import reversals
-from bushfit.effects.history import History
+from bushfit.effects.history import History, reversals
 from bushfit.errors import FitError
 from bushfit.fitting.noise import FLOOR
 from bushfit.measurement import Loop

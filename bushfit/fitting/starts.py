@@ -31,7 +31,7 @@ def start_values(bushing: Bushing, terms: Sequence[Term], known: Mapping[str, fl
     slowest = frequency <= 1.5 * frequency.min()
     largest = int(np.argmax(np.where(slowest, strain, 0.0)))
     eps_half = known.get("eps_half", float(strain.max()) / _SCALED_STRAIN)
-    shape, _ = harmonic_shape(strain / eps_half)
+    shape = harmonic_shape(strain / eps_half)
     loss = max(modulus[largest].imag, 1e-3 * abs(modulus[largest]))
     sigma_fmax = known.get("sigma_fmax", loss * eps_half / shape[largest].imag)
     friction = sigma_fmax / eps_half * shape
