@@ -10,6 +10,7 @@ Source: Garcia Tarrago et al. 2007, Eq. 5; M. Berg, Vehicle System Dynamics 30 (
 from __future__ import annotations
 
 from itertools import pairwise
+
 import numpy as np
 
 from bushfit.effects.contract import Array, Branch, Level, Parameter, Values

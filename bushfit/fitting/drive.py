@@ -90,17 +90,22 @@ class Drive:
 
     def history(self, settles: bool) -> History:
         """The motion as the model wants it: one settled cycle, or the whole record where it must be."""
+        return self._settling if settles and not self.from_rest else self._motion
+
+    @cached_property
+    def _motion(self) -> History:
+        spectrum = np.zeros(GRID // 2 + 1, dtype=complex)
+        spectrum[1 : self.coefficients.size] = 0.5 * GRID * self.coefficients[1:]
+        cycle = np.fft.irfft(spectrum)
         if not self.from_rest:
-            cycle = self._cycle
-            count = int(np.ceil(self.cycles - 1e-6)) if settles else 1
-            return History.steady(np.tile(cycle, count), self.frequency, cycles=count)
-        phase = np.arange(int(np.ceil(self.cycles * GRID)) + 2) / GRID
-        motion = self.displacement(phase) - self.displacement(np.zeros(1))
+            return History.steady(cycle, self.frequency)
+        motion = np.resize(cycle - cycle[0], int(np.ceil(self.cycles * GRID)) + 2)
         return History(motion, 1.0 / (self.frequency * GRID), periodic=False, frequency=self.frequency)
 
     @cached_property
-    def _cycle(self) -> Array:
-        return self.displacement(np.arange(GRID) / GRID) - self.coefficients[0].real
+    def _settling(self) -> History:
+        count = int(np.ceil(self.cycles - 1e-6))
+        return History.steady(np.tile(self._motion.value, count), self.frequency, cycles=count)
 
     def from_datum(self, response: Array) -> Array:
         """A response over `history`, less its mean where the loop counts from its own middle."""
@@ -108,13 +113,19 @@ class Drive:
 
     def at_rows(self, response: Array) -> Array:
         """A response over `history`, linearly interpolated at the rows: (..., n)."""
-        position = self.phase * GRID
-        if not self.from_rest:
-            response = np.concatenate((response, response[..., :1]), axis=-1)
-            position = position % (response.shape[-1] - 1)
-        index = np.minimum(position.astype(np.intp), response.shape[-1] - 2)
-        part = position - index
-        return response[..., index] * (1.0 - part) + response[..., index + 1] * part
+        length = response.shape[-1]
+        if length not in self._places:
+            position = self.phase * GRID
+            index = position.astype(np.intp)
+            ahead = np.minimum(index + 1, length - 1) if self.from_rest else (index + 1) % length
+            self._places[length] = index % length, ahead, position - index
+        index, ahead, part = self._places[length]
+        return response.take(index, axis=-1) * (1.0 - part) + response.take(ahead, axis=-1) * part
+
+    @cached_property
+    def _places(self) -> dict[int, tuple[Array, Array, Array]]:
+        """By length of the response: the samples before and after each row, and the part of the way between."""
+        return {}
 
 
 def series(coefficients: Array, phase: Array) -> Array:
