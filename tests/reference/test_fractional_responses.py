@@ -1,0 +1,146 @@
+"""The springpot in the time domain against closed results, on both roads: from rest, as the rig steps it, and on the
+steady cycle, as fits follow a loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import mpmath
+import numpy as np
+import pytest
+from agreement import Agree, digits
+
+from bushfit import rig
+from bushfit.effects import History
+from bushfit.effects.contract import Array
+from bushfit.effects.springpot import stress
+from bushfit.geometry import Bushing, Direction
+from bushfit.model import Model
+
+ALPHAS = (0.1, 0.24, 0.5, 0.9)
+STEPS = 2048
+MU = 1.0e6
+RATIO = 4.0  # m over 2 mu [s^alpha]: a record of 1 s sees a good part of the relaxation
+
+Response = Callable[[float, Array], tuple[Array, Array]]
+
+
+@cache
+def coefficients(alpha: float, beta: float) -> Array:
+    """1/Gamma(alpha k + beta) until they vanish."""
+    last = int(25.0 / alpha)
+    return np.array([float(mpmath.rgamma(mpmath.mpf(alpha) * k + beta)) for k in range(last)])
+
+
+def mittag_leffler(alpha: float, beta: float, z: Array) -> Array:
+    """E_{alpha,beta}(z) = sum z^k/Gamma(alpha k + beta), for |z| <= 1, where no digits cancel."""
+    assert np.max(np.abs(z)) <= 1.0
+    return np.polynomial.polynomial.polyval(z, coefficients(alpha, beta))
+
+
+def from_rest(value: Array) -> History:
+    return History(value, 1.0 / (value.size - 1), periodic=False, frequency=1.0)
+
+
+def springpot_step(alpha: float, time: Array) -> tuple[Array, Array]:
+    """Relaxation t^-alpha/Gamma(1 - alpha)."""
+    found = stress({"m": 1.0, "alpha": alpha}, from_rest(np.ones(time.size)))
+    return found[1:], time[1:] ** -alpha / float(mpmath.gamma(1.0 - alpha))
+
+
+def springpot_ramp(alpha: float, time: Array) -> tuple[Array, Array]:
+    """t^(1 - alpha)/Gamma(2 - alpha)."""
+    found = stress({"m": 1.0, "alpha": alpha}, from_rest(time))
+    return found[1:], time[1:] ** (1.0 - alpha) / float(mpmath.gamma(2.0 - alpha))
+
+
+def bushing_model(bushing: Bushing, alpha: float, compliance: float) -> tuple[Model, float, float]:
+    """Elasticity and springpot in parallel, a spring in series; with K mu and K m/2 of the axial direction."""
+    values = {"mu": MU, "m": 2.0 * MU * RATIO, "alpha": alpha, "rig_compliance.compliance": compliance}
+    stiffness = bushing.stiffness_per_modulus(Direction.AXIAL) * MU
+    return Model(bushing, ("elastic", "springpot", "rig_compliance"), values), stiffness, stiffness * RATIO
+
+
+def creep(bushing: Bushing) -> Response:
+    """Moved as a constant force moves a fractional Kelvin-Voigt body, F/k (1 - E_alpha(-k/c t^alpha)), the force
+    has to be constant."""
+
+    def response(alpha: float, time: Array) -> tuple[Array, Array]:
+        model, spring, pot = bushing_model(bushing, alpha, 0.0)
+        moved = 100.0 / spring * (1.0 - mittag_leffler(alpha, 1.0, -spring / pot * time**alpha))
+        return model.force(Direction.AXIAL, from_rest(moved))[1:], np.full(time.size - 1, 100.0)
+
+    return response
+
+
+def zener(bushing: Bushing, *, ramp: bool) -> Response:
+    """A series spring s makes it a fractional Zener body: x s (1 - s/(s + k) (1 - E_{alpha,1}(-(s + k)/c t^alpha))),
+    and under a ramp its integral, with t E_{alpha,2} for E_{alpha,1}."""
+
+    def response(alpha: float, time: Array) -> tuple[Array, Array]:
+        _, spring, pot = bushing_model(bushing, alpha, 0.0)
+        series = 2.0 * spring
+        model, _, _ = bushing_model(bushing, alpha, 1.0 / series)
+        moved = 1e-4 * (time if ramp else np.sign(time))
+        left = mittag_leffler(alpha, 2.0 if ramp else 1.0, -(series + spring) / pot * time**alpha)
+        exact = moved * series * (1.0 - series / (series + spring) * (1.0 - left))
+        return model.force(Direction.AXIAL, from_rest(moved))[1:], exact[1:]
+
+    return response
+
+
+RESPONSES = {
+    "springpot, step": lambda _: springpot_step,
+    "springpot, ramp": lambda _: springpot_ramp,
+    "elastic + springpot, creep": creep,
+    "elastic + springpot + series spring, step": lambda bushing: zener(bushing, ramp=False),
+    "elastic + springpot + series spring, ramp": lambda bushing: zener(bushing, ramp=True),
+}
+
+
+@pytest.mark.parametrize("name", RESPONSES)
+def test_from_rest(name: str, bushing: Bushing, agree: Agree) -> None:
+    """The sum of Eq. 3 is first order in the step, so twice as many steps tell its limit."""
+    response = RESPONSES[name](bushing)
+    plain, limit = [], []
+    for alpha in ALPHAS:
+        coarse, exact = (part[STEPS // 8 - 1 :] for part in response(alpha, np.linspace(0.0, 1.0, STEPS + 1)))
+        fine = response(alpha, np.linspace(0.0, 1.0, 2 * STEPS + 1))[0][1::2][STEPS // 8 - 1 :]
+        plain.append(digits(coarse, exact))
+        limit.append(digits(2.0 * fine - coarse, exact))
+    agree(name, plain)
+    agree(f"{name}, extrapolated", limit)
+
+
+def triangle(alpha: float, phase: float) -> float:
+    """D^alpha of a unit triangle of 1 rad/s, 8/pi^2 sum of sin(k t)/k^2 over odd k with alternating sign: a
+    polylogarithm of order 2 - alpha."""
+    turn = mpmath.expj(phase + mpmath.pi / 2)
+    odd = mpmath.polylog(2 - alpha, turn) - mpmath.mpf(2) ** (alpha - 2) * mpmath.polylog(2 - alpha, turn**2)
+    return float(8 / mpmath.pi**2 * mpmath.im(odd / 1j * mpmath.expj(alpha * mpmath.pi / 2)))
+
+
+def test_on_the_steady_cycle(agree: Agree) -> None:
+    cycles = np.arange(STEPS) / STEPS
+    at = [STEPS // 16 * k for k in (1, 2, 3, 5, 6, 7)]
+    sine, bent = [], []
+    for alpha in ALPHAS:
+        p = {"m": 1.0, "alpha": alpha}
+        exact = np.sin(2.0 * np.pi * cycles + alpha * np.pi / 2.0)
+        found = stress(p, History.steady(rig.wave("sine", cycles), 0.5 / np.pi))
+        sine.append(float(-np.log10(np.max(np.abs(found - exact)))))
+        found = stress(p, History.steady(rig.wave("triangle", cycles), 0.5 / np.pi))
+        bent.append(digits(found[at], [triangle(alpha, 2.0 * np.pi * cycles[i]) for i in at]))
+    agree("springpot, steady sine", sine)
+    agree("springpot, steady triangle", bent)
+
+
+def test_as_the_rig_measures_it(bushing: Bushing, agree: Agree) -> None:
+    """Ten cycles from rest, then the lock-in over one."""
+    found = []
+    for alpha in ALPHAS:
+        model = Model(bushing, ("springpot",), {"m": 1.0e5, "alpha": alpha})
+        exact = 0.5e5 * bushing.stiffness_per_modulus(Direction.AXIAL) * (10.0j * np.pi) ** alpha
+        found.append(digits(rig.dynamic_stiffness(model, Direction.AXIAL, np.array([5.0]), np.array([1e-4])), exact))
+    agree("springpot, stiffness on the rig", found)
