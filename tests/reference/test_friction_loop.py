@@ -10,7 +10,7 @@ from bushfit.effects import History
 from bushfit.effects.friction import stress
 
 VALUES = {"sigma_fmax": 1.46e4, "eps_half": 1.3e-2}
-SCALED = (0.1, 0.5, 3.8, 50.0, 1000.0)  # e0/eps_half
+SCALED = (1e-3, 0.1, 0.5, 3.8, 50.0, 1000.0)  # e0/eps_half
 
 
 def branches(strain: list[float]) -> list[mpmath.mpf]:
