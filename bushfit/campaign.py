@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from bushfit.schema import (
     SimulateSettings,
     SweepFile,
 )
+from bushfit.table import FileFormat
 from bushfit.toml import read_toml
 
 
@@ -97,5 +98,6 @@ def _keywords(campaign: Path, tests: Sequence[LoopFile | SweepFile]) -> Iterator
             raise CampaignError("a file is listed twice", file=campaign, found=test.file, expected="each file once")
         seen.add(place)
         stated = {key: value for key, value in vars(test).items() if value is not None}
+        written = FileFormat(**{entry.name: stated.pop(entry.name, None) for entry in fields(FileFormat)})
         name = stem if stems.count(stem) == 1 else test.file
-        yield {**stated, "file": file, "name": name, "listed_as": Path(test.file)}
+        yield {**stated, "file": file, "name": name, "listed_as": Path(test.file), "written": written}

@@ -7,16 +7,19 @@ from pathlib import Path
 
 from bushfit.errors import BushfitError
 
+#: A loop of 10 million rows has a tenth of this.
+_LARGEST_BYTES = 4 << 30
 
-def read_utf8(file: Path, kind: type[BushfitError]) -> bytes:
-    """The bytes of a text file in UTF-8, read once; a byte order mark is left in place.
+
+def read_bytes(file: Path, kind: type[BushfitError]) -> bytes:
+    """The bytes of a file, read once.
 
     Args:
         file: the file.
         kind: class of the error to raise.
 
     Raises:
-        kind: the file is missing, no regular file, not readable, empty, or not UTF-8 text.
+        kind: the file is missing, no regular file, not readable, empty, or too large.
     """
     try:
         if not file.exists():
@@ -24,11 +27,24 @@ def read_utf8(file: Path, kind: type[BushfitError]) -> bytes:
         if not file.is_file():
             found = "a folder" if file.is_dir() else "a device"
             raise kind("this is not a file", file=file, found=found, expected="a file")
+        if (size := file.stat().st_size) > _LARGEST_BYTES:
+            limit = f"at most {_LARGEST_BYTES >> 30} GiB"
+            raise kind("the file is too large", file=file, found=f"{size} bytes", expected=limit, hint="thin it out")
         data = file.read_bytes()
     except OSError as error:
         raise kind("the file cannot be read", file=file, found=error.strerror or str(error)) from error
     if not data or data.isspace():
         raise kind("the file is empty", file=file, expected="text", hint="export it again")
+    return data
+
+
+def read_utf8(file: Path, kind: type[BushfitError]) -> bytes:
+    """The bytes of a text file in UTF-8, a byte order mark left in place.
+
+    Raises:
+        kind: as `read_bytes`, or the file is not UTF-8 text.
+    """
+    data = read_bytes(file, kind)
     _check_utf8(data, file, kind)
     return data
 

@@ -1,4 +1,4 @@
-"""CSV files of a test rig -> Loop and Sweep in SI, with one clear error for what cannot be read or cannot be."""
+"""Files of a test rig -> Loop and Sweep in SI, with one clear error for what cannot be read or cannot be."""
 
 from __future__ import annotations
 
@@ -10,38 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.geometry import Direction
+from bushfit.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
 from bushfit.measurement import Floats, Loop, Source, Sweep, Waveform, rebuild_time
-from bushfit.table import Column, Table
+from bushfit.table import Column, FileFormat, Table
 
-AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak"]
-
-#: For each column of a loop, the headers it goes by.
-LOOP_COLUMNS = {
-    "time": ("time", "t"),
-    "displacement": (
-        "displacement",
-        "disp",
-        "deflection",
-        "stroke",
-        "travel",
-        "position",
-        "rotation",
-        "angle",
-        "twist",
-    ),
-    "force": ("force", "load", "torque", "moment"),
-}
-#: For each column of a sweep, the headers it goes by.
-SWEEP_COLUMNS = {
-    "frequency": ("frequency", "freq"),
-    "amplitude": ("amplitude", "ampl", "amp", "displacement amplitude", "rotation amplitude", "angle amplitude"),
-    "stiffness": ("stiffness", "dynamic stiffness", "stiffness magnitude", "kdyn", "|k|"),
-    "loss_factor": ("loss factor", "tan delta", "tandelta", "eta"),
-    "phase": ("phase", "phase angle", "loss angle", "delta"),
-    "storage_stiffness": ("storage stiffness", "k'"),
-    "loss_stiffness": ("loss stiffness", "k''"),
-    "repeat": ("repeat", "repetition"),
-}
 #: The pairs of columns that a complex stiffness can be read from, in order of preference.
 STIFFNESS_PAIRS = (("stiffness", "loss_factor"), ("stiffness", "phase"), ("storage_stiffness", "loss_stiffness"))
 _FEWEST_LOOP_ROWS = 10
@@ -59,6 +31,7 @@ def read_loop(
     listed_as: Path | None = None,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
+    written: FileFormat | None = None,
     force_sign: Literal[1, -1] = 1,
     rate: float | None = None,
     frequency: float | None = None,
@@ -74,6 +47,7 @@ def read_loop(
         listed_as: the file as the campaign names it, for provenance; default its name.
         columns: header of a role (a key of LOOP_COLUMNS), where it is not the usual one.
         units: unit of a role, where the file does not carry it.
+        written: how the file is written, where it does not tell.
         force_sign: -1 turns the recorded force around.
         rate: speed of the displacement [m/s or rad/s], for a file without time.
         frequency: cycles per time [Hz], for a file without time; goes with `waveform`.
@@ -83,7 +57,7 @@ def read_loop(
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
     """
-    table = Table.open(file, LOOP_COLUMNS, columns, units)
+    table = Table.open(file, LOOP_COLUMNS, columns, units, written)
     _check_not_swapped(table, direction)
     wanted = {
         "displacement": table.column("displacement", direction.displacement_unit),
@@ -127,7 +101,8 @@ def read_sweep(
     listed_as: Path | None = None,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
-    amplitude: AmplitudeConvention = "zero-to-peak",
+    written: FileFormat | None = None,
+    amplitude: AmplitudeConvention | None = None,
     noise: float | None = None,
 ) -> Sweep:
     """Read a stepped-sine sweep.
@@ -140,18 +115,20 @@ def read_sweep(
         listed_as: the file as the campaign names it, for provenance; default its name.
         columns: header of a role (a key of SWEEP_COLUMNS), where it is not the usual one.
         units: unit of a role, where the file does not carry it.
-        amplitude: how the file counts amplitudes; the sweep has them zero-to-peak.
+        written: how the file is written, where it does not tell.
+        amplitude: how the file counts amplitudes, where its header does not say so: zero-to-peak unless stated.
+            The sweep has them zero-to-peak.
         noise: passed on.
 
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
     """
-    table = Table.open(file, SWEEP_COLUMNS, columns, units)
+    table = Table.open(file, SWEEP_COLUMNS, columns, units, written)
     pair = next((pair for pair in STIFFNESS_PAIRS if set(pair) <= set(table.roles)), None)
     if pair is None:
         raise table.error(
             "no pair of columns gives a complex stiffness",
-            line=table.header_line,
+            line=table.layout.header_line,
             found=", ".join(table.headers),
             expected=", or ".join(" and ".join(pair) for pair in STIFFNESS_PAIRS).replace("_", " "),
             hint='correct the header, or name the columns in the campaign: columns = { stiffness = "..." }',
@@ -162,6 +139,7 @@ def read_sweep(
         role: table.column(role, expected.get(role, "1" if role == "repeat" else direction.stiffness_unit))
         for role in roles
     }
+    convention = _convention(table, wanted["amplitude"], amplitude)
     values = table.read(wanted, fewest_rows=_FEWEST_SWEEP_ROWS)
 
     for role in {"frequency", "amplitude", "stiffness", "storage_stiffness"} & set(values):
@@ -177,7 +155,7 @@ def read_sweep(
         f"a loss factor (loss over storage stiffness) from {low:g} to {high:g}",
         "check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]",
     )
-    zero_to_peak = values["amplitude"] * (0.5 if amplitude == "peak-to-peak" else 1.0)
+    zero_to_peak = values["amplitude"] * (0.5 if convention == "peak-to-peak" else 1.0)
     repeat = _repeats(table, wanted, values)
     source = Source(listed_as or Path(file.name), table.sha256)
     return Sweep(name or file.stem, direction, values["frequency"], zero_to_peak, stiffness, repeat, noise, source)
@@ -189,12 +167,26 @@ def _check_not_swapped(table: Table, direction: Direction) -> None:
         displacement, force = (table.roles[role].header for role in ("displacement", "force"))
         raise table.error(
             "displacement and force are swapped",
-            line=table.header_line,
+            line=table.layout.header_line,
             found=f'"{displacement}" and "{force}"',
             expected="a displacement in units of displacement, and a force in units of force",
             hint="correct the header, or name the columns in the campaign: columns = "
             f'{{ displacement = "{force}", force = "{displacement}" }}',
         )
+
+
+def _convention(table: Table, column: Column, stated: AmplitudeConvention | None) -> AmplitudeConvention:
+    """How amplitudes are counted, by their header or else by the campaign; zero-to-peak where neither says so."""
+    if column.convention and stated and column.convention != stated:
+        raise table.error(
+            "header and campaign count amplitudes differently",
+            line=table.layout.header_line,
+            column=column,
+            found=f'{column.convention} in the header, amplitude = "{stated}" in the campaign',
+            expected="one convention",
+            hint="correct one of them; what the header says needs no key in the campaign",
+        )
+    return column.convention or stated or "zero-to-peak"
 
 
 def _complex_stiffness(pair: tuple[str, str], first: Floats, second: Floats) -> tuple[NDArray[np.complex128], Floats]:

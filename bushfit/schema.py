@@ -14,8 +14,9 @@ from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo
 
 from bushfit.errors import BushfitError, CampaignError
 from bushfit.geometry import Direction
+from bushfit.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
 from bushfit.measurement import Waveform
-from bushfit.reading import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
+from bushfit.table import FileFormat
 from bushfit.units import quantity
 
 Residuals = Literal["complex", "magnitude_loss_factor"]
@@ -184,7 +185,7 @@ class BushingTable:
 
 
 @dataclass(frozen=True)
-class LoopFile:
+class LoopFile(FileFormat):
     """[[loops]]: a file and what it does not say itself. See reading.read_loop."""
 
     file: Text
@@ -209,14 +210,14 @@ class LoopFile:
 
 
 @dataclass(frozen=True)
-class SweepFile:
+class SweepFile(FileFormat):
     """[[sweeps]]: a file and what it does not say itself. See reading.read_sweep."""
 
     file: Text
     direction: Direction
     columns: Annotated[Mapping[str, Text], _roles(SWEEP_COLUMNS)] = field(default_factory=dict)
     units: Annotated[Mapping[str, Text], _roles(SWEEP_COLUMNS)] = field(default_factory=dict)
-    amplitude: AmplitudeConvention = "zero-to-peak"
+    amplitude: AmplitudeConvention | None = None
     noise: Share | None = None
 
 

@@ -1,56 +1,92 @@
-"""A CSV table with named columns and units: its header understood, its numbers in SI, its errors with their line."""
+"""A table with named columns and units: its layout understood, its numbers in SI, its errors with their line."""
 
 from __future__ import annotations
 
 import csv
 import hashlib
-import io
-import re
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from itertools import islice
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bushfit import units
 from bushfit.errors import MeasurementError, UnitError
-from bushfit.files import read_utf8
+from bushfit.files import read_bytes
+from bushfit.headers import AmplitudeConvention, Vocabulary, split_convention
+from bushfit.layout import DELIMITERS, Layout, find_layout, fits
 from bushfit.measurement import Floats
+from bushfit.numerals import ALL, Numerals, is_like_number, weigh
+from bushfit.source import Source, Text, rows
 
-_DELIMITERS = (";", "\t", ",")
 _LONGEST_FOUND = 200
-_LONGEST_HEADER = 100_000
 #: In SI; far beyond every rig, and its square is still a number.
 _LARGEST = 1e100
+#: Rows that are taken apart at a time, where a library cannot.
+_CHUNK = 1 << 16
+#: Bytes from which on a checksum is worth a thread.
+_LARGE = 1 << 22
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileFormat:
+    """What a user states of a file's format; None where the file itself settles it.
+
+    Args:
+        encoding: by Python's name, such as "cp1252".
+        delimiter: what parts columns.
+        decimal: decimal mark.
+        thousands: what parts thousands; "none" where nothing does.
+        header_line: line of the header, from 1; in a workbook the row.
+        sheet: sheet of a workbook.
+    """
+
+    encoding: str | None = None
+    delimiter: Literal["comma", "semicolon", "tab", "pipe", "blanks"] | None = None
+    decimal: Literal[".", ","] | None = None
+    thousands: Literal[".", ",", " ", "'", "none"] | None = None
+    header_line: int | None = None
+    sheet: str | None = None
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the file: the role it plays, its header, its place, its unit as stated, and that unit in SI."""
+    """A column of the file: the role it plays, its header, its place, its unit as stated, that unit in SI, and how
+    its header says that it counts amplitudes."""
 
     role: str
     header: str
     index: int
     unit: str | None
     scale: float = 1.0
+    convention: AmplitudeConvention | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Table:
-    """An opened table. `headers` are its header cells in order, `roles` the columns that were recognised."""
+    """An opened table.
+
+    Args:
+        file: where it comes from.
+        source: the file's rows.
+        layout: header, units row and delimiter.
+        numerals: how numbers are written.
+        roles: the columns that were recognised.
+        checksum: SHA-256 of the file, perhaps still under way.
+    """
 
     file: Path
-    data: bytes
-    delimiter: str
-    headers: tuple[str, ...]
-    header_line: int
-    lines_before_data: int
+    source: Source
+    layout: Layout
+    numerals: Numerals
     roles: Mapping[str, Column]
+    checksum: Future[str]
 
     @classmethod
     def open(
@@ -59,41 +95,46 @@ class Table:
         names: Mapping[str, Sequence[str]],
         columns: Mapping[str, str] | None = None,
         stated_units: Mapping[str, str] | None = None,
+        stated: FileFormat | None = None,
     ) -> Table:
-        """Read a file and understand its header.
+        """Read a file and understand its header and the way it writes numbers.
 
         Args:
-            file: comma, semicolon or tab CSV in UTF-8; blank lines and lines with # may lead it; a row of units may
-                follow the header.
-            names: for each role the headers it goes by; case, spaces, "-" and "_" do not count.
+            file: a text in any dialect. Lines of other content may lead it; a row of units may follow the header.
+            names: for each role the headers it goes by.
             columns: header of a role that goes by another name.
             stated_units: units that the file does not carry.
+            stated: what the file does not tell of its format.
 
         Raises:
-            MeasurementError: no such file, no text, no header, or a header that does not settle which column is which.
+            MeasurementError: no such file, no text, no header, a header that does not settle which column is which,
+                or numbers that can be read in two ways.
             UnitError: two different units for one column.
         """
-        data = read_utf8(file, MeasurementError)
-        lines = enumerate(_text(data), start=1)
-        filled = ((number, line) for number, line in lines if line.strip(" \t\r\n,;") and not line.startswith("#"))
-        header_line, header = next(filled, (1, ""))
-        delimiter = max(_DELIMITERS, key=lambda mark: len(_cells(header, mark)))
-        headers = tuple(cell.strip() for cell in _cells(header, delimiter))
-        table = cls(file, data, delimiter, headers, header_line, header_line, {})
+        stated = stated or FileFormat()
+        data = read_bytes(file, MeasurementError)
+        checksum = _checksum(data)
+        source: Source = Text.open(data, file, stated.encoding)
+        vocabulary = Vocabulary(names, columns or {})
+        delimiter = "" if source.sheet else DELIMITERS[stated.delimiter] if stated.delimiter else None
+        try:
+            layout = find_layout(source.head(), vocabulary, delimiter=delimiter, header_line=stated.header_line)
+        except csv.Error as error:
+            raise MeasurementError("the table cannot be read", file=file, found=str(error)) from error
+        table = cls(file, source, layout, Numerals(), {}, checksum)
         table._check_header()
+        table = replace(table, roles=table._recognise(vocabulary, columns or {}, stated_units or {}))
+        return replace(table, numerals=table._numerals(stated))
 
-        next_line, row = next(filled, (header_line, ""))
-        second = [cell.strip() for cell in _cells(row, delimiter)]
-        # a ratio may have the unit "1"
-        if len(second) == len(headers) and not any(units.is_number(cell) and cell != "1" for cell in second):
-            table, units_row = replace(table, lines_before_data=next_line), second
-        else:
-            units_row = [""] * len(headers)
-        return replace(table, roles=table._recognise(names, columns or {}, stated_units or {}, units_row))
+    @property
+    def headers(self) -> tuple[str, ...]:
+        """The header's cells."""
+        return self.layout.headers
 
     @property
     def sha256(self) -> str:
-        return hashlib.sha256(self.data).hexdigest()
+        """Checksum of the file."""
+        return self.checksum.result()
 
     def column(self, role: str, expected: str) -> Column:
         """The column of a role, with its unit resolved against the SI unit `expected`; a ratio needs no unit.
@@ -110,7 +151,7 @@ class Table:
             raise UnitError(
                 f"the {_label(role)} has no unit",
                 file=self.file,
-                place=self._place(self.header_line, column),
+                place=self._place(self.layout.header_line, column),
                 found=f'"{column.header}"',
                 expected=units.describe(expected),
                 hint=f'write "{column.header} [{example}]" in the header, '
@@ -119,7 +160,7 @@ class Table:
         try:
             return replace(column, scale=units.factor(column.unit or "1", expected))
         except UnitError as error:
-            error.file, error.place = self.file, self._place(self.header_line, column)
+            error.file, error.place = self.file, self._place(self.layout.header_line, column)
             raise
 
     def read(self, wanted: Mapping[str, Column], *, fewest_rows: int) -> dict[str, Floats]:
@@ -128,32 +169,12 @@ class Table:
         Raises:
             MeasurementError: a row of another length, a cell that is no finite number, or too few rows.
         """
-        import pandas as pd
-
-        numeric = {column.index for column in wanted.values()}
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error", pd.errors.ParserWarning)
-                frame = pd.read_csv(
-                    io.BytesIO(self.data),
-                    sep=self.delimiter,
-                    header=None,
-                    names=list(range(len(self.headers))),
-                    index_col=False,
-                    skiprows=self.lines_before_data,
-                    dtype={index: np.float64 if index in numeric else str for index in range(len(self.headers))},
-                    na_filter=False,
-                )
-        except pd.errors.EmptyDataError:
-            frame = pd.DataFrame({index: np.empty(0) for index in numeric})
-        except (ValueError, pd.errors.ParserWarning) as error:
-            raise self._unreadable(wanted, str(error)) from error
-        if len(frame) < fewest_rows:
-            raise self.error("too few rows", found=f"{len(frame)}", expected=f"at least {fewest_rows}")
-        with np.errstate(over="ignore"):
-            values = {role: frame[column.index].to_numpy() * column.scale for role, column in wanted.items()}
-        if not all(series.min() >= -_LARGEST and series.max() <= _LARGEST for series in values.values()):
-            raise self._unreadable(wanted, "a number that is not finite")
+        values = self._tidy(wanted)
+        if values is None:
+            values = self._row_by_row(wanted)
+        found = len(next(iter(values.values())))
+        if found < fewest_rows:
+            raise self.error("too few rows", found=f"{found}", expected=f"at least {fewest_rows}")
         return values
 
     def refuse(
@@ -166,7 +187,7 @@ class Table:
         """
         if bad.any():
             line, cells = next(islice(self._rows(), int(np.argmax(bad)), None))
-            found = f'"{cells[column.index].strip()}"'
+            found = f'"{cells[column.index]}"'
             raise self.error(problem, line=line, column=column, found=found, expected=expected, hint=hint)
 
     def agrees(self, role: str, expected: str) -> bool:
@@ -178,7 +199,7 @@ class Table:
         """The error for a role without a column, whose SI unit would be `expected`."""
         return self.error(
             f"there is no column for the {_label(role)}",
-            line=self.header_line,
+            line=self.layout.header_line,
             found=", ".join(self.headers),
             expected=f'a header such as "{_label(role)} [{units.example(expected)}]"',
             hint=f'name the column in the campaign: columns = {{ {role} = "..." }}' + (f", {hint}" if hint else ""),
@@ -200,126 +221,210 @@ class Table:
         return MeasurementError(problem, file=self.file, place=place, found=found, expected=expected, hint=hint)
 
     def _place(self, line: int | None, column: Column | None) -> str | None:
-        parts = [f"line {line}" if line else None, f'column "{column.header}"' if column else None]
+        sheet = self.source.sheet
+        row = "row" if sheet else "line"
+        parts = [
+            f'sheet "{sheet}"' if sheet else None,
+            f"{row} {line}" if line else None,
+            f'column "{column.header}"' if column else None,
+        ]
         return ", ".join(part for part in parts if part) or None
 
     def _check_header(self) -> None:
         if len(self.headers) < 2:
             raise self.error(
                 "there is only one column",
-                line=self.header_line,
+                line=self.layout.header_line,
                 found=self.headers[0] if self.headers else "nothing",
-                expected=f"{_EXPECTED_HEADER}, separated by comma, semicolon or tab",
+                expected=f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks",
             )
-        if all(units.is_number(cell) for cell in self.headers):
+        if all(is_like_number(cell) for cell in self.headers):
             raise self.error(
-                "there is no header", line=self.header_line, found=", ".join(self.headers), expected=_EXPECTED_HEADER
+                "there is no header",
+                line=self.layout.header_line,
+                found=", ".join(self.headers),
+                expected=_EXPECTED_HEADER,
             )
 
     def _recognise(
-        self,
-        names: Mapping[str, Sequence[str]],
-        columns: Mapping[str, str],
-        stated_units: Mapping[str, str],
-        units_row: Sequence[str],
+        self, vocabulary: Vocabulary, columns: Mapping[str, str], stated_units: Mapping[str, str]
     ) -> dict[str, Column]:
-        roles = {}
-        for role, usual in names.items():
-            known = {_plain(name) for name in ([columns[role]] if role in columns else usual)}
-            hits = [(index, *match) for index, header in enumerate(self.headers) if (match := _match(header, known))]
-            if len(hits) > 1:
+        roles: dict[str, Column] = {}
+        for index, (header, unit_cell) in enumerate(zip(self.headers, self.layout.units, strict=True)):
+            heading = vocabulary.heading(header)
+            if heading is None:
+                continue
+            role = heading.role
+            if role in roles:
                 raise self.error(
                     f"more than one column could be the {_label(role)}",
-                    line=self.header_line,
-                    found=", ".join(self.headers[hit[0]] for hit in hits),
+                    line=self.layout.header_line,
+                    found=f"{roles[role].header}, {header}",
                     expected="one",
-                    hint=f'choose it in the campaign: columns = {{ {role} = "{self.headers[hits[0][0]]}" }}',
+                    hint=f'choose it in the campaign: columns = {{ {role} = "{header}" }}',
                 )
-            if not hits and role in columns:
+            parts = [split_convention(unit) for unit in (heading.unit, unit_cell, stated_units.get(role)) if unit]
+            conventions = {said for said in (heading.convention, *(part[1] for part in parts)) if said}
+            stated = {unit for unit, _ in parts if unit}
+            column = Column(role, header, index, next(iter(stated), None), 1.0, next(iter(conventions), None))
+            if len(stated) > 1 or len(conventions) > 1:
+                raise UnitError(
+                    f"two units for the {_label(role)}",
+                    file=self.file,
+                    place=self._place(self.layout.header_line, column),
+                    found=" and ".join(sorted(stated) if len(stated) > 1 else sorted(conventions)),
+                    expected="one unit, from the header, the units row or the campaign",
+                )
+            roles[role] = column
+        for role in columns:
+            if role not in roles:
                 near = get_close_matches(columns[role], self.headers, n=1, cutoff=0.4)
                 raise self.error(
                     f'there is no column "{columns[role]}"',
-                    line=self.header_line,
+                    line=self.layout.header_line,
                     found=", ".join(self.headers),
                     expected=f"the column that the campaign names for the {_label(role)}",
                     hint=f'did you mean "{near[0]}"?' if near else None,
                 )
-            for index, header_unit in hits:
-                stated = {unit.strip() for unit in (header_unit, units_row[index], stated_units.get(role)) if unit}
-                column = Column(role, self.headers[index], index, next(iter(stated), None))
-                if len(stated) > 1:
-                    raise UnitError(
-                        f"two units for the {_label(role)}",
-                        file=self.file,
-                        place=self._place(self.header_line, column),
-                        found=" and ".join(sorted(stated)),
-                        expected="one unit, from the header, the units row or the campaign",
-                    )
-                roles[role] = column
         return roles
 
-    def _rows(self) -> Iterator[tuple[int, list[str]]]:
-        """Line number (from 1) and cells of each row of data, in the order in which pandas counts rows."""
-        skipped = self.lines_before_data
-        reader = csv.reader(islice(_text(self.data), skipped, None), delimiter=self.delimiter)
-        for cells in reader:
-            if len(cells) > 1 or any(cell.strip() for cell in cells):
-                yield skipped + reader.line_num, cells
+    def _numerals(self, stated: FileFormat) -> Numerals:
+        """How the recognised columns write their numbers, by what all of them tell.
 
-    def _unreadable(self, wanted: Mapping[str, Column], reason: str) -> MeasurementError:
-        """The error for the first row that cannot be read; `reason` serves where none is found."""
+        Raises:
+            MeasurementError: numbers that can be read in two ways, or that are written in two ways.
+        """
+        thousands = None if stated.thousands == "none" else stated.thousands
+        ways = tuple(
+            way
+            for way in ALL
+            if stated.decimal in (None, way.decimal) and (stated.thousands is None or way.thousands == thousands)
+        )
+        if not self.source.may_have_comma(self.layout):
+            ways = tuple(way for way in ways if "," not in (way.decimal, way.thousands)) or ways
+        if not ways:
+            raise self.error(
+                "decimal mark and thousands separator are the same", found=stated.decimal, expected="two signs"
+            )
+        evidence = weigh(self._cells(), ways)
+        decimal = evidence.ways[0].decimal
+        if evidence.contrary is None and self.source.may_group(self.layout, decimal):
+            evidence = weigh(self._cells(), ways, all_cells=True)
+        if evidence.contrary:
+            (line, index), text = evidence.contrary
+            mark = "comma" if evidence.ways[0].decimal == "," else "point"
+            raise self.error(
+                "this number is written in another way than those before it",
+                line=line,
+                column=self._column_at(index),
+                found=f'"{text}"',
+                expected=f"numbers with a decimal {mark}",
+                hint="write all numbers in one way; decimal and thousands in the campaign state it",
+            )
+        if evidence.unclear:
+            (line, index), text = evidence.unclear
+            readings = dict.fromkeys(way.value(text) or 0.0 for way in evidence.ways)
+            raise self.error(
+                "this number can be read in two ways",
+                line=line,
+                column=self._column_at(index),
+                found=f'"{text}", and no number in the file that settles it',
+                expected=" or ".join(f"{reading:.15g}" for reading in readings),
+                hint='state decimal = "." or decimal = "," in the campaign',
+            )
+        return evidence.ways[0]
+
+    def _cells(self) -> Iterator[tuple[tuple[int, int], str]]:
+        """Place and text of the recognised columns' cells, as far as they are texts."""
+        indices = [column.index for column in self.roles.values()]
+        for line, cells in self._rows():
+            for index in indices:
+                if index < len(cells) and isinstance(cell := cells[index], str):
+                    yield (line, index), cell
+
+    def _column_at(self, index: int) -> Column:
+        return next(column for column in self.roles.values() if column.index == index)
+
+    def _rows(self) -> Iterator[tuple[int, Sequence[str | float]]]:
+        """Line and cells of each row of data."""
         try:
-            for line, cells in self._rows():
-                if len(cells) != len(self.headers):
-                    return self.error(
-                        "the row does not match the header",
-                        line=line,
-                        found=f"{len(cells)} cell" + "s" * (len(cells) != 1),
-                        expected=f"{len(self.headers)} cells",
-                        hint="write numbers with a decimal point, without thousands separators"
-                        if len(cells) > len(self.headers)
-                        else None,
-                    )
-                for column in wanted.values():
-                    cell = cells[column.index].strip()
-                    if not (units.is_number(cell) and abs(float(cell) * column.scale) <= _LARGEST):
-                        return self.error(
-                            "this is no finite number" if cell else "the cell is empty",
-                            line=line,
-                            column=column,
-                            found=f'"{cell}"',
-                            expected="a number such as 12.5",
-                            hint="write numbers with a decimal point" if re.search(r"\d,\d", cell) else None,
-                        )
+            for line, cells in rows(self.source, self.layout):
+                if any(cell != "" for cell in cells):
+                    yield line, cells
         except csv.Error as error:
-            reason = str(error)
-        return self.error("the table cannot be read", found=reason.strip())
+            raise self.error("the table cannot be read", found=str(error)) from error
+
+    def _tidy(self, wanted: Mapping[str, Column]) -> dict[str, Floats] | None:
+        """The wanted columns read by a library, or None where row by row it has to be."""
+        first = next(self._rows(), (0, ()))[1]
+        plain = self.numerals.thousands is None and fits(first, len(self.headers))
+        # a library may take a column of TRUE for numbers
+        if not plain or not all(self._number(first[column.index], column) is not None for column in wanted.values()):
+            return None
+        indices = {column.index for column in wanted.values()}
+        columns = self.source.columns(self.layout, len(first), indices, self.numerals)
+        if columns is None:
+            return None
+        with np.errstate(over="ignore"):
+            values = {role: columns[column.index] * column.scale for role, column in wanted.items()}
+        # not a number fails this too
+        return values if all(x.min() >= -_LARGEST and x.max() <= _LARGEST for x in values.values()) else None
+
+    def _row_by_row(self, wanted: Mapping[str, Column]) -> dict[str, Floats]:
+        parts: dict[str, list[Floats]] = {role: [np.empty(0)] for role in wanted}
+        remaining = self._rows()
+        while chunk := list(islice(remaining, _CHUNK)):
+            for line, cells in chunk:
+                if not fits(cells, len(self.headers)):
+                    raise self._mismatch(line, len(cells))
+            for role, column in wanted.items():
+                numbers = [self._number(cells[column.index], column) for _, cells in chunk]
+                if None in numbers:
+                    line, cells = chunk[numbers.index(None)]
+                    raise self._no_number(line, column, cells[column.index])
+                parts[role].append(np.array(numbers, dtype=float))
+        return {role: np.concatenate(chunks) for role, chunks in parts.items()}
+
+    def _number(self, cell: str | float, column: Column) -> float | None:
+        """The number in a cell in SI; None where it holds none, or one beyond all measure."""
+        number = self.numerals.value(cell) if isinstance(cell, str) else cell
+        return number * column.scale if number is not None and abs(number * column.scale) <= _LARGEST else None
+
+    def _mismatch(self, line: int, found: int) -> MeasurementError:
+        width = len(self.headers)
+        return self.error(
+            "the row does not match the header",
+            line=line,
+            found=f"{found} cell" + "s" * (found != 1),
+            expected=f"{width} cells",
+            hint="part the columns by semicolons where numbers have a decimal comma" if found > width else None,
+        )
+
+    def _no_number(self, line: int, column: Column, cell: str | float) -> MeasurementError:
+        return self.error(
+            "the cell is empty" if cell == "" else "this is no finite number",
+            line=line,
+            column=column,
+            found=f'"{cell}"',
+            expected=f"a number such as 12{self.numerals.decimal}5",
+        )
 
 
-def _text(data: bytes) -> io.TextIOWrapper:
-    return io.TextIOWrapper(io.BytesIO(data), encoding="utf-8-sig", newline="")
+def _checksum(data: bytes) -> Future[str]:
+    """SHA-256 of a file's bytes, of large ones in a thread."""
+    if len(data) >= _LARGE:
+        with_thread = ThreadPoolExecutor(max_workers=1)
+        future = with_thread.submit(_sha256, data)
+        with_thread.shutdown(wait=False)
+        return future
+    done: Future[str] = Future()
+    done.set_result(_sha256(data))
+    return done
 
 
-def _cells(line: str, delimiter: str) -> list[str]:
-    return next(csv.reader([line[:_LONGEST_HEADER]], delimiter=delimiter), [])
+def _sha256(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
 
 
 def _label(role: str) -> str:
     return role.replace("_", " ")
-
-
-def _plain(name: str) -> str:
-    """A column name without case, and with "_" and "-" as spaces."""
-    return re.sub(r"[\s_-]+", " ", name).strip().casefold()
-
-
-def _match(header: str, known: set[str]) -> tuple[str | None] | None:
-    """The unit in a header, in a tuple, if the header bears one of the known names ("force [N]", "force_N")."""
-    name, unit = units.split_header(header)
-    if _plain(header) in known or _plain(name) in known:
-        return (unit,)
-    for cut in (position for position, mark in enumerate(name) if mark == "_"):
-        suffix = name[cut + 1 :].replace("_", " ")
-        if _plain(name[:cut]) in known and units.is_unit(suffix):
-            return (suffix,)
-    return None

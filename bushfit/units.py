@@ -36,6 +36,25 @@ _FACTOR = r"(?:[^\W\d_]+|%|°|1)(?:(?:\^|\*\*)-?[1-9]|⁻?[¹²³])?"
 #: The products and quotients of units that are handed on to pint, which would otherwise evaluate any arithmetic.
 _UNIT = re.compile(rf"{_FACTOR}(?:(?:\s*[*/·⋅]\s*|\s+){_FACTOR})*")
 _LONGEST = 40
+#: Words of other languages and signs, by lower case; pint takes a capital Grad for a billion radians.
+_SPELLINGS = {
+    word: unit
+    for unit, words in {
+        "s": "sek sekunde sekunden seconde secondes segundo segundos seg 秒",
+        "mm": "millimeter millimetre millimetres milimetro milimetros milímetros 毫米",
+        "µm": "mikrometer 微米",
+        "N": "newton 牛 牛顿",
+        "kN": "kilonewton kilonewtons 千牛",
+        "deg": "º ˚ grados grado degré degrés degre degres 度",
+        "Hz": "hz hertz 赫兹",
+        "%": "prozent pct percent",
+    }.items()
+    for word in words.split()
+}
+#: Words that only some spellings of are known, and capitals that pint takes for other units.
+_EXACT = {"Grad": "deg", "GRAD": "deg", "DEG": "deg", "Deg": "deg", "MM": "mm", "KN": "kN", "SEC": "s", "Sec": "s"}
+_WORD = re.compile(r"[^\W\d_]+|[º˚]")
+_JOINT = re.compile(r"(?<=[^\W\d_])[.-](?=[^\W\d_])")
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*")
 
 
@@ -142,14 +161,18 @@ def _split_quantity(value: object, expected: str) -> tuple[float, str]:
 @lru_cache(maxsize=256)
 def _resolve(text: str) -> tuple[float, str]:
     """Scale and SI base unit of a unit; angles keep their radian."""
-    text = text.strip()
+    text = text.strip().rstrip(".")
     if text in ("", "-"):
         text = "1"
     unknown = UnitError(
         "unknown unit", found=f'"{text[:_LONGEST]}"', expected="a unit such as mm, N, kN/mm, deg, Hz or %"
     )
+    if len(text) <= _LONGEST:
+        text = _JOINT.sub("*", _WORD.sub(_usual, text))
     if len(text) > _LONGEST or not _UNIT.fullmatch(text):
         raise unknown
+    if re.search(r"\bgrad\b", text):
+        raise UnitError("a unit that can be read in two ways", found=f'"{text}"', expected='"deg" or "gon"')
     registry = _registry()
     try:
         unit = registry.parse_units(text.replace("⋅", "*"))
@@ -159,6 +182,11 @@ def _resolve(text: str) -> tuple[float, str]:
     if zero.magnitude != 0.0:  # decibel and the like
         raise unknown
     return float(one.magnitude), str(one.units)
+
+
+def _usual(word: re.Match[str]) -> str:
+    """A word of a unit as pint spells it."""
+    return _EXACT.get(word[0]) or _SPELLINGS.get(word[0].lower(), word[0])
 
 
 @lru_cache(maxsize=1)

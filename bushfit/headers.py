@@ -1,0 +1,184 @@
+"""Names that columns go by in test files: English, German, French, Spanish and Chinese words, and symbols.
+
+Case, accents, blanks, hyphens and underscores do not count, and an umlaut is the same as its vowel with or without e.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from bushfit import units
+
+AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak"]
+
+#: For each column of a loop, the headers it goes by.
+LOOP_COLUMNS = {
+    "time": ("time", "t", "zeit", "temps", "tiempo", "时间", "elapsed time", "running time", "test time", "Prüfzeit"),
+    "displacement": (
+        *("displacement", "disp", "deflection", "stroke", "travel", "position", "extension"),
+        *("rotation", "angle", "twist", "phi"),
+        *("Weg", "Verschiebung", "Auslenkung", "Hub", "Federweg", "Prüfweg", "Kolbenweg", "Winkel", "Drehwinkel"),
+        *("Verdrehung", "Verdrehwinkel"),
+        *("déplacement", "course", "flèche", "enfoncement", "rotation", "angle de torsion", "rotación"),
+        *("desplazamiento", "recorrido", "carrera", "deformación", "ángulo", "giro", "ángulo de giro"),
+        *("位移", "行程", "角度", "转角"),
+    ),
+    "force": (
+        *("force", "load", "torque", "moment", "F"),
+        *("Kraft", "Prüfkraft", "Last", "Drehmoment", "Torsionsmoment"),
+        *("effort", "charge", "couple", "moment de torsion"),
+        *("fuerza", "carga", "par", "momento", "par de torsión"),
+        *("力", "载荷", "负荷", "扭矩"),
+    ),
+}
+#: For each column of a sweep, the headers it goes by.
+SWEEP_COLUMNS = {
+    "frequency": ("frequency", "freq", "f", "Frequenz", "Prüffrequenz", "fréquence", "frecuencia", "频率"),
+    "amplitude": (
+        *("amplitude", "ampl", "amp", "displacement amplitude", "rotation amplitude", "angle amplitude"),
+        *("dynamic amplitude", "Wegamplitude", "Winkelamplitude", "amplitude de déplacement", "amplitude dynamique"),
+        *("amplitud", "amplitud de desplazamiento", "amplitud dinámica", "振幅", "幅值"),
+    ),
+    "stiffness": (
+        *("stiffness", "dynamic stiffness", "stiffness magnitude", "complex stiffness", "kdyn", "cdyn", "|k|", "K*"),
+        *("Steifigkeit", "dynamische Steifigkeit", "Federsteifigkeit", "Drehsteifigkeit", "dyn Steifigkeit"),
+        *("raideur", "rigidité", "raideur dynamique", "rigidité dynamique"),
+        *("rigidez", "rigidez dinámica", "刚度", "动刚度"),
+    ),
+    "loss_factor": (
+        *("loss factor", "tan delta", "tandelta", "tan d", "eta", "η", "tan δ"),
+        *("Verlustfaktor", "facteur de perte", "facteur de pertes", "facteur d'amortissement"),
+        *("factor de pérdida", "factor de pérdidas", "损耗因子"),
+    ),
+    "phase": (
+        *("phase", "phase angle", "loss angle", "delta", "δ", "phi"),
+        *("Phasenwinkel", "Verlustwinkel", "Phasenverschiebung"),
+        *("déphasage", "angle de phase", "angle de perte", "angle de pertes"),
+        *("fase", "ángulo de fase", "ángulo de pérdida", "ángulo de pérdidas", "desfase", "相位", "相位角", "损耗角"),
+    ),
+    "storage_stiffness": (
+        *("storage stiffness", "k'", "elastic stiffness"),
+        *("Speichersteifigkeit", "raideur de stockage", "raideur élastique", "raideur conservative"),
+        *("rigidité de stockage", "rigidez de almacenamiento", "rigidez elástica", "储能刚度"),
+    ),
+    "loss_stiffness": (
+        *("loss stiffness", "k''", "Verluststeifigkeit", "raideur de perte", "raideur de pertes"),
+        *("raideur dissipative", "rigidité de perte", "rigidité de pertes"),
+        *("rigidez de pérdida", "rigidez de pérdidas", "损耗刚度"),
+    ),
+    "repeat": (
+        *("repeat", "repetition", "Wiederholung", "Wdh", "répétition", "repetición", "重复"),
+    ),
+}  # fmt: skip
+#: Words that say where or how a channel was recorded, and not what it is.
+_ASIDES = re.compile(r"\b(?:axial|radial|torsional|measured|actual|gemessen|mesure|medido|ist)\b")
+#: Names of an amplitude that say peak-to-peak by themselves.
+_DOUBLE = {
+    *("doppelamplitude", "schwingbreite", "schwingungsbreite", "doubleamplitude", "amplitudedouble", "amplituddoble"),
+    *("doublestroke", "doppelhub", "峰峰值"),
+}
+_PEAK = r"(?:peak|pk|spitze|crete|cresta|pico|pic)"
+_BEFORE, _AFTER = r"(?<![^\W_])", r"(?![^\W_])"
+_PEAK_TO_PEAK = re.compile(
+    rf"{_BEFORE}(?:{_PEAK}[\s_/-]*(?:(?:to|zu|a|2)[\s_-]*)?{_PEAK}|p[\s_./-]?(?:t[\s_./-]?|2[\s_./-]?)?p|c[\s-]a[\s-]c)\.?{_AFTER}"
+)
+_ZERO_TO_PEAK = re.compile(
+    rf"{_BEFORE}(?:(?:zero|null|cero|0)[\s_/-]*(?:(?:to|bis|zu|a|2)[\s_-]*)?(?:{_PEAK}|p))\.?{_AFTER}"
+)
+_CONVENTIONS: tuple[tuple[re.Pattern[str], AmplitudeConvention], ...] = (
+    (_ZERO_TO_PEAK, "zero-to-peak"),
+    (_PEAK_TO_PEAK, "peak-to-peak"),
+)
+_EMPTY_BRACKETS = re.compile(r"[\[(]\s*[\])]")
+_SPELLINGS: dict[int, int | str] = {
+    **str.maketrans("\uff08\uff09\uff3b\uff3d\u2032\u2019\u00b4", "()[]'''"),
+    **{0x2033: "''", ord('"'): ""},
+}
+#: Where a name may end and a unit begin, other than at a bracket: "force_N", "Kraft in N", "F / kN", "load, N".
+_CUT = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
+
+
+@dataclass(frozen=True)
+class Heading:
+    """What a header says of its column: its role, its unit as written, and how it counts an amplitude."""
+
+    role: str
+    unit: str | None = None
+    convention: AmplitudeConvention | None = None
+
+
+class Vocabulary:
+    """The headers that each role of a table goes by.
+
+    Args:
+        names: for each role its usual names.
+        columns: header of a role that goes by another name; the usual ones then do not count.
+    """
+
+    def __init__(self, names: Mapping[str, Sequence[str]], columns: Mapping[str, str]) -> None:
+        self._roles = {
+            plain(name): role
+            for role, usual in names.items()
+            for name in ([columns[role]] if role in columns else usual)
+        }
+        self._known: dict[str, Heading | None] = {}
+
+    def heading(self, header: str) -> Heading | None:
+        """What a header cell says; None where it names no role."""
+        if header not in self._known:
+            self._known[header] = self._read(header)
+        return self._known[header]
+
+    def roles(self, cells: Sequence[str]) -> set[str]:
+        """The roles that a row of cells names."""
+        return {heading.role for cell in cells if (heading := self.heading(cell))}
+
+    def _read(self, header: str) -> Heading | None:
+        text, convention = split_convention(header.translate(_SPELLINGS))
+        if plain(header) in self._roles:  # a campaign may name a header with its unit
+            return Heading(self._roles[plain(header)], units.split_header(text)[1], convention)
+        for name, unit in _splits(text):
+            bare = plain(name)
+            if bare in _DOUBLE:
+                bare, convention = "amplitude", "peak-to-peak"
+            with_aside = plain(_ASIDES.sub("", _folded(name)))
+            for candidate in (bare, with_aside, *([bare + "amplitude"] if convention else [])):
+                if candidate in self._roles:
+                    return Heading(self._roles[candidate], unit, convention)
+        return None
+
+
+def split_convention(text: str) -> tuple[str, AmplitudeConvention | None]:
+    """A header or unit without what it says of counting amplitudes, and what it says."""
+    folded = _folded(text)
+    for pattern, convention in _CONVENTIONS:
+        if found := pattern.search(folded):
+            rest = text[: found.start()] + " " + text[found.end() :]
+            return _EMPTY_BRACKETS.sub("", rest).strip(), convention
+    return text.strip(), None
+
+
+def plain(name: str) -> str:
+    """A name by which spellings agree: letters, digits and the signs ' | * alone, without case, accents and umlauts."""
+    letters = re.sub(r"[^\w'|*]|_", "", _folded(name.translate(_SPELLINGS)).replace("ß", "ss"))
+    return letters.replace("ae", "a").replace("oe", "o").replace("ue", "u")
+
+
+def _splits(text: str) -> Iterator[tuple[str, str | None]]:
+    """All ways to take a header apart into name and unit."""
+    name, unit = units.split_header(text)
+    yield name, unit
+    if unit is None:
+        for cut in _CUT.finditer(name):
+            suffix = name[cut.end() :].replace("_", " ")
+            if units.is_unit(suffix):
+                yield name[: cut.start()], suffix
+
+
+def _folded(text: str) -> str:
+    """Lower case without accents, of the same length."""
+    return "".join(unicodedata.normalize("NFKD", letter)[0] for letter in text.lower())
