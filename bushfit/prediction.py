@@ -15,7 +15,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction
 from bushfit.measurement import Sweep
-from bushfit.results import Z95, Result
+from bushfit.results import Result
 from bushfit.sensitivity import stiffness_jacobian
 
 #: The paper's grid: frequencies [Hz], amplitudes [m], and for torsion [rad].
@@ -125,14 +125,13 @@ def predict(
     )
     stiffness = model.stiffness(direction, frequency, amplitude)
     names = [name for name in result.covariance.names if name in model.values]
-    root = result.covariance.restricted(names).root()
+    covariance = result.covariance.restricted(names)
+    slopes = np.zeros((0, frequency.size), dtype=complex)
     if names:
         slopes = stiffness_jacobian(model, direction, frequency, amplitude, names)
-    else:
-        slopes, root = np.zeros((1, frequency.size), dtype=complex), np.zeros((1, 1))
 
     def band(value: Array, slope: Array) -> Band:
-        half = Z95 * np.linalg.norm(root.T @ slope, axis=0)
+        half = covariance.half_width(slope)
         return Band(value, value - half, value + half)
 
     relative = slopes / stiffness

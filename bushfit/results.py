@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.special import stdtrit
 
 from bushfit import __version__
 from bushfit.effects.contract import Array
@@ -18,17 +19,27 @@ from bushfit.measurement import Source
 from bushfit.model import Model
 
 SCHEMA = "bushfit/model/1"
-#: Half width of a 95 % interval in standard errors.
+#: Half width of a 95 % interval in standard deviations, where these are known.
 Z95 = 1.959963984540054
+#: Beyond the one, degrees of freedom make no difference; below the other, an estimated variance says next to nothing.
+_MOST_FREEDOM, _LEAST_FREEDOM = 1e6, 2.0
 _PACKAGES = ("numpy", "scipy", "lmfit")
 
 
 @dataclass(frozen=True, eq=False)
 class Covariance:
-    """Covariance matrix of parameter values, (k, k), in their SI units."""
+    """Covariance matrix of parameter values, (k, k), in their SI units, and how well it is known itself.
+
+    Args:
+        names: of the parameters.
+        matrix: (k, k).
+        spread: per variance behind the matrix that was itself estimated, how far the matrix moves when that variance
+            moves by its own standard error, (k, k) each.
+    """
 
     names: tuple[str, ...] = ()
     matrix: Array = field(default_factory=lambda: np.empty((0, 0)))
+    spread: tuple[Array, ...] = ()
 
     def stderr(self, name: str) -> float | None:
         """Standard error; None where the parameter was held at an exact value."""
@@ -39,10 +50,21 @@ class Covariance:
 
     def root(self) -> Array:
         """B with B B^T the covariance, so that |B^T slope| is a standard error however ill-conditioned it is."""
-        sigma = np.sqrt(np.diag(self.matrix))
-        safe = np.where(sigma > 0.0, sigma, 1.0)
-        values, vectors = np.linalg.eigh(self.matrix / np.outer(safe, safe))
-        return sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+        return _root(self.matrix)
+
+    def half_width(self, slopes: Array) -> Array:
+        """Half width of the 95 % interval of quantities with these slopes by parameter, (k, n) -> (n,).
+
+        Student's t with the effective degrees of freedom of Satterthwaite (1946): 2 v^2 over the variance of v, which
+        is the sum of squares of what each spread adds to the quantity's variance v.
+        """
+        variance = np.sum(np.square(self.root().T @ slopes), axis=0)
+        moved = [np.sum(np.square(_root(part).T @ slopes), axis=0) for part in self.spread]
+        unsure = np.sqrt(np.sum(np.square(moved), axis=0)) if moved else np.zeros_like(variance)
+        least = np.sqrt(2.0 / _MOST_FREEDOM)
+        share = np.divide(unsure, variance, out=np.zeros_like(variance), where=variance > 0.0)
+        freedom = np.maximum(2.0 / np.square(np.maximum(share, least)), _LEAST_FREEDOM)
+        return stdtrit(freedom, 0.975) * np.sqrt(variance)
 
     def correlations(self) -> list[tuple[str, str, float]]:
         """All pairs, the most correlated first."""
@@ -58,7 +80,16 @@ class Covariance:
     def restricted(self, names: Sequence[str]) -> Covariance:
         """The part of some names, in this covariance's order."""
         kept = [i for i, name in enumerate(self.names) if name in names]
-        return Covariance(tuple(self.names[i] for i in kept), self.matrix[np.ix_(kept, kept)])
+        square = np.ix_(kept, kept)
+        names = tuple(self.names[i] for i in kept)
+        return Covariance(names, self.matrix[square], tuple(part[square] for part in self.spread))
+
+
+def _root(matrix: Array) -> Array:
+    sigma = np.sqrt(np.diag(matrix))
+    safe = np.where(sigma > 0.0, sigma, 1.0)
+    values, vectors = np.linalg.eigh(matrix / np.outer(safe, safe))
+    return sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
 
 
 @dataclass(frozen=True)
@@ -114,9 +145,10 @@ class Result:
         if stderr is None:
             return None
         parameter = self.model.parameters[name]
-        low, high = value - Z95 * stderr, value + Z95 * stderr
+        half = float(self.covariance.half_width(np.array(self.covariance.names)[:, None] == name)[0])
+        low, high = value - half, value + half
         if parameter.log and value > 0.0:
-            factor = float(np.exp(min(Z95 * stderr / value, 300.0)))
+            factor = float(np.exp(min(half / value, 300.0)))
             low, high = value / factor, value * factor
         least, most = parameter.bounds
         return max(low, min(least, value)), min(high, max(most, value))
@@ -129,7 +161,11 @@ class Result:
             entry["stderr"] = self.covariance.stderr(name)
             entry["ci95"] = None if interval is None else list(interval)
             entry["vary"] = name in self.fitted
-        document["covariance"] = {"names": list(self.covariance.names), "matrix": self.covariance.matrix.tolist()}
+        document["covariance"] = {
+            "names": list(self.covariance.names),
+            "matrix": self.covariance.matrix.tolist(),
+            "spread": [part.tolist() for part in self.covariance.spread],
+        }
         document["fit"] = None
         if self.quality and self.measured:
             document["fit"] = {
@@ -168,13 +204,16 @@ class Result:
         try:
             fit, covariance = document.get("fit"), document.get("covariance") or {"names": [], "matrix": []}
             names = tuple(str(name) for name in covariance["names"])
-            matrix = np.array(covariance["matrix"], dtype=float).reshape(len(names), len(names))
-            if not np.all(np.isfinite(matrix)) or not set(names) <= model.parameters.keys():
+            matrix, *spread = (
+                np.array(part, dtype=float).reshape(len(names), len(names))
+                for part in (covariance["matrix"], *covariance.get("spread", ()))
+            )
+            if not np.all(np.isfinite([matrix, *spread])) or not set(names) <= model.parameters.keys():
                 raise ModelError("the covariance does not belong to the parameters", place="covariance")
             return cls(
                 model,
                 tuple(name for name, entry in document["parameters"].items() if entry.get("vary")),
-                Covariance(names, matrix),
+                Covariance(names, matrix, tuple(spread)),
                 Quality(float(fit["nrmse"]), float(fit["reduced_chi_square"]), int(fit["points"]), float(fit["noise"]))
                 if fit
                 else None,

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import t
 
 from bushfit.campaign import load_campaign
 from bushfit.errors import ModelError
@@ -44,6 +45,7 @@ def test_schema_of_the_interface(document: dict[str, Any]) -> None:
         assert entry["vary"] is True
     assert document["parameters"]["m"]["unit"] == "Pa*s^alpha"
     assert np.shape(document["covariance"]["matrix"]) == (5, 5)
+    assert np.shape(document["covariance"]["spread"])[1:] == (5, 5)
     assert {"nrmse", "reduced_chi_square", "points", "noise"} <= set(document["fit"])
     assert document["warnings"] == [] or all(isinstance(line, str) for line in document["warnings"])
     for source in document["provenance"]["inputs"]:
@@ -59,6 +61,7 @@ def test_there_and_back(result: Result, document: dict[str, Any]) -> None:
     assert back.measured == result.measured
     assert back.warnings == result.warnings
     np.testing.assert_array_equal(back.covariance.matrix, result.covariance.matrix)
+    np.testing.assert_array_equal(back.covariance.spread, result.covariance.spread)
     again = back.to_document()
     assert {**again, "provenance": None} == {**document, "provenance": None}
 
@@ -77,7 +80,9 @@ def test_intervals(result: Result) -> None:
     low, high = result.interval("mu") or (0.0, 0.0)
     value = result.model.values["mu"]
     assert low * high == pytest.approx(value**2)
-    assert np.log(high / value) == pytest.approx(Z95 * stderr / value)
+    assert 1.0 <= np.log(high / value) / (Z95 * stderr / value) < 1.05, (
+        "Student's t with hundreds of degrees of freedom"
+    )
     low, high = result.interval("alpha") or (0.0, 0.0)
     assert (low + high) / 2.0 == pytest.approx(result.model.values["alpha"])
 
@@ -98,6 +103,21 @@ def test_covariance_root(result: Result) -> None:
     held = Covariance(("mu", "m"), np.array([[4.0, 0.0], [0.0, 0.0]]))
     np.testing.assert_allclose(held.root() @ held.root().T, held.matrix, atol=1e-12)
     assert held.correlations() == []
+
+
+def test_intervals_are_as_wide_as_an_estimated_variance_needs() -> None:
+    """A variance of 3 and one of 5 degrees of freedom: alone Student's t, in a sum between the two and the normal."""
+    one, other = np.diag([4.0, 0.0]), np.diag([0.0, 9.0])
+    spread = (one * np.sqrt(2.0 / 3.0), other * np.sqrt(2.0 / 5.0))
+    covariance = Covariance(("mu", "m"), one + other, spread)
+    found = covariance.half_width(np.array([[1.0, 0.0, 1.0], [0.0, 1.0, 1.0]]))
+    summed = 2.0 * 13.0**2 / (4.0**2 * 2.0 / 3.0 + 9.0**2 * 2.0 / 5.0)
+    print(f"half widths {found}; degrees of freedom of the sum {summed:.2f}")
+    expected = [t.ppf(0.975, freedom) * np.sqrt(variance) for freedom, variance in ((3, 4), (5, 9), (summed, 13))]
+    np.testing.assert_allclose(found, expected)
+    known = Covariance(("mu", "m"), one + other)
+    np.testing.assert_allclose(known.half_width(np.eye(2)), [Z95 * 2.0, Z95 * 3.0], rtol=1e-4)
+    assert known.restricted(["m"]).half_width(np.ones((1, 1))) == pytest.approx(3.0 * Z95, rel=1e-4)
 
 
 @pytest.mark.parametrize("schema", ["bushfit/model/2", "bushfit/diagnosis/1", None, 3])
@@ -123,6 +143,8 @@ DAMAGES: dict[str, Change] = {
     "unknown parameter": lambda d: d["parameters"].update(nu={"value": 1.0}),
     "short covariance": lambda d: d["covariance"]["matrix"].pop(),
     "covariance of others": lambda d: d["covariance"].update(names=["a", "b", "c", "d", "e"]),
+    "short spread": lambda d: d["covariance"]["spread"][0].pop(),
+    "spread is a number": lambda d: d["covariance"].update(spread=3.0),
     "infinite covariance": lambda d: d["covariance"]["matrix"][0].__setitem__(0, float("inf")),
     "covariance is text": lambda d: d.update(covariance="none"),
     "fit is a list": lambda d: d.update(fit=[1, 2]),

@@ -45,7 +45,12 @@ class Evidence:
     @property
     def reduced(self) -> float:
         """Mean square residual; 1 where only noise is left."""
-        return self.chi_square / max(self.residual.size - self.parameters, 1)
+        return self.chi_square / max(self.counted - self.parameters, 1)
+
+    @property
+    def counted(self) -> int:
+        """Residuals that carry weight."""
+        return sum(term.counted for term in self.terms)
 
     @property
     def penalty(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,7 +37,9 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
     carry their own errors. With J_own^T = Q R this is Q^T J^T d = b, cov(b) = 1, which never squares the Jacobian.
     Stacked over the stages it is M d = b, so that cov(d) = (M^-1 B) (M^-1 B)^T with cov(b) = B B^T. A joint fit is
     the one-stage case, cov = (J J^T)^-1. Parameters `held` with a known covariance enter as they are. Where a
-    stage's residuals exceed its noise, its share is inflated by the reduced chi-square.
+    stage's residuals exceed its noise, its share is inflated by the reduced chi-square. The noise that weighs the
+    data is itself an estimate: what its error adds is counted as Kenward and Roger (1997) do, and how far the
+    covariance may be off for it goes along as `spread`.
 
     Raises:
         FitError: the data leave some combination of the parameters wholly open.
@@ -48,40 +50,73 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
     system, root = np.eye(len(names)), np.zeros((len(names), len(names)))
     begin = len(held.names)
     root[:begin, :begin] = held.root() / slopes[:begin, None]
+    bases = []
     for stage in stages:
         own = slice(begin, begin + len(stage.names))
         slope = jacobian(model, stage.terms, names)
-        system[own] = np.linalg.qr(slope[own].T)[0].T @ slope.T
-        inflation = _inflation(residual(model, stage.terms), len(stage.names))
-        root[own, own] = np.sqrt(inflation) * np.eye(len(stage.names))
+        basis = np.linalg.qr(slope[own].T)[0]
+        system[own] = basis.T @ slope.T
+        inflation = np.sqrt(_inflation(model, stage.terms, len(stage.names)))
+        root[own, own] = inflation * np.eye(len(stage.names))
+        bases.append((own, inflation * basis.T))
         begin = own.stop
     try:
-        answer = np.linalg.solve(system, root)
+        answer, reaction = np.linalg.solve(system, root), np.linalg.inv(system)
     except np.linalg.LinAlgError:
         raise FitError(
             "the data leave a combination of parameters wholly open",
             found="a singular Jacobian in " + ", ".join(names),
             hint="hold one of them with vary = false in [fit], or measure another amplitude, frequency or rate",
         ) from None
-    by_value = answer * slopes[:, None]
-    return Covariance(names, by_value @ by_value.T)
+    by_value, reaction = answer * slopes[:, None], reaction * slopes[:, None]
+    carried = reaction[:, : len(held.names)] / slopes[: len(held.names)]
+    spread = [carried @ part @ carried.T for part in held.spread]
+    matrix = by_value @ by_value.T
+    for part, lost in _unsure(stages, [(reaction[:, own], basis) for own, basis in bases]):
+        spread.append(part)
+        matrix = matrix + 2.0 * lost
+    return Covariance(names, matrix, tuple(spread))
 
 
-def _inflation(residuals: Array, parameters: int) -> float:
-    freedom = max(residuals.size - parameters, 1)
-    reduced = float(residuals @ residuals) / freedom
+def _unsure(stages: Sequence[Stage], reactions: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
+    """Per estimated variance of the noise: how far the covariance moves with its standard error, and the covariance
+    that its error adds by giving the data wrong weights. The same variance may act in many terms."""
+    parts: dict[Hashable, tuple[Array, Array]] = {}
+    for stage, (reaction, basis) in zip(stages, reactions, strict=True):
+        influence = reaction @ basis
+        unit = basis / np.linalg.norm(basis[0])
+        ends = np.cumsum([0, *(term.size for term in stage.terms)])
+        moved: dict[Hashable, Array] = {}
+        for term, first, last in zip(stage.terms, ends[:-1], ends[1:], strict=True):
+            for variance, part in term.unsure(influence[:, first:last]).items():
+                moved.setdefault(variance, np.zeros_like(influence))[:, first:last] = part
+        for variance, move in moved.items():
+            absorbed = move @ unit.T
+            spread, lost = parts.get(variance, (0.0, 0.0))
+            parts[variance] = spread + move @ influence.T, lost + move @ move.T - absorbed @ absorbed.T
+    return list(parts.values())
+
+
+def _reduced(model: Model, terms: Sequence[Term], parameters: int) -> tuple[float, int]:
+    """Reduced chi-square and its degrees of freedom."""
+    residuals = residual(model, terms)
+    freedom = max(sum(term.counted for term in terms) - parameters, 1)
+    return float(residuals @ residuals) / freedom, freedom
+
+
+def _inflation(model: Model, terms: Sequence[Term], parameters: int) -> float:
+    reduced, freedom = _reduced(model, terms, parameters)
     return reduced if reduced > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else 1.0
 
 
 def quality(model: Model, terms: Sequence[Term], parameters: int) -> Quality:
     """NRMSE, reduced chi-square, number of residuals and relative noise over some terms."""
-    residuals = residual(model, terms)
     relative = np.concatenate([np.abs(term.relative(model)) for term in terms])
     noise = np.concatenate([np.full(term.size, term.relative_noise) for term in terms])
     return Quality(
         nrmse=float(np.sqrt(np.mean(relative**2))),
-        reduced_chi_square=float(residuals @ residuals) / max(residuals.size - parameters, 1),
-        points=int(residuals.size),
+        reduced_chi_square=_reduced(model, terms, parameters)[0],
+        points=sum(term.counted for term in terms),
         noise=float(np.sqrt(np.mean(noise**2))),
     )
 
@@ -111,7 +146,7 @@ def cautions(solution: Solution, terms: Sequence[Term], cov: Covariance) -> list
         if abs(value) > _TRADE_OFF and {one, other} <= set(names):
             reason = _pair_reason(one, other, model, reach)
             lines.append(f"{one} and {other} trade off (correlation {value:+.3f}): use them together{reason}")
-    return lines + _misfit(solution)
+    return lines + _misfit(model, terms, len(names))
 
 
 def _reason(name: str, model: Model, reach: Range) -> str:
@@ -135,12 +170,11 @@ def _pair_reason(one: str, other: str, model: Model, reach: Range) -> str:
     return ""
 
 
-def _misfit(solution: Solution) -> list[str]:
-    residuals = solution.residual
-    if _inflation(residuals, len(solution.coordinates.names)) == 1.0:
+def _misfit(model: Model, terms: Sequence[Term], parameters: int) -> list[str]:
+    if _inflation(model, terms, parameters) == 1.0:
         return []
-    reduced = solution.chi_square / max(residuals.size - len(solution.coordinates.names), 1)
     return [
-        f"the model misses the data by more than their noise (reduced chi-square {reduced:.2g}): "
+        "the model misses the data by more than their noise "
+        f"(reduced chi-square {_reduced(model, terms, parameters)[0]:.2g}): "
         "standard errors are scaled up; bushfit diagnose looks for what is missing"
     ]

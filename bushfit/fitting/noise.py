@@ -46,12 +46,14 @@ class SweepNoise:
         shared: standard deviation of what a block shares, (ln|K|, phase [rad]).
         origin: "repeats", "stated" or "assumed": where it comes from.
         freedom: degrees of freedom behind the shared part; 0 where it is not measured.
+        scatter_freedom: the same of the random part of each level; 0 where it is stated.
     """
 
     random: dict[LevelKey, tuple[float, float]]
     shared: tuple[float, float]
     origin: str
     freedom: int
+    scatter_freedom: int = 0
 
     def describe(self) -> str:
         """One line for reports."""
@@ -90,10 +92,14 @@ def sweep_noise(sweeps: Sequence[Sweep]) -> SweepNoise:
     }
     variances = {key: np.square(level.scatter).sum(axis=0) / max(level.freedom, 1) for key, level in levels.items()}
     repeated = [key for key, level in levels.items() if level.repeats > 1]
+    scatter_freedom = min(level.freedom for level in levels.values())
     if repeated and not _unequal([levels[key] for key in repeated]):
         freedoms = np.array([levels[key].freedom for key in repeated], dtype=float)
         pooled = np.average([variances[key] for key in repeated], axis=0, weights=freedoms)
         variances |= dict.fromkeys(levels, pooled)
+        scatter_freedom = int(freedoms.sum())
+    if any(sweep.noise is not None for sweep in sweeps):
+        scatter_freedom = 0
     stated = {sweep.name: sweep.noise for sweep in sweeps if sweep.noise is not None}
     random = {}
     for key, variance in variances.items():
@@ -105,10 +111,10 @@ def sweep_noise(sweeps: Sequence[Sweep]) -> SweepNoise:
         shared = np.where(usual.any(axis=0), np.mean(pairs, axis=0, where=usual), 0.0)
         gain, phase = np.sqrt(np.maximum(shared, 0.0))
         freedom = sum(levels[key].repeats - 1 for key in repeated)
-        return SweepNoise(random, (float(gain), float(phase)), "repeats", freedom)
+        return SweepNoise(random, (float(gain), float(phase)), "repeats", freedom, scatter_freedom)
     if len(stated) == len(sweeps):
-        return SweepNoise(random, (0.0, 0.0), "stated", 0)
-    return SweepNoise(random, ASSUMED_SHARED, "assumed", 0)
+        return SweepNoise(random, (0.0, 0.0), "stated", 0, 0)
+    return SweepNoise(random, ASSUMED_SHARED, "assumed", 0, scatter_freedom)
 
 
 def _level(sweep: Sweep, amplitude: float) -> _Level:

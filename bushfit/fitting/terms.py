@@ -6,7 +6,7 @@ which are independent with unit variance where the model is right, and their der
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -38,6 +38,11 @@ class LoopTerm:
     @property
     def size(self) -> int:
         return int(self.drive.force.size)
+
+    @property
+    def counted(self) -> int:
+        """Residuals that carry weight."""
+        return int(np.count_nonzero(self.drive.weight))
 
     @property
     def loop(self) -> Loop:
@@ -99,6 +104,11 @@ class LoopTerm:
         """Difference relative to half the force range, for NRMSE."""
         return (self.force(model) - self.drive.force) / self.drive.half_range
 
+    def unsure(self, influence: Array) -> dict[Hashable, Array]:
+        """Per estimated variance of the noise, what reacts to the whitened residuals by `influence`, (k, n), times the
+        whitened derivative of their covariance by that variance, times its standard error: (k, n)."""
+        return {} if self.loop.noise is not None else {self.name: np.sqrt(2.0 / self.counted) * influence}
+
     @cached_property
     def _per_noise(self) -> Array:
         return np.sqrt(self.drive.weight) / self.drive.noise
@@ -125,6 +135,11 @@ class SweepTerm:
     @property
     def size(self) -> int:
         return 2 * int(self.sweep.frequency.size)
+
+    @property
+    def counted(self) -> int:
+        """Residuals that carry weight."""
+        return self.size
 
     @property
     def direction(self) -> Direction:
@@ -241,6 +256,31 @@ class SweepTerm:
         scale, share = self._block_scales[which]
         means = np.add.reduceat(part, self.block_starts, axis=-1) / self._block_sizes
         return (part - np.repeat(means * share, self._block_sizes, axis=-1)) * scale
+
+    def unsure(self, influence: Array) -> dict[Hashable, Array]:
+        """Per estimated variance of the noise, what reacts to the whitened residuals by `influence`, (k, 2 n), times
+        the whitened derivative of their covariance by that variance, times its standard error: (k, 2 n).
+
+        Within a block V = s^2 I + t^2 1 1^T has the derivatives I and 1 1^T, whitened W^2 and (W 1)(W 1)^T. The
+        estimate of t^2 is a mean of `freedom` squares that expect t^2 + s^2/n, and scatters no further down than to 0.
+        """
+        gain, phase = np.split(influence, 2, axis=1)
+        whitened = np.split(self.whiten(gain + 1j * phase), 2, axis=1)
+        zero = np.zeros_like(gain)
+        parts: dict[Hashable, Array] = {}
+        for which, (part, shared) in enumerate(zip(whitened, self.noise.shared, strict=True)):
+            scale, share = self._block_scales[which]
+            reactions = {}
+            if self.noise.scatter_freedom:
+                reactions["scatter"] = self._whiten(part, which) / scale**2 * np.sqrt(2.0 / self.noise.scatter_freedom)
+            if self.noise.freedom:
+                expected = shared**2 + 1.0 / (scale[self.block_starts] ** 2 * self._block_sizes)
+                error = np.minimum(expected * np.sqrt(2.0 / self.noise.freedom), shared**2) * (1.0 - share)
+                block = np.add.reduceat(part, self.block_starts, axis=-1) * error
+                reactions["shared"] = np.repeat(block, self._block_sizes, axis=-1) * scale
+            for kind, reaction in reactions.items():
+                parts[kind, which] = np.concatenate((zero, reaction) if which else (reaction, zero), axis=1)
+        return parts
 
     @cached_property
     def _block_sizes(self) -> Array:

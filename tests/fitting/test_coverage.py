@@ -1,0 +1,88 @@
+"""Whether 95 % means 95 %: intervals and bands against the truth, over simulated campaigns that differ in noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pytest
+
+from bushfit.campaign import Campaign
+from bushfit.fitting.data import Data
+from bushfit.fitting.procedures import fit_joint
+from bushfit.geometry import Direction
+from bushfit.model import FIVE, Model
+from bushfit.prediction import Band, predict
+from bushfit.results import Result
+from bushfit.schema import SimulateSettings
+
+SEEDS = 300
+#: Three standard errors of a share of 95 % over that many campaigns.
+CHANCE = 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
+
+
+def covered(result: Result, truth: Mapping[str, float]) -> list[bool]:
+    """Whether each parameter's interval holds the truth."""
+    limits = [result.interval(name) or (np.nan, np.nan) for name in FIVE]
+    return [low <= truth[name] <= high for name, (low, high) in zip(FIVE, limits, strict=True)]
+
+
+def bands_covered(result: Result, truth: Model) -> np.ndarray:
+    """Share of the points of which each band holds the truth, (direction, quantity), at points that were not fitted:
+    between and beyond the amplitudes and frequencies of the tests, and in the radial direction."""
+    top = 1e-3 * truth.bushing.unit_strain(Direction.AXIAL)
+    shares = []
+    for direction in (Direction.AXIAL, Direction.RADIAL):
+        amplitudes = np.array([0.05, 0.3, 0.8]) * top / truth.bushing.unit_strain(direction)
+        found = predict(result, direction, [1.0, 40.0, 250.0], amplitudes)
+        stiffness = truth.stiffness(direction, found.frequency, found.amplitude)
+        pairs: list[tuple[Band, np.ndarray]] = [
+            (found.stiffness, np.abs(stiffness)),
+            (found.loss_factor, stiffness.imag / stiffness.real),
+            (found.storage_stiffness, stiffness.real),
+            (found.loss_stiffness, stiffness.imag),
+        ]
+        shares.append([np.mean((band.low <= true) & (true <= band.high)) for band, true in pairs])
+    return np.array(shares)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "shared"),
+    [
+        ("paper", False),
+        ("soft and long", False),
+        ("stiff and thin", False),
+        ("strongly filled", False),
+        ("paper", True),
+        ("stiff and thin", True),
+    ],
+)
+def test_95_percent_intervals_and_bands_cover(
+    rig: Callable[..., Campaign],
+    paper_noise: SimulateSettings,
+    shared_noise: SimulateSettings,
+    paper_model: Model,
+    other_models: dict[str, Model],
+    name: str,
+    shared: bool,
+) -> None:
+    truth = {"paper": paper_model, **other_models}[name]
+    inside, banded = [], []
+    for seed in range(SEEDS):
+        result = fit_joint(Data.of(rig(truth, shared_noise if shared else paper_noise, seed)))
+        inside.append(covered(result, truth.values))
+        banded.append(bands_covered(result, truth))
+    each, bands = np.mean(inside, axis=0), np.mean(banded, axis=0)
+    print(
+        f"{name}, {SEEDS} seeds, block errors {shared}: all parameters {np.mean(inside):.3f}, "
+        + ", ".join(f"{parameter} {share:.3f}" for parameter, share in zip(FIVE, each, strict=True))
+    )
+    print(
+        f"  bands at points not fitted {np.mean(banded):.3f}; axial |K|, loss factor, K', K'': {bands[0].round(3)}, "
+        f"radial {bands[1].round(3)}"
+    )
+    assert 0.93 <= np.mean(inside) <= 0.97
+    assert 0.93 <= np.mean(banded) <= 0.97
+    assert np.all(np.abs(each - 0.95) <= max(0.02, CHANCE))
+    assert np.all(np.abs(bands - 0.95) <= max(0.02, CHANCE))
