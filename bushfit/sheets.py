@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from bushfit.measurement import Loop, Sweep
     from bushfit.model import Model
     from bushfit.prediction import Prediction
+    from bushfit.reduction import Reduction
 
 #: Displacement and stiffness as engineers read them: unit and factor from SI.
 _TRANSLATION = {"length": ("mm", 1e3), "force": ("N", 1.0), "stiffness": ("N/mm", 1e-3)}
@@ -181,6 +182,50 @@ def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
             "loss factor [-]": _loss_factor(sweep.stiffness),
         }
     )
+
+
+def reduced_table(reduction: Reduction, *, reached: bool = False) -> pd.DataFrame:
+    """Raw histories reduced to a sweep: what the sweep reader takes, then what tells how good each point is.
+
+    Args:
+        reduction: the points.
+        reached: whether the amplitude is what each point reached; else the mean of its level.
+    """
+    import pandas as pd
+
+    units = display_units(reduction.direction)
+    (length, length_factor), (stiffness, factor) = units["length"], units["stiffness"]
+    steps = reduction.steps
+    measured = np.array([step.stiffness for step in steps])
+    loss_factor = _loss_factor(measured)
+    frame = pd.DataFrame(
+        {
+            "frequency [Hz]": [float(f"{step.nominal_frequency:.5g}") for step in steps],
+            f"amplitude [{length}]": [
+                float(f"{length_factor * (step.amplitude if reached else step.level):.5g}") for step in steps
+            ],
+            "repeat": [step.repeat for step in steps],
+            f"stiffness [{stiffness}]": np.abs(measured) * factor,
+            "loss factor [-]": loss_factor,
+            f"stiffness std error [{stiffness}]": [
+                step.gain_error * abs(step.stiffness) * factor for step in steps
+            ],
+            "loss factor std error [-]": [
+                step.phase_error * (1.0 + eta**2) for step, eta in zip(steps, loss_factor, strict=True)
+            ],
+            "frequency found [Hz]": [step.frequency for step in steps],
+            f"amplitude reached [{length}]": [step.amplitude * length_factor for step in steps],
+            "displacement distortion [-]": [step.displacement_distortion for step in steps],
+            "force distortion [-]": [step.force_distortion for step in steps],
+            "cycles used": [step.cycles for step in steps],
+            "rows per cycle": [step.rows_per_cycle for step in steps],
+            "start [s]": [step.start for step in steps],
+            "end [s]": [step.end for step in steps],
+            "history": [step.name for step in steps],
+        }
+    )
+    order = [f"amplitude [{length}]", "repeat", "frequency [Hz]"]
+    return frame.sort_values(order, ignore_index=True, kind="stable")
 
 
 def _loss_factor(stiffness: Array) -> Array:

@@ -8,6 +8,7 @@ thread. Levels differ in colour (of scales that survive colour blindness and gre
 from bushfit.plots.fits import loops_figure, sweeps_figure
 from bushfit.plots.gap import gap_figure
 from bushfit.plots.prediction import fine_grid, prediction_figure
+from bushfit.plots.reduction import reduction_figure
 from bushfit.plots.style import to_png
 
-__all__ = ["fine_grid", "gap_figure", "loops_figure", "prediction_figure", "sweeps_figure", "to_png"]
+__all__ = ["fine_grid", "gap_figure", "loops_figure", "prediction_figure", "reduction_figure", "sweeps_figure", "to_png"]

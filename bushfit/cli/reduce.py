@@ -1,0 +1,111 @@
+"""`bushfit reduce`: raw stepped-sine histories -> a sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from bushfit.cli.common import Options, new_table, shared_options, warn
+from bushfit.cli.raw import FileSettings, file_options
+
+if TYPE_CHECKING:
+    from bushfit.reduction import Reduction, Step
+
+
+@click.command("reduce")
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@file_options
+@click.option("--levels", help='Amplitudes that were asked for, such as "0.1, 0.2, 0.5 mm" [found from the data].')
+@click.option("--cycles", type=click.IntRange(2, 1000), default=3, show_default=True, help="Fewest steady cycles.")
+@click.option("--reached", is_flag=True, help="Write the amplitude of each point, not the mean of its level.")
+@shared_options
+def command(
+    files: tuple[Path, ...],
+    settings: FileSettings,
+    levels: str | None,
+    cycles: int,
+    reached: bool,
+    options: Options,
+) -> None:
+    """Reduce raw stepped-sine histories (columns time, displacement, force) to a sweep.
+
+    One FILE may hold one step or many, joined by ramps and pauses; several files of one direction make one sweep. The
+    steady whole cycles of each step are found, its transient left out, and stiffness and loss factor of the
+    fundamental computed by least squares, with the amplitude really reached, noise and harmonic distortion.
+
+    Writes sweep.csv, which a campaign names under [[sweeps]], and reduce.png.
+    """
+    from bushfit.cli.grids import parse_grid
+    from bushfit.reduction import reduce
+    from bushfit.sheets import reduced_table, to_csv
+
+    direction = settings.direction_of(files)
+    folder = options.folder(f"reduced {files[0].stem}")
+    options.require_free(folder, ["sweep.csv", *(["reduce.png"] if options.plots else [])])
+    histories = settings.read_histories(files, direction)
+    asked = parse_grid(levels, "--levels", direction.displacement_unit) or ()
+    reduction = reduce(histories, fewest_cycles=cycles, levels=asked)
+    _tell(options, reduction)
+    output = {"sweep.csv": to_csv(reduced_table(reduction, reached=reached))}
+    if options.plots:
+        from bushfit.plots import reduction_figure, to_png
+
+        title = ", ".join(history.name for history in histories[:3]) + (", ..." if len(histories) > 3 else "")
+        output["reduce.png"] = to_png(reduction_figure(reduction, histories, title))
+    options.write(folder, output)
+    snippet = f'[[sweeps]]\nfile = "sweep.csv"\ndirection = "{direction}"\n'
+    options.console.print(f"for the campaign:\n\n{snippet}", markup=False)
+    options.tell(_document(reduction, snippet, reached))
+
+
+def _tell(options: Options, reduction: Reduction) -> None:
+    """A line a level and repeat, with -v a line a point."""
+    from bushfit.sheets import display_units
+
+    units = display_units(reduction.direction)
+    (unit, length), (stiffness_unit, factor) = units["length"], units["stiffness"]
+    groups: dict[tuple[float, ...], list[Step]] = {}
+    for step in reduction.steps:
+        key = (step.level, step.repeat, *((step.nominal_frequency,) if options.verbose else ()))
+        groups.setdefault(key, []).append(step)
+    count = len(reduction.steps)
+    table = new_table(
+        f"{count} point{'s' * (count > 1)} found; of each line the largest noise and distortion",
+        f"level [{unit}]", "repeat", "points", "f [Hz]", f"|K| [{stiffness_unit}]", "loss factor", "noise [%]", "THD [%]",
+    )  # fmt: skip
+    for (level, repeat, *_), steps in sorted(groups.items()):
+        table.add_row(
+            f"{length * level:.4g}",
+            f"{repeat:.0f}",
+            f"{len(steps)}",
+            _span([step.nominal_frequency for step in steps], 4),
+            _span([factor * abs(step.stiffness) for step in steps], 4),
+            _span([step.loss_factor for step in steps], 3),
+            f"{100 * max(step.gain_error for step in steps):.1g}",
+            f"{100 * max(step.force_distortion for step in steps):.2g}",
+        )
+    options.console.print(table)
+    warn(options, reduction.warnings)
+    if options.verbose:
+        for skip in reduction.skipped:
+            text = f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s makes no point: {skip.why}"
+            options.console.print(text, markup=False)
+
+
+def _span(values: Sequence[float], digits: int) -> str:
+    low, high = f"{min(values):.{digits}g}", f"{max(values):.{digits}g}"
+    return low if low == high else f"{low}-{high}"
+
+
+def _document(reduction: Reduction, snippet: str, reached: bool) -> dict[str, Any]:
+    from bushfit.sheets import reduced_table
+
+    return {
+        "direction": str(reduction.direction),
+        "points": reduced_table(reduction, reached=reached).to_dict(orient="list"),
+        "warnings": list(reduction.warnings),
+        "campaign": snippet,
+    }
