@@ -6,6 +6,7 @@ Everything is counted on the displacement and works on arrays of all rows or all
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,7 @@ class Cycles:
             return cls(time, np.empty(0), np.empty(0, dtype=np.intp), np.empty(0))
         height = motion[turns]
         middle, sense = (height[1:] + height[:-1]) / 2.0, np.sign(np.diff(height))
+        middle[0], middle[-1] = middle[1], middle[-2]  # the record cuts these strokes short
         length = np.diff(turns)
         stroke = motion[turns[0] : turns[-1]]
         before = (stroke - np.repeat(middle, length)) * np.repeat(sense, length) < 0.0
@@ -69,7 +71,8 @@ class Cycles:
         row = np.clip(row, turns[:-1] + 1, turns[1:])
         rise = motion[row] - motion[row - 1]
         part = np.clip((middle - motion[row - 1]) / np.where(rise == 0.0, 1.0, rise), 0.0, 1.0)
-        upward = np.flatnonzero(sense > 0.0)
+        crossed = (middle - height[:-1]) * (height[1:] - middle) > 0.0
+        upward = np.flatnonzero((sense > 0.0) & crossed)
         edges = (time[row - 1] + part * (time[row] - time[row - 1]))[upward]
         peak, trough = height[upward[:-1] + 1], height[upward[:-1] + 2]
         return cls(time, edges, np.searchsorted(time, edges).astype(np.intp), peak - trough)
@@ -84,7 +87,7 @@ class Cycles:
         hole = gap > _HOLE * period
         other = (np.abs(np.diff(np.log(period))) > _SAME_PERIOD) | (np.abs(np.diff(np.log(self.range))) > _SAME_RANGE)
         border = np.concatenate(([0], 1 + np.flatnonzero(other | hole[1:] | hole[:-1]), [period.size]))
-        return [slice(int(a), int(b)) for a, b in zip(border[:-1], border[1:], strict=True) if not hole[a]]
+        return [slice(int(a), int(b)) for a, b in pairwise(border) if not hole[a]]
 
     def fundamentals(self, run: slice, values: Floats) -> Complex:
         """Complex fundamental of each cycle of a run, by least squares with its mean, (k,)."""
@@ -197,8 +200,10 @@ def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
     if len(parts) < _FEWEST_IN_SWEEP:
         return False
     middle = np.array([(part.start + part.stop) / 2.0 for part in parts])
-    fits = [np.polyfit(np.arange(part.start, part.stop + 1) - m, edges[part.start : part.stop + 1], 2)
-            for part, m in zip(parts, middle, strict=True)]
+    fits = [
+        np.polyfit(np.arange(part.start, part.stop + 1) - m, edges[part.start : part.stop + 1], 2)
+        for part, m in zip(parts, middle, strict=True)
+    ]
     curve, period, _ = np.array(fits).T
     within, between = 2.0 * curve / period, np.gradient(np.log(period), middle)
     return bool(np.median(within / np.where(between == 0.0, np.inf, between)) > _SWEPT)

@@ -43,6 +43,7 @@ SWEEP_COLUMNS = {
         *("dynamic amplitude", "Wegamplitude", "Winkelamplitude", "amplitude de déplacement", "amplitude dynamique"),
         *("amplitud", "amplitud de desplazamiento", "amplitud dinámica", "振幅", "幅值"),
     ),
+    "amplitude_reached": ("amplitude reached", "erreichte Amplitude", "amplitude atteinte", "amplitud alcanzada"),
     "stiffness": (
         *("stiffness", "dynamic stiffness", "stiffness magnitude", "complex stiffness", "kdyn", "cdyn", "|k|", "K*"),
         *("Steifigkeit", "dynamische Steifigkeit", "Federsteifigkeit", "Drehsteifigkeit", "dyn Steifigkeit"),

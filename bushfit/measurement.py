@@ -52,6 +52,9 @@ class Sweep:
     """Stepped sine: frequency [Hz], zero-to-peak amplitude [m or rad], complex dynamic stiffness
     [N/m or N m/rad] and repeat number (default: all 1), each (n,).
 
+    amplitude is that of the level, the same for all its points; reached is what each point really reached, where
+    that is known: the model is asked there.
+
     noise is the standard deviation of the real and of the imaginary part, each relative to |K|, where
     the campaign states it.
     """
@@ -64,11 +67,17 @@ class Sweep:
     repeat: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     noise: float | None = None
     source: Source | None = None
+    reached: Floats | None = None
 
     def __post_init__(self) -> None:
         if self.repeat.size == 0:
             object.__setattr__(self, "repeat", np.ones(self.frequency.size, dtype=np.int64))
-        _check_lengths(self.name, self.frequency, self.amplitude, self.stiffness, self.repeat)
+        _check_lengths(self.name, self.frequency, self.amplitude, self.stiffness, self.repeat, self.amplitude_reached)
+
+    @property
+    def amplitude_reached(self) -> Floats:
+        """Amplitude of each point as reached, or else of its level [m or rad], (n,)."""
+        return self.amplitude if self.reached is None else self.reached
 
 
 def _check_lengths(name: str, *columns: NDArray[np.generic]) -> None:

@@ -109,7 +109,8 @@ def read_sweep(
 
     Args:
         file: a table with columns frequency, amplitude, one of STIFFNESS_PAIRS, and repeat (optional: without it,
-            an operating point that occurs again is a repeat).
+            an operating point that occurs again is a repeat) and amplitude reached (optional: where the rig missed
+            the amplitude of the level).
         direction: direction of the test, which settles the units that fit.
         name: of the sweep; default the stem of the file.
         listed_as: the file as the campaign names it, for provenance; default its name.
@@ -133,16 +134,19 @@ def read_sweep(
             expected=", or ".join(" and ".join(pair) for pair in STIFFNESS_PAIRS).replace("_", " "),
             hint='correct the header, or name the columns in the campaign: columns = { stiffness = "..." }',
         )
-    expected = {"frequency": "Hz", "amplitude": direction.displacement_unit, "loss_factor": "1", "phase": "rad"}
-    roles = ["frequency", "amplitude", *pair, *(["repeat"] if "repeat" in table.roles else [])]
-    wanted = {
-        role: table.column(role, expected.get(role, "1" if role == "repeat" else direction.stiffness_unit))
-        for role in roles
+    expected = {
+        "frequency": "Hz",
+        **dict.fromkeys(("amplitude", "amplitude_reached"), direction.displacement_unit),
+        **dict.fromkeys(("loss_factor", "repeat"), "1"),
+        "phase": "rad",
     }
+    also = (role for role in ("amplitude_reached", "repeat") if role in table.roles)
+    roles = ["frequency", "amplitude", *pair, *also]
+    wanted = {role: table.column(role, expected.get(role, direction.stiffness_unit)) for role in roles}
     convention = _convention(table, wanted["amplitude"], amplitude)
     values = table.read(wanted, fewest_rows=_FEWEST_SWEEP_ROWS)
 
-    for role in {"frequency", "amplitude", "stiffness", "storage_stiffness"} & set(values):
+    for role in {"frequency", "amplitude", "amplitude_reached", "stiffness", "storage_stiffness"} & set(values):
         label = role.replace("_", " ")
         table.refuse(values[role] <= 0.0, wanted[role], f"the {label} is not positive", "a number above zero")
     with np.errstate(over="ignore"):
@@ -155,10 +159,14 @@ def read_sweep(
         f"a loss factor (loss over storage stiffness) from {low:g} to {high:g}",
         "check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]",
     )
-    zero_to_peak = values["amplitude"] * (0.5 if convention == "peak-to-peak" else 1.0)
+    counted = 0.5 if convention == "peak-to-peak" else 1.0
+    zero_to_peak = counted * values["amplitude"]
+    reached = counted * values["amplitude_reached"] if "amplitude_reached" in values else None
     repeat = _repeats(table, wanted, values)
     source = Source(listed_as or Path(file.name), table.sha256)
-    return Sweep(name or file.stem, direction, values["frequency"], zero_to_peak, stiffness, repeat, noise, source)
+    return Sweep(
+        name or file.stem, direction, values["frequency"], zero_to_peak, stiffness, repeat, noise, source, reached
+    )
 
 
 def _check_not_swapped(table: Table, direction: Direction) -> None:

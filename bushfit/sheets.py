@@ -184,13 +184,8 @@ def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
     )
 
 
-def reduced_table(reduction: Reduction, *, reached: bool = False) -> pd.DataFrame:
-    """Raw histories reduced to a sweep: what the sweep reader takes, then what tells how good each point is.
-
-    Args:
-        reduction: the points.
-        reached: whether the amplitude is what each point reached; else the mean of its level.
-    """
+def reduced_table(reduction: Reduction) -> pd.DataFrame:
+    """Raw histories reduced to a sweep: what the sweep reader takes, then what tells how good each point is."""
     import pandas as pd
 
     units = display_units(reduction.direction)
@@ -201,20 +196,16 @@ def reduced_table(reduction: Reduction, *, reached: bool = False) -> pd.DataFram
     frame = pd.DataFrame(
         {
             "frequency [Hz]": [float(f"{step.nominal_frequency:.5g}") for step in steps],
-            f"amplitude [{length}]": [
-                float(f"{length_factor * (step.amplitude if reached else step.level):.5g}") for step in steps
-            ],
+            f"amplitude [{length}]": [float(f"{length_factor * step.level:.5g}") for step in steps],
+            f"amplitude reached [{length}]": [step.amplitude * length_factor for step in steps],
             "repeat": [step.repeat for step in steps],
             f"stiffness [{stiffness}]": np.abs(measured) * factor,
             "loss factor [-]": loss_factor,
-            f"stiffness std error [{stiffness}]": [
-                step.gain_error * abs(step.stiffness) * factor for step in steps
-            ],
+            f"stiffness std error [{stiffness}]": [step.gain_error * abs(step.stiffness) * factor for step in steps],
             "loss factor std error [-]": [
                 step.phase_error * (1.0 + eta**2) for step, eta in zip(steps, loss_factor, strict=True)
             ],
             "frequency found [Hz]": [step.frequency for step in steps],
-            f"amplitude reached [{length}]": [step.amplitude * length_factor for step in steps],
             "displacement distortion [-]": [step.displacement_distortion for step in steps],
             "force distortion [-]": [step.force_distortion for step in steps],
             "cycles used": [step.cycles for step in steps],

@@ -24,7 +24,9 @@ class Stepped:
     history: Loop
     truth: Array
 
-    def measured(self, random: np.random.Generator, noise: float, drift: float = 0.0, rows: Array | None = None) -> Loop:
+    def measured(
+        self, random: np.random.Generator, noise: float, drift: float = 0.0, rows: Array | None = None
+    ) -> Loop:
         """The history with white noise and a wandering zero in both channels, relative to their largest value.
 
         `rows` are those that are kept, for records that are coarse or uneven.

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from stepped import Stepped, settled, stepped
 
 from bushfit.cycles import turning_points
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
 from bushfit.measurement import Loop
 from bushfit.model import Model
+from bushfit.reading import read_loop
 from bushfit.reduction import Reduction, reduce
-from stepped import Stepped, settled, stepped
 
 FREQUENCIES = (5.0, 25.0, 100.0, 101.0, 155.0)
 #: The rig misses 0.1, 0.2 and 0.5 mm.
@@ -46,26 +49,30 @@ def test_every_step_is_found_where_it_is(clean: Stepped) -> None:
     assert not any(skip.steady for skip in reduction.skipped)
 
 
-def rows_of(kind: str, clean: Stepped) -> np.ndarray | None:
+def rows_of(kind: str, count: int) -> np.ndarray | None:
     """Rows that a coarse or uneven record keeps of the 5 kHz."""
-    count, random = clean.history.time.size, np.random.default_rng(5)
     match kind:
         case "uneven":
-            return np.sort(random.choice(count, count // 2, replace=False))
-        case "coarse":  # 8.1 rows a cycle at 155 Hz
+            return np.sort(np.random.default_rng(5).choice(count, count // 2, replace=False))
+        case "coarse":  # 10.8 rows a cycle at 155 Hz
+            return np.arange(0, count, 3)
+        case "coarse, nearly 8 rows a cycle":  # the 7th and 9th overtone fold onto the fundamental of 155 Hz
             return np.arange(0, count, 4)
         case _:
             return None
 
 
-@pytest.mark.parametrize("kind", ["even", "uneven", "coarse"])
-def test_stiffness_is_that_of_the_closed_form(clean: Stepped, paper_model: Model, kind: str) -> None:
-    history = clean.measured(np.random.default_rng(1), 0.0, rows=rows_of(kind, clean))
-    reduction = reduce([history])
+@pytest.mark.parametrize(
+    ("kind", "limit"), [("even", 5e-5), ("uneven", 5e-5), ("coarse", 5e-5), ("coarse, nearly 8 rows a cycle", 5e-4)]
+)
+def test_stiffness_is_that_of_the_closed_form(clean: Stepped, paper_model: Model, kind: str, limit: float) -> None:
+    rows = rows_of(kind, clean.history.time.size)
+    reduction = reduce([clean.measured(np.random.default_rng(1), 0.0, rows=rows)])
     off = worst(reduction, paper_model)
     print(f"{kind}: {len(reduction.steps)} points, off by at most {off:.1e} of |K|, without noise")
     assert len(reduction.steps) == len(POINTS)
-    assert off < (2e-4 if kind == "coarse" else 1e-4)
+    assert off < limit
+    assert any("rows a cycle" in line for line in reduction.warnings) == kind.startswith("coarse")
 
 
 @pytest.mark.parametrize("direction", [Direction.RADIAL, Direction.TORSION])
@@ -99,14 +106,14 @@ def test_noise_that_is_not_white_is_told_by_the_cycles() -> None:
     random, time = np.random.default_rng(3), np.arange(0.0, 4.0, 1e-3)
     errors, stated = [], []
     for _ in range(40):
-        wander = np.interp(time, np.arange(0.0, 5.0, 0.1), 1.0 + 0.01 * random.standard_normal(50))
+        wander = np.repeat(1.0 + 0.01 * random.standard_normal(40), 100)
         force = wander * np.sin(2.0 * np.pi * 10.0 * time + 0.1) + 1e-4 * random.standard_normal(time.size)
         motion = 1e-3 * np.sin(2.0 * np.pi * 10.0 * time) + 1e-7 * random.standard_normal(time.size)
         (step,) = reduce([Loop("x", Direction.AXIAL, time, motion, force)]).steps
         errors.append(abs(step.stiffness) / 1e3 - 1.0)
         stated.append(step.gain_error)
     print(f"scatter of |K| {np.std(errors):.2e}, stated {np.median(stated):.2e}")
-    assert np.median(stated) == pytest.approx(np.std(errors), rel=0.35)
+    assert np.median(stated) == pytest.approx(np.std(errors), rel=0.3)
 
 
 def sine(frequency: float, amplitude: float, start: float, stop: float, rate: float = 4000.0) -> tuple[np.ndarray, ...]:
@@ -148,7 +155,6 @@ def test_repeats_and_levels(paper_model: Model) -> None:
     reduction = reduce([first.history, second.history])
     assert reduction.array("repeat").tolist() == [1, 1, 2, 2, 3, 3]
     assert np.unique(reduction.array("level")).tolist() == [pytest.approx(reduction.array("amplitude").mean())]
-    assert len([line for line in reduction.warnings if "the rig reached 0.097 to 0.103 mm" in line]) == 0  # one level
     named = reduce([first.history, second.history], levels=(0.97e-4, 1.03e-4))
     assert np.unique(named.array("level")).size == 2
 
@@ -156,7 +162,7 @@ def test_repeats_and_levels(paper_model: Model) -> None:
 def test_what_a_missed_set_point_does_to_the_stiffness_is_said(paper_model: Model) -> None:
     points = [(f, a) for f in (10.0, 30.0) for a in (1e-4, 5e-4 * (1.0 if f < 20.0 else 0.92))]
     (warning,) = reduce([stepped(paper_model, points).history]).warnings
-    assert "the rig reached 0.46 to 0.5 mm where the level is 0.48 mm" in warning
+    assert "the rig reached 0.46 to 0.5 mm at the level of 0.48 mm" in warning
     slope = np.log(np.abs(np.divide(*paper_model.stiffness(Direction.AXIAL, 10.0, np.array([5e-4, 1e-4]))))) / np.log(5)
     assert f"{abs(100 * slope * 0.042):.1f}" in warning
 
@@ -178,6 +184,30 @@ def test_too_few_cycles_and_a_still_record_make_no_points() -> None:
     still = Loop("x", Direction.AXIAL, time, np.zeros_like(time), np.zeros_like(time))
     with pytest.raises(MeasurementError, match="does not go up and down"):
         reduce([still])
+
+
+#: How data/cmp_15961_raw was made.
+KEPT = {"seed": 34, "step": 4e-6, "every": 100, "pause": 0.15, "cycles": 12}
+
+
+def kept_record(model: Model) -> Loop:
+    """The record in data/cmp_15961_raw: three levels, five frequencies, set points missed by about 1 %."""
+    random = np.random.default_rng(KEPT["seed"])
+    points = [
+        (frequency, amplitude * (1.0 + 0.01 * random.standard_normal()))
+        for amplitude in (1e-4, 2e-4, 5e-4)
+        for frequency in (10.0, 20.0, 40.0, 80.0, 155.0)
+    ]
+    made = stepped(model, points, step=KEPT["step"], every=KEPT["every"], pause=KEPT["pause"], cycles=KEPT["cycles"])
+    return made.measured(random, noise=5e-4, drift=0.005)
+
+
+def test_the_record_in_data_can_be_made_again(paper_model: Model, root: Path) -> None:
+    made = kept_record(paper_model)
+    kept = read_loop(root / "data/cmp_15961_raw/stepped_sine_axial.csv", Direction.AXIAL)
+    assert kept.time.size == made.time.size
+    np.testing.assert_allclose(kept.displacement, made.displacement, atol=1.1e-8)
+    np.testing.assert_allclose(kept.force, made.force, atol=0.02)
 
 
 @settings(max_examples=60, deadline=None)

@@ -34,7 +34,7 @@ class FileSettings:
         """
         from bushfit.directions import direction_of_file
         from bushfit.errors import MeasurementError
-        from bushfit.reading import LOOP_COLUMNS
+        from bushfit.headers import LOOP_COLUMNS
         from bushfit.table import Table
 
         if self.direction:
@@ -91,7 +91,7 @@ def file_options(function: F) -> F:
 
     @click.option("--direction", type=click.Choice(["axial", "radial", "torsion"]), help="[from the file's name]")
     @click.option("--column", "columns", multiple=True, metavar="ROLE=HEADER", help='Such as "force=Kraft (Zelle 2)".')
-    @click.option("--unit", "units", multiple=True, metavar="ROLE=UNIT", help='That the file lacks, such as "force=kN".')
+    @click.option("--unit", "units", multiple=True, metavar="ROLE=UNIT", help='Such as "force=kN".')
     @click.option(
         "--force-sign", type=click.Choice(["1", "-1"]), default="1", help="-1: the load cell counts the other way."
     )
@@ -113,7 +113,7 @@ def file_options(function: F) -> F:
 
 def _pairs(texts: Sequence[str], option: str, example: str) -> dict[str, str]:
     from bushfit.errors import MeasurementError
-    from bushfit.reading import LOOP_COLUMNS, SWEEP_COLUMNS
+    from bushfit.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 
     known = list(dict.fromkeys([*LOOP_COLUMNS, *SWEEP_COLUMNS]))
     pairs = {}

@@ -20,14 +20,12 @@ if TYPE_CHECKING:
 @file_options
 @click.option("--levels", help='Amplitudes that were asked for, such as "0.1, 0.2, 0.5 mm" [found from the data].')
 @click.option("--cycles", type=click.IntRange(2, 1000), default=3, show_default=True, help="Fewest steady cycles.")
-@click.option("--reached", is_flag=True, help="Write the amplitude of each point, not the mean of its level.")
 @shared_options
 def command(
     files: tuple[Path, ...],
     settings: FileSettings,
     levels: str | None,
     cycles: int,
-    reached: bool,
     options: Options,
 ) -> None:
     """Reduce raw stepped-sine histories (columns time, displacement, force) to a sweep.
@@ -49,7 +47,7 @@ def command(
     asked = parse_grid(levels, "--levels", direction.displacement_unit) or ()
     reduction = reduce(histories, fewest_cycles=cycles, levels=asked)
     _tell(options, reduction)
-    output = {"sweep.csv": to_csv(reduced_table(reduction, reached=reached))}
+    output = {"sweep.csv": to_csv(reduced_table(reduction))}
     if options.plots:
         from bushfit.plots import reduction_figure, to_png
 
@@ -58,7 +56,7 @@ def command(
     options.write(folder, output)
     snippet = f'[[sweeps]]\nfile = "sweep.csv"\ndirection = "{direction}"\n'
     options.console.print(f"for the campaign:\n\n{snippet}", markup=False)
-    options.tell(_document(reduction, snippet, reached))
+    options.tell(_document(reduction, snippet))
 
 
 def _tell(options: Options, reduction: Reduction) -> None:
@@ -74,7 +72,8 @@ def _tell(options: Options, reduction: Reduction) -> None:
     count = len(reduction.steps)
     table = new_table(
         f"{count} point{'s' * (count > 1)} found; of each line the largest noise and distortion",
-        f"level [{unit}]", "repeat", "points", "f [Hz]", f"|K| [{stiffness_unit}]", "loss factor", "noise [%]", "THD [%]",
+        f"level [{unit}]", "repeat", "points", "f [Hz]", f"|K| [{stiffness_unit}]", "loss factor", "noise [%]",
+        "THD [%]",
     )  # fmt: skip
     for (level, repeat, *_), steps in sorted(groups.items()):
         table.add_row(
@@ -100,12 +99,12 @@ def _span(values: Sequence[float], digits: int) -> str:
     return low if low == high else f"{low}-{high}"
 
 
-def _document(reduction: Reduction, snippet: str, reached: bool) -> dict[str, Any]:
+def _document(reduction: Reduction, snippet: str) -> dict[str, Any]:
     from bushfit.sheets import reduced_table
 
     return {
         "direction": str(reduction.direction),
-        "points": reduced_table(reduction, reached=reached).to_dict(orient="list"),
+        "points": reduced_table(reduction).to_dict(orient="list"),
         "warnings": list(reduction.warnings),
         "campaign": snippet,
     }

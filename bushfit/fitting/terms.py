@@ -163,6 +163,7 @@ class SweepTerm:
             amplitude=self.sweep.amplitude[kept],
             stiffness=self.sweep.stiffness[kept],
             repeat=self.sweep.repeat[kept],
+            reached=self.sweep.amplitude_reached[kept],
         )
         return replace(self, sweep=part)
 
@@ -202,8 +203,8 @@ class SweepTerm:
 
     @cached_property
     def _distinct(self) -> tuple[Array, Array, Array]:
-        """Frequency and amplitude of the distinct operating points, and the place of each point among them."""
-        points = np.stack((self.frequency, self.amplitude))
+        """Frequency and reached amplitude of the distinct operating points, and the place of each point among them."""
+        points = np.stack((self.frequency, self.sweep.amplitude_reached[self.order]))
         distinct, place = np.unique(points, axis=1, return_inverse=True)
         return distinct[0], distinct[1], place.ravel()
 

@@ -11,4 +11,12 @@ from bushfit.plots.prediction import fine_grid, prediction_figure
 from bushfit.plots.reduction import reduction_figure
 from bushfit.plots.style import to_png
 
-__all__ = ["fine_grid", "gap_figure", "loops_figure", "prediction_figure", "reduction_figure", "sweeps_figure", "to_png"]
+__all__ = [
+    "fine_grid",
+    "gap_figure",
+    "loops_figure",
+    "prediction_figure",
+    "reduction_figure",
+    "sweeps_figure",
+    "to_png",
+]

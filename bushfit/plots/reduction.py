@@ -107,9 +107,7 @@ def _draw_quality(pair: Sequence[Axes], reduction: Reduction, looks: dict[float,
         frequency = np.array([step.frequency for step in mine])
         noise = np.array([np.hypot(step.gain_error, step.phase_error) / 2**0.5 for step in mine])
         pair[0].plot(frequency, 100 * noise, look.marker, color=look.color, **POINT)
-        pair[1].plot(
-            frequency, [100 * step.force_distortion for step in mine], look.marker, color=look.color, **POINT
-        )
+        pair[1].plot(frequency, [100 * step.force_distortion for step in mine], look.marker, color=look.color, **POINT)
         hollow = [100 * step.displacement_distortion for step in mine]
         pair[1].plot(frequency, hollow, look.marker, color=look.color, ms=3.4, mfc="none", mew=0.7)
     dress(pair[0], "frequency [Hz]", "noise [%]")
