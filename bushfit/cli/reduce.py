@@ -37,11 +37,12 @@ def command(
     Writes sweep.csv, which a campaign names under [[sweeps]], and reduce.png.
     """
     from bushfit.cli.grids import parse_grid
+    from bushfit.output import folder_name
     from bushfit.reduction import reduce
     from bushfit.sheets import reduced_table, to_csv
 
     direction = settings.direction_of(files)
-    folder = options.folder(f"reduced {files[0].stem}")
+    folder = options.folder(folder_name(files[0].stem))
     options.require_free(folder, ["sweep.csv", *(["reduce.png"] if options.plots else [])])
     histories = settings.read_histories(files, direction)
     asked = parse_grid(levels, "--levels", direction.displacement_unit) or ()
