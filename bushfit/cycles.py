@@ -30,7 +30,7 @@ _HOLE = 0.34
 #: A split takes this much off chi-square, and parts frequencies or amplitudes by these shares at least.
 _SPLIT_GAIN, _OTHER_FREQUENCY, _OTHER_AMPLITUDE = 40.0, 1e-3, 0.02
 #: No crossing is known better than this share of a period, no amplitude better than this share of itself.
-_LEAST_JITTER, _LEAST_SCATTER = 1e-4, 1e-4
+_LEAST_JITTER, _LEAST_SCATTER = 5e-4, 5e-4
 #: Cycles on either side of a split.
 _FEWEST = 2
 #: A run of so many pieces sweeps where this share of the change between them is within them.
@@ -63,7 +63,8 @@ class Cycles:
             return cls(time, np.empty(0), np.empty(0, dtype=np.intp), np.empty(0))
         height = motion[turns]
         middle, sense = (height[1:] + height[:-1]) / 2.0, np.sign(np.diff(height))
-        middle[0], middle[-1] = middle[1], middle[-2]  # the record cuts these strokes short
+        if middle.size > 4:  # the record cuts the first and the last stroke short
+            middle[[0, -1]] = 2.0 * middle[[1, -2]] - middle[[2, -3]]
         length = np.diff(turns)
         stroke = motion[turns[0] : turns[-1]]
         before = (stroke - np.repeat(middle, length)) * np.repeat(sense, length) < 0.0
