@@ -9,6 +9,7 @@ import re
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 from bushfit import units
@@ -153,6 +154,7 @@ class Vocabulary:
         return None
 
 
+@lru_cache(maxsize=4096)
 def split_convention(text: str) -> tuple[str, AmplitudeConvention | None]:
     """A header or unit without what it says of counting amplitudes, and what it says."""
     folded = _folded(text)
@@ -163,6 +165,7 @@ def split_convention(text: str) -> tuple[str, AmplitudeConvention | None]:
     return text.strip(), None
 
 
+@lru_cache(maxsize=4096)
 def plain(name: str) -> str:
     """A name by which spellings agree: letters, digits and the signs ' | * alone, without case, accents and umlauts."""
     letters = re.sub(r"[^\w'|*]|_", "", _folded(name.translate(_SPELLINGS)).replace("ß", "ss"))
