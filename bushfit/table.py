@@ -23,6 +23,7 @@ from bushfit.layout import DELIMITERS, Layout, find_layout, fits
 from bushfit.measurement import Floats
 from bushfit.numerals import ALL, Numerals, is_like_number, weigh
 from bushfit.source import Source, Text, rows
+from bushfit.workbook import is_workbook, open_sheet
 
 _LONGEST_FOUND = 200
 #: In SI; far beyond every rig, and its square is still a number.
@@ -114,11 +115,21 @@ class Table:
         stated = stated or FileFormat()
         data = read_bytes(file, MeasurementError)
         checksum = _checksum(data)
-        source: Source = Text.open(data, file, stated.encoding)
         vocabulary = Vocabulary(names, columns or {})
-        delimiter = "" if source.sheet else DELIMITERS[stated.delimiter] if stated.delimiter else None
+
+        def lay_out(source: Source) -> Layout:
+            delimiter = "" if source.sheet else DELIMITERS[stated.delimiter] if stated.delimiter else None
+            return find_layout(source.head(), vocabulary, delimiter=delimiter, header_line=stated.header_line)
+
         try:
-            layout = find_layout(source.head(), vocabulary, delimiter=delimiter, header_line=stated.header_line)
+            source: Source
+            if is_workbook(data):
+                source = open_sheet(
+                    data, file, stated.sheet, lambda sheet: len(vocabulary.roles(lay_out(sheet).headers)) > 1
+                )
+            else:
+                source = Text.open(data, file, stated.encoding)
+            layout = lay_out(source)
         except csv.Error as error:
             raise MeasurementError("the table cannot be read", file=file, found=str(error)) from error
         table = cls(file, source, layout, Numerals(), {}, checksum)
