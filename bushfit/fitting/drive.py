@@ -16,6 +16,7 @@ from bushfit.effects.contract import Array
 from bushfit.effects.history import History, reversals
 from bushfit.errors import FitError
 from bushfit.fitting.noise import FLOOR
+from bushfit.fitting.runin import steady_part
 from bushfit.measurement import Loop
 
 #: Samples of the model's cycle; measured rows lie between them and are reached by linear interpolation.
@@ -35,6 +36,8 @@ _ALIKE = 1.02
 _AT_REST = 0.02
 #: Share of a cycle at its start, and of the half range of the force by which it is another a cycle later.
 _FIRST, _OTHER = 0.02, 5e-3
+#: Standard deviations, and loss factor, by which a loop may give energy for its noise and the rig's delay.
+_CERTAIN, _NO_LOSS = 5.0, 2e-3
 #: Share of the amplitude by which a motion may lie off zero before its middle is taken for unknown.
 _CENTRED = 0.01
 
@@ -55,6 +58,7 @@ class Drive:
         coefficients: complex harmonics of the displacement, mean first.
         datum: mean of the measured force where the motion lies off zero, else None. Whether a sensor's zero or
             a preload put it there is not known, so such a loop counts from its own middle.
+        note: what of the record was left out, in words; None where nothing was.
     """
 
     loop: Loop
@@ -67,6 +71,7 @@ class Drive:
     noise: float
     coefficients: Array
     datum: float | None = None
+    note: str | None = None
 
     @property
     def half_range(self) -> float:
@@ -140,22 +145,41 @@ def drive_of(loop: Loop) -> Drive:
     """Find the cycles of a loop and clear its displacement of noise.
 
     Raises:
-        FitError: the displacement is not one whole cycle or more of a periodic motion.
+        FitError: the displacement is not one whole cycle or more of a periodic motion, or the loop gives energy.
     """
+    begin = loop.time[0]
+    loop, note = steady_part(loop)
     frequency, cycles = _fundamental(loop)
     phase = (loop.time - loop.time[0]) * frequency
     half_motion, half_force = np.ptp(loop.displacement) / 2.0, np.ptp(loop.force) / 2.0
     motion, force_mean, force_noise = _harmonics(phase, loop)
     noise = loop.noise * half_force if loop.noise is not None else force_noise
-    from_rest = _from_rest(loop, phase, half_motion, half_force, noise)
+    from_rest = loop.time[0] == begin and _from_rest(loop, phase, half_motion, half_force, noise)
     force, weight = loop.force, np.ones(loop.force.size)
     if loop.force.size > MOST_ROWS and not from_rest:
         phase, force, weight = _binned(phase, loop.force)
     noise = max(noise, FLOOR * half_force)
     off_zero = not from_rest and abs(motion[0]) > _CENTRED * half_motion
     datum = force_mean if off_zero else None
-    drive = Drive(loop, frequency, cycles, from_rest, phase, force, weight, noise, motion, datum)
-    return replace(drive, weight=np.where(_at_reversal(drive), 0.0, weight))
+    drive = Drive(loop, frequency, cycles, from_rest, phase, force, weight, noise, motion, datum, note)
+    drive = replace(drive, weight=np.where(_at_reversal(drive), 0.0, weight))
+    _check_loses_energy(drive)
+    return drive
+
+
+def _check_loses_energy(drive: Drive) -> None:
+    """A bushing loses energy: its force runs ahead of its displacement, beyond noise."""
+    stiffness = drive.first_harmonic()
+    chance = drive.noise * np.sqrt(2.0 / drive.weight.sum()) / abs(drive.coefficients[1])
+    if stiffness.imag < -max(_CERTAIN * chance, _NO_LOSS * abs(stiffness)):
+        raise FitError(
+            "the loop gives energy, which no bushing does",
+            file=drive.loop.source.file if drive.loop.source else None,
+            found=f"a loss factor of {stiffness.imag / stiffness.real:.3g}: the force lags behind the displacement",
+            expected="a force that runs ahead of the displacement",
+            hint="are the columns of displacement and force swapped, or do the rows run backwards in time? Name the "
+            'columns in the campaign: columns = { displacement = "...", force = "..." }',
+        )
 
 
 def _at_reversal(drive: Drive) -> Array:

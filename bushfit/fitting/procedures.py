@@ -14,7 +14,7 @@ from bushfit.fitting.assess import Stage, cautions, covariance, measured_range, 
 from bushfit.fitting.data import Data
 from bushfit.fitting.solve import Coordinates, Solution, solve
 from bushfit.fitting.starts import start_values
-from bushfit.fitting.terms import SweepTerm, Term
+from bushfit.fitting.terms import LoopTerm, SweepTerm, Term
 from bushfit.geometry import Direction
 from bushfit.model import Model
 from bushfit.results import Covariance, Result
@@ -195,6 +195,7 @@ def _result(
 
 
 def _assumptions(terms: Sequence[Term]) -> list[str]:
-    """What was assumed of the noise because nothing was repeated."""
+    """What was left out of the loops, and what was assumed of the noise because nothing was repeated."""
     noises = {id(term.noise): term.noise for term in terms if isinstance(term, SweepTerm)}
-    return [f"noise of the sweeps: {noise.describe()}" for noise in noises.values() if noise.origin == "assumed"]
+    assumed = [f"noise of the sweeps: {noise.describe()}" for noise in noises.values() if noise.origin == "assumed"]
+    return [*(term.drive.note for term in terms if isinstance(term, LoopTerm) and term.drive.note), *assumed]

@@ -1,0 +1,86 @@
+"""The steady cycles of a loop: what comes before them (a ramp, a hold, smaller cycles) and after them is left out.
+
+A motion is steady where it comes again a period later. The longest stretch that does so is kept; without a stretch that
+does not, nothing is touched, so a record may start and end anywhere in its cycle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.measurement import Loop
+
+#: The motion comes again where it is the same a period later within this share of its range, for all but this share
+#: of a period.
+_SAME, _BRIEF = 0.05, 0.02
+#: The ends of the stretch are drawn in, by half a period at most, to where the difference is within so many times its
+#: median and this share of the range.
+_WITHIN, _LEAST, _EDGE = 8.0, 5e-4, 0.5
+#: Cycles, for what noise may take off them, from which on the first one can go.
+_THREE = 2.95
+#: Share of the range by which the motion passes its middle, before that counts as a crossing.
+_BAND = 0.1
+#: Rows that are enough to find the stretch.
+_MOST_ROWS = 200_000
+
+
+def steady_part(loop: Loop) -> tuple[Loop, str | None]:
+    """A loop without what comes before and after its steady cycles, and a sentence on what was left out, if anything.
+
+    After a run-in the first cycle still remembers it, and goes too where two more are left.
+    """
+    step = -(-loop.time.size // _MOST_ROWS)
+    time, motion = loop.time[::step], loop.displacement[::step]
+    period = _period(time, motion)
+    if period is None or time[-1] - time[0] <= period:
+        return loop, None
+    again = np.interp(time + period, time, motion)
+    comparable = time + period <= time[-1]
+    off, clock = np.abs(again - motion)[comparable], time[comparable]
+    start, end = _longest(off < _SAME * np.ptp(motion), clock, _BRIEF * period)
+    before, after = start > 0, end < off.size
+    if start == end or not (before or after):
+        return loop, None
+    other = np.flatnonzero(off[start:end] > _WITHIN * np.median(off[start:end]) + _LEAST * np.ptp(motion)) + start
+    if before:
+        start = max(other[clock[other] < clock[start] + _EDGE * period], default=start - 1) + 1
+    if after:
+        end = min(other[clock[other] > clock[end - 1] - _EDGE * period], default=end)
+    first, last = float(time[start]), float(time[end - 1]) + period
+    if before and last - first > _THREE * period:
+        first += period
+    kept = slice(np.searchsorted(loop.time, first), np.searchsorted(loop.time, last, side="right") if after else None)
+    left_out = [
+        f"{duration:.3g} s {where} its steady cycles"
+        for duration, where in ((first - time[0], "before"), (time[-1] - last, "after"))
+        if duration > _BRIEF * period
+    ]
+    note = f"{loop.name}: {' and '.join(left_out)} are left out; {(last - first) / period:.3g} cycles are used"
+    return replace(loop, **{name: getattr(loop, name)[kept] for name in ("time", "displacement", "force")}), note
+
+
+def _period(time: Array, motion: Array) -> float | None:
+    """Usual time between upward crossings of the middle in the later half; twice a stroke where there is one cycle."""
+    centred = motion - (motion.max() + motion.min()) / 2.0
+    band = _BAND * np.ptp(motion)
+    marks = np.flatnonzero(np.abs(centred) > band)
+    upper = centred[marks] > 0.0
+    crossings = marks[1:][upper[1:] != upper[:-1]]
+    if crossings.size < 2:
+        return None
+    if crossings.size == 2:
+        return float(2.0 * (time[crossings[1]] - time[crossings[0]]))
+    intervals = time[crossings[2:]] - time[crossings[:-2]]
+    return float(np.median(intervals[intervals.size // 2 :]))
+
+
+def _longest(alike: Array, time: Array, brief: float) -> tuple[int, int]:
+    """Start and end of the longest stretch of rows that are alike; brief breaks count as alike."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], (~alike).astype(np.int8), [0]))))
+    breaks = [(start, end) for start, end in edges.reshape(-1, 2) if time[end - 1] - time[start] > brief]
+    starts = [0, *(end for _, end in breaks)]
+    ends = [*(start for start, _ in breaks), alike.size]
+    return max(zip(starts, ends, strict=True), key=lambda stretch: stretch[1] - stretch[0])
