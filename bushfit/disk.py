@@ -1,0 +1,103 @@
+"""What POSIX and Linux offer so that a set of files changes at once: folders exchanged, locked and flushed."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+_AT_FDCWD = -100
+_RENAME_EXCHANGE = 2
+
+
+def exchange(one: Path, other: Path) -> None:
+    """Swap two folders of one file system in a single step: whoever looks sees the one or the other, whole.
+
+    Raises:
+        OSError: this system, or this file system, cannot do it; both are as they were.
+    """
+    names = (os.fsencode(path) for path in (one, other))
+    arguments = [part for name in names for part in (ctypes.c_int(_AT_FDCWD), ctypes.c_char_p(name))]
+    rename = getattr(_libc(), "renameat2", None)
+    if rename is None:
+        raise OSError(38, "folders cannot be exchanged here")
+    if rename(*arguments, ctypes.c_uint(_RENAME_EXCHANGE)) != 0:
+        number = ctypes.get_errno()
+        raise OSError(number, os.strerror(number), str(other))
+
+
+def flush(files: list[int]) -> None:
+    """Put open files on the disk; in one go where the system can, because one by one costs several times as much.
+
+    Raises:
+        OSError: the disk is full or fails.
+    """
+    sync = getattr(_libc(), "syncfs", None)
+    if files and sync is not None and sync(ctypes.c_int(files[0])) == 0:
+        return
+    for descriptor in files:
+        os.fsync(descriptor)
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold a folder against other runs of bushfit; the lock leaves no file and ends with the process.
+
+    Where the system or the file system knows no such lock, the body runs without.
+    """
+    held = claim(folder)
+    try:
+        yield
+    finally:
+        held.close()
+
+
+def claim(folder: Path) -> Claim:
+    """Show other runs that a folder is in use, until the claim is closed or this process ends."""
+    return Claim(_lock(folder, wait=True))
+
+
+def is_abandoned(folder: Path) -> bool:
+    """Whether nobody claims a folder; False where that cannot be told."""
+    descriptor = _lock(folder, wait=False)
+    Claim(descriptor).close()
+    return descriptor is not None
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A lock that is held."""
+
+    descriptor: int | None
+
+    def close(self) -> None:
+        if self.descriptor is not None:
+            os.close(self.descriptor)
+
+
+def _lock(folder: Path, *, wait: bool) -> int | None:
+    """A descriptor that holds the folder; None where it is held, or cannot be."""
+    if sys.platform == "win32":
+        return None
+    import fcntl
+
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except OSError:
+            os.close(descriptor)
+            raise
+        return descriptor
+    return None
+
+
+@cache
+def _libc() -> Any:
+    return ctypes.CDLL(None, use_errno=True) if sys.platform.startswith("linux") else None
