@@ -80,15 +80,15 @@ def load_campaign(path: str | Path) -> Campaign:
         content.name or bushing.name,
         path,
         bushing,
-        tuple(read_loop(**keywords) for keywords in _keywords(path, content.loops)),
-        tuple(read_sweep(**keywords) for keywords in _keywords(path, content.sweeps)),
+        tuple(read_loop(**keywords) for keywords in reader_keywords(path, content.loops)),
+        tuple(read_sweep(**keywords) for keywords in reader_keywords(path, content.sweeps)),
         content.fit,
         content.predict,
         content.simulate,
     )
 
 
-def _keywords(campaign: Path, tests: Sequence[LoopFile | SweepFile]) -> Iterator[dict[str, Any]]:
+def reader_keywords(campaign: Path, tests: Sequence[LoopFile | SweepFile]) -> Iterator[dict[str, Any]]:
     """The reader's keywords for each file; it is named by its stem, or as the campaign lists it where stems agree."""
     stems = [Path(test.file).stem for test in tests]
     seen = set()

@@ -142,6 +142,21 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
     return Reduction(histories[0].direction, tuple(_grouped(steps, levels)), skipped)
 
 
+def sines(history: Loop) -> list[tuple[float, float, int]]:
+    """Frequency [Hz], rough amplitude [m or rad] and cycles of each stretch of one frequency and amplitude."""
+    cycles = Cycles.of(history.time, history.displacement)
+    found = []
+    for run in cycles.runs():
+        edges = cycles.edges[run.start : run.stop + 1]
+        size = cycles.range[run] / 2.0
+        for part in pieces(edges, np.log(size)):
+            count = part.stop - part.start
+            if count > 1:
+                frequency = count / float(edges[part.stop] - edges[part.start])
+                found.append((frequency, float(np.median(size[part])), count))
+    return found
+
+
 def _steps_of(history: Loop, fewest: int) -> tuple[list[Step], list[Skipped]]:
     steps: list[Step] = []
     skipped: list[Skipped] = []

@@ -47,7 +47,7 @@ def read_toml(path: Path, schema: type[T], *, what: str = "a campaign file", lar
         CampaignError: the file is missing, too large, no TOML, or has keys or values that are not understood.
         UnitError: a quantity without a unit, or with one that does not fit.
     """
-    return _check(_parse(path, what, largest), path, schema)
+    return check_tables(_parse(path, what, largest), path, schema)
 
 
 def _parse(path: Path, what: str, largest: int) -> dict[str, Any]:
@@ -80,7 +80,13 @@ def _parse(path: Path, what: str, largest: int) -> dict[str, Any]:
     return tables
 
 
-def _check(tables: Mapping[str, Any], file: Path, schema: type[T]) -> T:
+def check_tables(tables: Mapping[str, Any], file: Path, schema: type[T]) -> T:
+    """Parsed TOML as the dataclass `schema`, all quantities in SI; `file` is where errors say that it stands.
+
+    Raises:
+        CampaignError: keys or values that are not understood.
+        UnitError: a quantity without a unit, or with one that does not fit.
+    """
     try:
         return TypeAdapter(schema).validate_python(tables)
     except ValidationError as error:

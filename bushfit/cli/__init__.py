@@ -21,6 +21,8 @@ _COMMANDS = {
     "predict": ("predict", "Model -> axial and radial stiffness tables and plots."),
     "diagnose": ("diagnose", "Where do model and tests disagree? What is missing? Add it, show the gap shrink."),
     "scorecard": ("scorecard", "How often is diagnose right? Judged on hidden campaigns."),
+    "inspect": ("inspect", "Test files: how they are understood, what is in them, what is odd."),
+    "init": ("init", "Test files and geometry -> a campaign."),
     "reduce": ("reduce", "Raw stepped-sine histories -> a sweep, with its noise and distortion."),
     "simulate": ("simulate", "Model -> a simulated campaign of raw tests, with noise."),
 }

@@ -1,82 +1,88 @@
-"""What the commands on raw files share: what a file does not say itself, stated by options."""
+"""What the commands on test files share: options that state what a file does not say itself, and errors that name
+them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import wraps
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import reduce, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import click
 
-if TYPE_CHECKING:
-    from bushfit.geometry import Direction
-    from bushfit.measurement import Loop
+from bushfit.errors import BushfitError, MeasurementError
 
 F = TypeVar("F", bound=Callable[..., Any])
+#: Keys of a campaign's tables that are an option of the same name here.
+_SAME_NAME = {
+    "force_sign": "-1: the load cell counts the other way.",
+    "rate": 'Of a loop without time: a triangle at this speed, such as "10 mm/min".',
+    "frequency": 'Of a loop without time, with --waveform, such as "0.1 Hz".',
+    "waveform": "sine or triangle.",
+    "amplitude": "How sweeps count amplitudes, where the header does not say: zero-to-peak or peak-to-peak.",
+    "encoding": 'Such as "cp1252" [detected].',
+    "delimiter": "comma, semicolon, tab, pipe or blanks [detected].",
+    "decimal": '"." or "," [detected].',
+    "thousands": 'What parts thousands: ".", ",", " ", "\'" or none [detected].',
+    "header_line": "Line of the header, from 1 [found].",
+    "sheet": "Sheet of a workbook.",
+}
+_NUMBERS = ("force_sign", "header_line")
+_PAIRED = re.compile(r'(column|unit)s = \{ (\w+) = "([^"]*)"')
 
 
-@dataclass(frozen=True)
-class FileSettings:
-    """Direction, headers and units that options state for every file."""
+def file_options(*keys: str) -> Callable[[F], F]:
+    """--direction, --column, --unit and an option for each of some keys, gathered into one `stated` argument: keys of
+    [[loops]] and [[sweeps]] as a campaign would have them."""
 
-    direction: Direction | None
-    columns: Mapping[str, str]
-    units: Mapping[str, str]
-    force_sign: int
+    def decorate(function: F) -> F:
+        @wraps(function)
+        def wrapped(*args: Any, **kwargs: Any) -> Any:
+            stated = {key: kwargs.pop(key) for key in ("direction", *keys)}
+            stated["columns"] = _pairs(kwargs.pop("columns"), "--column", "force=Kraft")
+            stated["units"] = _pairs(kwargs.pop("units"), "--unit", "force=kN")
+            return function(*args, stated={key: value for key, value in stated.items() if value}, **kwargs)
 
-    def direction_of(self, files: Sequence[Path]) -> Direction:
-        """The direction of raw histories: as stated, else as every file's name or columns say.
-
-        Raises:
-            MeasurementError: nothing says it, or the files differ.
-        """
-        from bushfit.directions import direction_of_file
-        from bushfit.errors import MeasurementError
-        from bushfit.headers import LOOP_COLUMNS
-        from bushfit.table import Table
-
-        if self.direction:
-            return self.direction
-        found = {}
-        for file in files:
-            table = Table.open(file, LOOP_COLUMNS, self.columns, self.units)
-            direction = direction_of_file(file, table.headers, turns=table.agrees("displacement", "rad"))
-            if direction is None:
-                raise direction_error(file)
-            found[direction] = file
-        if len(found) > 1:
-            raise MeasurementError(
-                "the files are of several directions",
-                found=", ".join(f"{file.name} ({direction})" for direction, file in found.items()),
-                expected="histories of one direction",
-                hint="reduce each direction by itself, or state --direction",
-            )
-        return next(iter(found))
-
-    def read_histories(self, files: Sequence[Path], direction: Direction) -> list[Loop]:
-        """The raw histories of some files, named by their stems, or by their paths where stems agree."""
-        from bushfit.reading import read_loop
-
-        stems = [file.stem for file in files]
-        return [
-            read_loop(
-                file,
-                direction,
-                name=stem if stems.count(stem) == 1 else str(file),
-                listed_as=file,
-                columns=self.columns,
-                units=self.units,
-                force_sign=-1 if self.force_sign < 0 else 1,
-            )
-            for file, stem in zip(files, stems, strict=True)
+        decorators = [
+            click.option(
+                "--direction",
+                type=click.Choice(["axial", "radial", "torsion"]),
+                help="Of the files whose names and columns do not say it.",
+            ),
+            click.option("--column", "columns", multiple=True, metavar="ROLE=HEADER", help='Such as "force=Fz".'),
+            click.option("--unit", "units", multiple=True, metavar="ROLE=UNIT", help='Such as "force=kN".'),
+            *(
+                click.option(
+                    "--" + key.replace("_", "-"), key, type=int if key in _NUMBERS else str, help=_SAME_NAME[key]
+                )
+                for key in keys
+            ),
         ]
+        return reduce(lambda command, decorator: decorator(command), reversed(decorators), wrapped)  # type: ignore[return-value]
+
+    return decorate
 
 
-def direction_error(file: Path) -> Exception:
-    from bushfit.errors import MeasurementError
+@contextmanager
+def options_named() -> Iterator[None]:
+    """Where an error says what to write in the campaign, it says which option does the same here."""
+    try:
+        yield
+    except BushfitError as error:
+        hint = error.hint or ""
+        named = [f'--{kind} "{role}={text}"' for kind, role, text in _PAIRED.findall(hint)]
+        named += [
+            "--" + key.replace("_", "-") for key in _SAME_NAME if re.search(rf"\b{key}\b", hint) and "campaign" in hint
+        ]
+        if named:
+            error.hint = f"{hint}; for this command: {', '.join(dict.fromkeys(named))}"
+        raise
 
+
+def direction_error(file: Path) -> MeasurementError:
+    """The error for a file of a direction that nothing settles."""
     return MeasurementError(
         "nothing says in which direction this was tested",
         file=file,
@@ -86,33 +92,7 @@ def direction_error(file: Path) -> Exception:
     )
 
 
-def file_options(function: F) -> F:
-    """--direction, --column, --unit, --force-sign, gathered into one `settings` argument."""
-
-    @click.option("--direction", type=click.Choice(["axial", "radial", "torsion"]), help="[from the file's name]")
-    @click.option("--column", "columns", multiple=True, metavar="ROLE=HEADER", help='Such as "force=Kraft (Zelle 2)".')
-    @click.option("--unit", "units", multiple=True, metavar="ROLE=UNIT", help='Such as "force=kN".')
-    @click.option(
-        "--force-sign", type=click.Choice(["1", "-1"]), default="1", help="-1: the load cell counts the other way."
-    )
-    @wraps(function)
-    def wrapped(*args: Any, **kwargs: Any) -> Any:
-        from bushfit.geometry import Direction
-
-        direction = kwargs.pop("direction")
-        settings = FileSettings(
-            Direction(direction) if direction else None,
-            _pairs(kwargs.pop("columns"), "--column", "force=Kraft"),
-            _pairs(kwargs.pop("units"), "--unit", "force=kN"),
-            int(kwargs.pop("force_sign")),
-        )
-        return function(*args, settings=settings, **kwargs)
-
-    return wrapped  # type: ignore[return-value]
-
-
-def _pairs(texts: Sequence[str], option: str, example: str) -> dict[str, str]:
-    from bushfit.errors import MeasurementError
+def _pairs(texts: Sequence[str], option: str, example: str) -> Mapping[str, str]:
     from bushfit.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 
     known = list(dict.fromkeys([*LOOP_COLUMNS, *SWEEP_COLUMNS]))

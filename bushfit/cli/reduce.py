@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from bushfit.cli.common import Options, new_table, shared_options, warn
-from bushfit.cli.raw import FileSettings, file_options
+from bushfit.cli.inspect import KEYS
+from bushfit.cli.raw import direction_error, file_options, options_named
+from bushfit.errors import MeasurementError
 
 if TYPE_CHECKING:
+    from bushfit.measurement import Loop
     from bushfit.reduction import Reduction, Step
 
 
 @click.command("reduce")
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@file_options
+@file_options(*(key for key in KEYS if key not in ("rate", "frequency", "waveform", "amplitude")))
 @click.option("--levels", help='Amplitudes that were asked for, such as "0.1, 0.2, 0.5 mm" [found from the data].')
 @click.option("--cycles", type=click.IntRange(2, 1000), default=3, show_default=True, help="Fewest steady cycles.")
 @shared_options
 def command(
     files: tuple[Path, ...],
-    settings: FileSettings,
+    stated: Mapping[str, Any],
     levels: str | None,
     cycles: int,
     options: Options,
@@ -41,10 +45,10 @@ def command(
     from bushfit.reduction import reduce
     from bushfit.sheets import reduced_table, to_csv
 
-    direction = settings.direction_of(files)
     folder = options.folder(folder_name(files[0].stem))
     options.require_free(folder, ["sweep.csv", *(["reduce.png"] if options.plots else [])])
-    histories = settings.read_histories(files, direction)
+    histories = _read(files, stated)
+    direction = histories[0].direction
     asked = parse_grid(levels, "--levels", direction.displacement_unit) or ()
     reduction = reduce(histories, fewest_cycles=cycles, levels=asked)
     _tell(options, reduction)
@@ -58,6 +62,28 @@ def command(
     snippet = f'[[sweeps]]\nfile = "sweep.csv"\ndirection = "{direction}"\n'
     options.console.print(f"for the campaign:\n\n{snippet}", markup=False)
     options.tell(_document(reduction, snippet))
+
+
+def _read(files: Sequence[Path], stated: Mapping[str, Any]) -> list[Loop]:
+    """The histories, of one direction, named by their stems, or by their paths where stems agree."""
+    from bushfit.inspection.opening import read_history
+
+    stems = [file.stem for file in files]
+    histories: list[Loop] = []
+    for file, stem in zip(files, stems, strict=True):
+        with options_named():
+            history, direction = read_history(file, stated)
+        if direction is None:
+            raise direction_error(file)
+        if histories and direction is not histories[0].direction:
+            raise MeasurementError(
+                "the files are of several directions",
+                found=f"{files[0]} ({histories[0].direction}), {file} ({direction})",
+                expected="histories of one direction",
+                hint="reduce each direction by itself",
+            )
+        histories.append(replace(history, direction=direction, name=stem if stems.count(stem) == 1 else str(file)))
+    return histories
 
 
 def _tell(options: Options, reduction: Reduction) -> None:

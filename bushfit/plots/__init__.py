@@ -7,6 +7,7 @@ thread. Levels differ in colour (of scales that survive colour blindness and gre
 
 from bushfit.plots.fits import loops_figure, sweeps_figure
 from bushfit.plots.gap import gap_figure
+from bushfit.plots.inspection import inspection_figure
 from bushfit.plots.prediction import fine_grid, prediction_figure
 from bushfit.plots.reduction import reduction_figure
 from bushfit.plots.style import to_png
@@ -14,6 +15,7 @@ from bushfit.plots.style import to_png
 __all__ = [
     "fine_grid",
     "gap_figure",
+    "inspection_figure",
     "loops_figure",
     "prediction_figure",
     "reduction_figure",

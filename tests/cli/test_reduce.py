@@ -100,7 +100,17 @@ def test_a_direction_is_never_guessed(
     assert done.returncode == 2
     assert said in done.stderr
     assert not (tmp_path / "x").exists()
+
+
+def test_a_direction_can_be_stated(typed: Callable, root: Path, tmp_path: Path) -> None:
+    files = halves(root, tmp_path, "first.csv", "second.csv")
     assert typed("reduce", *files, "-o", "x", "--direction", "axial", "--no-plots").returncode == 0
+
+
+def test_a_sweep_needs_no_reduction(typed: Callable, root: Path, tmp_path: Path) -> None:
+    done = typed("reduce", root / "data/cmp_15961/sweep_axial.csv", "-o", "x")
+    assert done.returncode == 2
+    assert "this is a sweep already" in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,99 @@
+"""`bushfit inspect`: what test files hold, how they were understood, and what is odd."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from bushfit.cli.common import Options, new_table, shared_options
+from bushfit.cli.raw import file_options, options_named
+from bushfit.errors import BushfitError
+
+if TYPE_CHECKING:
+    from bushfit.inspection.record import Inspected
+
+KEYS = (
+    *("force_sign", "rate", "frequency", "waveform", "amplitude"),
+    *("encoding", "delimiter", "decimal", "thousands", "header_line", "sheet"),
+)
+_KINDS = {"loop": "a hysteresis loop", "sweep": "a sweep", "history": "a raw stepped-sine history"}
+#: Files in one picture.
+_PICTURE = 5
+
+
+@click.command("inspect")
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@file_options(*KEYS)
+@shared_options
+def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options) -> None:
+    """Look at test files before a campaign names them: loops, sweeps, raw stepped-sine histories.
+
+    For each FILE: how every column was understood, in which unit, and its range; cycles, sampling, waveform, noise,
+    frequencies, amplitudes, repeats; and what is odd, in sentences with figures. The text for the campaign goes to
+    standard output, ready to paste.
+
+    Writes inspect.png (inspect_2.png and so on of more than five files).
+    """
+    from bushfit.inspection.draft import file_text
+    from bushfit.inspection.opening import inspect
+    from bushfit.output import folder_name
+
+    folder = options.folder(folder_name(files[0].stem))
+    pages = [f"inspect{f'_{page}' if page > 1 else ''}.png" for page in range(1, -(-len(files) // _PICTURE) + 1)]
+    if options.plots:
+        options.require_free(folder, pages)
+    seen: list[Inspected] = []
+    failed: list[BushfitError] = []
+    for file in files:
+        try:
+            with options_named():
+                seen.append(inspect(file, stated))
+        except BushfitError as error:
+            failed.append(error)
+        else:
+            tell(options, seen[-1])
+    text = "\n".join(file_text(one) for one in seen)
+    if not options.as_json:
+        click.echo(text, nl=False)
+    if failed:
+        for other in failed[1:]:
+            options.console.print(f"cannot be used either: {other}", markup=False)
+        raise failed[0]
+    if options.plots:
+        options.write(folder, _pictures(seen, pages))
+    options.tell({"files": [one.to_document() for one in seen], "campaign": text})
+
+
+def tell(options: Options, seen: Inspected) -> None:
+    """One file in words: columns, facts, oddities."""
+    from rich.markup import escape
+
+    console = options.console
+    written = ", ".join(f"{label} {value}" for label, value in seen.written.items())
+    table = new_table(
+        f"{seen.file}: {_KINDS[seen.kind]}, {seen.direction or 'direction unknown'}",
+        "column", "taken for", "unit", "from", "to",
+    )  # fmt: skip
+    for column in seen.columns:
+        ends = ("" if end is None else f"{end:.6g}" for end in (column.low, column.high))
+        table.add_row(escape(column.header), column.role or "(not needed)", escape(column.unit or ""), *ends)
+    console.print(table)
+    facts = {"written with": written, **seen.looked.facts}
+    for label, value in facts.items():
+        console.print(f"  {label}: {value}", markup=False)
+    for sentence in seen.looked.odd:
+        console.print(f"  [yellow]odd:[/yellow] {escape(sentence)}")
+    if not seen.looked.odd:
+        console.print("  nothing odd")
+
+
+def _pictures(seen: Sequence[Inspected], pages: Sequence[str]) -> dict[str, bytes]:
+    from bushfit.plots import inspection_figure, to_png
+
+    return {
+        name: to_png(inspection_figure(seen[page * _PICTURE : (page + 1) * _PICTURE]))
+        for page, name in enumerate(pages)
+    }

@@ -1,0 +1,121 @@
+"""A hysteresis loop looked at: cycles, sampling, waveform, noise, and what is odd."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.fitting.drive import Drive, drive_of
+from bushfit.geometry import Direction
+from bushfit.inspection.channels import clock, odd_channels
+from bushfit.inspection.labels import wrong_labels
+from bushfit.inspection.record import Looked
+from bushfit.measurement import Loop
+from bushfit.sheets import display_units
+
+#: Third harmonic of a triangle over its first, and how near to it, or to none, a motion is called by its name.
+_TRIANGLE, _LIKE = 1.0 / 9.0, 0.03
+#: Cycles differ beyond so many standard errors and this share of half the force's range.
+_SURE, _SHARE = 6.0, 2e-3
+#: A loop's zero is off by this share of half the range.
+_OFF_ZERO = 0.02
+#: At most so many cycles are looked at from either end, with so many harmonics.
+_ENDS, _HARMONICS = 6, 7
+
+
+def look_at_loop(loop: Loop, file: Path) -> Looked:
+    """Facts and oddities of a loop.
+
+    Raises:
+        FitError: no whole cycle, or a loop that runs the wrong way round.
+    """
+    drive = drive_of(loop)
+    units = display_units(loop.direction)
+    (length, to_length), (force, to_force) = units["length"], units["force"]
+    names = ("rotation", "moment") if loop.direction is Direction.TORSION else ("displacement", "force")
+    rows = loop.time.size / drive.cycles
+    half_motion, half_force = np.ptp(loop.displacement) / 2.0, np.ptp(loop.force) / 2.0
+    mean_motion, mean_force = drive.coefficients[0].real, _mean(drive)
+    facts = {
+        "cycles": f"{drive.cycles:.4g}, {'from rest' if drive.from_rest else 'settled or run in'}",
+        "frequency": f"{drive.frequency:.4g} Hz, {_waveform(drive)}",
+        "sampling": f"{clock(loop)}, {rows:.4g} rows a cycle",
+        "amplitude": f"{to_length * drive.amplitude:.4g} {length} zero-to-peak",
+        f"mean {names[0]}": f"{to_length * mean_motion:.3g} {length}",
+        f"mean {names[1]}": f"{to_force * mean_force:.3g} {force}",
+        "noise": f"{100 * drive.noise / half_force:.2g} % of half the {names[1]}'s range, a row",
+    }
+    odd = [
+        *wrong_labels(file, loop.direction, [drive.amplitude, half_motion], [drive.frequency]),
+        *odd_channels(loop, rows),
+        *([drive.note.removeprefix(f"{loop.name}: ")] if drive.note else []),
+        *_changing(drive, names),
+    ]
+    if abs(mean_motion) > _OFF_ZERO * half_motion and not drive.from_rest:
+        odd.append(
+            f"the motion is off zero by {to_length * mean_motion:.3g} {length}, {100 * mean_motion / half_motion:.2g} "
+            "% of its amplitude: the loop counts from its own middle"
+        )
+    return Looked(facts, tuple(odd))
+
+
+def _mean(drive: Drive) -> float:
+    return float(np.average(drive.force, weights=np.ones_like(drive.weight)))
+
+
+def _waveform(drive: Drive) -> str:
+    third = abs(drive.coefficients[3]) if drive.coefficients.size > 3 else 0.0
+    share = third / abs(drive.coefficients[1])
+    if abs(share - _TRIANGLE) < _LIKE:
+        return "a triangle"
+    return "a sine" if share < _LIKE else f"neither sine nor triangle (third harmonic {100 * share:.2g} %)"
+
+
+def _changing(drive: Drive, names: tuple[str, str]) -> Iterator[str]:
+    """Whether force amplitude, mean force or mean motion change from cycle to cycle."""
+    loop = drive.loop
+    count = int(drive.cycles + 0.01)
+    if count < 2:
+        return
+    units = display_units(loop.direction)
+    phase = (loop.time - loop.time[0]) * drive.frequency
+    numbers = sorted({*range(min(count, _ENDS)), *range(max(count - _ENDS, 0), count)})
+    parts = [np.flatnonzero((phase >= n) & (phase < n + 1)) for n in numbers]
+    rows = min(part.size for part in parts)
+    order = int(np.clip(rows // 5, 1, _HARMONICS))
+    if rows < 4 * order:
+        return
+    fitted = [
+        _cycle(phase[part], np.stack((loop.force[part], loop.displacement[part]), axis=1), order) for part in parts
+    ]
+    means, force = np.array([mean for mean, _ in fitted]), np.array([abs(first[0]) for _, first in fitted])
+    half = np.ptp(loop.force) / 2.0
+    error = drive.noise * np.sqrt(1.0 / rows)
+    change = force[-1] - force[0]
+    if abs(change) > max(_SURE * 2.0 * error, _SHARE * half):
+        last = force[-1] - force[-2]
+        settled = abs(last) < max(_SURE * error, _SHARE * half / 2.0) and count > 2
+        yield (
+            f"the cycles {'settle' if settled else 'are still settling'}: the {names[1]} amplitude goes from "
+            f"{units['force'][1] * force[0]:.4g} {units['force'][0]} in the first cycle to "
+            f"{units['force'][1] * force[-1]:.4g} in the last ({100 * change / force[0]:+.2g} %)"
+        )
+    for name, kind, mean, least in (
+        (names[1], "force", means[:, 0], max(_SURE * 1.5 * error, _SHARE * half)),
+        (names[0], "length", means[:, 1], 2.0 * _SHARE * drive.amplitude),
+    ):
+        drift = mean[-1] - mean[0]
+        if abs(drift) > least:
+            unit, factor = units[kind]
+            yield f"the {name} drifts: its mean goes from {factor * mean[0]:.3g} to {factor * mean[-1]:.3g} {unit}"
+
+
+def _cycle(phase: Array, values: Array, order: int) -> tuple[Array, Array]:
+    """Mean and complex fundamental of the columns over one cycle."""
+    turns = 2.0 * np.pi * np.outer(phase, np.arange(1, order + 1))
+    basis = np.hstack((np.ones((phase.size, 1)), np.cos(turns), -np.sin(turns)))
+    solution = np.linalg.lstsq(basis, values, rcond=None)[0]
+    return solution[0], solution[1] + 1j * solution[1 + order]

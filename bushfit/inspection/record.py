@@ -1,0 +1,73 @@
+"""What a look at a test file tells."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from bushfit.geometry import Direction
+from bushfit.measurement import Loop, Sweep
+
+#: A hysteresis loop, a sweep, or the raw history of a stepped sine.
+Kind = Literal["loop", "sweep", "history"]
+
+
+@dataclass(frozen=True)
+class ColumnSeen:
+    """A column of a file: its header, the role it was taken for (None: not needed), its unit, and the range of its
+    values in that unit."""
+
+    header: str
+    role: str | None
+    unit: str | None
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True)
+class Looked:
+    """What the content of a file tells: facts by label, and each oddity in a sentence with its figures."""
+
+    facts: Mapping[str, str]
+    odd: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Inspected:
+    """A file that can be used.
+
+    Args:
+        file: the file.
+        kind: what it holds.
+        direction: of the test; None where neither file nor options say it.
+        written: how the file is written: encoding, delimiter, decimal mark and so on, by label.
+        columns: all columns, in order.
+        looked: facts and oddities.
+        entry: keys of its table in a campaign besides `file` and `direction`, as TOML has them.
+        measured: its content in SI.
+        counted: whether the header of a sweep says how amplitudes are counted.
+    """
+
+    file: Path
+    kind: Kind
+    direction: Direction | None
+    written: Mapping[str, str]
+    columns: tuple[ColumnSeen, ...]
+    looked: Looked
+    entry: Mapping[str, Any] = field(default_factory=dict)
+    measured: Loop | Sweep | None = None
+    counted: bool = False
+
+    def to_document(self) -> dict[str, Any]:
+        """As JSON."""
+        return {
+            "file": str(self.file),
+            "kind": self.kind,
+            "direction": self.direction and str(self.direction),
+            "written": dict(self.written),
+            "columns": [vars(column) for column in self.columns],
+            "facts": dict(self.looked.facts),
+            "odd": list(self.looked.odd),
+        }

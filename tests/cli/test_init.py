@@ -1,0 +1,147 @@
+"""`init` as typed: a campaign that loads and fits, and an error with the option for what only the user knows."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bushfit.campaign import load_campaign
+from bushfit.inspection.draft import toml_value
+
+GEOMETRY = ("--inner-radius", "10 mm", "--outer-radius", "18 mm", "--length", "34 mm")
+FILES = ("loop_axial_1.csv", "sweep_axial.csv", "sweep_radial.csv")
+
+
+@pytest.fixture
+def tests(root: Path, tmp_path: Path) -> list[Path]:
+    """The tests of the paper's bushing in a folder of their own."""
+    shutil.copytree(root / "data/cmp_15961", tmp_path / "lab/my tests")
+    return [tmp_path / "lab/my tests" / name for name in FILES]
+
+
+def test_the_campaign_loads_and_fits(typed: Callable, tests: list[Path], tmp_path: Path, table_1: dict) -> None:
+    done = typed("init", *tests, *GEOMETRY, "--name", 'Bushing "7"', "-o", "lab/campaign")
+    assert done.returncode == 0, done.stderr
+    written = tomllib.loads((tmp_path / "lab/campaign/campaign.toml").read_text(encoding="utf-8"))
+    assert [test["file"] for test in written["loops"] + written["sweeps"]] == [f"../my tests/{name}" for name in FILES]
+    campaign = load_campaign(tmp_path / "lab/campaign/campaign.toml")
+    assert campaign.bushing.name == 'Bushing "7"'
+    assert [str(sweep.direction) for sweep in campaign.sweeps] == ["axial", "radial"]
+    fitted = typed("fit", "lab/campaign/campaign.toml", "-o", "fit", "--no-plots", "--json", "-q")
+    values = {name: entry["value"] for name, entry in json.loads(fitted.stdout)["parameters"].items()}
+    assert values == pytest.approx(table_1, rel=0.02)
+
+
+def test_where_it_is_written(typed: Callable, tests: list[Path], tmp_path: Path) -> None:
+    done = typed("init", *tests, *GEOMETRY, "-o", "lab/my.toml", "--json")
+    assert done.returncode == 0, done.stderr
+    text = (tmp_path / "lab/my.toml").read_text(encoding="utf-8")
+    assert json.loads(done.stdout)["campaign"] == text
+    assert tomllib.loads(text)["bushing"]["name"] == "my tests"
+    assert tomllib.loads(text)["loops"][0]["file"] == "my tests/loop_axial_1.csv"
+    assert "next: bushfit fit lab/my.toml" in done.stderr
+    assert "results stand there already" in typed("init", *tests, *GEOMETRY, "-o", "lab/my.toml").stderr
+    assert typed("init", *tests, *GEOMETRY, "-o", "lab/my.toml", "--force").returncode == 0
+    assert typed("init", *tests, *GEOMETRY).returncode == 0
+    assert (tmp_path / "results/my tests/campaign.toml").exists()
+
+
+def change(file: Path, **renamed: str) -> Path:
+    """A file with other headers; None drops the column."""
+    table = pd.read_csv(file)
+    for column in list(table):
+        new = renamed.get(column.split()[0], column)
+        table = table.drop(columns=column) if new == "" else table.rename(columns={column: new})
+    table.to_csv(file, index=False)
+    return file
+
+
+def test_what_only_the_user_knows_is_asked_for_and_written(typed: Callable, tests: list[Path], tmp_path: Path) -> None:
+    loop = change(tests[0], time="", force="Kanal 3").rename(tests[0].with_name("first.csv"))
+    known: list[str] = []
+    asked = (
+        ("--column", "force=Kanal 3", "--column force="),
+        ("--unit", "force=N", '--unit "force='),
+        ("--rate", "24 mm/min", "--rate"),
+        ("--direction", "axial", "--direction axial"),
+    )
+    for option, answer, named in asked:
+        done = typed("init", loop, *GEOMETRY, *known, "-o", "x")
+        assert done.returncode == 2
+        assert named in done.stderr
+        assert not (tmp_path / "x").exists()
+        known += [option, answer]
+    assert typed("init", loop, tests[1], *GEOMETRY, *known, "-o", "x").returncode == 0
+    written = tomllib.loads((tmp_path / "x/campaign.toml").read_text(encoding="utf-8"))
+    assert written["loops"] == [
+        {
+            "file": "../lab/my tests/first.csv",
+            "direction": "axial",
+            "rate": "24 mm/min",
+            "columns": {"force": "Kanal 3"},
+            "units": {"force": "N"},
+        }
+    ]
+    assert set(written["sweeps"][0]) == {"file", "direction"}
+    assert load_campaign(tmp_path / "x/campaign.toml").loops[0].time[-1] > 1.0
+
+
+def test_amplitudes_that_may_be_counted_otherwise_are_said(typed: Callable, tests: list[Path], tmp_path: Path) -> None:
+    done = typed("init", tests[1], *GEOMETRY, "-o", "x")
+    assert "taken zero-to-peak, else --amplitude peak-to-peak" in done.stderr
+    done = typed("init", tests[1], *GEOMETRY, "-o", "y", "--amplitude", "peak-to-peak")
+    assert "taken zero-to-peak" not in done.stderr
+    one, other = (load_campaign(tmp_path / name / "campaign.toml").sweeps[0].amplitude for name in "xy")
+    assert other.tolist() == (one / 2.0).tolist()
+
+
+def test_a_force_that_counts_the_other_way_is_turned_and_said(
+    typed: Callable, tests: list[Path], tmp_path: Path
+) -> None:
+    table = pd.read_csv(tests[0])
+    table["force [N]"] *= -1.0
+    table.to_csv(tests[0], index=False)
+    done = typed("init", tests[0], *GEOMETRY, "-o", "x")
+    assert done.returncode == 0
+    assert "the load cell counts the other way" in done.stderr
+    assert "force_sign = -1" in (tmp_path / "x/campaign.toml").read_text(encoding="utf-8")
+    assert load_campaign(tmp_path / "x/campaign.toml").loops
+
+
+@pytest.mark.parametrize(
+    ("files", "options", "said"),
+    [
+        (("data/cmp_15961_raw/stepped_sine_axial.csv",), GEOMETRY, "is a raw stepped-sine history"),
+        (("data/cmp_15961/loop_axial_1.csv",) * 2, GEOMETRY, "a file is given twice"),
+        (("data/cmp_15961/loop_axial_1.csv",), GEOMETRY[:4], "Missing option '--length'"),
+        (("data/cmp_15961/loop_axial_1.csv",), (*GEOMETRY[:5], "34"), 'write "34 mm"'),
+        (
+            ("data/cmp_15961/loop_axial_1.csv",),
+            (*GEOMETRY, "--inner-radius", "20 mm"),
+            "--inner-radius, --outer-radius: impossible bushing",
+        ),
+        (("data/cmp_15961/loop_axial_1.csv",), (*GEOMETRY, "--decimal", ";"), "decimal"),
+        (("data/reference/radial_fe.csv",), GEOMETRY, "the columns do not make a test"),
+        (("data/nothing.csv",), GEOMETRY, "there is no such file"),
+    ],
+)
+def test_what_cannot_be_a_campaign(
+    typed: Callable, root: Path, tmp_path: Path, files: tuple[str, ...], options: tuple[str, ...], said: str
+) -> None:
+    done = typed("init", *(root / file for file in files), *options, "-o", "x")
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert not (tmp_path / "x").exists()
+
+
+@given(st.text(st.characters(exclude_categories=["Cs"])))
+def test_any_text_is_written_as_toml(text: str) -> None:
+    assert tomllib.loads(f"x = {toml_value(text)}") == {"x": text}

@@ -1,0 +1,93 @@
+"""`inspect` as typed: told on standard error, the campaign's text on standard output, one error for what is bad."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+CLEAN = ("data/arm_bushing/loop_axial_1.csv", "data/arm_bushing/sweep_radial.csv")
+RECORD = "data/cmp_15961_raw/stepped_sine_axial.csv"
+
+
+def test_files_are_told_and_the_campaign_s_text_can_be_pasted(typed: Callable, root: Path, tmp_path: Path) -> None:
+    done = typed("inspect", *(root / file for file in (*CLEAN, RECORD)), "-o", "x")
+    assert done.returncode == 0, done.stderr
+    assert [file.name for file in (tmp_path / "x").iterdir()] == ["inspect.png"]
+    campaign = tomllib.loads(done.stdout)
+    assert [(kind, test["direction"]) for kind, (test,) in campaign.items()] == [
+        ("loops", "axial"), ("sweeps", "radial"),
+    ]  # fmt: skip
+    assert "bushfit reduce" in done.stdout
+    assert done.stderr.count("nothing odd") == 3
+    for words in ("a hysteresis loop, axial", "taken for", "columns parted by comma", "0.1 Hz, a sine", "frequencies"):
+        assert words in done.stderr
+
+
+def test_json_holds_everything(typed: Callable, root: Path) -> None:
+    done = typed("inspect", *(root / file for file in CLEAN), "--json", "-q", "--no-plots")
+    assert (done.returncode, done.stderr) == (0, "")
+    document = json.loads(done.stdout)
+    loop, sweep = document["files"]
+    assert (loop["kind"], sweep["kind"]) == ("loop", "sweep")
+    assert [column["role"] for column in loop["columns"]] == ["time", "displacement", "force"]
+    assert loop["odd"] == []
+    assert "[[loops]]" in document["campaign"]
+
+
+def test_a_bad_file_is_one_error_after_the_good_ones(typed: Callable, root: Path, tmp_path: Path) -> None:
+    (tmp_path / "bad.csv").write_text("length [mm],colour\n1,2\n2,3\n", encoding="utf-8")
+    done = typed("inspect", "bad.csv", root / CLEAN[0], "-o", "x")
+    assert done.returncode == 2
+    assert done.stderr.index("a hysteresis loop") < done.stderr.index("bushfit: error: bad.csv")
+    assert "the columns do not make a test" in done.stderr
+    assert "[[loops]]" in done.stdout
+    assert not (tmp_path / "x").exists()
+
+
+def test_results_are_not_replaced_unasked(typed: Callable, root: Path) -> None:
+    assert typed("inspect", root / CLEAN[0], "-o", "x", "-q").returncode == 0
+    assert "results stand there already" in typed("inspect", root / CLEAN[0], "-o", "x").stderr
+    assert typed("inspect", root / CLEAN[0], "-o", "x", "-q", "--force").returncode == 0
+    assert typed("inspect", root / CLEAN[0], "-o", "x", "--no-plots").returncode == 0
+
+
+def test_many_files_make_several_pictures(typed: Callable, root: Path, tmp_path: Path) -> None:
+    done = typed("inspect", *[root / CLEAN[1]] * 6, "-o", "x", "-q")
+    assert done.returncode == 0, done.stderr
+    assert {file.name for file in (tmp_path / "x").iterdir()} == {"inspect.png", "inspect_2.png"}
+
+
+def test_a_sheet_of_a_workbook(typed: Callable, root: Path, tmp_path: Path) -> None:
+    with pd.ExcelWriter(tmp_path / "tests axial.xlsx") as book:
+        for name, file in (("loop", CLEAN[0]), ("sweep", CLEAN[1])):
+            pd.read_csv(root / file).to_excel(book, sheet_name=name, index=False)
+    for sheet, kind in (("loop", "loops"), ("sweep", "sweeps")):
+        done = typed("inspect", "tests axial.xlsx", "--sheet", sheet, "--no-plots")
+        assert done.returncode == 0, done.stderr
+        assert f"sheet {sheet}" in done.stderr
+        assert tomllib.loads(done.stdout)[kind][0]["sheet"] == sheet
+
+
+@pytest.mark.parametrize(
+    ("header", "option", "said"),
+    [
+        ("time [s],displacement [mm],force", "force=N", '--unit "force='),
+        ("time [s],displacement [mm],cell 2 [N]", "force=cell 2 [N]", "--column force="),
+    ],
+)
+def test_an_error_names_the_option_that_settles_it(
+    typed: Callable, root: Path, tmp_path: Path, header: str, option: str, said: str
+) -> None:
+    rows = (root / CLEAN[0]).read_text(encoding="utf-8").split("\n", 1)[1]
+    (tmp_path / "axial.csv").write_text(f"{header}\n{rows}", encoding="utf-8")
+    done = typed("inspect", "axial.csv", "--no-plots")
+    assert done.returncode == 2
+    assert said in done.stderr
+    again = typed("inspect", "axial.csv", "--no-plots", "--unit" if "unit" in said else "--column", option)
+    assert again.returncode == 0, again.stderr
+    assert option.partition("=")[2] in again.stdout

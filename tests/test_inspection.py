@@ -1,0 +1,332 @@
+"""Files looked at: what is recognised, that clean files raise nothing, and that each fault is told with its figures."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bushfit.errors import FitError
+from bushfit.geometry import Direction
+from bushfit.inspection.draft import file_text
+from bushfit.inspection.labels import labelled
+from bushfit.inspection.opening import inspect
+from bushfit.inspection.record import Inspected
+from bushfit.measurement import Loop, Sweep
+from bushfit.model import Model
+from bushfit.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.sheets import raw_loop_table, raw_sweep_table, to_csv
+from bushfit.simulation import Undisturbed, measure, undisturbed
+
+#: As good a rig as any, and as bad a one as most.
+NOISE = {
+    "good": {"noise": 1e-3, "force_noise": 5e-4, "displacement_noise": 1e-4},
+    "bad": {
+        **{"noise": 0.01, "force_noise": 0.01, "displacement_noise": 2e-3},
+        **{"gain_error": 5e-3, "phase_error": 5e-3},
+    },
+}
+SEEDS = 25
+
+
+def plan(**settings: float) -> SimulateSettings:
+    loops = (
+        SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=3),
+        SimulatedLoop(Direction.AXIAL, 3e-4, 0.2, cycles=2, waveform="triangle"),
+    )
+    sweep = SimulatedSweep(Direction.AXIAL, (1e-4, 2e-4, 5e-4), tuple(float(f) for f in range(5, 156, 10)))
+    return SimulateSettings(repeats=3, loops=loops, sweeps=(sweep,), **settings)
+
+
+@pytest.fixture(scope="module")
+def clean(paper_model: Model) -> Undisturbed:
+    return undisturbed(paper_model, plan(), steps_per_cycle=256)
+
+
+def look(folder: Path, test: Loop | Sweep, name: str = "axial.csv", **stated: object) -> Inspected:
+    """A test written as a file and looked at."""
+    table = raw_sweep_table(test) if isinstance(test, Sweep) else raw_loop_table(test)
+    (folder / name).write_bytes(to_csv(table))
+    return inspect(folder / name, stated)
+
+
+@pytest.mark.parametrize("rig", NOISE)
+def test_clean_tests_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str) -> None:
+    raised = []
+    for seed in range(SEEDS):
+        made = measure(clean, plan(seed=seed, **NOISE[rig]))
+        for test in (*made.loops, *made.sweeps):
+            raised += [f"seed {seed}, {test.name}: {sentence}" for sentence in look(tmp_path, test).looked.odd]
+    print(f"{rig} rig: {len(raised)} sentences over {SEEDS} clean campaigns")
+    assert raised == []
+
+
+def test_the_data_of_the_repository_raise_nothing(root: Path) -> None:
+    files = [*root.glob("data/cmp_15961*/*.csv"), *root.glob("data/arm_bushing/*.csv")]
+    assert len(files) == 8
+    assert {file.name: inspect(file, {}).looked.odd for file in files} == {file.name: () for file in files}
+
+
+def test_practice_campaigns_raise_only_what_is_there(root: Path) -> None:
+    """Two of them lag so much that loss factors fall below zero; nothing else is odd in a single file."""
+    files = [*root.glob("data/practice/*/*.csv"), *root.glob("data/mystery_mount/*.csv")]
+    said = {file: odd for file in files if (odd := inspect(file, {}).looked.odd)}
+    assert all("loss factor below zero" in sentence for odd in said.values() for sentence in odd)
+    assert len(said) <= 2
+
+
+@pytest.fixture
+def loop(clean: Undisturbed) -> Loop:
+    return measure(clean, plan(seed=1, force_noise=3e-3, displacement_noise=2e-4)).loops[0]
+
+
+@pytest.fixture
+def sweep(clean: Undisturbed) -> Sweep:
+    return measure(clean, plan(seed=1, noise=5e-3, gain_error=2e-3, phase_error=2e-3)).sweeps[0]
+
+
+def test_a_loop_is_described(loop: Loop, tmp_path: Path) -> None:
+    seen = look(tmp_path, replace(loop, force=loop.force + 20.0), "loop_axial_1mm_0.1Hz.csv")
+    assert (seen.kind, seen.direction) == ("loop", Direction.AXIAL)
+    assert [(column.role, column.unit) for column in seen.columns] == [
+        ("time", "s"), ("displacement", "mm"), ("force", "N"),
+    ]  # fmt: skip
+    assert seen.columns[1].high == pytest.approx(1.0, abs=2e-3)
+    facts = seen.looked.facts
+    assert facts["cycles"].startswith("3")
+    assert facts["frequency"] == "0.1 Hz, a sine"
+    assert facts["sampling"] == "even, every 0.01 s, 1000 rows a cycle"
+    assert facts["amplitude"] == "1 mm zero-to-peak"
+    assert facts["mean force"].startswith("20")
+    assert facts["noise"].startswith("0.3 %")
+    assert seen.looked.odd == ()
+
+
+def test_a_triangle_and_torsion_are_recognised(paper_model: Model, tmp_path: Path) -> None:
+    test = SimulatedLoop(Direction.TORSION, 0.02, 0.1, cycles=2, waveform="triangle")
+    made = measure(undisturbed(paper_model, SimulateSettings(loops=(test,))), SimulateSettings(force_noise=1e-3))
+    seen = look(tmp_path, made.loops[0], "x.csv")
+    assert seen.direction is Direction.TORSION
+    assert seen.looked.facts["frequency"] == "0.1 Hz, a triangle"
+    assert seen.looked.facts["amplitude"].endswith("deg zero-to-peak")
+    assert seen.looked.odd == ()
+
+
+def cut_off(values: np.ndarray, share: float) -> np.ndarray:
+    return np.minimum(values, share * values.max())
+
+
+LOOP_FAULTS: dict[str, tuple[Callable[[Loop], Loop], str]] = {
+    "saturated force": (lambda x: replace(x, force=cut_off(x.force, 0.8)), "the force is cut off at its top"),
+    "saturated displacement": (
+        lambda x: replace(x, displacement=np.maximum(x.displacement, 0.9 * x.displacement.min())),
+        "the displacement is cut off at its bottom",
+    ),
+    "drifting force": (
+        lambda x: replace(x, force=x.force + 3.0 * x.time / x.time[-1]),
+        "the force drifts: its mean goes from",
+    ),
+    "drifting displacement": (
+        lambda x: replace(x, displacement=x.displacement + 2e-5 * x.time / x.time[-1]),
+        "the displacement drifts",
+    ),
+    "still settling": (
+        lambda x: replace(x, force=x.force * (1.0 + 0.1 * np.exp(-x.time / 20.0))),
+        "the cycles are still settling: the force amplitude goes from",
+    ),
+    "wild row": (
+        lambda x: replace(x, force=x.force + np.where(np.arange(x.force.size) == 700, 90.0, 0.0)),
+        "the force is wild at row 701",
+    ),
+    "gap": (
+        lambda x: replace(x, **{key: np.delete(getattr(x, key), slice(300, 330)) for key in CHANNELS}),
+        "1 gap in time, the first after row 300: 0.31 s without a row",
+    ),
+    "stuck": (
+        lambda x: replace(
+            x,
+            displacement=np.where(STUCK(x), x.displacement[400], x.displacement),
+            force=np.where(STUCK(x), x.force[400], x.force),
+        ),
+        "30 rows from row 401 on repeat one displacement and force",
+    ),
+    "run-in": (
+        lambda x: replace(x, displacement=x.displacement * np.where(x.time < 9.9, 0.6, 1.0)),
+        "before its steady cycles are left out",
+    ),
+    "off zero": (
+        lambda x: replace(x, displacement=x.displacement + 1e-4),
+        "the motion is off zero by 0.1 mm, 10 % of its amplitude",
+    ),
+    "turned force": (lambda x: replace(x, force=-x.force), "the campaign needs force_sign = -1"),
+}
+CHANNELS = ("time", "displacement", "force")
+
+
+def STUCK(x: Loop) -> np.ndarray:  # noqa: N802
+    return (np.arange(x.time.size) >= 400) & (np.arange(x.time.size) < 430)
+
+
+@pytest.mark.parametrize("fault", LOOP_FAULTS)
+def test_each_fault_of_a_loop_is_told(loop: Loop, tmp_path: Path, fault: str) -> None:
+    spoil, said = LOOP_FAULTS[fault]
+    odd = look(tmp_path, spoil(loop)).looked.odd
+    print("; ".join(odd))
+    assert any(said in sentence for sentence in odd)
+    assert len(odd) <= 2
+
+
+def test_a_loop_the_wrong_way_round_is_refused(loop: Loop, tmp_path: Path) -> None:
+    with pytest.raises(FitError, match="gives energy"):
+        look(tmp_path, replace(loop, force=np.roll(loop.force, 60)))
+
+
+def spoiled(sweep: Sweep, rows: np.ndarray, factor: complex) -> Sweep:
+    return replace(sweep, stiffness=np.where(rows, factor, 1.0) * sweep.stiffness)
+
+
+def without(sweep: Sweep, rows: np.ndarray) -> Sweep:
+    kept = ~rows
+    names = ("frequency", "amplitude", "stiffness", "repeat")
+    return replace(sweep, **{name: getattr(sweep, name)[kept] for name in names})
+
+
+def copied(sweep: Sweep) -> Sweep:
+    """The second repeat of the smallest level is the first one once more."""
+    first, second = ((sweep.amplitude == 1e-4) & (sweep.repeat == number) for number in (1, 2))
+    stiffness = sweep.stiffness.copy()
+    stiffness[second] = stiffness[first]
+    return replace(sweep, stiffness=stiffness)
+
+
+SWEEP_FAULTS: dict[str, tuple[Callable[[Sweep], Sweep], str]] = {
+    "copied block": (copied, "16 rows repeat another one digit by digit"),
+    "missing frequencies": (
+        lambda x: without(x, (x.amplitude == 2e-4) & np.isin(x.frequency, (45.0, 55.0))),
+        "0.2 mm, repeat 1, lacks 45, 55 Hz, which most others have",
+    ),
+    "wild point": (
+        lambda x: spoiled(x, np.arange(x.repeat.size) == 20, 1.15),
+        "row 21 (45 Hz, 0.1 mm, repeat 2) is +1",
+    ),
+    "block off": (
+        lambda x: spoiled(x, (x.amplitude == 5e-4) & (x.repeat == 3), 1.08),
+        "0.5 mm, repeat 3 lies +",
+    ),
+    "drift over repeats": (
+        lambda x: replace(x, stiffness=x.stiffness * (1.0 - 0.02 * x.repeat)),
+        "|K| drifts by -4",
+    ),
+    "loss below zero": (
+        lambda x: spoiled(x, x.frequency == 155.0, np.exp(-0.4j)),
+        "9 points with a loss factor below zero, the first at 155 Hz, 0.1 mm",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", SWEEP_FAULTS)
+def test_each_fault_of_a_sweep_is_told(sweep: Sweep, tmp_path: Path, fault: str) -> None:
+    spoil, said = SWEEP_FAULTS[fault]
+    odd = look(tmp_path, spoil(sweep)).looked.odd
+    print("; ".join(odd))
+    assert any(said in sentence for sentence in odd)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("loop_axial_1mm_0.1Hz.csv", ()),
+        ("loop axial 1,0 mm 10mm_min.csv", ()),
+        ("axial_18mm_bushing_1mm.csv", ()),
+        ("loop_axial_2mm.csv", ("the name says 2 mm, the amplitude is 1 mm zero-to-peak: the name may count p",)),
+        ("loop_axial_0p5mm_0.2Hz.csv", ("the name says 0.5 mm, the amplitude", "the name says 0.2 Hz, the frequency")),
+    ],
+)
+def test_labels_are_held_against_the_content(loop: Loop, tmp_path: Path, name: str, said: tuple[str, ...]) -> None:
+    odd = look(tmp_path, loop, name).looked.odd
+    assert len(odd) == len(said)
+    assert all(sentence.startswith(start) for sentence, start in zip(odd, said, strict=True))
+
+
+def test_label_of_a_sweep(sweep: Sweep, tmp_path: Path) -> None:
+    one = without(sweep, sweep.amplitude != 2e-4)
+    assert look(tmp_path, one, "sweep_axial_0.2mm.csv").looked.odd == ()
+    (said,) = look(tmp_path, one, "sweep_axial_0.4mm.csv").looked.odd
+    assert "the amplitude is 0.2 mm zero-to-peak: the name may count peak-to-peak" in said
+
+
+def test_labels_are_read_with_their_units() -> None:
+    assert labelled(Path("a_0,25mm_300um_2deg.csv"), "m") == [("0.25 mm", 2.5e-4), ("300 µm", pytest.approx(3e-4))]
+    assert labelled(Path("x_50mHz.csv"), "Hz") == [("50 mHz", pytest.approx(0.05))]
+
+
+@pytest.mark.parametrize(
+    ("name", "direction"),
+    [
+        ("Schleife_radial_1.csv", Direction.RADIAL),
+        ("bague_axiale.csv", Direction.AXIAL),
+        ("essai_AXIAUX.csv", Direction.AXIAL),
+        ("ensayo torsión.csv", Direction.TORSION),
+        ("Verdrehung_3.csv", Direction.TORSION),
+        ("axial_and_radial.csv", None),
+        ("coaxial_mount.csv", None),
+        ("test_7.csv", None),
+    ],
+)
+def test_direction_from_the_name(loop: Loop, tmp_path: Path, name: str, direction: Direction | None) -> None:
+    if direction is Direction.TORSION:
+        table = raw_loop_table(loop).set_axis(["time [s]", "rotation [deg]", "moment [N m]"], axis=1)
+        (tmp_path / name).write_bytes(to_csv(table))
+        assert inspect(tmp_path / name, {}).direction is direction
+    else:
+        assert look(tmp_path, loop, name).direction is direction
+
+
+def test_what_the_user_states_goes_into_the_text(loop: Loop, tmp_path: Path) -> None:
+    table = raw_loop_table(loop).drop(columns="time [s]").set_axis(["Weg X", "Zelle 2"], axis=1)
+    (tmp_path / "loop.csv").write_bytes(to_csv(table))
+    stated = {
+        "direction": "radial",
+        "columns": {"displacement": "Weg X", "force": "Zelle 2", "stiffness": "k"},
+        "units": {"displacement": "mm", "force": "N"},
+        "frequency": "0.1 Hz",
+        "waveform": "sine",
+        "amplitude": "peak-to-peak",
+    }
+    seen = inspect(tmp_path / "loop.csv", stated)
+    (written,) = tomllib.loads(file_text(seen, tmp_path))["loops"]
+    assert written == {
+        "file": "loop.csv",
+        "direction": "radial",
+        "columns": {"displacement": "Weg X", "force": "Zelle 2"},
+        "units": {"displacement": "mm", "force": "N"},
+        "frequency": "0.1 Hz",
+        "waveform": "sine",
+    }
+    assert seen.looked.facts["frequency"].startswith("0.1")
+
+
+def test_a_history_points_to_reduce(root: Path) -> None:
+    seen = inspect(root / "data/cmp_15961_raw/stepped_sine_axial.csv", {})
+    assert seen.kind == "history"
+    assert "bushfit reduce" in file_text(seen, root)
+    assert tomllib.loads(file_text(seen, root)) == {}
+    assert seen.looked.facts["frequencies"] == "5, from 10 to 155 Hz"
+
+
+def test_a_sweep_in_another_dialect(sweep: Sweep, tmp_path: Path) -> None:
+    table = raw_sweep_table(sweep).set_axis(
+        ["Frequenz [Hz]", "Amplitude [mm]", "Wiederholung", "Steifigkeit [N/mm]", "Verlustfaktor [-]"], axis=1
+    )
+    text = table.to_csv(index=False, sep=";", decimal=",", float_format="%.6f")
+    (tmp_path / "Kennlinie_radial.csv").write_bytes(text.encode("cp1252"))
+    seen = inspect(tmp_path / "Kennlinie_radial.csv", {})
+    assert (seen.kind, seen.direction) == ("sweep", Direction.RADIAL)
+    assert seen.written["columns parted by"] == "semicolon"
+    assert seen.written["decimal mark"] == "comma"
+    assert seen.columns[3].low == pytest.approx(pd.to_numeric(table["Steifigkeit [N/mm]"]).min(), rel=1e-5)
