@@ -1,0 +1,85 @@
+"""Pictures of raw files: what is drawn, with which units, nothing clipped, and the same file for the same figure."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from stepped import stepped
+
+from bushfit.geometry import Direction
+from bushfit.inspection.opening import inspect
+from bushfit.inspection.record import Inspected
+from bushfit.measurement import Loop
+from bushfit.model import Model
+from bushfit.plots import inspection_figure, reduction_figure, to_png
+from bushfit.reduction import reduce
+
+
+def labels(figure: Figure) -> set[str]:
+    return {label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label}
+
+
+def outside(figure: Figure) -> list[str]:
+    """Texts that leave the canvas."""
+    figure.draw_without_rendering()
+    texts = [text for axes in figure.axes for text in (axes.xaxis.label, axes.yaxis.label, axes.title)]
+    boxes = [(text.get_text(), text.get_window_extent()) for text in texts if text.get_text()]
+    boxes += [("legend", box.get_window_extent()) for axes in figure.axes if (box := axes.get_legend())]
+    canvas = figure.bbox
+    return [
+        name for name, box in boxes
+        if box.x0 < -1 or box.x1 > canvas.x1 + 1 or box.y0 < -1 or box.y1 > canvas.y1 + 1
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("direction", list(Direction))
+def test_reduction(paper_model: Model, direction: Direction) -> None:
+    turns = direction is Direction.TORSION
+    points = [(f, a * (30.0 if turns else 1.0)) for a in (1e-4, 4e-4) for f in (10.0, 30.0)]
+    history = stepped(paper_model, points, direction=direction).history
+    reduction = reduce([history])
+    figure = reduction_figure(reduction, [history], "$ raw $.csv")
+    assert outside(figure) == []
+    shown = labels(figure)
+    assert {"time [s]", "frequency [Hz]", "noise [%]", "distortion [%]"} <= shown
+    assert f"{direction} stiffness |K| [{'N m/rad' if turns else 'N/mm'}]" in shown
+    assert ("rotation [deg]" if turns else "displacement [mm]") in shown
+    loss = figure.axes[2]
+    drawn = np.concatenate([line.get_ydata() for line in loss.get_lines() if line.get_linestyle() == "None"])
+    np.testing.assert_allclose(np.sort(drawn), np.sort([step.loss_factor for step in reduction.steps]))
+    assert len({to_png(reduction_figure(reduction, [history], "$ raw $.csv")) for _ in range(2)}) == 1
+
+
+def test_reduction_of_many_histories_draws_the_first(paper_model: Model) -> None:
+    history = stepped(paper_model, [(10.0, 1e-4)]).history
+    histories = [Loop(str(n), history.direction, history.time, history.displacement, history.force) for n in range(6)]
+    figure = reduction_figure(reduce(histories), histories, "six")
+    assert len(figure.axes) == 4 + 4
+    assert "The first 4 of 6 histories" in " ".join(figure.get_supxlabel().split())
+    assert outside(figure) == []
+
+
+@pytest.fixture(scope="module")
+def seen(root: object) -> list[Inspected]:
+    names = (
+        *("cmp_15961/loop_axial_1.csv", "cmp_15961/sweep_radial.csv"),
+        *("cmp_15961_raw/stepped_sine_axial.csv", "arm_bushing/loop_axial_2.csv"),
+    )
+    return [inspect(root / "data" / name, {}) for name in names]
+
+
+def test_inspection(seen: list[Inspected]) -> None:
+    figure = inspection_figure(seen)
+    assert outside(figure) == []
+    assert {"time [s]", "displacement [mm]", "force [N]", "frequency [Hz]", "|K| [N/mm]", "loss factor [-]"} <= labels(
+        figure
+    )
+    titles = [axes.get_title(loc="left") for axes in figure.axes if axes.get_title(loc="left")]
+    assert sorted(titles) == sorted(f"{one.file.name}: {one.kind}, {one.direction}" for one in seen)
+    assert len({to_png(inspection_figure(seen)) for _ in range(2)}) == 1
+
+
+def test_one_file_alone_is_whole(seen: list[Inspected]) -> None:
+    for one in seen:
+        assert outside(inspection_figure([one])) == []
