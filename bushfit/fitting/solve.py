@@ -1,4 +1,4 @@
-"""The least-squares problem and its solution by lmfit's Levenberg-Marquardt.
+"""The least-squares problem and its solution by lmfit: Levenberg-Marquardt, with walls where it meets a bound.
 
 A fit moves the logarithm of strictly positive parameters and the others in units of their typical size, so
 that every coordinate is of order one and two decades are a step like any other.
@@ -7,12 +7,14 @@ that every coordinate is of order one and two decades are a step like any other.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bushfit.effects import Parameter
+from bushfit.effects import BASE, Parameter
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.terms import Term
@@ -102,8 +104,9 @@ def solve(
 ) -> Solution:
     """Least squares over the named parameters, the others held, from the model's own values.
 
-    Trust-region reflective Levenberg-Marquardt by way of lmfit: bounds are walls, not a transformation, so a
-    parameter may come to rest on one.
+    Bounds are walls, not a transformation, so a parameter may come to rest on one: the trust-region reflective
+    method. The paper's branches alone have one minimum and seldom meet a wall; they go MINPACK's shorter way, and
+    back to the start and the other method where a step leaves the bounds.
 
     Args:
         model: where to start.
@@ -123,32 +126,50 @@ def solve(
     if points <= len(names):
         raise FitError("too few points for the fit", found=f"{points} points for {len(names)} parameters")
     coordinates = Coordinates.of(model, names)
-    start = _lmfit_parameters(model, coordinates, bounds or {})
+    low, high = _walls(coordinates, bounds or {})
+    inside = 1e-6 * (high - low)
+    lifted = {name: value or model.parameters[name].bounds[0] for name, value in model.values.items()}
+    start = np.clip(coordinates.point(lifted), low + inside, high - inside)
+
+    @lru_cache(maxsize=2)  # terms know again the model they answered last: the best so far, and the one tried
+    def model_at(point: tuple[float, ...]) -> Model:
+        return model.with_values(coordinates.values(point))
 
     def at(parameters: lmfit.Parameters) -> Model:
-        return model.with_values(coordinates.values([parameters[_key(name)].value for name in coordinates.names]))
+        return model_at(tuple(parameter.value for parameter in parameters.values()))
 
+    def misfit(parameters: lmfit.Parameters) -> Array:
+        return residual(at(parameters), terms)
+
+    def slopes(parameters: lmfit.Parameters) -> Array:
+        return jacobian(at(parameters), terms, coordinates.names)
+
+    def within(parameters: lmfit.Parameters) -> Array:
+        point = np.array([parameter.value for parameter in parameters.values()])
+        if np.any((point < low) | (point > high)):
+            raise _WallMetError
+        return misfit(parameters)
+
+    common: dict[str, Any] = {"max_nfev": evaluations, "ftol": tolerance, "xtol": tolerance, "calc_covar": False}
+    fit = None
     try:
         with np.errstate(invalid="ignore", divide="ignore"):  # lmfit takes roots of a covariance nobody asked for
-            fit = lmfit.minimize(
-                lambda parameters: residual(at(parameters), terms),
-                start,
-                method="least_squares",
-                max_nfev=evaluations,
-                jac=lambda parameters: jacobian(at(parameters), terms, coordinates.names).T,
-                x_scale="jac",
-                ftol=tolerance,
-                xtol=tolerance,
-                gtol=None,
-                calc_covar=False,
-            )
+            if set(model.effects) <= set(BASE):
+                with suppress(_WallMetError, ValueError):
+                    free = _lmfit_parameters(start)
+                    fit = lmfit.minimize(within, free, "leastsq", Dfun=slopes, col_deriv=True, gtol=0.0, **common)
+            if fit is None or fit.aborted:
+                walled = _lmfit_parameters(start, low, high)
+                by_point = {"jac": lambda parameters: slopes(parameters).T, "x_scale": "jac", "gtol": None}
+                fit = lmfit.minimize(misfit, walled, "least_squares", **by_point, **common)
     except ValueError as error:  # lmfit's word for a residual that is not finite
         raise FitError(
             "the model has no finite response to these tests",
             found=", ".join(f"{name} = {value:.4g}" for name, value in model.values.items()),
             hint="give start values or bounds in [fit] of the campaign",
         ) from error
-    best = at(fit.params)
+    end = np.array([parameter.value for parameter in fit.params.values()])
+    best = model_at(tuple(end))
     if fit.aborted and strict:
         raise FitError(
             "the fit did not converge",
@@ -161,31 +182,34 @@ def solve(
         residual(best, terms),
         jacobian(best, terms, coordinates.names),
         int(fit.nfev),
-        tuple(name for name in coordinates.names if _at_bound(fit.params[_key(name)])),
+        tuple(name for name, met in zip(coordinates.names, _at_bound(end, low, high), strict=True) if met),
     )
 
 
-def _key(name: str) -> str:
-    """lmfit wants Python names."""
-    return name.replace(".", "__")
+class _WallMetError(Exception):
+    """A step leaves the bounds."""
 
 
-def _lmfit_parameters(model: Model, coordinates: Coordinates, bounds: Bounds) -> Any:
+def _walls(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, Array]:
+    """Lower and upper bound of each coordinate, (k,) each."""
+    ends = []
+    for name, parameter in zip(coordinates.names, coordinates.parameters, strict=True):
+        limits = zip(parameter.bounds, bounds.get(name, (None, None)), strict=True)
+        ends.append(sorted(coordinates.forward(name, limit if own is None else own) for limit, own in limits))
+    low, high = np.array(ends).T
+    return low, high
+
+
+def _lmfit_parameters(start: Array, low: Array | None = None, high: Array | None = None) -> Any:
     import lmfit
 
+    lows, highs = (np.full(start.shape, None) if wall is None else wall for wall in (low, high))
     parameters = lmfit.Parameters()
-    for name, parameter in zip(coordinates.names, coordinates.parameters, strict=True):
-        low, high = (
-            limit if wanted is None else wanted
-            for limit, wanted in zip(parameter.bounds, bounds.get(name, (None, None)), strict=True)
-        )
-        ends = sorted(coordinates.forward(name, limit) for limit in (low, high))
-        inside = 1e-6 * (ends[1] - ends[0])
-        value = np.clip(coordinates.forward(name, model.values[name] or low), ends[0] + inside, ends[1] - inside)
-        parameters.add(_key(name), value=float(value), min=ends[0], max=ends[1])
+    for i, (value, least, most) in enumerate(zip(start, lows, highs, strict=True)):
+        parameters.add(f"u{i}", value=value, min=least, max=most)
     return parameters
 
 
-def _at_bound(parameter: lmfit.Parameter) -> bool:
-    near = _AT_BOUND * min(parameter.max - parameter.min, 1.0)
-    return bool(parameter.value - parameter.min < near or parameter.max - parameter.value < near)
+def _at_bound(point: Array, low: Array, high: Array) -> Array:
+    near = _AT_BOUND * np.minimum(high - low, 1.0)
+    return (point - low < near) | (high - point < near)

@@ -42,11 +42,17 @@ def start_values(bushing: Bushing, terms: Sequence[Term], known: Mapping[str, fl
     if not swept.any() or np.ptp(log_omega) < 0.1:
         return {"mu": mu, "m": 0.2 * mu, "alpha": 0.25, "sigma_fmax": sigma_fmax, "eps_half": eps_half, **known}
     viscous_loss = np.maximum(modulus.imag - friction.imag, _LEAST_SHARE * modulus.imag.clip(min=0.0) + 1e-9 * mu)
-    alpha = float(np.clip(np.polyfit(log_omega, np.log(viscous_loss[smallest]), 1)[0], 0.1, 0.6))
+    alpha = float(np.clip(_slope(log_omega, np.log(viscous_loss[smallest])), 0.1, 0.6))
     middle = float(np.exp(log_omega.mean()))
-    growth = max(float(np.polyfit(log_omega, modulus.real[smallest], 1)[0]), 1e-3 * mu)
+    growth = max(_slope(log_omega, modulus.real[smallest]), 1e-3 * mu)
     m = 2.0 * growth / (alpha * middle**alpha * np.cos(np.pi * alpha / 2.0))
     return {"mu": mu, "m": m, "alpha": alpha, "sigma_fmax": sigma_fmax, "eps_half": eps_half, **known}
+
+
+def _slope(x: np.ndarray, y: np.ndarray) -> float:
+    """Slope of the straight line through points."""
+    apart = x - x.mean()
+    return float(apart @ y / (apart @ apart))
 
 
 def _points(bushing: Bushing, terms: Sequence[Term]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

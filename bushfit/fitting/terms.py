@@ -6,10 +6,10 @@ which are independent with unit variance where the model is right, and their der
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Literal
+from functools import cached_property, wraps
+from typing import Any, Literal
 
 import numpy as np
 
@@ -22,6 +22,21 @@ from bushfit.model import Model
 from bushfit.sensitivity import force_jacobian, stiffness_jacobian
 
 Residuals = Literal["complex", "magnitude_loss_factor"]
+
+
+def _kept(answer: Callable[..., Array]) -> Callable[..., Array]:
+    """Keeps what a term answered to the last model: residuals, derivatives and quality ask it for the same again."""
+    place = f"_last{answer.__name__}"
+
+    @wraps(answer)
+    def asked(term: Any, model: Model, *rest: Any) -> Array:
+        last = term.__dict__.get(place)
+        if last is None or last[0] is not model or last[1] != rest:
+            last = term.__dict__[place] = (model, rest, answer(term, model, *rest))
+            last[2].flags.writeable = False
+        return last[2]
+
+    return asked
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +93,13 @@ class LoopTerm:
 
     def force(self, model: Model, values: Values | None = None) -> Array:
         """Model force at the rows [N or N m]."""
+        return self._force(model) if values is None else self._force_of(model, values)
+
+    @_kept
+    def _force(self, model: Model) -> Array:
+        return self._force_of(model, model.values)
+
+    def _force_of(self, model: Model, values: Values) -> Array:
         history = self.drive.history(_settles(model))
         force = model.force(self.loop.direction, history, kind="loop", values=values)
         return self.drive.at_rows(self.drive.from_datum(force)) + (self.drive.datum or 0.0)
@@ -88,6 +110,10 @@ class LoopTerm:
 
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
         """(len(names), n)"""
+        return self._jacobian(model, tuple(names))
+
+    @_kept
+    def _jacobian(self, model: Model, names: tuple[str, ...]) -> Array:
         history = self.drive.history(_settles(model))
         slopes = force_jacobian(model, self.loop.direction, history, names)
         return self.drive.at_rows(self.drive.from_datum(slopes)) * self._per_noise
@@ -198,6 +224,13 @@ class SweepTerm:
 
     def stiffness(self, model: Model, values: Values | None = None) -> Array:
         """Model stiffness at the points, sorted by block; what repeats is computed once."""
+        return self._stiffness(model) if values is None else self._stiffness_of(model, values)
+
+    @_kept
+    def _stiffness(self, model: Model) -> Array:
+        return self._stiffness_of(model, model.values)
+
+    def _stiffness_of(self, model: Model, values: Values) -> Array:
         frequency, amplitude, place = self._distinct
         return model.stiffness(self.sweep.direction, frequency, amplitude, values=values)[..., place]
 
@@ -226,6 +259,10 @@ class SweepTerm:
 
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
         """(len(names), 2 n)"""
+        return self._jacobian(model, tuple(names))
+
+    @_kept
+    def _jacobian(self, model: Model, names: tuple[str, ...]) -> Array:
         frequency, amplitude, place = self._distinct
         slopes = stiffness_jacobian(model, self.sweep.direction, frequency, amplitude, names)[:, place]
         if self.residuals == "complex":
