@@ -134,11 +134,11 @@ def _steady_start(levels: Array, eps_half: Array) -> tuple[Array, Array]:
     Two turning points have the closed form of `harmonic_shape`, u = y. More take Newton on the map of one cycle,
     whose slope is the product of the du/du_s of the pieces.
     """
-    travel = np.roll(levels, -1, axis=-1) - levels
     if levels.shape[-1] == 2:
-        x = travel[..., 1:] / (2.0 * eps_half)
+        x = (levels[..., :1] - levels[..., 1:]) / (2.0 * eps_half)
         s = np.sqrt(x * (x + 6.0) + 1.0)
         return 2.0 * x / (s + x + 1.0), -4.0 * x / (s * (x + 3.0 + s) * eps_half)
+    travel = np.roll(levels, -1, axis=-1) - levels
     senses, distances = np.sign(travel), np.abs(travel) / eps_half
     u = np.zeros((*distances.shape[:-1], 1))
     forced = np.zeros_like(u)

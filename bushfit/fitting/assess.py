@@ -86,14 +86,16 @@ def _unsure(stages: Sequence[Stage], reactions: Sequence[tuple[Array, Array]]) -
         influence = reaction @ basis
         unit = basis / np.linalg.norm(basis[0])
         ends = np.cumsum([0, *(term.size for term in stage.terms)])
-        moved: dict[Hashable, Array] = {}
+        moved: dict[Hashable, tuple[Array, Array, Array]] = {}
         for term, first, last in zip(stage.terms, ends[:-1], ends[1:], strict=True):
-            for variance, part in term.unsure(influence[:, first:last]).items():
-                moved.setdefault(variance, np.zeros_like(influence))[:, first:last] = part
-        for variance, move in moved.items():
-            absorbed = move @ unit.T
+            own = influence[:, first:last]
+            for variance, move in term.unsure(own).items():
+                products = move @ own.T, move @ move.T, move @ unit[:, first:last].T
+                so_far = moved.get(variance, (0.0, 0.0, 0.0))
+                moved[variance] = products[0] + so_far[0], products[1] + so_far[1], products[2] + so_far[2]
+        for variance, (along, squared, absorbed) in moved.items():
             spread, lost = parts.get(variance, (0.0, 0.0))
-            parts[variance] = spread + move @ influence.T, lost + move @ move.T - absorbed @ absorbed.T
+            parts[variance] = spread + along, lost + squared - absorbed @ absorbed.T
     return list(parts.values())
 
 

@@ -81,7 +81,7 @@ class LoopTerm:
         """Zero-to-peak [m or rad], (1,)."""
         return np.array([self.drive.amplitude])
 
-    @property
+    @cached_property
     def measured(self) -> Array:
         """Complex stiffness of the loop's fundamental, (1,)."""
         return np.array([self.drive.first_harmonic()])
