@@ -75,3 +75,7 @@ class FitError(BushfitError):
 
 class OutputError(BushfitError):
     """A result that cannot be written, or must not be overwritten."""
+
+
+class BatchError(BushfitError):
+    """A batch that cannot go on: no workers, another version on them, or a cluster that is gone."""

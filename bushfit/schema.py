@@ -35,7 +35,7 @@ def unknown_key(key: str, known: Collection[str]) -> CampaignError:
     return CampaignError("unknown key", found=f'"{key}"', expected=expected, hint=hint)
 
 
-def _converted(convert: Callable[[Any, ValidationInfo], Any]) -> BeforeValidator:
+def converted(convert: Callable[[Any, ValidationInfo], Any]) -> BeforeValidator:
     """A pydantic validator that calls convert(raw value, info); a BushfitError travels inside pydantic's."""
 
     def run(raw: Any, info: ValidationInfo) -> Any:
@@ -48,7 +48,7 @@ def _converted(convert: Callable[[Any, ValidationInfo], Any]) -> BeforeValidator
 
 
 def _si(*units: str) -> BeforeValidator:
-    return _converted(lambda raw, _: quantity(raw, *units))
+    return converted(lambda raw, _: quantity(raw, *units))
 
 
 def _displacement(raw: object, info: ValidationInfo) -> float:
@@ -102,7 +102,8 @@ def _parameter(name: str, raw: Any) -> float:
     return quantity(_S_TO_ALPHA.sub("", raw) if name == "m" and isinstance(raw, str) else raw, units[name])
 
 
-def _placed(place: str, name: str, raw: object) -> float:
+def parameter_value(place: str, name: str, raw: object) -> float:
+    """The SI value of a model parameter by its name in files; an error names the place."""
     try:
         return _parameter(name, raw)
     except BushfitError as error:
@@ -111,7 +112,7 @@ def _placed(place: str, name: str, raw: object) -> float:
 
 
 def _parameters(raw: object, _: ValidationInfo) -> object:
-    return {name: _placed(name, name, value) for name, value in raw.items()} if isinstance(raw, dict) else raw
+    return {name: parameter_value(name, name, value) for name, value in raw.items()} if isinstance(raw, dict) else raw
 
 
 def _effects(raw: object, _: ValidationInfo) -> object:
@@ -119,7 +120,7 @@ def _effects(raw: object, _: ValidationInfo) -> object:
     if not isinstance(raw, dict):
         return raw
     return {
-        effect: {key: _placed(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in table.items()}
+        effect: {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in table.items()}
         if isinstance(table, dict)
         else table
         for effect, table in raw.items()
@@ -134,7 +135,7 @@ def _parameter_settings(raw: object, _: ValidationInfo) -> object:
     for name, table in raw.items():
         if isinstance(table, dict):
             given = [key for key in ("min", "value", "max") if key in table]
-            numbers = {key: _placed(f"{name}.{key}", name, table[key]) for key in given}
+            numbers = {key: parameter_value(f"{name}.{key}", name, table[key]) for key in given}
             ordered = list(numbers.values())
             if ordered != sorted(ordered) or numbers.get("min", -np.inf) == numbers.get("max", np.inf):
                 expected = "min below max, and value between them"
@@ -161,15 +162,15 @@ def _roles(known: Collection[str]) -> BeforeValidator:
                 raise unknown_key(role, known)
         return raw
 
-    return _converted(check_keys)
+    return converted(check_keys)
 
 
 Text = Annotated[str, Field(min_length=1)]
 Length = Annotated[float, _si("m"), Field(gt=0)]
 Angle = Annotated[float, _si("rad"), Field(gt=0)]
 Frequency = Annotated[float, _si("Hz"), Field(gt=0)]
-Frequencies = Annotated[tuple[Frequency, ...], _converted(_frequencies), Field(min_length=1)]
-Displacement = Annotated[float, _converted(_displacement), Field(gt=0)]
+Frequencies = Annotated[tuple[Frequency, ...], converted(_frequencies), Field(min_length=1)]
+Displacement = Annotated[float, converted(_displacement), Field(gt=0)]
 Share = Annotated[float, _si("1"), Field(ge=0, lt=1)]
 Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
 
@@ -193,7 +194,7 @@ class LoopFile(FileFormat):
     columns: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS)] = field(default_factory=dict)
     units: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS)] = field(default_factory=dict)
     force_sign: Literal[1, -1] = 1
-    rate: Annotated[float, _converted(_speed), Field(gt=0)] | None = None
+    rate: Annotated[float, converted(_speed), Field(gt=0)] | None = None
     frequency: Frequency | None = None
     waveform: Waveform | None = None
     noise: Share | None = None
@@ -235,7 +236,7 @@ class ParameterSetting:
 class FitSettings:
     """[fit]: settings by parameter; amplitudes [m or rad] that fit-dynamic uses, none for the smallest; residuals."""
 
-    parameters: Annotated[Mapping[str, ParameterSetting], _converted(_parameter_settings)] = field(default_factory=dict)
+    parameters: Annotated[Mapping[str, ParameterSetting], converted(_parameter_settings)] = field(default_factory=dict)
     dynamic_amplitudes: tuple[Annotated[float, _si("m", "rad"), Field(gt=0)], ...] = ()
     residuals: Residuals = "complex"
 
@@ -286,8 +287,8 @@ class SimulateSettings:
         loops, sweeps: the tests; empty for the rig's own choice.
     """
 
-    parameters: Annotated[Mapping[str, float], _converted(_parameters)] = field(default_factory=dict)
-    effects: Annotated[Mapping[str, Mapping[str, float]], _converted(_effects)] = field(default_factory=dict)
+    parameters: Annotated[Mapping[str, float], converted(_parameters)] = field(default_factory=dict)
+    effects: Annotated[Mapping[str, Mapping[str, float]], converted(_effects)] = field(default_factory=dict)
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
     repeats: Count = 1
     noise: Share = 0.0
@@ -309,6 +310,6 @@ class CampaignFile:
     name: Text | None = None
     loops: tuple[LoopFile, ...] = ()
     sweeps: tuple[SweepFile, ...] = ()
-    fit: Annotated[FitSettings, _converted(_fit_table)] = field(default_factory=FitSettings)
+    fit: Annotated[FitSettings, converted(_fit_table)] = field(default_factory=FitSettings)
     predict: PredictSettings = field(default_factory=PredictSettings)
     simulate: SimulateSettings | None = None

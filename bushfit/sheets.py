@@ -223,6 +223,11 @@ def _loss_factor(stiffness: Array) -> Array:
     return np.imag(stiffness) / np.real(stiffness)
 
 
+def defused(text: str) -> str:
+    """A text that a spreadsheet shows and does not run: a leading =, +, -, @ or tab is quoted."""
+    return f"'{text}" if text.lstrip()[:1] in {"=", "+", "-", "@"} or text[:1] in {"\t", "\r"} else text
+
+
 def to_csv(table: pd.DataFrame) -> bytes:
     """Comma, decimal point, UTF-8, seven digits."""
     return table.to_csv(index=False, float_format="%.7g", lineterminator="\n").encode()

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_type_hints
+from typing import Any, TypeVar, cast, get_args, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
@@ -80,20 +81,27 @@ def _parse(path: Path, what: str, largest: int) -> dict[str, Any]:
     return tables
 
 
-def check_tables(tables: Mapping[str, Any], file: Path, schema: type[T]) -> T:
-    """Parsed TOML as the dataclass `schema`, all quantities in SI; `file` is where errors say that it stands.
+@cache
+def _adapter(schema: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(schema)
+
+
+def check_tables(tables: Mapping[str, Any], file: Path, schema: type[T], place: str | None = None) -> T:
+    """Parsed TOML as the dataclass `schema`, all quantities in SI; errors say that it stands in `file`, at `place`.
 
     Raises:
         CampaignError: keys or values that are not understood.
         UnitError: a quantity without a unit, or with one that does not fit.
     """
     try:
-        return TypeAdapter(schema).validate_python(tables)
+        checked: T = _adapter(cast(Hashable, schema)).validate_python(tables)
+        return checked
     except ValidationError as error:
         # a mistyped key is missing and unknown: the latter says more
         details = sorted(error.errors(include_url=False), key=lambda detail: detail["type"] != _UNKNOWN)
         complaint = _complaint(details[0], schema)
     complaint.file = file
+    complaint.place = ", ".join(filter(None, (place, complaint.place)))
     raise complaint  # outside of `except`: pydantic's error holds ours, and a ring of errors cannot be pickled
 
 

@@ -1,0 +1,43 @@
+"""A report for continuous integration: a test case a bushing."""
+
+from __future__ import annotations
+
+from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
+
+from bushfit.batch.ledger import Record
+from bushfit.batch.limits import Judgement
+from bushfit.batch.manifest import Row
+
+
+class Report:
+    """Grows by a case a bushing: an error where the row failed, a failure where it misses limits, else a pass."""
+
+    def __init__(self, name: str) -> None:
+        self._suite = TestSuite(name)
+
+    def add(self, row: Row, record: Record, judged: Judgement | None) -> None:
+        case = TestCase(_printable(row.name), self._suite.name, record["seconds"])
+        if record["status"] != "done":
+            text = _printable(record["error"])
+            case.result = [_with_text(Error(text.partition("\n")[0], "failed"), text)]
+        elif judged and judged.missed:
+            text = _printable("\n".join(judged.missed.values()))
+            case.result = [_with_text(Failure("; ".join(text.splitlines()), "limits"), text)]
+        self._suite.add_testcase(case)
+
+    def to_xml(self) -> bytes:
+        report = JUnitXml("bushfit batch")
+        report.add_testsuite(self._suite)
+        report.update_statistics()  # type: ignore[no-untyped-call]
+        text: bytes = report.tostring()  # type: ignore[no-untyped-call]
+        return b'<?xml version="1.0" encoding="utf-8"?>\n' + text
+
+
+def _with_text(result: Error | Failure, text: str) -> Error | Failure:
+    result.text = text
+    return result
+
+
+def _printable(text: str) -> str:
+    """Without the control characters that XML cannot hold."""
+    return "".join(letter if letter.isprintable() or letter == "\n" else " " for letter in text)

@@ -1,0 +1,100 @@
+"""What is kept of a row: a folder of its own, complete or absent, that says of which inputs it is the result.
+
+Below the batch's folder: bushings/<row>/ with the row's result files and row.json, its record. A folder is written
+aside and renamed, so a process that is killed leaves a whole one or none; and since a record lists the hashes of its
+inputs and of its files, nothing is trusted that a crash of the machine has left torn. No disk is waited for.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import shutil
+import uuid
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from bushfit import __version__
+from bushfit.batch.manifest import Row
+from bushfit.batch.points import Point
+
+SCHEMA = "bushfit/row/1"
+RECORD, ROWS, ASIDE = "row.json", "bushings", ".aside"
+
+Record = dict[str, Any]
+
+
+def key(row: Row, points: tuple[Point, ...], formats: tuple[str, ...]) -> str:
+    """Hash of a row's settings, of what is asked of it, and of the version that answers."""
+    asked = {"settings": asdict(row.settings), "points": [str(point) for point in points], "formats": formats}
+    return hashlib.sha256(json.dumps([__version__, SCHEMA, asked], sort_keys=True).encode()).hexdigest()
+
+
+def place(output: Path, row: Row) -> Path:
+    """The folder of a row's results."""
+    return output / ROWS / row.folder
+
+
+def standing(output: Path, row: Row, wanted: str) -> Record | None:
+    """The record of a row that was done before with the same inputs and settings, all its files whole; else None."""
+    folder, campaign = place(output, row), Path(row.campaign)
+    with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):  # torn: as good as absent
+        record: Record = json.loads((folder / RECORD).read_bytes())
+        if record["key"] != wanted or record["status"] != "done":
+            return None
+        for files, at in ((record["inputs"], campaign.parent), (record["files"], folder)):
+            if any(digest((at / name).read_bytes()) != sha for name, sha in files.items()):
+                return None
+        return record
+    return None
+
+
+def digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def keep(output: Path, row: Row, files: Mapping[str, bytes], record: Record) -> None:
+    """Put a row's files and its record in place, and what stood there away.
+
+    Raises:
+        OSError: the disk is full, or does not let itself be written.
+    """
+    folder, aside = place(output, row), output / ASIDE / uuid.uuid4().hex
+    aside.mkdir()
+    try:
+        for name, content in files.items():
+            (aside / name).write_bytes(content)
+        (aside / RECORD).write_bytes(to_line(record))
+        while True:
+            try:
+                aside.rename(folder)
+                break
+            except OSError:
+                if not folder.exists():
+                    raise
+                gone = output / ASIDE / uuid.uuid4().hex
+                with contextlib.suppress(FileNotFoundError):  # a twin on a worker given up for lost may be as fast
+                    folder.rename(gone)
+                shutil.rmtree(gone, ignore_errors=True)
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def to_line(record: Record) -> bytes:
+    """A record on one line."""
+    return json.dumps(record, allow_nan=False, ensure_ascii=False, separators=(",", ":")).encode() + b"\n"
+
+
+def prepare(output: Path) -> None:
+    """Make the folders, and clear away what a killed run left half written."""
+    shutil.rmtree(output / ASIDE, ignore_errors=True)
+    for folder in (ROWS, ASIDE):
+        os.makedirs(output / folder, exist_ok=True)  # noqa: PTH103
+
+
+def finish(output: Path) -> None:
+    shutil.rmtree(output / ASIDE, ignore_errors=True)

@@ -1,0 +1,280 @@
+"""Limits: a TOML file of bounds, fixed or relative to the batch, and the verdict on each bushing.
+
+A value with its 95 % interval meets a limit in one of four ways (the words are those of ILAC-G8:09/2019 for
+statements of conformity): pass, the whole interval is within; conditional pass, the value is within but the interval
+reaches over the limit; conditional fail, the value is outside but the interval reaches back; fail, the whole interval
+is outside. A bushing is as good as the worst of its quantities.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import ConfigDict, Field, ValidationInfo
+
+from bushfit.batch.points import At, Point
+from bushfit.batch.quantities import (
+    CHI_SQUARE,
+    LOSS_FACTOR,
+    NRMSE,
+    STIFFNESS,
+    Figures,
+    Quantity,
+    Record,
+    at_point,
+    figures,
+)
+from bushfit.effects.contract import Array
+from bushfit.errors import CampaignError
+from bushfit.schema import Share, converted, parameter_value
+from bushfit.toml import read_toml
+from bushfit.units import quantity
+
+#: Standard deviations in a median absolute deviation, for a normal distribution.
+_MAD = 1.482602218505602
+
+
+class Verdict(IntEnum):
+    """How a value meets its limits, better before worse."""
+
+    PASS = 0
+    CONDITIONAL_PASS = 1
+    CONDITIONAL_FAIL = 2
+    FAIL = 3
+
+    def __str__(self) -> str:
+        return self.name.lower().replace("_", " ")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bounds:
+    """Limits of one quantity: min and max; nominal and tolerance; sigma robust standard deviations of the batch."""
+
+    min: float | None = None
+    max: float | None = None
+    nominal: float | None = None
+    tolerance: Share | None = None
+    sigma: Annotated[float, Field(gt=0)] | None = None
+    at_least: Annotated[int, Field(ge=3)] = 10
+
+    def __post_init__(self) -> None:
+        given = [value is not None for value in (self.min, self.max, self.nominal, self.sigma)]
+        if not any(given) or (self.nominal is None) != (self.tolerance is None):
+            raise ValueError(
+                CampaignError("these keys make no limit", expected="min, max, nominal with tolerance, or sigma")
+            )
+        if self.min is not None and self.max is not None and self.min >= self.max:
+            raise ValueError(CampaignError("these limits hold no value", expected="min below max"))
+
+    def resolve(self, values: Array) -> tuple[float, float]:
+        """Lowest and highest allowed value; `values` are those of the batch, (n,)."""
+        low = [-math.inf if self.min is None else self.min]
+        high = [math.inf if self.max is None else self.max]
+        if self.nominal is not None and self.tolerance is not None:
+            half = abs(self.nominal) * self.tolerance
+            low.append(self.nominal - half)
+            high.append(self.nominal + half)
+        if self.sigma is not None and values.size >= self.at_least:
+            middle, spread = scatter(values)
+            if spread > 0.0:
+                low.append(middle - self.sigma * spread)
+                high.append(middle + self.sigma * spread)
+        return max(low), min(high)
+
+    def idle(self, values: Array) -> str | None:
+        """Why `sigma` cannot be held against these values, or None."""
+        if self.sigma is None:
+            return None
+        if values.size < self.at_least:
+            return f"{values.size} bushings, and at_least = {self.at_least}: the batch's own scatter is not judged"
+        if scatter(values)[1] == 0.0:
+            return "more than half of the bushings agree to the digit: the batch's own scatter is not judged"
+        return None
+
+
+def scatter(values: Array) -> tuple[float, float]:
+    """Median, and standard deviation by the median absolute deviation: outliers hardly move either."""
+    middle = float(np.median(values))
+    return middle, _MAD * float(np.median(np.abs(values - middle)))
+
+
+_SIZES = ("min", "max", "nominal")
+
+
+def _sizes(table: dict[str, Any], si: Any) -> dict[str, Any]:
+    return {key: si(key, value) if key in _SIZES else value for key, value in table.items()}
+
+
+def _parameters(raw: object, _: ValidationInfo) -> object:
+    """Tables of limits by parameter, sizes in SI."""
+    if not isinstance(raw, dict):
+        return raw
+    return {
+        name: _sizes(table, lambda key, value, name=name: parameter_value(f"{name}.{key}", name, value))
+        if isinstance(table, dict)
+        else table
+        for name, table in raw.items()
+    }
+
+
+def _stiffness(raw: object, info: ValidationInfo) -> object:
+    point = info.data.get("at")
+    return quantity(raw, point.direction.stiffness_unit) if isinstance(point, Point) else 0.0
+
+
+def _ratio(raw: object, _: ValidationInfo) -> object:
+    return raw if isinstance(raw, int | float) and not isinstance(raw, bool) else quantity(raw, "1")
+
+
+Ratio = Annotated[float, converted(_ratio)]
+Stiffness = Annotated[float, converted(_stiffness)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Located:
+    """A table with a point; the last base, so that the point is read first and settles the units."""
+
+    at: At
+
+
+@dataclass(frozen=True, kw_only=True)
+class StiffnessBounds(Bounds, Located):
+    """[[stiffness]]: limits of |K| at a point."""
+
+    min: Stiffness | None = None
+    max: Stiffness | None = None
+    nominal: Stiffness | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LossFactorBounds(Bounds, Located):
+    """[[loss_factor]]: limits of the loss factor at a point."""
+
+    min: Ratio | None = None
+    max: Ratio | None = None
+    nominal: Ratio | None = None
+
+
+@dataclass(frozen=True)
+class Limits:
+    """A whole limits file.
+
+    Args:
+        parameters: by name, in the file's units of a campaign's [fit].
+        stiffness, loss_factor: at points.
+        nrmse, reduced_chi_square: largest allowed.
+        verdicts: of `diagnose` that are allowed; empty for all.
+        guard: whether a conditional pass counts as a miss.
+    """
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
+    parameters: Annotated[Mapping[str, Bounds], converted(_parameters)] = field(default_factory=dict)
+    stiffness: tuple[StiffnessBounds, ...] = ()
+    loss_factor: tuple[LossFactorBounds, ...] = ()
+    nrmse: Ratio | None = None
+    reduced_chi_square: Ratio | None = None
+    verdicts: tuple[Literal["consistent", "named", "ambiguous", "partly", "unexplained"], ...] = ()
+    guard: Annotated[bool, Field(strict=True)] = False
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        return tuple(dict.fromkeys([*(b.at for b in self.stiffness), *(b.at for b in self.loss_factor)]))
+
+    @property
+    def bounds(self) -> dict[str, Bounds]:
+        """By the name of the quantity."""
+        found = dict(self.parameters)
+        found |= {at_point(bounds.at, STIFFNESS).name: bounds for bounds in self.stiffness}
+        found |= {at_point(bounds.at, LOSS_FACTOR).name: bounds for bounds in self.loss_factor}
+        for quantity_, most in ((NRMSE, self.nrmse), (CHI_SQUARE, self.reduced_chi_square)):
+            if most is not None:
+                found[quantity_.name] = Bounds(max=most)
+        return found
+
+    @property
+    def missed_from(self) -> Verdict:
+        """The best verdict that counts as a miss."""
+        return Verdict.CONDITIONAL_PASS if self.guard else Verdict.CONDITIONAL_FAIL
+
+
+def read_limits(path: Path) -> Limits:
+    """A limits file.
+
+    Raises:
+        CampaignError: keys or values that are not understood, or no limit at all.
+    """
+    limits = read_toml(path, Limits, what="a limits file")
+    if not (limits.bounds or limits.verdicts):
+        raise CampaignError("there is no limit in it", file=path, expected='such as [parameters.mu] with max = "2 MPa"')
+    return limits
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The verdict on a bushing: its worst; what misses a limit and what is only just within, in words by name."""
+
+    verdict: Verdict
+    missed: Mapping[str, str]
+    edge: Mapping[str, str]
+
+
+class Judge:
+    """Limits held against the values of a whole batch, ready for each bushing.
+
+    Args:
+        limits: the file.
+        columns: values of each quantity over the batch, (n,), NaN where a bushing has none.
+        quantities: how each is written.
+    """
+
+    def __init__(self, limits: Limits, columns: Mapping[str, Array], quantities: Mapping[str, Quantity]) -> None:
+        self._limits, self._quantities = limits, quantities
+        self.allowed: dict[str, tuple[float, float]] = {}
+        self.notes: list[str] = []
+        for name, bounds in limits.bounds.items():
+            values = columns.get(name, np.empty(0))
+            values = values[np.isfinite(values)]
+            self.allowed[name] = bounds.resolve(values)
+            if idle := bounds.idle(values):
+                self.notes.append(f"{name}: {idle}")
+
+    def __call__(self, record: Record) -> Judgement:
+        worst, missed, edge = Verdict.PASS, dict[str, str](), dict[str, str]()
+        for name, found in figures(record):
+            if name not in self.allowed:
+                continue
+            verdict = judge(found, *self.allowed[name])
+            worst = max(worst, verdict)
+            if verdict >= self._limits.missed_from:
+                missed[name] = self._words(name, found, verdict)
+            elif verdict is not Verdict.PASS:
+                edge[name] = self._words(name, found, verdict)
+        said = record.get("verdict")
+        if self._limits.verdicts and said and said not in self._limits.verdicts:
+            worst = Verdict.FAIL
+            missed["verdict"] = f"verdict {said}, allowed {', '.join(self._limits.verdicts)}"
+        return Judgement(worst, missed, edge)
+
+    def _words(self, name: str, found: Figures, verdict: Verdict) -> str:
+        quantity, (low, high) = self._quantities[name], self.allowed[name]
+        value, least, most, _ = found
+        unit = "" if quantity.unit == "-" else f" {quantity.unit}"
+        span = "" if least is None or most is None else f" ({' to '.join(quantity.shown(x) for x in (least, most))})"
+        ends = [f"{word} {quantity.shown(x)}" for word, x in (("min", low), ("max", high)) if math.isfinite(x)]
+        return f"{name} = {quantity.shown(value)}{span}{unit}, {' '.join(ends)}: {verdict}"
+
+
+def judge(figures: Figures, low: float, high: float) -> Verdict:
+    """How a value and its 95 % interval lie to the lowest and highest allowed."""
+    value, least, most, _ = figures
+    least, most = (value if least is None else least), (value if most is None else most)
+    if low <= value <= high:
+        return Verdict.PASS if low <= least and most <= high else Verdict.CONDITIONAL_PASS
+    return Verdict.FAIL if most < low or least > high else Verdict.CONDITIONAL_FAIL

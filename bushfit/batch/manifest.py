@@ -1,0 +1,229 @@
+"""Manifests: TOML, CSV, or a pattern -> rows, each with its name, its folder and its settings."""
+
+from __future__ import annotations
+
+import csv
+import glob
+import io
+import os
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, ConfigDict, Field
+
+from bushfit.batch.points import At, Point
+from bushfit.effects import effect_named
+from bushfit.errors import CampaignError
+from bushfit.files import read_utf8
+from bushfit.geometry import Direction
+from bushfit.output import folder_name
+from bushfit.schema import Share, Text, converted, unknown_key
+from bushfit.toml import check_tables, read_toml
+
+Command = Literal["fit", "diagnose", "predict"]
+
+_LARGEST_BYTES = 200_000_000
+_WILD = re.compile(r"[*?\[]")
+_DELIMITERS = ",;\t"
+
+
+def _effect(raw: object, _: object) -> object:
+    return effect_named(raw).name if isinstance(raw, str) else raw
+
+
+def _words(raw: object) -> object:
+    """A list, from a cell as from TOML: "fit; predict"."""
+    return tuple(word for word in re.split(r"[;,\s]+", raw) if word) if isinstance(raw, str) else raw
+
+
+Words = BeforeValidator(_words)
+Effects = Annotated[tuple[Annotated[str, converted(_effect)], ...], Words]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What to do with a campaign; None where a row leaves it to the manifest, and the manifest to the default.
+
+    Args:
+        commands: any of fit, diagnose, predict [fit].
+        directions, effects: of fit, as `bushfit fit --direction --effect`.
+        adopt, without, max_effects, tolerance: of diagnose, as its options.
+        model: a model file to predict from, or for diagnose to start from.
+    """
+
+    commands: Annotated[tuple[Command, ...], Words, Field(min_length=1)] | None = None
+    directions: Annotated[tuple[Direction, ...], Words] | None = None
+    effects: Effects | None = None
+    adopt: Effects | None = None
+    without: Effects | None = None
+    max_effects: Annotated[int, Field(ge=0, le=5)] | None = None
+    tolerance: Share | None = None
+    model: Text | None = None
+
+    def over(self, other: Settings) -> Settings:
+        """These, and where they say nothing the other's."""
+        return replace(other, **{key: value for key, value in vars(self).items() if value is not None})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry(Settings):
+    """[[bushings]], or a line of a CSV manifest: a campaign file or a pattern of such, relative to the manifest."""
+
+    campaign: Text
+    name: Text | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ManifestFile(Settings):
+    """A whole TOML manifest: settings for every row that has none of its own, points, rows."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
+    bushings: Annotated[tuple[Entry, ...], Field(min_length=1)]
+    at: tuple[At, ...] = ()
+
+
+@dataclass(frozen=True)
+class Row:
+    """One bushing of a batch: its name, the folder of its results, its campaign as listed and as found, what to do."""
+
+    name: str
+    folder: str
+    listed: str
+    campaign: str
+    settings: Settings
+
+
+@dataclass(frozen=True, eq=False)
+class Manifest:
+    """All rows, in order, and the points that the manifest asks for."""
+
+    stem: str
+    rows: Sequence[Row]
+    points: tuple[Point, ...] = ()
+
+
+def read_manifest(source: str, given: Settings) -> Manifest:
+    """The rows of a manifest or a pattern.
+
+    Args:
+        source: a TOML or CSV file, or a pattern such as "bushings/*/campaign.toml".
+        given: settings for rows that have none of their own; they win over those at the manifest's top.
+
+    Raises:
+        CampaignError: no such file, no match, or keys and values that are not understood.
+    """
+    path, points = Path(source), tuple[Point, ...]()
+    if _WILD.search(source) and not path.exists():
+        stem, base, entries = "batch", Path(), _expanded([Entry(campaign=source)], Path(), source)
+    elif path.suffix.lower() == ".toml":
+        content = _toml(path)
+        given = given.over(Settings(**{key: getattr(content, key) for key in _keys(Settings)}))
+        points = content.at
+        stem, base, entries = path.stem, path.parent, _expanded(content.bushings, path.parent, source)
+    elif path.suffix.lower() in (".csv", ".tsv", ".txt"):
+        stem, base, entries = path.stem, path.parent, _expanded(_csv_entries(path), path.parent, source)
+    else:
+        raise CampaignError(
+            "this is no manifest",
+            file=path,
+            expected='a .toml or .csv file, or a pattern in quotes such as "bushings/*/campaign.toml"',
+            hint=f'"{path}/*/campaign.toml" in quotes' if path.is_dir() else None,
+        )
+    return Manifest(stem, _rows(list(entries), base, given, source), points)
+
+
+def _toml(path: Path) -> ManifestFile:
+    try:
+        return read_toml(path, ManifestFile, what="a manifest", largest=_LARGEST_BYTES)
+    except CampaignError as error:
+        if error.found == '"bushing"':
+            error.hint = "this is one campaign: bushfit fit takes it, and a pattern in quotes takes many"
+        raise
+
+
+def _keys(table: type) -> list[str]:
+    return [entry.name for entry in fields(table)]
+
+
+def _csv_entries(path: Path) -> Iterator[Entry]:
+    """The lines of a CSV manifest; a header names the columns."""
+    text = read_utf8(path, CampaignError).decode("utf-8-sig")
+    text = text.lstrip()
+    delimiter = max(_DELIMITERS, key=text.partition("\n")[0].count)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
+    header = [cell.strip() for cell in next(reader)]
+    for column in header:
+        if column not in (known := _keys(Entry)):
+            error = unknown_key(column, known)
+            error.file, error.place = path, "header"
+            raise error
+    for cells in reader:
+        filled = {key: cell.strip() for key, cell in zip(header, cells, strict=False) if cell.strip()}
+        if not filled:
+            continue
+        place = f"line {reader.line_num}"
+        if len(cells) > len(header):
+            raise CampaignError(
+                "more cells than columns", file=path, place=place, found=str(len(cells)), expected=str(len(header))
+            )
+        yield check_tables(filled, path, Entry, place=place)
+
+
+def _expanded(entries: Iterable[Entry], base: Path, source: str) -> Iterator[Entry]:
+    """Entries with their patterns replaced by what they match, sorted."""
+    for entry in entries:
+        if not _WILD.search(entry.campaign) or (base / entry.campaign).exists():
+            yield entry
+            continue
+        found = sorted(glob.glob(entry.campaign, root_dir=base, recursive=True))  # noqa: PTH207 - Path.glob refuses ".."
+        if not found or entry.name:
+            problem = "a pattern cannot have a name" if found else "the pattern matches no file"
+            expected = "campaign files, counted from the folder of the manifest"
+            raise CampaignError(problem, file=source, place="campaign", found=entry.campaign, expected=expected)
+        yield from (replace(entry, campaign=match) for match in found)
+
+
+def _rows(entries: Sequence[Entry], base: Path, given: Settings, source: str) -> list[Row]:
+    """Entries with names and folders of their own.
+
+    A bushing is called as the row says, else as its file; files of the same name, as their folders. Folders are the
+    names made safe, numbered where they are equal, upper and lower case being one.
+    """
+    if not entries:
+        raise CampaignError("the manifest has no rows", file=source, expected="a campaign on each line")
+    stems = Counter(Path(entry.campaign).stem for entry in entries)
+    taken: set[str] = set()
+    merged = cache(lambda settings: _complete(settings.over(given), base, source))
+    rows = []
+    for entry in entries:
+        path = Path(entry.campaign)
+        shared = stems[path.stem] > 1 and path.parent.name not in ("", "..")
+        name = entry.name or (path.parent.name if shared else path.stem)
+        folder, count = (first := folder_name(name)), 1
+        while folder.casefold() in taken:
+            count += 1
+            folder = f"{first} {count}"
+        taken.add(folder.casefold())
+        own = Settings(**{key: getattr(entry, key) for key in _keys(Settings)})
+        rows.append(Row(name, folder, entry.campaign, os.path.abspath(base / path), merged(own)))  # noqa: PTH100 - links stay as named
+    return rows
+
+
+def _complete(settings: Settings, base: Path, source: str) -> Settings:
+    """Settings with every default filled in, checked against each other."""
+    commands = settings.commands or ("fit",)
+    if commands == ("predict",) and not settings.model:
+        raise CampaignError(
+            "predict has no model to predict from",
+            file=source,
+            place="commands",
+            expected='commands = ["fit", "predict"], or model = "model.json"',
+        )
+    model = os.path.abspath(base / settings.model) if settings.model else None  # noqa: PTH100
+    return replace(settings, commands=commands, model=model)

@@ -1,0 +1,204 @@
+"""Workers: processes of this machine or of a Dask cluster, through one `concurrent.futures.Executor`.
+
+Rows go out in chunks, few at a time. A worker that dies costs its rows a second try, alone; a row that takes its
+worker with it every time is given up, and the rest goes on.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
+from itertools import islice
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from bushfit.errors import BatchError
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+#: A chunk should take about this long [s]: far more than handing it over, far less than one would like to lose.
+_CHUNK_SECONDS = 0.5
+_LARGEST_CHUNK = 64
+#: Chunks handed out per worker: one to do and one to go on with.
+_AHEAD = 2
+#: A row that was alone with its worker this often when the worker died is to blame.
+_MOST_DEATHS = 3
+_WAIT_FOR_WORKERS = 60.0
+
+
+class Pool(Protocol):
+    """Where chunks are sent."""
+
+    def executor(self) -> Executor:
+        """One that works: a new one where the last is broken."""
+
+    def workers(self) -> int:
+        """How many chunks are worked on at once."""
+
+    def mend(self, cause: BaseException, /) -> None:
+        """A future failed, of that cause. Raises BatchError where it is of no use to try again."""
+
+    def close(self) -> None:
+        """Let go of what is not finished."""
+
+
+class LocalPool:
+    """Worker processes of this machine."""
+
+    def __init__(self, jobs: int) -> None:
+        self._jobs = jobs
+        self._executor: Executor | None = None
+
+    def executor(self) -> Executor:
+        if self._executor is None:
+            # No fork of this process: it has threads. A server forks instead, with all imported already.
+            kind = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+            context = multiprocessing.get_context(kind)
+            if kind == "forkserver":
+                context.set_forkserver_preload(["bushfit.batch.work", "bushfit.jobs.fits"])
+            self._executor = ProcessPoolExecutor(self._jobs, context, initializer=_begin_worker)
+        return self._executor
+
+    def workers(self) -> int:
+        return self._jobs
+
+    def mend(self, _: BaseException) -> None:
+        self.close()
+
+    def close(self) -> None:
+        if self._executor is not None:
+            self._executor.shutdown(wait=False, cancel_futures=True)
+            self._executor = None
+
+
+def _begin_worker() -> None:
+    """Ctrl-C is for the parent to answer; and where the parent is gone, so is its worker."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_follow, args=(parent,), daemon=True).start()
+
+
+def _follow(parent: Any) -> None:
+    parent.join()
+    os._exit(1)
+
+
+class DaskPool:
+    """The workers of a Dask cluster, which see the same files.
+
+    Raises:
+        BatchError: the extra is not installed, or nobody answers at the address.
+    """
+
+    def __init__(self, address: str) -> None:
+        try:
+            from distributed import Client
+        except ImportError:
+            raise BatchError("Dask is not installed", place="--scheduler", hint='pip install "bushfit[dask]"') from None
+        try:
+            self._client: Client = Client(address, timeout=_WAIT_FOR_WORKERS / 6, set_as_default=False)
+            self._client.wait_for_workers(1, timeout=_WAIT_FOR_WORKERS)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise BatchError(
+                "no cluster answers there",
+                place="--scheduler",
+                found=address,
+                expected="the address of a Dask scheduler with workers, such as tcp://10.0.0.5:8786",
+                hint=str(error) or "start one with: dask scheduler; dask worker ADDRESS",
+            ) from None
+        self._executor: Executor = self._client.get_executor(pure=False)
+        self._counted, self._count = 0.0, 1
+
+    def executor(self) -> Executor:
+        return self._executor
+
+    def workers(self) -> int:
+        if time.monotonic() > self._counted:  # workers come and go
+            self._count = max(1, sum(self._client.nthreads().values()))
+            self._counted = time.monotonic() + 5.0
+        return self._count
+
+    def mend(self, cause: BaseException) -> None:
+        if isinstance(cause, CancelledError) or self._client.status != "running":
+            raise BatchError(
+                "the Dask scheduler is gone", found=str(cause), hint="the same command with --resume goes on from here"
+            )
+
+    def close(self) -> None:
+        self._executor.shutdown(wait=False)
+        self._client.close()
+
+
+def run(
+    rows: Sequence[T], work: Callable[[Sequence[T]], Sequence[R]], give_up: Callable[[str], R], pool: Pool
+) -> Iterator[tuple[int, R]]:
+    """Do work(chunk) for all rows in some order, and yield each row's number and result as it comes.
+
+    Args:
+        rows: what to do.
+        work: results of a chunk of rows, in their order; it must bear being asked again.
+        give_up: the result of a row that took its worker down time after time, from a sentence on that.
+        pool: where.
+
+    Raises:
+        BatchError: the workers are gone for good.
+    """
+    left, size = iter(enumerate(rows)), 1
+    out: dict[Future[Sequence[R]], Sequence[tuple[int, T]]] = {}
+    started: dict[Future[Sequence[R]], float] = {}
+    suspects: deque[tuple[int, T]] = deque()
+    try:
+        while True:
+            while not suspects and len(out) < _AHEAD * pool.workers() and (batch := list(islice(left, size))):
+                future = pool.executor().submit(work, [row for _, row in batch])
+                out[future], started[future] = batch, time.monotonic()
+            if not out:
+                if not suspects:
+                    return
+                number, row = suspects.popleft()
+                yield number, _alone(row, work, give_up, pool)
+                continue
+            done, _ = wait(out, return_when=FIRST_COMPLETED)
+            for future in done:
+                chunk, seconds = out.pop(future), time.monotonic() - started.pop(future)
+                try:
+                    results = future.result()
+                except BatchError:
+                    raise
+                except (Exception, CancelledError) as error:
+                    pool.mend(error)
+                    suspects.extend(chunk)
+                else:
+                    size = _next_size(size, seconds / (_AHEAD * len(chunk)))
+                    yield from ((number, result) for (number, _), result in zip(chunk, results, strict=True))
+    finally:
+        pool.close()
+
+
+def _next_size(size: int, seconds_per_row: float) -> int:
+    """Rows in the next chunk: towards the time a chunk should take, at most twice as many as before."""
+    return max(1, min(2 * size, _LARGEST_CHUNK, int(_CHUNK_SECONDS / max(seconds_per_row, 1e-9))))
+
+
+def _alone(row: T, work: Callable[[Sequence[T]], Sequence[R]], give_up: Callable[[str], R], pool: Pool) -> R:
+    """The result of a row that was with a worker when it died: nothing else is out while it tries again."""
+    cause = ""
+    for _ in range(_MOST_DEATHS):
+        try:
+            return pool.executor().submit(work, [row]).result()[0]
+        except BatchError:
+            raise
+        except (Exception, CancelledError) as error:
+            pool.mend(error)
+            cause = f"{type(error).__name__}: {error}"
+    return give_up(f"its worker process died {_MOST_DEATHS} times with nothing else to do (out of memory?): {cause}")

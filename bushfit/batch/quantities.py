@@ -1,0 +1,62 @@
+"""What is tabled, judged and drawn of a bushing: parameters, quality, stiffness and loss factor at points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from bushfit.batch.points import Point
+from bushfit.effects import LIBRARY, qualified
+from bushfit.sheets import display_units
+
+Record = Mapping[str, Any]
+#: Value, low and high of its 95 % interval, standard error, in SI; None where it is not known.
+Figures = tuple[float, float | None, float | None, float | None]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One number of a bushing: what it is called, its unit and the factor from SI to it."""
+
+    name: str
+    unit: str
+    factor: float = 1.0
+
+    def shown(self, value: float) -> str:
+        """A value in this unit, four digits."""
+        return f"{value * self.factor:.4g}"
+
+    @property
+    def header(self) -> str:
+        return f"{self.name} [{self.unit}]"
+
+
+NRMSE, CHI_SQUARE = Quantity("NRMSE", "-"), Quantity("reduced chi-square", "-")
+STIFFNESS, LOSS_FACTOR = "stiffness", "loss factor"
+
+
+def at_point(point: Point, what: str) -> Quantity:
+    """Stiffness or loss factor at an operating point."""
+    unit, factor = display_units(point.direction)["stiffness"] if what == STIFFNESS else ("-", 1.0)
+    return Quantity(f"{what} {point}", unit, factor)
+
+
+def parameter_quantities(names: Iterable[str]) -> list[Quantity]:
+    """Parameters of the library that are among the names, in its order."""
+    units = {qualified(effect, p): p.unit for effect in LIBRARY.values() for p in effect.parameters}
+    wanted = set(names)
+    return [Quantity(name, "-" if unit == "1" else unit) for name, unit in units.items() if name in wanted]
+
+
+def figures(record: Record) -> Iterator[tuple[str, Figures]]:
+    """All quantities of a row's record, by name."""
+    for name, (value, low, high, stderr, _) in record.get("parameters", {}).items():
+        yield name, (value, low, high, stderr)
+    for quantity, key in ((NRMSE, "nrmse"), (CHI_SQUARE, "reduced_chi_square")):
+        if record.get(key) is not None:
+            yield quantity.name, (record[key], None, None, None)
+    for point, pair in record.get("points", {}).items():
+        for what, (value, low, high) in pair.items():
+            if value is not None:
+                yield f"{what} {point}", (value, low, high, None)

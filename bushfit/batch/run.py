@@ -1,0 +1,223 @@
+"""The whole batch: rows to workers, records to disk, then the table, the verdicts and the picture."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bushfit.batch import ledger, pool
+from bushfit.batch.junit import Report
+from bushfit.batch.limits import Judge, Limits, scatter
+from bushfit.batch.manifest import Row
+from bushfit.batch.pool import Pool
+from bushfit.batch.quantities import (
+    CHI_SQUARE,
+    LOSS_FACTOR,
+    NRMSE,
+    STIFFNESS,
+    Quantity,
+    at_point,
+    parameter_quantities,
+)
+from bushfit.batch.spool import Spool
+from bushfit.batch.table import Table
+from bushfit.batch.work import Orders, given_up, work
+from bushfit.effects.contract import Array
+from bushfit.errors import OutputError
+from bushfit.output import write_files
+
+SCHEMA = "bushfit/batch/1"
+TABLE, PICTURE = "batch.csv", "batch.png"
+#: A quantity that fewer bushings have shows no scatter.
+_LEAST_DRAWN = 3
+#: More names do not fit along a panel.
+_MOST_LABELLED = 40
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A batch: its title, rows, what all rows share, limits, a JUnit file on request, whether to draw."""
+
+    title: str
+    rows: Sequence[Row]
+    orders: Orders
+    limits: Limits | None
+    junit: Path | None
+    picture: bool
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What came of it.
+
+    Args:
+        status: rows by done, failed.
+        kept: rows taken over from an earlier run.
+        limits: bushings by verdict.
+        missed: names of bushings that miss a limit.
+        errors: name and error of rows that failed.
+        scatter: median and robust standard deviation of each quantity, in its unit.
+        notes: limits that could not be judged.
+        seconds: of the work.
+    """
+
+    status: Counter[str]
+    kept: int
+    limits: Counter[str]
+    missed: tuple[str, ...]
+    errors: tuple[tuple[str, str], ...]
+    scatter: dict[Quantity, tuple[float, float]]
+    notes: tuple[str, ...]
+    seconds: float
+
+    def to_document(self) -> dict[str, Any]:
+        return {
+            "schema": SCHEMA,
+            "rows": self.status.total(),
+            "done": self.status["done"],
+            "failed": [{"name": name, "error": error} for name, error in self.errors],
+            "kept": self.kept,
+            "limits": dict(self.limits),
+            "missed": list(self.missed),
+            "scatter": {
+                quantity.name: {"median": middle, "sigma": spread, "unit": quantity.unit}
+                for quantity, (middle, spread) in self.scatter.items()
+            },
+            "warnings": list(self.notes),
+            "seconds": self.seconds,
+        }
+
+
+def check_free(plan: Plan, *, force: bool) -> None:
+    """Refuse to replace results that stand, unless asked to go on or to replace.
+
+    Raises:
+        OutputError: the folder is a file, or holds a batch.
+    """
+    output = plan.orders.output
+    if output.exists() and not output.is_dir():
+        raise OutputError("the output is not a folder", file=output, expected="a folder", hint="another -o/--output")
+    places = [output / name for name in (TABLE, PICTURE, ledger.ROWS)] + ([plan.junit] if plan.junit else [])
+    found = [place for place in places if place.exists()]
+    if found and not (force or plan.orders.resume):
+        raise OutputError(
+            "results stand there already",
+            file=output,
+            found=", ".join(place.name for place in found),
+            hint="--resume does what is missing; --force does all again; -o/--output names another folder",
+        )
+
+
+def run(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Summary:
+    """Do every row, then write batch.csv, batch.png and the JUnit report.
+
+    Args:
+        plan: the batch.
+        workers: where rows are done.
+        progress: called with the status of each row as it comes.
+
+    Raises:
+        BatchError: the workers are gone for good; what was done is kept.
+        OutputError: the results cannot be written.
+    """
+    begin, output = time.perf_counter(), plan.orders.output
+    try:
+        ledger.prepare(output)
+        with Spool(output / ledger.ASIDE / "records", len(plan.rows)) as spool:
+            task = partial(work, orders=plan.orders)
+            for number, (status, line) in pool.run(plan.rows, task, given_up, workers):
+                spool.put(number, line)
+                progress(status)
+            return _report(plan, spool, time.perf_counter() - begin)
+    except OSError as error:
+        raise OutputError(
+            "the results cannot be written", file=output, found=error.strerror or str(error), hint="free some space"
+        ) from error
+    finally:
+        ledger.finish(output)
+
+
+def _report(plan: Plan, spool: Spool, seconds: float) -> Summary:
+    """Hold every record against the limits and write what people read."""
+    output, columns = plan.orders.output, spool.columns()
+    parameters = parameter_quantities(columns)
+    points = [at_point(point, what) for point in plan.orders.points for what in (STIFFNESS, LOSS_FACTOR)]
+    quantities = {quantity.name: quantity for quantity in (*parameters, NRMSE, CHI_SQUARE, *points)}
+    judge = Judge(plan.limits, columns, quantities) if plan.limits else None
+    report = Report(plan.title) if plan.junit else None
+    status, limits, kept = Counter[str](), Counter[str](), 0
+    missed: dict[int, tuple[str, ...]] = {}
+    errors = []
+    aside = output / ledger.ASIDE / TABLE
+    with aside.open("w", encoding="utf-8", newline="") as stream:
+        diagnosed = any("diagnose" in (row.settings.commands or ()) for row in plan.rows)
+        table = Table(stream, parameters, points, verdicts=diagnosed, limits=judge is not None)
+        for number, (row, record) in enumerate(zip(plan.rows, spool, strict=True)):
+            done = record["status"] == "done"
+            judged = judge(record) if judge and done else None
+            table.add(row, record, judged)
+            if report:
+                report.add(row, record, judged)
+            status[record["status"]] += 1
+            kept += bool(record.get("kept"))
+            if not done:
+                errors.append((row.name, record["error"]))
+            if judged:
+                limits[str(judged.verdict)] += 1
+                if judged.missed:
+                    missed[number] = tuple(judged.missed)
+        stream.flush()
+        os.fsync(stream.fileno())
+    aside.replace(output / TABLE)
+    if plan.picture:
+        _draw(plan, columns, quantities, judge, missed)
+    if report and plan.junit:
+        write_files(plan.junit.parent, {plan.junit.name: report.to_xml()}, force=True)
+    return Summary(
+        status,
+        kept,
+        limits,
+        tuple(plan.rows[number].name for number in missed),
+        tuple(errors),
+        {q: _scatter(columns[q.name], q.factor) for q in quantities.values() if q.name in columns},
+        tuple(judge.notes) if judge else (),
+        seconds,
+    )
+
+
+def _scatter(values: Array, factor: float) -> tuple[float, float]:
+    middle, spread = scatter(values[np.isfinite(values)])
+    return middle * factor, spread * factor
+
+
+def _draw(
+    plan: Plan,
+    columns: dict[str, Array],
+    quantities: dict[str, Quantity],
+    judge: Judge | None,
+    missed: dict[int, tuple[str, ...]],
+) -> None:
+    from bushfit.plots import to_png
+    from bushfit.plots.batch import Panel, batch_figure
+
+    panels = [
+        Panel(
+            quantity.header,
+            columns[name] * quantity.factor,
+            tuple(limit * quantity.factor for limit in (judge.allowed.get(name, ()) if judge else ())),
+            {number: plan.rows[number].name for number, names in missed.items() if name in names},
+        )
+        for name, quantity in quantities.items()
+        if name in columns and (np.isfinite(columns[name]).sum() >= _LEAST_DRAWN or (judge and name in judge.allowed))
+    ]
+    if panels:
+        names = [row.name for row in plan.rows] if len(plan.rows) <= _MOST_LABELLED else []
+        write_files(plan.orders.output, {PICTURE: to_png(batch_figure(panels, plan.title, names))}, force=True)

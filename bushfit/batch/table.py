@@ -1,0 +1,78 @@
+"""batch.csv: a row a bushing, in the manifest's order, a unit in every header."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from typing import TextIO
+
+from bushfit.batch.ledger import ROWS, Record
+from bushfit.batch.limits import Judgement
+from bushfit.batch.manifest import Row
+from bushfit.batch.quantities import CHI_SQUARE, NRMSE, Quantity, figures
+from bushfit.sheets import defused
+
+_FIRST = ("name", "campaign", "folder", "status", "error")
+_FOUND = ("verdict", "named effects", "cannot be told from")
+_JUDGED = ("limits", "out of limits", "on the edge")
+_LAST = ("warnings",)
+
+
+class Table:
+    """Writes rows as they come."""
+
+    def __init__(
+        self,
+        stream: TextIO,
+        parameters: Sequence[Quantity],
+        points: Sequence[Quantity],
+        *,
+        verdicts: bool,
+        limits: bool,
+    ) -> None:
+        self._writer = csv.writer(stream, lineterminator="\n")
+        self._parameters, self._points = parameters, points
+        self._verdicts, self._limits = verdicts, limits
+        header = [*_FIRST, *(_JUDGED if limits else ()), *(_FOUND if verdicts else ())]
+        for quantity in parameters:
+            header += [quantity.header, *(f"{quantity.header}, {part}" for part in ("std error", "low", "high"))]
+        header += [NRMSE.header, CHI_SQUARE.header]
+        for quantity in points:
+            header += [quantity.header, f"{quantity.header}, low", f"{quantity.header}, high"]
+        self._writer.writerow([*header, *_LAST])
+
+    def add(self, row: Row, record: Record, judged: Judgement | None) -> None:
+        """One line."""
+        found = dict(figures(record))
+        done = record["status"] == "done"
+        cells = [row.name, row.listed, f"{ROWS}/{row.folder}" if done else "", record["status"]]
+        cells.append(" ".join(record.get("error", "").split()))
+        if self._limits:
+            cells += (
+                [str(judged.verdict), *("; ".join(words.values()) for words in (judged.missed, judged.edge))]
+                if judged
+                else [""] * 3
+            )
+        if self._verdicts:
+            cells += [record.get("verdict", ""), *(", ".join(record.get(k, ())) for k in ("effects", "alternatives"))]
+        for quantity in self._parameters:
+            value, low, high, stderr = found.get(quantity.name, (None,) * 4)
+            cells += [_number(x, quantity) for x in (value, stderr, low, high)]
+        cells += [_number(found.get(quantity.name, (None,))[0], quantity) for quantity in (NRMSE, CHI_SQUARE)]
+        for quantity in self._points:
+            cells += [_number(x, quantity) for x in found.get(quantity.name, (None,) * 4)[:3]]
+        cells.append("; ".join(record.get("warnings", ())))
+        self._writer.writerow([_safe(cell) for cell in cells])
+
+
+def _number(value: float | None, quantity: Quantity) -> str:
+    return "" if value is None else f"{value * quantity.factor:.7g}"
+
+
+def _safe(cell: str) -> str:
+    """Numbers stay numbers, negative ones too; other texts are no formulas."""
+    try:
+        float(cell)
+    except ValueError:
+        return defused(cell)
+    return cell

@@ -1,0 +1,187 @@
+"""One row, as a worker does it: the jobs of the single commands, and a record of what they found."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bushfit import __version__
+from bushfit.batch import ledger
+from bushfit.batch.ledger import Record
+from bushfit.batch.points import Point
+from bushfit.campaign import Campaign, load_campaign
+from bushfit.errors import BatchError, BushfitError
+from bushfit.fitting.data import Data
+from bushfit.prediction import Band, predict
+from bushfit.results import Result, load_result
+
+if TYPE_CHECKING:
+    from bushfit.batch.manifest import Row, Settings
+
+
+@dataclass(frozen=True)
+class Orders:
+    """What all rows of a batch share: where results go, points and files to make, whether to trust what stands."""
+
+    output: Path
+    points: tuple[Point, ...]
+    formats: tuple[str, ...]
+    resume: bool
+    version: str = __version__
+
+
+def work(rows: Sequence[Row], orders: Orders) -> list[tuple[str, bytes]]:
+    """Status and record, on a line, of some rows; every row's results are kept before the next is begun.
+
+    Raises:
+        BatchError: this process runs another version of bushfit than the one that ordered the work.
+    """
+    if orders.version != __version__:
+        raise BatchError(
+            "a worker runs another bushfit", found=__version__, expected=orders.version, hint="install the same on all"
+        )
+    _one_thread()
+    return [_told(_row(row, orders)) for row in rows]
+
+
+def given_up(why: str) -> tuple[str, bytes]:
+    """The same of a row that no worker survived."""
+    return _told(_failed(why))
+
+
+def _told(record: Record) -> tuple[str, bytes]:
+    return record["status"], ledger.to_line(record)
+
+
+@cache
+def _one_thread() -> Any:
+    """Linear algebra on one thread in this process, for its lifetime: cores are for rows, and sums keep their order."""
+    from threadpoolctl import threadpool_limits
+
+    return threadpool_limits(1)
+
+
+def _row(row: Row, orders: Orders) -> Record:
+    wanted = ledger.key(row, orders.points, orders.formats)
+    if orders.resume and (record := ledger.standing(orders.output, row, wanted)):
+        return {**record, "kept": True}
+    begin = time.perf_counter()
+    files: dict[str, bytes] = {}
+    try:
+        found = _worked(row, orders, files)
+        record = {"schema": ledger.SCHEMA, "key": wanted, "status": "done", **found}
+    except Exception as error:  # whatever befalls a row, it costs that row and is said
+        files.clear()
+        record = _failed(_in_words(error))
+    record["seconds"] = round(time.perf_counter() - begin, 4)
+    record["files"] = {name: ledger.digest(content) for name, content in files.items()}
+    try:
+        ledger.keep(orders.output, row, files, record)
+    except OSError as error:
+        return _failed(f"the results cannot be written: {error}")
+    return record
+
+
+def _failed(error: str) -> Record:
+    """The record of a row that came to nothing."""
+    return {"schema": ledger.SCHEMA, "status": "failed", "error": error, "seconds": 0.0}
+
+
+def _in_words(error: Exception) -> str:
+    if isinstance(error, BushfitError):
+        return str(error)
+    kind = "out of memory" if isinstance(error, MemoryError) else "a fault in bushfit itself"
+    return f"{kind}: {type(error).__name__}: {error}"
+
+
+def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Record:
+    """Run a row's commands, gather their files, and say what was found."""
+    settings, path = row.settings, Path(row.campaign)
+    inputs = {path.name: ledger.digest(path.read_bytes())} if path.is_file() else {}
+    campaign = load_campaign(path)
+    sources = [*(loop.source for loop in campaign.loops), *(sweep.source for sweep in campaign.sweeps)]
+    inputs |= {str(source.file): source.sha256 for source in sources if source}
+    result = load_result(Path(settings.model)) if settings.model else None
+    if settings.model:
+        inputs[settings.model] = ledger.digest(Path(settings.model).read_bytes())
+    found: Record = {"campaign_name": campaign.name, "inputs": inputs}
+    commands, formats = settings.commands or (), orders.formats
+    data = Data.of(campaign) if set(commands) - {"predict"} else None
+    if "fit" in commands and data:
+        fitted = _fit(settings).run(data)
+        result = fitted.result
+        made = fitted.files(formats)
+        if "diagnose" in commands:  # as `run` calls them: model.json is with what diagnose added
+            made["joint.json"] = made.pop("model.json")
+        files |= made
+    if "diagnose" in commands and data:
+        diagnosed = _diagnose(settings).run(data)
+        result = diagnosed.result
+        files |= diagnosed.files(formats)
+        found |= {
+            "verdict": diagnosed.diagnosis.verdict,
+            "effects": [named.name for named in diagnosed.diagnosis.effects],
+            "alternatives": [name for named in diagnosed.diagnosis.effects for name in named.alternatives],
+            "warnings": list(diagnosed.diagnosis.notes),
+        }
+    assert result is not None  # the manifest has seen to it that there is a model
+    if "predict" in commands:
+        files |= _predict(result, campaign, formats)
+    return {**found, **_numbers(result, orders.points, found.get("warnings", []))}
+
+
+def _fit(settings: Settings) -> Any:
+    from bushfit.jobs.fits import Fit
+
+    return Fit(settings.directions or (), settings.effects or ())
+
+
+def _diagnose(settings: Settings) -> Any:
+    from bushfit.diagnosis.record import Settings as How
+    from bushfit.jobs.diagnose import Diagnose
+
+    asked = {key: getattr(settings, key) for key in ("max_effects", "tolerance", "adopt", "without")}
+    how = How(**{key: value for key, value in asked.items() if value is not None})
+    return Diagnose(how, load_result(Path(settings.model)).model if settings.model else None)
+
+
+def _predict(result: Result, campaign: Campaign, formats: Collection[str]) -> dict[str, bytes]:
+    from bushfit.jobs import TABLES
+    from bushfit.jobs.predict import Predict
+
+    return Predict().run(result, campaign).files({TABLES, *formats})
+
+
+def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> Record:
+    """Parameters, quality, and stiffness and loss factor at the points, each with what is known of its error."""
+    parameters = {}
+    for name, parameter in result.model.parameters.items():
+        interval = result.interval(name)
+        value, stderr = result.model.values[name], result.covariance.stderr(name)
+        parameters[name] = [*map(_finite, (value, *(interval or (None, None)), stderr)), parameter.unit]
+    warnings, at = [*notes, *result.warnings], {}
+    for point in points:
+        prediction = predict(result, point.direction, [point.frequency], [point.amplitude])
+        at[str(point)] = {"stiffness": _band(prediction.stiffness), "loss factor": _band(prediction.loss_factor)}
+        warnings += [line for line in prediction.warnings if line not in warnings]
+    quality = result.quality
+    return {
+        "parameters": parameters,
+        "nrmse": quality.nrmse if quality else None,
+        "reduced_chi_square": quality.reduced_chi_square if quality else None,
+        "points": at,
+        "warnings": warnings,
+    }
+
+
+def _band(band: Band) -> list[float | None]:
+    return [_finite(float(values[0])) for values in (band.value, band.low, band.high)]
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None

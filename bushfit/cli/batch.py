@@ -1,0 +1,190 @@
+"""`bushfit batch`: many campaigns at once."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from bushfit.cli.common import Options, new_table, number, shared_options, warn
+
+if TYPE_CHECKING:
+    from bushfit.batch.points import Point
+    from bushfit.batch.pool import Pool
+    from bushfit.batch.run import Plan, Summary
+
+_MOST_SHOWN = 10
+#: Where standard error is no terminal: a line every so many seconds, and every tenth.
+_SECONDS_A_LINE = 10.0
+
+_DIRECTIONS = click.Choice(["axial", "radial", "torsion"])
+
+
+@click.command("batch")
+@click.argument("manifest")
+@click.option(
+    "--command",
+    "commands",
+    type=click.Choice(["fit", "diagnose", "predict"]),
+    multiple=True,
+    help="What to do with each campaign; may be given again [fit].",
+)
+@click.option("--direction", "directions", type=_DIRECTIONS, multiple=True, help="Tests to fit, as in bushfit fit.")
+@click.option("--effect", "effects", multiple=True, metavar="NAME", help="Add an effect, as in bushfit fit.")
+@click.option(
+    "--at",
+    multiple=True,
+    metavar="POINT",
+    help='Stiffness and loss factor there, such as "axial 25 Hz 0.1 mm"; may be given again.',
+)
+@click.option("--limits", type=click.Path(path_type=Path), metavar="FILE", help="Judge each bushing by this TOML file.")
+@click.option("--junit", type=click.Path(path_type=Path), metavar="FILE", help="Write a JUnit report for CI.")
+@click.option("--jobs", type=click.IntRange(min=1), default=None, help="Worker processes [the cores there are].")
+@click.option("--scheduler", metavar="ADDRESS", help="Work on the Dask cluster of this scheduler instead.")
+@click.option("--resume", is_flag=True, help="Go on with the results that stand: do what is missing or has changed.")
+@click.option("--tables", is_flag=True, help="Write each bushing's loops.csv, sweeps.csv and the like too.")
+@click.option("--plots", is_flag=True, help="Write each bushing's plots too.")
+@shared_options
+def command(
+    manifest: str,
+    commands: tuple[str, ...],
+    directions: tuple[str, ...],
+    effects: tuple[str, ...],
+    at: tuple[str, ...],
+    limits: Path | None,
+    junit: Path | None,
+    jobs: int | None,
+    scheduler: str | None,
+    resume: bool,
+    tables: bool,
+    plots: bool,
+    options: Options,
+) -> None:
+    """Fit (diagnose, predict) every campaign of MANIFEST: a TOML or CSV list, or a pattern in quotes.
+
+    Work is kept as it finishes: after an interruption the same command with --resume does what is missing. A row that
+    fails costs that row; its error stands in the table. Exit status 1 where a row failed or a limit is missed.
+
+    Writes batch.csv (a row a bushing), batch.png, and bushings/<name>/ with model.json of each.
+    """
+    from bushfit.batch.limits import read_limits
+    from bushfit.batch.manifest import Settings, read_manifest
+    from bushfit.batch.pool import DaskPool, LocalPool
+    from bushfit.batch.run import Plan, check_free, run
+    from bushfit.batch.work import Orders
+    from bushfit.effects import effect_named
+    from bushfit.geometry import Direction
+
+    given = Settings(
+        commands=commands or None,  # type: ignore[arg-type]
+        directions=tuple(Direction(direction) for direction in directions) or None,
+        effects=tuple(effect_named(name).name for name in effects) or None,
+    )
+    read = read_manifest(manifest, given)
+    judged_by = read_limits(limits) if limits else None
+    points = (*read.points, *_points(at), *(judged_by.points if judged_by else ()))
+    formats = tuple(kind for kind, wanted in (("csv", tables), ("png", plots and options.plots)) if wanted)
+    output = options.folder(read.stem).absolute()
+    orders = Orders(output, tuple(dict.fromkeys(points)), formats, resume)
+    plan = Plan(read.stem, read.rows, orders, judged_by, junit, options.plots)
+    check_free(plan, force=options.force)
+    workers: Pool = DaskPool(scheduler) if scheduler else LocalPool(jobs or os.cpu_count() or 1)
+    with _progress(options, len(plan.rows)) as advance:
+        summary = run(plan, workers, advance)
+    _tell(options, summary, options.folder(read.stem), plan)
+    options.tell(summary.to_document())
+    if summary.status["failed"] or summary.missed:
+        click.get_current_context().exit(1)
+
+
+def _points(texts: tuple[str, ...]) -> tuple[Point, ...]:
+    from bushfit.batch.points import parse_point
+    from bushfit.errors import BushfitError
+
+    try:
+        return tuple(parse_point(text) for text in texts)
+    except BushfitError as error:
+        error.place = "--at"
+        raise
+
+
+@contextmanager
+def _progress(options: Options, total: int) -> Iterator[Callable[[str], None]]:
+    """Rate and time left: a bar on a terminal, now and then a line elsewhere."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = options.console
+    if not console.is_terminal:
+        yield _lines(options, total)
+        return
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[failures]}", style="red"),
+    )
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("bushings", total=total, rate="", failures="")
+        begin, failed = time.monotonic(), 0
+
+        def advance(status: str) -> None:
+            nonlocal failed
+            failed += status == "failed"
+            done = bar.tasks[0].completed + 1
+            rate = f"{done / max(time.monotonic() - begin, 1e-9):.1f}/s"
+            bar.update(task, advance=1, rate=rate, failures=f"{failed} failed" if failed else "")
+
+        yield advance
+
+
+def _lines(options: Options, total: int) -> Callable[[str], None]:
+    begin = said = time.monotonic()
+    done = failed = 0
+    tenth = 0
+
+    def advance(status: str) -> None:
+        nonlocal done, failed, said, tenth
+        done, failed, now = done + 1, failed + (status == "failed"), time.monotonic()
+        if now - said < _SECONDS_A_LINE and (10 * done // total == tenth or now - begin < _SECONDS_A_LINE):
+            return
+        said, tenth, rate = now, 10 * done // total, done / (now - begin)
+        text = f"{done} of {total}, {rate:.1f}/s, {(total - done) / rate:.0f} s left"
+        options.console.print(text + (f", {failed} failed" if failed else ""), markup=False)
+
+    return advance
+
+
+def _tell(options: Options, summary: Summary, folder: Path, plan: Plan) -> None:
+    """Counts, the batch's own scatter, what failed and what misses limits."""
+    console, status = options.console, summary.status
+    if summary.scatter:
+        table = new_table(f"{plan.title}: {status['done']} bushings", "quantity", "median", "robust std dev", "unit")
+        for quantity, (middle, spread) in summary.scatter.items():
+            table.add_row(quantity.name, number(middle, 4), number(spread, 2), quantity.unit)
+        console.print(table)
+    rate = status.total() / max(summary.seconds, 1e-9)
+    kept = f", {summary.kept} of them from before" if summary.kept else ""
+    console.print(
+        f"{status['done']} done{kept}, {status['failed']} failed; {summary.seconds:.1f} s, {rate:.1f} a second",
+        markup=False,
+    )
+    if plan.limits:
+        console.print("limits: " + ", ".join(f"{count} {word}" for word, count in summary.limits.items()), markup=False)
+    warn(options, summary.notes)
+    for word, names in (
+        ("failed", [f"{name}: {' '.join(error.split())}" for name, error in summary.errors]),
+        ("out of limits", list(summary.missed)),
+    ):
+        for name in names[:_MOST_SHOWN]:
+            console.print(f"{word}: {name}", markup=False)
+        if len(names) > _MOST_SHOWN:
+            console.print(f"... and {len(names) - _MOST_SHOWN} more {word}: see batch.csv", markup=False)
+    written = ["batch.csv", *(["batch.png"] if plan.picture else []), "bushings/"]
+    console.print(f"wrote {', '.join(written)} to {folder}", markup=False)

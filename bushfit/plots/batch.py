@@ -1,0 +1,140 @@
+"""The picture of a batch: the scatter of each quantity over its bushings, limits drawn, the ones out of them named."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from bushfit.effects.contract import Array
+from bushfit.plots.style import DOT, FRAME, GREY, INK, POINT, ROW, SMALL, dress, explain, fonts, new_figure
+
+_MISS, _LIMIT, _GOOD = "#c1272d", "#c1272d", "#31688e"
+#: Up to this many bushings are drawn as single points; beyond, as a cloud with its histogram.
+_CLOUD = 200
+_MOST_NAMED = 4
+_MOST_LETTERS = 24
+#: Values further out than this many robust standard deviations are drawn at the edge.
+_FURTHEST = 12.0
+_COLUMNS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One quantity: its header, values over the bushings (n,) with NaN where there is none, the lowest and highest
+    allowed value where there is a limit, and the names of bushings that miss it, by their place."""
+
+    title: str
+    values: Array
+    allowed: tuple[float, ...] = ()
+    missed: Mapping[int, str] = field(default_factory=dict)
+
+
+def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str] = ()) -> Figure:
+    """Two columns of panels, the bushings along x in the manifest's order.
+
+    Args:
+        panels: the quantities.
+        title: of the batch.
+        names: of all bushings, to stand along x; empty where they are too many.
+    """
+    lines = math.ceil(len(panels) / _COLUMNS)
+    height = ROW * (0.9 + 0.1 * bool(names)) * lines + 0.35 * FRAME
+    figure = new_figure(f"{title}: {panels[0].values.size} bushings", height)
+    grid = figure.subplots(lines, _COLUMNS, sharex=True, squeeze=False)
+    for axes, panel in zip(grid.flat, panels, strict=False):
+        _draw(axes, panel)
+    for axes in grid.flat[len(panels) :]:
+        axes.set_visible(False)
+    count = panels[0].values.size
+    for place, axes in enumerate(grid.flat[: len(panels)]):
+        lowest = place + _COLUMNS >= len(panels)
+        axes.tick_params(labelbottom=lowest)
+        if names:
+            axes.set_xticks(
+                range(1, count + 1), names, rotation=90, fontsize=SMALL - 1, family=fonts(), parse_math=False
+            )
+        elif lowest:
+            axes.set_xlabel("bushing, in the manifest's order", fontsize=SMALL, color=INK)
+        axes.set_xlim(0.5, count + 0.5)
+    limits = "Dashed: limits; red: out of them, the worst by name." if any(panel.allowed for panel in panels) else ""
+    explain(figure, "Grey line: median of the batch.", limits, "Triangles: further out than the panel reaches.")
+    return figure
+
+
+def _draw(axes: Axes, panel: Panel) -> None:
+    there = np.isfinite(panel.values)
+    place, values = np.flatnonzero(there), panel.values[there]
+    low, high = _reach(values, panel.allowed)
+    shown = np.clip(values, low, high)
+    inside = shown == values
+    bad = np.isin(place, list(panel.missed))
+    cloud = values.size > _CLOUD
+    good_style = {**DOT, "ms": 1.6, "alpha": max(0.15, min(1.0, 1500 / values.size))} if cloud else POINT
+    for chosen, color, style, order in ((~bad, _GOOD, good_style, 2), (bad, _MISS, POINT if not cloud else DOT, 4)):
+        for marker, which in (("o", inside), ("^", shown < values), ("v", shown > values)):
+            x, y = place[chosen & which] + 1, shown[chosen & which]
+            axes.plot(x, y, marker, color=color, zorder=order, rasterized=cloud, **(style if marker == "o" else POINT))
+    axes.axhline(float(np.median(values)), color=GREY, lw=0.9, zorder=1)
+    for limit in panel.allowed:
+        if math.isfinite(limit):
+            axes.axhline(limit, color=_LIMIT, lw=0.9, ls=(0, (5, 2)), zorder=3)
+    dress(axes, "", "")
+    margin = 0.08 * (high - low)
+    axes.set_ylim(low - margin, high + margin)
+    axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
+    axes.yaxis.get_offset_text().set_fontsize(SMALL)
+    axes.set_title(panel.title, fontsize=SMALL + 0.5, loc="left", color=_MISS if panel.missed else INK, pad=3)
+    if panel.missed:
+        count = f"{len(panel.missed)} out"
+        axes.set_title(count, fontsize=SMALL + 0.5, loc="right", color=_MISS, weight="bold", pad=3)
+    _name(axes, panel, (low, high))
+    if cloud:
+        _histogram(axes, shown)
+
+
+def _reach(values: Array, allowed: Sequence[float]) -> tuple[float, float]:
+    """Lowest and highest value to show: all but the far out, and the limits."""
+    middle = float(np.median(values))
+    spread = _FURTHEST * 1.4826 * float(np.median(np.abs(values - middle)))
+    limits = [limit for limit in allowed if math.isfinite(limit)]
+    near = values[np.abs(values - middle) <= spread] if spread > 0.0 else values
+    low, high = min(float(near.min()), *limits, middle), max(float(near.max()), *limits, middle)
+    if high - low <= 1e-6 * abs(middle):
+        half = 0.05 * abs(middle) or 1.0
+        return middle - half, middle + half
+    return low, high
+
+
+def _name(axes: Axes, panel: Panel, reach: tuple[float, float]) -> None:
+    """The bushings that are furthest out."""
+    low, high = panel.allowed if panel.allowed else (-math.inf, math.inf)
+    worst = sorted(panel.missed, key=lambda k: min(high - panel.values[k], panel.values[k] - low))[:_MOST_NAMED]
+    for k in worst:
+        name, left = panel.missed[k], k < 0.6 * panel.values.size
+        short = name if len(name) <= _MOST_LETTERS else name[: _MOST_LETTERS - 1] + "…"
+        axes.annotate(
+            short,
+            (k + 1, float(np.clip(panel.values[k], *reach))),
+            xytext=(4 if left else -4, 2),
+            textcoords="offset points",
+            ha="left" if left else "right",
+            fontsize=SMALL - 1,
+            color=_MISS,
+            family=fonts(),
+            parse_math=False,
+            zorder=5,
+        )
+
+
+def _histogram(axes: Axes, values: Array) -> None:
+    """How many bushings lie where, at the right edge."""
+    counts, edges = np.histogram(values, bins=60, range=axes.get_ylim())
+    side = axes.inset_axes((1.005, 0.0, 0.13, 1.0), sharey=axes)
+    side.barh(edges[:-1], counts, height=np.diff(edges), align="edge", color=_GOOD, alpha=0.5, lw=0)
+    side.set_axis_off()
