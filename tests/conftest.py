@@ -1,4 +1,4 @@
-"""What the tests share: the paper's bushing and model, other bushings, and where the data lie."""
+"""What the tests share: commands as typed, the paper's bushing and model, other bushings, and where the data lie."""
 
 from __future__ import annotations
 
@@ -7,10 +7,17 @@ import os
 # Small matrices, and a worker a core: threads of the linear algebra would only stand in each other's way.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import contextlib
+import io
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from unittest import mock
 
 import pytest
 
+from bushfit.cli import main
 from bushfit.effects import BASE
 from bushfit.geometry import Bushing
 from bushfit.model import Model
@@ -64,3 +71,31 @@ def other_models() -> dict[str, Model]:
             {"mu": 1.3e6, "m": 4.5e5, "alpha": 0.21, "sigma_fmax": 6.0e4, "eps_half": 9.0e-3},
         ),
     }
+
+
+@dataclass(frozen=True)
+class Typed:
+    """What a command left behind."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+@pytest.fixture
+def typed(tmp_path: Path) -> Callable[..., Typed]:
+    """Run a command line in `tmp_path`, in this process: what it would do in its own, less the time to start."""
+
+    def call(*arguments: object) -> Typed:
+        out, err = io.StringIO(), io.StringIO()
+        with (
+            contextlib.chdir(tmp_path),
+            contextlib.redirect_stdout(out),
+            contextlib.redirect_stderr(err),
+            mock.patch.object(sys, "argv", ["bushfit", *map(str, arguments)]),
+            pytest.raises(SystemExit) as left,
+        ):
+            main()
+        return Typed(int(left.value.code or 0), out.getvalue(), err.getvalue())
+
+    return call

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import re
+import shlex
 import tomllib
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -14,8 +15,11 @@ import click
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 from pydantic import TypeAdapter
 
+from bushfit.batch.limits import Limits
+from bushfit.batch.manifest import ManifestFile
 from bushfit.campaign import load_campaign
 from bushfit.cli import cli
 from bushfit.effects import LIBRARY, Effect, qualified
@@ -73,6 +77,27 @@ def test_the_campaign_reference_is_valid_and_has_every_key(readme: str) -> None:
     reference = tomllib.loads(max(blocks, key=len))
     TypeAdapter(CampaignFile).validate_python(reference)
     assert keys(CampaignFile) - keys_written(reference) <= {"parameters"}
+
+
+def test_manifest_and_limits_are_valid_and_have_every_key(readme: str) -> None:
+    blocks = [tomllib.loads(block) for block in re.findall(r"^```toml\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)]
+    for schema, mark in ((ManifestFile, "bushings"), (Limits, "parameters")):
+        (block,) = (block for block in blocks if mark in block and "bushing" not in block)
+        TypeAdapter(schema).validate_python(block)
+        assert [key for key in keys(schema) if not re.search(rf"\b{key}\b", readme)] == []
+
+
+def test_recipes_for_ci_are_valid_and_run_what_there_is(readme: str) -> None:
+    recipes = [yaml.safe_load(block) for block in re.findall(r"^```yaml\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)]
+    github, gitlab = recipes
+    steps = [step["run"] for step in github["jobs"]["fit"]["steps"] if "run" in step]
+    batch = cli.get_command(click.Context(cli), "batch")
+    assert batch is not None
+    for script in (steps, gitlab["bushings"]["script"]):
+        (line,) = (line for line in script if line.startswith("bushfit "))
+        _, name, *arguments = shlex.split(line)
+        assert name == "batch"
+        batch.make_context("batch", arguments)
 
 
 def test_json_keys_of_a_model_are_listed(readme: str, root: Path) -> None:
