@@ -39,7 +39,7 @@ def to_utf8(data: bytes, file: Path, stated: str | None = None) -> tuple[bytes, 
         MeasurementError: no text, or not in the encoding stated.
     """
     encoding = stated or detect(data)
-    if encoding in ("utf-8", "utf-8-sig", "ascii"):
+    if encoding in ("utf-8", "utf-8-sig"):
         without_mark = data.removeprefix(codecs.BOM_UTF8)
         if (bad := _not_utf8(without_mark)) is None:
             return without_mark, "utf-8"

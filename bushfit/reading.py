@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -59,9 +60,10 @@ def read_loop(
     """
     table = Table.open(file, LOOP_COLUMNS, columns, units, written)
     _check_not_swapped(table, direction)
+    force = table.column("force", direction.force_unit)
     wanted = {
         "displacement": table.column("displacement", direction.displacement_unit),
-        "force": table.column("force", direction.force_unit),
+        "force": replace(force, scale=force_sign * force.scale),
     }
     if "time" in table.roles:
         wanted["time"] = table.column("time", "s")
@@ -69,11 +71,11 @@ def read_loop(
         raise table.missing("time", "s", hint='or state rate = "10 mm/min", or frequency and waveform, in the campaign')
     values = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
 
-    displacement, force = values["displacement"], force_sign * values["force"]
-    for column, series in ((wanted["displacement"], displacement), (wanted["force"], force)):
-        if np.ptp(series) == 0.0:
-            raise table.error(f"the {column.role} never changes", column=column, expected="a loop")
-    if np.dot(displacement - displacement.mean(), force - force.mean()) < 0.0:
+    for role in ("displacement", "force"):
+        if np.ptp(values[role]) == 0.0:
+            raise table.error(f"the {role} never changes", column=wanted[role], expected="a loop")
+    displacement = values["displacement"]
+    if np.dot(displacement, values["force"]) < displacement.sum() * values["force"].mean():
         raise table.error(
             "the force falls where the displacement rises",
             column=wanted["force"],
@@ -84,13 +86,12 @@ def read_loop(
         )
     if "time" in values:
         time = values["time"]
-        table.refuse(
-            np.diff(time, prepend=-np.inf) <= 0.0, wanted["time"], "time does not increase", "a later time on every row"
-        )
+        late = np.append(False, time[1:] <= time[:-1])
+        table.refuse(late, wanted["time"], "time does not increase", "a later time on every row")
     else:
         time = rebuild_time(displacement, rate=rate, frequency=frequency, waveform=waveform)
     source = Source(listed_as or Path(file.name), table.sha256)
-    return Loop(name or file.stem, direction, time, displacement, force, noise, source)
+    return Loop(name or file.stem, direction, time, displacement, values["force"], noise, source)
 
 
 def read_sweep(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import io
+import os
 import re
 import warnings
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Protocol
 
@@ -18,9 +20,13 @@ from bushfit.layout import HEAD, MOST_LINES, Layout, Line, is_comment, split
 from bushfit.measurement import Floats
 from bushfit.numerals import Numerals
 
+#: In SI; far beyond every rig, and its square is still a number.
+LARGEST = 1e100
+#: Bytes that are read at a time.
+_PIECE = 1 << 22
 _LINE_END = re.compile(rb"\r\n|\n|\r")
-#: Signs that, inside a number, part thousands.
-_SEPARATORS = ("'", "\u2019", "\u00a0", "\u2009", "\u202f")
+#: Other signs than ASCII that, inside a number, part thousands.
+_SEPARATORS = ("\u2019", "\u00a0", "\u2009", "\u202f")
 _GROUP_BY_BLANK = re.compile(rb"\d \d{3}(?!\d)")
 
 
@@ -48,9 +54,10 @@ class Source(Protocol):
         """Whether numbers below the header may have thousands separators, when that is the decimal mark."""
 
     def columns(
-        self, layout: Layout, width: int, wanted: Collection[int], numerals: Numerals
+        self, layout: Layout, width: int, scales: Mapping[int, float], numerals: Numerals
     ) -> dict[int, Floats] | None:
-        """The numbers of columns by index, each (n,); None where the rows are not so tidy that a library reads them."""
+        """Columns by index times their scale, each (n,); None where the rows are not so tidy that a library reads them,
+        or hold no number, or one beyond LARGEST."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +66,7 @@ class Text:
 
     data: bytes
     encoding: str | None
+    is_ascii: bool
     sheet: str | None = None
 
     @classmethod
@@ -68,7 +76,8 @@ class Text:
         Raises:
             MeasurementError: no text, or not in the encoding stated.
         """
-        return cls(*to_utf8(data, file, encoding))
+        data, encoding = to_utf8(data, file, encoding)
+        return cls(data, encoding, data.isascii())
 
     def head(self) -> list[Line]:
         """The filled lines at its start."""
@@ -89,34 +98,55 @@ class Text:
         offset = self._offset(layout.lines_before_data)
         if self.may_have_comma(layout) if decimal == "." else self._has(".", offset):
             return True
-        if any(self._has(sign, offset) for sign in _SEPARATORS):
+        if self._has("'", offset) or (not self.is_ascii and any(self._has(sign, offset) for sign in _SEPARATORS)):
             return True
         return layout.delimiter != " " and self._has(" ", offset) and bool(_GROUP_BY_BLANK.search(self.data, offset))
 
     def columns(
-        self, layout: Layout, width: int, wanted: Collection[int], numerals: Numerals
+        self, layout: Layout, width: int, scales: Mapping[int, float], numerals: Numerals
     ) -> dict[int, Floats] | None:
-        """The numbers of columns by index, each (n,); None where the rows are not so tidy that pandas reads them."""
+        """Columns by index times their scale, each (n,); None where the rows are not so tidy that pandas reads them.
+
+        pandas lets go of the interpreter while it reads, so large files are read in pieces by as many threads as there
+        are cores, and each piece is scaled into its place while it is still in the cache.
+        """
         import pandas as pd
 
-        body = io.BytesIO(self.data)
-        body.seek(self._offset(layout.lines_before_data))
+        def parse(piece: slice) -> pd.DataFrame:
+            return pd.read_csv(
+                io.BytesIO(self.data[piece]),
+                sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
+                header=None,
+                names=list(range(width)),
+                index_col=False,
+                decimal=numerals.decimal,
+                dtype={index: np.float64 if index in scales else str for index in range(width)},
+                na_filter=False,
+            )
+
+        pieces = self._pieces(self._offset(layout.lines_before_data))
+        most_rows = sum(piece.stop - piece.start for piece in pieces) // (2 * width) + 1  # untouched, so not in memory
+        values, count = {index: np.empty(most_rows) for index in scales}, 0
         try:
-            with warnings.catch_warnings():
+            with warnings.catch_warnings(), ThreadPoolExecutor(min(len(pieces), os.cpu_count() or 1)) as pool:
                 warnings.simplefilter("error", pd.errors.ParserWarning)
-                frame = pd.read_csv(
-                    body,
-                    sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
-                    header=None,
-                    names=list(range(width)),
-                    index_col=False,
-                    decimal=numerals.decimal,
-                    dtype={index: np.float64 if index in wanted else str for index in range(width)},
-                    na_filter=False,
-                )
+                for frame in pool.map(parse, pieces) if len(pieces) > 1 else map(parse, pieces):
+                    for index, scale in scales.items():
+                        place = values[index][count : count + len(frame)]
+                        np.multiply(frame[index].to_numpy(), scale, out=place)
+                        if not (place.min() >= -LARGEST and place.max() <= LARGEST):  # not a number fails this too
+                            return None
+                    count += len(frame)
         except (ValueError, pd.errors.ParserWarning):
             return None
-        return {index: frame[index].to_numpy() for index in wanted}
+        return {index: column[:count] for index, column in values.items()}
+
+    def _pieces(self, start: int) -> list[slice]:
+        """The bytes from a place on, cut at line ends."""
+        cuts = [start]
+        while len(self.data) - cuts[-1] > _PIECE and (end := self.data.find(b"\n", cuts[-1] + _PIECE)) >= 0:
+            cuts.append(end + 1)
+        return [slice(*ends) for ends in pairwise([*cuts, len(self.data)])]
 
     def _has(self, sign: str, offset: int) -> bool:
         return self.data.find(sign.encode(), offset) >= 0

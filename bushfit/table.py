@@ -22,12 +22,10 @@ from bushfit.headers import AmplitudeConvention, Vocabulary, split_convention
 from bushfit.layout import DELIMITERS, Layout, find_layout, fits
 from bushfit.measurement import Floats
 from bushfit.numerals import ALL, Numerals, is_like_number, weigh
-from bushfit.source import Source, Text, rows
+from bushfit.source import LARGEST, Source, Text, rows
 from bushfit.workbook import is_workbook, open_sheet
 
 _LONGEST_FOUND = 200
-#: In SI; far beyond every rig, and its square is still a number.
-_LARGEST = 1e100
 #: Rows that are taken apart at a time, where a library cannot.
 _CHUNK = 1 << 16
 #: Bytes from which on a checksum is worth a thread.
@@ -372,14 +370,9 @@ class Table:
         # a library may take a column of TRUE for numbers
         if not plain or not all(self._number(first[column.index], column) is not None for column in wanted.values()):
             return None
-        indices = {column.index for column in wanted.values()}
-        columns = self.source.columns(self.layout, len(first), indices, self.numerals)
-        if columns is None:
-            return None
-        with np.errstate(over="ignore"):
-            values = {role: columns[column.index] * column.scale for role, column in wanted.items()}
-        # not a number fails this too
-        return values if all(x.min() >= -_LARGEST and x.max() <= _LARGEST for x in values.values()) else None
+        scales = {column.index: column.scale for column in wanted.values()}
+        columns = self.source.columns(self.layout, len(first), scales, self.numerals)
+        return None if columns is None else {role: columns[column.index] for role, column in wanted.items()}
 
     def _row_by_row(self, wanted: Mapping[str, Column]) -> dict[str, Floats]:
         parts: dict[str, list[Floats]] = {role: [np.empty(0)] for role in wanted}
@@ -399,7 +392,7 @@ class Table:
     def _number(self, cell: str | float, column: Column) -> float | None:
         """The number in a cell in SI; None where it holds none, or one beyond all measure."""
         number = self.numerals.value(cell) if isinstance(cell, str) else cell
-        return number * column.scale if number is not None and abs(number * column.scale) <= _LARGEST else None
+        return number * column.scale if number is not None and abs(number * column.scale) <= LARGEST else None
 
     def _mismatch(self, line: int, found: int) -> MeasurementError:
         width = len(self.headers)
