@@ -38,6 +38,8 @@ def to_utf8(data: bytes, file: Path, stated: str | None = None) -> tuple[bytes, 
     Raises:
         MeasurementError: no text, or not in the encoding stated.
     """
+    if data.isascii() and stated is None and 0 not in data:
+        return data, "utf-8"
     encoding = stated or detect(data)
     if encoding in ("utf-8", "utf-8-sig"):
         without_mark = data.removeprefix(codecs.BOM_UTF8)
@@ -83,9 +85,8 @@ def detect(data: bytes) -> str:
 
 def _not_utf8(data: bytes) -> int | None:
     """Index of the first byte that UTF-8 text cannot have; None where there is none."""
-    zero = data.find(0)
-    if data.isascii() or zero >= 0:
-        return None if zero < 0 else zero
+    if (zero := data.find(0)) >= 0:
+        return zero
     decoder = codecs.getincrementaldecoder("utf-8")()
     for start in range(0, len(data), _CHUNK):
         try:

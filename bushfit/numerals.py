@@ -17,6 +17,10 @@ _BLANKS, _APOSTROPHES, _SIGN = " \u00a0\u2009\u202f", "'\u2019", "[+\\-\u2212]"
 _GROUPS = {",": ",", ".": r"\.", " ": f"[{_BLANKS}]", "'": f"[{_APOSTROPHES}]"}
 _LIKE = re.compile(rf"{_SIGN}?[.,]?\d[\d.,{_BLANKS}{_APOSTROPHES}]*(?:[eE]{_SIGN}?\d+)?", re.ASCII)
 
+#: A number that may have one group of thousands, and one with thousands that are not grouped.
+_ONE_GROUP = re.compile(rf"{_SIGN}?[1-9]\d{{0,2}}([.,])\d{{3}}", re.ASCII)
+_BARE = re.compile(rf"{_SIGN}?\d{{4,}}(?:[.,]\d*)?", re.ASCII)
+
 
 @dataclass(frozen=True)
 class Numerals:
@@ -32,10 +36,11 @@ class Numerals:
 
     @cached_property
     def _pattern(self) -> re.Pattern[str]:
-        mark, whole = re.escape(self.decimal), r"\d+"
+        mark = re.escape(self.decimal)
+        forms = [rf"(?:\d+(?:{mark}\d*)?|{mark}\d+)(?:[eE]{_SIGN}?\d+)?"]
         if self.thousands:
-            whole = rf"(?:[1-9]\d{{0,2}}(?:{_GROUPS[self.thousands]}\d{{3}})+|\d+)"
-        return re.compile(rf"{_SIGN}?(?:{whole}(?:{mark}\d*)?|{mark}\d+)(?:[eE]{_SIGN}?\d+)?", re.ASCII)
+            forms.append(rf"[1-9]\d{{0,2}}(?:{_GROUPS[self.thousands]}\d{{3}})+(?:{mark}\d*)?")
+        return re.compile(rf"{_SIGN}?(?:{'|'.join(forms)})", re.ASCII)
 
     def allows(self, text: str) -> bool:
         """Whether a cell, without blanks around it, is a number when written in this way."""
@@ -83,17 +88,20 @@ def is_like_number(text: str) -> bool:
 
 
 def weigh(cells: Iterable[tuple[Place, str]], ways: tuple[Numerals, ...] = ALL, *, all_cells: bool = False) -> Evidence:
-    """Find the ways that numbers are written in.
+    """Find the ways that numbers are written in. A file that groups thousands does so throughout, unless it is stated.
 
     Args:
         cells: place and text of each; texts that are no numbers in any way count for nothing.
         ways: those that may be.
         all_cells: go on when the decimal mark is settled, for thousands separators and contradictions.
     """
-    unclear = None
+    open_thousands = len({way.thousands for way in ways}) > 1
+    unclear, bare = None, False
+    grouped: dict[str, tuple[Place, str]] = {}
     for place, text in cells:
         if not all_cells and len({way.decimal for way in ways}) == 1:
             break
+        bare = bare or _BARE.fullmatch(text) is not None
         if text.isdecimal():
             continue
         left = tuple(way for way in ways if way.allows(text))
@@ -102,8 +110,12 @@ def weigh(cells: Iterable[tuple[Place, str]], ways: tuple[Numerals, ...] = ALL, 
                 return Evidence(ways, contrary=(place, text))
             continue
         ways = left
+        if group := _ONE_GROUP.fullmatch(text):
+            grouped.setdefault(group[1], (place, text))
         if unclear is None and len({way.value(text) for way in ways}) > 1:
             unclear = place, text
         if len({way.decimal for way in ways}) == 1:
             unclear = None
-    return Evidence(ways, unclear)
+    # 62.598 between 20,000 and 3694,85 is a slip rather than 62 thousand
+    contrary = grouped.get(ways[0].thousands or "") if bare and open_thousands else None
+    return Evidence(ways, unclear, contrary)

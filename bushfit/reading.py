@@ -60,11 +60,11 @@ def read_loop(
     """
     table = Table.open(file, LOOP_COLUMNS, columns, units, written)
     _check_not_swapped(table, direction)
-    force = table.column("force", direction.force_unit)
     wanted = {
         "displacement": table.column("displacement", direction.displacement_unit),
-        "force": replace(force, scale=force_sign * force.scale),
+        "force": table.column("force", direction.force_unit),
     }
+    wanted["force"] = replace(wanted["force"], scale=force_sign * wanted["force"].scale)
     if "time" in table.roles:
         wanted["time"] = table.column("time", "s")
     elif rate is None and frequency is None:

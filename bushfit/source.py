@@ -23,7 +23,7 @@ from bushfit.numerals import Numerals
 #: In SI; far beyond every rig, and its square is still a number.
 LARGEST = 1e100
 #: Bytes that are read at a time.
-_PIECE = 1 << 22
+_PIECE = 1 << 20
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 #: Other signs than ASCII that, inside a number, part thousands.
 _SEPARATORS = ("\u2019", "\u00a0", "\u2009", "\u202f")
@@ -66,7 +66,6 @@ class Text:
 
     data: bytes
     encoding: str | None
-    is_ascii: bool
     sheet: str | None = None
 
     @classmethod
@@ -76,8 +75,7 @@ class Text:
         Raises:
             MeasurementError: no text, or not in the encoding stated.
         """
-        data, encoding = to_utf8(data, file, encoding)
-        return cls(data, encoding, data.isascii())
+        return cls(*to_utf8(data, file, encoding))
 
     def head(self) -> list[Line]:
         """The filled lines at its start."""
@@ -98,7 +96,7 @@ class Text:
         offset = self._offset(layout.lines_before_data)
         if self.may_have_comma(layout) if decimal == "." else self._has(".", offset):
             return True
-        if self._has("'", offset) or (not self.is_ascii and any(self._has(sign, offset) for sign in _SEPARATORS)):
+        if self._has("'", offset) or (not self.data.isascii() and any(self._has(sign, offset) for sign in _SEPARATORS)):
             return True
         return layout.delimiter != " " and self._has(" ", offset) and bool(_GROUP_BY_BLANK.search(self.data, offset))
 

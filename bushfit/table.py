@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from functools import cached_property
 from itertools import islice
 from pathlib import Path
 from typing import Literal
@@ -28,6 +29,8 @@ from bushfit.workbook import is_workbook, open_sheet
 _LONGEST_FOUND = 200
 #: Rows that are taken apart at a time, where a library cannot.
 _CHUNK = 1 << 16
+#: Cells that may settle the decimal mark.
+_FIRST_CELLS = 1000
 #: Bytes from which on a checksum is worth a thread.
 _LARGE = 1 << 22
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
@@ -75,7 +78,7 @@ class Table:
         file: where it comes from.
         source: the file's rows.
         layout: header, units row and delimiter.
-        numerals: how numbers are written.
+        stated: what the user says of the file's format.
         roles: the columns that were recognised.
         checksum: SHA-256 of the file, perhaps still under way.
     """
@@ -83,9 +86,9 @@ class Table:
     file: Path
     source: Source
     layout: Layout
-    numerals: Numerals
     roles: Mapping[str, Column]
     checksum: Future[str]
+    stated: FileFormat
 
     @classmethod
     def open(
@@ -96,7 +99,7 @@ class Table:
         stated_units: Mapping[str, str] | None = None,
         stated: FileFormat | None = None,
     ) -> Table:
-        """Read a file and understand its header and the way it writes numbers.
+        """Read a file and understand its header.
 
         Args:
             file: a text in any dialect. Lines of other content may lead it; a row of units may follow the header.
@@ -106,8 +109,7 @@ class Table:
             stated: what the file does not tell of its format.
 
         Raises:
-            MeasurementError: no such file, no text, no header, a header that does not settle which column is which,
-                or numbers that can be read in two ways.
+            MeasurementError: no such file, no text, no header, or a header that does not settle which column is which.
             UnitError: two different units for one column.
         """
         stated = stated or FileFormat()
@@ -130,10 +132,9 @@ class Table:
             layout = lay_out(source)
         except csv.Error as error:
             raise MeasurementError("the table cannot be read", file=file, found=str(error)) from error
-        table = cls(file, source, layout, Numerals(), {}, checksum)
+        table = cls(file, source, layout, {}, checksum, stated)
         table._check_header()
-        table = replace(table, roles=table._recognise(vocabulary, columns or {}, stated_units or {}))
-        return replace(table, numerals=table._numerals(stated))
+        return replace(table, roles=table._recognise(vocabulary, columns or {}, stated_units or {}))
 
     @property
     def headers(self) -> tuple[str, ...]:
@@ -176,7 +177,8 @@ class Table:
         """The numbers of the wanted columns in SI, each (n,).
 
         Raises:
-            MeasurementError: a row of another length, a cell that is no finite number, or too few rows.
+            MeasurementError: a row of another length, a cell that is no finite number, numbers that can be read in two
+                ways, or too few rows.
         """
         values = self._tidy(wanted)
         if values is None:
@@ -297,27 +299,18 @@ class Table:
                 )
         return roles
 
-    def _numerals(self, stated: FileFormat) -> Numerals:
+    @cached_property
+    def numerals(self) -> Numerals:
         """How the recognised columns write their numbers, by what all of them tell.
 
         Raises:
             MeasurementError: numbers that can be read in two ways, or that are written in two ways.
         """
-        thousands = None if stated.thousands == "none" else stated.thousands
-        ways = tuple(
-            way
-            for way in ALL
-            if stated.decimal in (None, way.decimal) and (stated.thousands is None or way.thousands == thousands)
-        )
-        if not self.source.may_have_comma(self.layout):
+        ways = self._ways()
+        if self.layout.delimiter == "," and not self.source.may_have_comma(self.layout):
             ways = tuple(way for way in ways if "," not in (way.decimal, way.thousands)) or ways
-        if not ways:
-            raise self.error(
-                "decimal mark and thousands separator are the same", found=stated.decimal, expected="two signs"
-            )
         evidence = weigh(self._cells(), ways)
-        decimal = evidence.ways[0].decimal
-        if evidence.contrary is None and self.source.may_group(self.layout, decimal):
+        if evidence.contrary is None and self.source.may_group(self.layout, evidence.ways[0].decimal):
             evidence = weigh(self._cells(), ways, all_cells=True)
         if evidence.contrary:
             (line, index), text = evidence.contrary
@@ -343,6 +336,16 @@ class Table:
             )
         return evidence.ways[0]
 
+    def _ways(self) -> tuple[Numerals, ...]:
+        """The ways to write numbers that the user leaves open."""
+        decimal, thousands = self.stated.decimal, self.stated.thousands
+        ways = tuple(
+            way for way in ALL if decimal in (None, way.decimal) and thousands in (None, way.thousands or "none")
+        )
+        if not ways:
+            raise self.error("decimal mark and thousands separator are the same", found=decimal, expected="two signs")
+        return ways
+
     def _cells(self) -> Iterator[tuple[tuple[int, int], str]]:
         """Place and text of the recognised columns' cells, as far as they are texts."""
         indices = [column.index for column in self.roles.values()]
@@ -364,14 +367,23 @@ class Table:
             raise self.error("the table cannot be read", found=str(error)) from error
 
     def _tidy(self, wanted: Mapping[str, Column]) -> dict[str, Floats] | None:
-        """The wanted columns read by a library, or None where row by row it has to be."""
+        """The wanted columns read by a library, or None where row by row it has to be.
+
+        The library takes no thousands separators, so what it reads as numbers needs no more evidence than that of the
+        first cells, as long as these settle the decimal mark.
+        """
+        decimals = {way.decimal for way in weigh(islice(self._cells(), _FIRST_CELLS), self._ways()).ways}
         first = next(self._rows(), (0, ()))[1]
-        plain = self.numerals.thousands is None and fits(first, len(self.headers))
+        if len(decimals) > 1 or not fits(first, len(self.headers)):
+            return None
+        numerals = Numerals(decimals.pop())
         # a library may take a column of TRUE for numbers
-        if not plain or not all(self._number(first[column.index], column) is not None for column in wanted.values()):
+        if not all(
+            isinstance(cell := first[column.index], str) and numerals.allows(cell) for column in wanted.values()
+        ):
             return None
         scales = {column.index: column.scale for column in wanted.values()}
-        columns = self.source.columns(self.layout, len(first), scales, self.numerals)
+        columns = self.source.columns(self.layout, len(first), scales, numerals)
         return None if columns is None else {role: columns[column.index] for role, column in wanted.items()}
 
     def _row_by_row(self, wanted: Mapping[str, Column]) -> dict[str, Floats]:

@@ -125,9 +125,13 @@ class Dialect:
 
     def bytes(self) -> bytes:
         """The table as a file."""
+        return self.encoded(self.text())
+
+    def encoded(self, text: str) -> bytes:
+        """A text as a file."""
         marks = {"utf-16-le with mark": ("utf-16-le", "\ufeff"), "utf-16-be with mark": ("utf-16-be", "\ufeff")}
         encoding, mark = marks.get(self.encoding, (self.encoding, ""))
-        return (mark + self.text()).encode(encoding)
+        return (mark + text).encode(encoding)
 
 
 DIALECTS = {

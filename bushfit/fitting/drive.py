@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History, reversals
@@ -23,6 +24,11 @@ from bushfit.measurement import Loop
 GRID = 1024
 #: Loops with more rows than this are averaged into as many bins of phase.
 MOST_ROWS = 4 * GRID
+#: Rows that are enough to find the cycles.
+_ENOUGH_ROWS = 200_000
+#: Cycles whose bins are kept apart, and how fast the groups of later ones grow.
+_APART, _GROWTH = 4, 1.5
+_GOLDEN = 0.6180339887498949
 _HARMONICS = 60
 _CLOCK_HARMONICS = 15
 #: Harmonics of one cycle that count as slow, when the scatter between cycles is taken.
@@ -150,14 +156,14 @@ def drive_of(loop: Loop) -> Drive:
     begin = loop.time[0]
     loop, note = steady_part(loop)
     frequency, cycles = _fundamental(loop)
-    phase = (loop.time - loop.time[0]) * frequency
     half_motion, half_force = np.ptp(loop.displacement) / 2.0, np.ptp(loop.force) / 2.0
-    motion, force_mean, force_noise = _harmonics(phase, loop)
+    motion, force_mean, force_noise = _harmonics(loop, frequency, cycles)
     noise = loop.noise * half_force if loop.noise is not None else force_noise
-    from_rest = loop.time[0] == begin and _from_rest(loop, phase, half_motion, half_force, noise)
-    force, weight = loop.force, np.ones(loop.force.size)
-    if loop.force.size > MOST_ROWS and not from_rest:
-        phase, force, weight = _binned(phase, loop.force)
+    from_rest = loop.time[0] == begin and _from_rest(loop, frequency, half_motion, half_force, noise)
+    if loop.force.size > MOST_ROWS:
+        phase, force, weight = _binned(loop, frequency, cycles, each_cycle=from_rest)
+    else:
+        phase, force, weight = (loop.time - loop.time[0]) * frequency, loop.force, np.ones(loop.force.size)
     noise = max(noise, FLOOR * half_force)
     off_zero = not from_rest and abs(motion[0]) > _CENTRED * half_motion
     datum = force_mean if off_zero else None
@@ -200,31 +206,34 @@ def _at_reversal(drive: Drive) -> Array:
     return nearest < _JUMP
 
 
-def _from_rest(loop: Loop, phase: Array, half_motion: float, half_force: float, noise: float) -> bool:
+def _from_rest(loop: Loop, frequency: float, half_motion: float, half_force: float, noise: float) -> bool:
     """Whether the record begins with nothing moved, no force, and a force that is another a cycle later.
 
     A settled loop may pass the origin too, where its load cell is off zero, but then it passes it every cycle.
     """
     if abs(loop.displacement[0]) > _AT_REST * half_motion or abs(loop.force[0]) > _AT_REST * half_force + 3.0 * noise:
         return False
-    first = phase < _FIRST
-    change = np.interp(phase[first] + 1.0, phase, loop.force) - loop.force[first]
-    chance = 5.0 * noise * np.sqrt(2.0 / np.count_nonzero(first))
+    clock = loop.time - loop.time[0]
+    first = clock[: np.searchsorted(clock, _FIRST / frequency)]
+    change = np.interp(first + 1.0 / frequency, clock, loop.force) - loop.force[: first.size]
+    chance = 5.0 * noise * np.sqrt(2.0 / first.size)
     return bool(abs(change.mean()) > max(chance, _OTHER * half_force))
 
 
 def _fundamental(loop: Loop) -> tuple[float, float]:
     """Frequency [Hz] and number of cycles: from crossings in one sense, refined by Gauss-Newton on the motion."""
-    x = loop.displacement - (loop.displacement.max() + loop.displacement.min()) / 2.0
+    step = -(-loop.time.size // _ENOUGH_ROWS)
+    x = loop.displacement[::step] - (loop.displacement.max() + loop.displacement.min()) / 2.0
     band = 0.1 * np.ptp(x)
     state = np.where(x > band, 1, np.where(x < -band, -1, 0))
     marks = np.flatnonzero(state)
     turns = marks[1:][state[marks[1:]] != state[marks[:-1]]]
-    crossings = max((turns[state[turns] == sense] for sense in (1, -1)), key=len)
+    crossings = step * max((turns[state[turns] == sense] for sense in (1, -1)), key=len)
     duration = float(loop.time[-1] - loop.time[0])
     closed = duration * loop.time.size / (loop.time.size - 1)
     if crossings.size < 2:
-        if abs(x[-1] - x[0]) > band:
+        apart = abs(loop.displacement[-1] - loop.displacement[0])
+        if apart > band:
             unit = loop.direction.displacement_unit
             raise FitError(
                 "the loop does not hold a whole cycle",
@@ -233,13 +242,13 @@ def _fundamental(loop: Loop) -> tuple[float, float]:
                 expected="at least one closed cycle",
                 hint="export the whole cycle, or several",
             )
-        stride = (abs(x[1] - x[0]) + abs(x[-1] - x[-2])) / 2.0
-        period = duration if abs(x[-1] - x[0]) < 0.5 * stride else closed
+        stride = np.abs(np.diff(loop.displacement[[0, 1, -2, -1]]))[[0, 2]].mean()
+        period = duration if apart < 0.5 * stride else closed
         return 1.0 / period, closed / period
     frequency = (crossings.size - 1) / float(loop.time[crossings[-1]] - loop.time[crossings[0]])
     order = _order(loop.time.size / (closed * frequency), _CLOCK_HARMONICS)
     sample = slice(None, None, max(1, x.size // 2000))
-    time, motion = loop.time[sample] - loop.time[0], x[sample]
+    time, motion = loop.time[::step][sample] - loop.time[0], x[sample]
     for _ in range(4):
         basis = _basis(time * frequency, order)
         angle_slope = 2.0 * np.pi * time * (basis @ _turned(_solve(basis, motion)))
@@ -272,16 +281,16 @@ def _turned(solution: Array) -> Array:
     return np.concatenate(([0.0], number * -solution[order + 1 :], number * solution[1 : order + 1]))
 
 
-def _harmonics(phase: Array, loop: Loop) -> tuple[Array, float, float]:
+def _harmonics(loop: Loop, frequency: float, cycles: float) -> tuple[Array, float, float]:
     """Significant harmonics of the displacement, and the force's mean and scatter about its own harmonics.
 
     The scatter holds what does not repeat from cycle to cycle and what is too fast for the rubber, but not what
     changes slowly from one cycle to the next, which is settling or drift.
     """
-    step = max(1, phase.size // MOST_ROWS)
-    values = np.column_stack((loop.displacement, loop.force))[::step]
-    phase = phase[::step]
-    order = _order(phase.size / max(float(np.ptp(phase)), 1.0), _HARMONICS)
+    sample = _sample(loop.time.size)
+    phase = (loop.time[sample] - loop.time[0]) * frequency
+    values = np.column_stack((loop.displacement[sample], loop.force[sample]))
+    order = _order(loop.time.size / max(cycles, 1.0), _HARMONICS)
     basis = _basis(phase, order)
     solution = _solve(basis, values)
     freedom = max(phase.size - 2 * order - 1, 1)
@@ -294,7 +303,7 @@ def _harmonics(phase: Array, loop: Loop) -> tuple[Array, float, float]:
     keep[:2] = True
     motion = np.where(keep, coefficients, 0.0)[: int(np.flatnonzero(keep)[-1]) + 1]
     triangle = _triangle(motion[0], motion[1])
-    if np.std(loop.displacement[::step] - series(triangle, phase)) < _ALIKE * motion_noise:
+    if np.std(values[:, 0] - series(triangle, phase)) < _ALIKE * motion_noise:
         motion = triangle
     return motion, float(solution[0, 1]), force_noise
 
@@ -323,14 +332,39 @@ def _triangle(mean: complex, fundamental: complex) -> Array:
     return coefficients
 
 
-def _binned(phase: Array, force: Array) -> tuple[Array, Array, Array]:
-    """Mean phase, mean force and number of rows of each filled bin of every cycle."""
-    bins = (phase * GRID).astype(np.intp)
-    weight = np.bincount(bins).astype(float)
-    filled = weight > 0
-    weight = weight[filled]
-    return (
-        np.bincount(bins, weights=phase)[filled] / weight,
-        np.bincount(bins, weights=force)[filled] / weight,
-        weight,
+def _binned(loop: Loop, frequency: float, cycles: float, each_cycle: bool) -> tuple[Array, Array, Array]:
+    """Mean phase, mean force and number of rows of each filled bin of every cycle, or of cycles taken together: the
+    first few are kept apart, because a loop settles over them, and later ones go into ever larger groups."""
+    number = np.arange(int(cycles) + 2)
+    starts = number
+    if not each_cycle:
+        later = _APART * _GROWTH ** np.arange(np.log(number.size / _APART) / np.log(_GROWTH))
+        starts = np.union1d(np.arange(_APART), later.astype(np.intp))
+    group = np.searchsorted(starts, number, side="right") - 1
+    middle = np.round(np.bincount(group, weights=number) / np.bincount(group))
+    clock = loop.time - loop.time[0]
+    first_rows = np.searchsorted(clock, np.arange(int(cycles * GRID) + 1) / (frequency * GRID))
+    bins = np.flatnonzero(np.diff(first_rows, append=clock.size))  # the filled ones
+    edges = first_rows[bins]
+    count = np.diff(edges, append=clock.size).astype(float)
+    place = GRID * group[bins // GRID] + bins % GRID
+    rows, inside, force = (
+        np.bincount(place, weights=sums)
+        for sums in (
+            count,
+            np.add.reduceat(clock, edges) * (frequency * GRID) - count * bins,
+            np.add.reduceat(loop.force, edges),
+        )
     )
+    filled = np.flatnonzero(rows)
+    rows, inside, force = rows[filled], inside[filled], force[filled]
+    phase = middle[filled // GRID] + (filled % GRID + inside / rows) / GRID
+    return phase, force / rows, rows
+
+
+def _sample(rows: int) -> NDArray[np.intp]:
+    """Rows that stand for all: every one of few, else spread evenly, but in no step that could keep time with the
+    cycles."""
+    count = min(rows, MOST_ROWS)
+    number = np.arange(count)
+    return (number if count == rows else (number + number * _GOLDEN % 1.0) * (rows / count)).astype(np.intp)
