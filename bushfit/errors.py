@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+#: What was found is quoted up to here.
+_LONGEST_QUOTE = 300
+
 
 class BushfitError(Exception):
     """Something the user can put right; the command line prints it and exits with status 2.
@@ -30,7 +33,7 @@ class BushfitError(Exception):
         self.problem = problem
         self.file = None if file is None else Path(file)
         self.place = place
-        self.found = found
+        self.found = found if found is None or len(found) <= _LONGEST_QUOTE else f"{found[:_LONGEST_QUOTE]} ..."
         self.expected = expected
         self.hint = hint
         super().__init__(str(self))

@@ -11,12 +11,16 @@ from bushfit.errors import BushfitError
 _LARGEST_BYTES = 4 << 30
 
 
-def read_bytes(file: Path, kind: type[BushfitError]) -> bytes:
+def read_bytes(
+    file: Path, kind: type[BushfitError], *, largest: int = _LARGEST_BYTES, hint: str = "thin it out"
+) -> bytes:
     """The bytes of a file, read once.
 
     Args:
         file: the file.
         kind: class of the error to raise.
+        largest: refuse more bytes than this, before reading them.
+        hint: what to do about a file that is too large.
 
     Raises:
         kind: the file is missing, no regular file, not readable, empty, or too large.
@@ -27,9 +31,9 @@ def read_bytes(file: Path, kind: type[BushfitError]) -> bytes:
         if not file.is_file():
             found = "a folder" if file.is_dir() else "a device"
             raise kind("this is not a file", file=file, found=found, expected="a file")
-        if (size := file.stat().st_size) > _LARGEST_BYTES:
-            limit = f"at most {_LARGEST_BYTES >> 30} GiB"
-            raise kind("the file is too large", file=file, found=f"{size} bytes", expected=limit, hint="thin it out")
+        if (size := file.stat().st_size) > largest:
+            limit = f"at most {largest} bytes"
+            raise kind("the file is too large", file=file, found=f"{size} bytes", expected=limit, hint=hint)
         data = file.read_bytes()
     except OSError as error:
         raise kind("the file cannot be read", file=file, found=error.strerror or str(error)) from error
@@ -38,13 +42,15 @@ def read_bytes(file: Path, kind: type[BushfitError]) -> bytes:
     return data
 
 
-def read_utf8(file: Path, kind: type[BushfitError]) -> bytes:
-    """The bytes of a text file in UTF-8, a byte order mark left in place.
+def read_utf8(
+    file: Path, kind: type[BushfitError], *, largest: int = _LARGEST_BYTES, hint: str = "thin it out"
+) -> bytes:
+    """The bytes of a text file in UTF-8, a byte order mark left in place; arguments as of `read_bytes`.
 
     Raises:
         kind: as `read_bytes`, or the file is not UTF-8 text.
     """
-    data = read_bytes(file, kind)
+    data = read_bytes(file, kind, largest=largest, hint=hint)
     _check_utf8(data, file, kind)
     return data
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.metadata
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -18,6 +17,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import BushfitError, ModelError
 from bushfit.measurement import Source
 from bushfit.model import Model
+from bushfit.modelfile import read_model_file
 
 SCHEMA = "bushfit/model/1"
 #: Half width of a 95 % interval in standard deviations, where these are known.
@@ -190,17 +190,8 @@ class Result:
         """The result of `to_document`.
 
         Raises:
-            ModelError: another schema, or a key that is missing or of the wrong kind.
+            ModelError: a key that is missing or of the wrong kind.
         """
-        schema = document.get("schema")
-        if schema != SCHEMA:
-            raise ModelError(
-                "not a model this version reads",
-                place="schema",
-                found=repr(schema),
-                expected=SCHEMA,
-                hint="use a file written by bushfit fit-static, fit-dynamic, fit or diagnose",
-            )
         model = Model.from_document(document)
         try:
             fit, covariance = document.get("fit"), document.get("covariance") or {"names": [], "matrix": []}
@@ -248,20 +239,9 @@ def load_result(file: Path) -> Result:
     Raises:
         ModelError: a file that is missing, is no JSON, or is no model; it names the file.
     """
-    try:
-        document = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ModelError("no such file", file=file, hint="bushfit fit writes one") from None
-    except (OSError, UnicodeDecodeError) as wrong:
-        raise ModelError("cannot be read", file=file, found=str(wrong)) from None
-    except (json.JSONDecodeError, RecursionError) as wrong:
-        place = f"line {wrong.lineno}" if isinstance(wrong, json.JSONDecodeError) else None
-        raise ModelError("not JSON", file=file, place=place, found=str(wrong), expected="a model file") from None
-    if not isinstance(document, dict):
-        raise ModelError("not a model", file=file, found=type(document).__name__, expected="a JSON object")
+    document = read_model_file(file, SCHEMA)
     try:
         return Result.from_document(document)
     except BushfitError as error:
-        raise type(error)(
-            error.problem, file=file, place=error.place, found=error.found, expected=error.expected, hint=error.hint
-        ) from None
+        error.file = file
+        raise

@@ -24,6 +24,8 @@ Residuals = Literal["complex", "magnitude_loss_factor"]
 _MOST_LISTED = 12
 _LARGEST_GRID = 100_000
 _LARGEST_NUMBER = 1e100
+#: One error of a list is enough: a hundred thousand would fill the memory.
+_FIRST_ERROR = Field(fail_fast=True)
 _S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
 
 
@@ -169,7 +171,7 @@ Text = Annotated[str, Field(min_length=1)]
 Length = Annotated[float, _si("m"), Field(gt=0)]
 Angle = Annotated[float, _si("rad"), Field(gt=0)]
 Frequency = Annotated[float, _si("Hz"), Field(gt=0)]
-Frequencies = Annotated[tuple[Frequency, ...], converted(_frequencies), Field(min_length=1)]
+Frequencies = Annotated[tuple[Frequency, ...], _FIRST_ERROR, converted(_frequencies), Field(min_length=1)]
 Displacement = Annotated[float, converted(_displacement), Field(gt=0)]
 Share = Annotated[float, _si("1"), Field(ge=0, lt=1)]
 Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
@@ -237,7 +239,7 @@ class FitSettings:
     """[fit]: settings by parameter; amplitudes [m or rad] that fit-dynamic uses, none for the smallest; residuals."""
 
     parameters: Annotated[Mapping[str, ParameterSetting], converted(_parameter_settings)] = field(default_factory=dict)
-    dynamic_amplitudes: tuple[Annotated[float, _si("m", "rad"), Field(gt=0)], ...] = ()
+    dynamic_amplitudes: Annotated[tuple[Annotated[float, _si("m", "rad"), Field(gt=0)], ...], _FIRST_ERROR] = ()
     residuals: Residuals = "complex"
 
 
@@ -246,9 +248,9 @@ class PredictSettings:
     """[predict]: frequencies [Hz], amplitudes [m], rotation amplitudes [rad] and directions; None for the default."""
 
     frequencies: Frequencies | None = None
-    amplitudes: Annotated[tuple[Length, ...], Field(min_length=1)] | None = None
-    torsion_amplitudes: Annotated[tuple[Angle, ...], Field(min_length=1)] | None = None
-    directions: Annotated[tuple[Direction, ...], Field(min_length=1)] | None = None
+    amplitudes: Annotated[tuple[Length, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
+    torsion_amplitudes: Annotated[tuple[Angle, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
+    directions: Annotated[tuple[Direction, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
 
 
 @dataclass(frozen=True)
@@ -267,7 +269,7 @@ class SimulatedSweep:
     """[[simulate.sweeps]]: zero-to-peak amplitudes [m or rad] and frequencies [Hz], all combinations."""
 
     direction: Direction
-    amplitudes: Annotated[tuple[Displacement, ...], Field(min_length=1)]
+    amplitudes: Annotated[tuple[Displacement, ...], _FIRST_ERROR, Field(min_length=1)]
     frequencies: Frequencies
 
 

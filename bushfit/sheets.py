@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
     from bushfit.prediction import Prediction
     from bushfit.reduction import Reduction
 
+#: How a text begins that a spreadsheet takes for a formula, in ASCII or full width, be it after blanks.
+_FORMULA = re.compile("[\\s\"']*[=+\\-@\uff1d\uff0b\uff0d\uff20|%]|\\t")
+_LINES = re.compile("[\\r\\n]+")
 #: Displacement and stiffness as engineers read them: unit and factor from SI.
 _TRANSLATION = {"length": ("mm", 1e3), "force": ("N", 1.0), "stiffness": ("N/mm", 1e-3)}
 _ROTATION = {"length": ("deg", 180.0 / np.pi), "force": ("N m", 1.0), "stiffness": ("N m/rad", 1.0)}
@@ -229,5 +233,17 @@ def defused(text: str) -> str:
 
 
 def to_csv(table: pd.DataFrame) -> bytes:
-    """Comma, decimal point, UTF-8, seven digits."""
-    return table.to_csv(index=False, float_format="%.7g", lineterminator="\n").encode()
+    """Comma, decimal point, UTF-8, seven digits; no text that a spreadsheet would run as a formula."""
+    import pandas as pd
+
+    texts = [name for name in table if not pd.api.types.is_numeric_dtype(table[name])]
+    table = table.assign(**{name: table[name].map(defused) for name in texts}).rename(columns=defused)
+    return table.to_csv(index=False, float_format="%.7g", lineterminator="\n").encode("utf-8", "replace")
+
+
+def defused(cell: object) -> object:
+    """A text as one line, with an apostrophe before one that a spreadsheet would run as a formula; else as it is."""
+    if not isinstance(cell, str):
+        return cell
+    line = " ".join(_LINES.split(cell))
+    return f"'{line}" if _FORMULA.match(line) else line

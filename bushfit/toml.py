@@ -20,6 +20,8 @@ from bushfit.schema import FitSettings, fit_keys, unknown_key
 T = TypeVar("T")
 
 _LARGEST_BYTES = 1_000_000
+#: A key of many parts costs the parser the square of their number.
+_DEEP_KEY = re.compile(rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}""")
 _UNKNOWN = "unexpected_keyword_argument"
 #: pydantic's names for what has the wrong shape, in the words of TOML.
 _SHAPES = {
@@ -52,15 +54,10 @@ def read_toml(path: Path, schema: type[T], *, what: str = "a campaign file", lar
 
 
 def _parse(path: Path, what: str, largest: int) -> dict[str, Any]:
-    data = read_utf8(path, CampaignError)
-    if len(data) > largest:
-        raise CampaignError(
-            f"this is too large for {what}",
-            file=path,
-            found=f"{len(data)} bytes",
-            expected=f"TOML of at most {largest} bytes",
-            hint=f"give {what}, not a measurement",
-        )
+    data = read_utf8(path, CampaignError, largest=largest, hint=f"give {what}, not a measurement")
+    if chain := _DEEP_KEY.search(data):
+        line = data.count(b"\n", 0, chain.start()) + 1
+        raise _too_deep(path, f"line {line}")
     try:
         tables = tomllib.loads(data.decode("utf-8-sig"))
         repr(tables)  # an error may have to quote any part of it
@@ -70,14 +67,14 @@ def _parse(path: Path, what: str, largest: int) -> dict[str, Any]:
             "this is not valid TOML",
             file=path,
             place=reason["place"] if reason else None,
-            found=reason["problem"] if reason else str(error),
+            found=reason["problem"] if reason else "a whole number of thousands of digits",
             expected='lines such as length = "34 mm"',
             hint="put texts and quantities in quotes",
         ) from error
     except RecursionError:
         tables = None
     if tables is None:  # outside of `except`: an error of a thousand frames cannot be pickled
-        raise CampaignError("the tables are nested too deeply", file=path, expected="plain tables")
+        raise _too_deep(path, None)
     return tables
 
 
@@ -86,11 +83,23 @@ def _adapter(schema: Any) -> TypeAdapter[Any]:
     return TypeAdapter(schema)
 
 
-def check_tables(tables: Mapping[str, Any], file: Path, schema: type[T], place: str | None = None) -> T:
+def _too_deep(file: Path, place: str | None) -> CampaignError:
+    expected = "keys of a few parts, such as simulate.effects.inertia.mass"
+    return CampaignError("the tables are nested too deeply", file=file, place=place, expected=expected)
+
+
+def check_tables(
+    tables: Mapping[str, Any],
+    file: Path,
+    schema: type[T],
+    place: str | None = None,
+    *,
+    kind: type[BushfitError] = CampaignError,
+) -> T:
     """Parsed TOML as the dataclass `schema`, all quantities in SI; errors say that it stands in `file`, at `place`.
 
     Raises:
-        CampaignError: keys or values that are not understood.
+        kind: keys or values that are not understood.
         UnitError: a quantity without a unit, or with one that does not fit.
     """
     try:
@@ -99,13 +108,13 @@ def check_tables(tables: Mapping[str, Any], file: Path, schema: type[T], place: 
     except ValidationError as error:
         # a mistyped key is missing and unknown: the latter says more
         details = sorted(error.errors(include_url=False), key=lambda detail: detail["type"] != _UNKNOWN)
-        complaint = _complaint(details[0], schema)
+        complaint = _complaint(details[0], schema, kind)
     complaint.file = file
     complaint.place = ", ".join(filter(None, (place, complaint.place)))
     raise complaint  # outside of `except`: pydantic's error holds ours, and a ring of errors cannot be pickled
 
 
-def _complaint(detail: ErrorDetails, schema: type) -> BushfitError:
+def _complaint(detail: ErrorDetails, schema: type, kind: type[BushfitError]) -> BushfitError:
     """One error of pydantic's as one of ours; tables of an array are counted from 1."""
     location = detail["loc"]
     place = ".".join(str(key) for key in location)
@@ -116,11 +125,11 @@ def _complaint(detail: ErrorDetails, schema: type) -> BushfitError:
     elif detail["type"] == _UNKNOWN:
         error = unknown_key(str(location[-1]), _keys(_table_at(schema, location[:-1])))
     elif detail["type"] == "missing":
-        error = CampaignError("a key is missing", expected=f"{location[-1]} = ...")
+        error = kind("a key is missing", expected=f"{location[-1]} = ...")
     else:
         found = str(detail["input"])
         expected = _SHAPES.get(detail["type"], detail["msg"].removeprefix("Input should be "))
-        error = CampaignError("this value is not understood", found=found, expected=expected)
+        error = kind("this value is not understood", found=found, expected=expected)
     error.place = re.sub(r"\.(\d+)", lambda index: f" #{int(index[1]) + 1}", place.replace("fit.parameters.", "fit."))
     return error
 

@@ -178,5 +178,5 @@ def test_files_that_are_no_model(tmp_path: Path, content: bytes) -> None:
 def test_missing_files_and_folders(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="no such file"):
         load_result(tmp_path / "absent.json")
-    with pytest.raises(ModelError, match="cannot be read"):
+    with pytest.raises(ModelError, match="this is not a file"):
         load_result(tmp_path)
