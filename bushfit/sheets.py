@@ -236,9 +236,13 @@ def to_csv(table: pd.DataFrame) -> bytes:
     """Comma, decimal point, UTF-8, seven digits; no text that a spreadsheet would run as a formula."""
     import pandas as pd
 
-    texts = [name for name in table if not pd.api.types.is_numeric_dtype(table[name])]
-    table = table.assign(**{name: table[name].map(defused) for name in texts}).rename(columns=defused)
-    return table.to_csv(index=False, float_format="%.7g", lineterminator="\n").encode("utf-8", "replace")
+    columns = {
+        defused(name): table[name] if pd.api.types.is_numeric_dtype(table[name]) else table[name].map(defused)
+        for name in table
+    }
+    return (
+        pd.DataFrame(columns).to_csv(index=False, float_format="%.7g", lineterminator="\n").encode("utf-8", "replace")
+    )
 
 
 def defused(cell: object) -> object:
