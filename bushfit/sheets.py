@@ -227,27 +227,21 @@ def _loss_factor(stiffness: Array) -> Array:
     return np.imag(stiffness) / np.real(stiffness)
 
 
-def defused(text: str) -> str:
-    """A text that a spreadsheet shows and does not run: a leading =, +, -, @ or tab is quoted."""
-    return f"'{text}" if text.lstrip()[:1] in {"=", "+", "-", "@"} or text[:1] in {"\t", "\r"} else text
-
-
 def to_csv(table: pd.DataFrame) -> bytes:
     """Comma, decimal point, UTF-8, seven digits; no text that a spreadsheet would run as a formula."""
     import pandas as pd
 
-    columns = {
-        defused(name): table[name] if pd.api.types.is_numeric_dtype(table[name]) else table[name].map(defused)
-        for name in table
+    safe = {
+        defused(str(name)): column.map(lambda cell: defused(cell) if isinstance(cell, str) else cell)
+        if column.dtype == object or pd.api.types.is_string_dtype(column)
+        else column
+        for name, column in table.items()
     }
-    return (
-        pd.DataFrame(columns).to_csv(index=False, float_format="%.7g", lineterminator="\n").encode("utf-8", "replace")
-    )
+    text = pd.DataFrame(safe).to_csv(index=False, float_format="%.7g", lineterminator="\n")
+    return text.encode("utf-8", "replace")
 
 
-def defused(cell: object) -> object:
-    """A text as one line, with an apostrophe before one that a spreadsheet would run as a formula; else as it is."""
-    if not isinstance(cell, str):
-        return cell
-    line = " ".join(_LINES.split(cell))
+def defused(text: str) -> str:
+    """A text as one line, with an apostrophe before one that a spreadsheet would run as a formula."""
+    line = " ".join(_LINES.split(text))
     return f"'{line}" if _FORMULA.match(line) else line
