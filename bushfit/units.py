@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bushfit.errors import UnitError
@@ -193,7 +194,4 @@ def _usual(word: re.Match[str]) -> str:
 def _registry() -> pint.UnitRegistry[Any]:
     import pint
 
-    registry: pint.UnitRegistry[Any] = pint.UnitRegistry(cache_folder=None, on_redefinition="ignore")
-    registry.define("newton_meter = newton * meter = Nm")  # pint's Nm is a measure of yarn
-    registry.define("newton_millimeter = newton * millimeter = Nmm")
-    return registry
+    return pint.UnitRegistry(str(Path(__file__).with_name("units.txt")), cache_folder=None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import pint
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -100,3 +101,17 @@ def test_quantity_is_number_times_unit(number: float, unit: tuple[str, str, floa
 )
 def test_split_header(header: str, parts: tuple[str, str | None]) -> None:
     assert units.split_header(header) == parts
+
+
+FIELD = """m mm cm um µm in inch inches ft mil thou rad mrad deg ° gon grade arcmin s ms sec min h Hz kHz rpm 1/s
+N kN mN MN daN dyn kgf gf tf lbf kip ozf N*m N*mm kN*m lbf*in lbf*ft kgf*m N/m N/mm kN/mm lbf/in
+kip/in kgf/mm N*m/rad N*m/deg lbf*in/deg Pa kPa MPa GPa bar mbar psi ksi atm N/mm^2 kgf/cm^2 m/s mm/s mm/min in/s mph
+km/h knot rad/s deg/s g kg t lb oz slug % ppm V mV A mA W kW hp J Wh ohm K m/s^2 l"""
+
+
+def test_units_of_the_field_are_as_large_as_in_the_whole_list_of_pint() -> None:
+    whole = pint.UnitRegistry(cache_folder=None)
+    for text in FIELD.split():
+        one = whole.Quantity(1.0, text).to_base_units()
+        scale, base = units._resolve(text)
+        assert (scale, base) == (pytest.approx(one.magnitude, rel=1e-14), str(one.units)), text

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from scipy.signal import cont2discrete, lfilter
 
 from bushfit.effects.contract import (
     Array,
@@ -57,6 +56,8 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
 
 def _mode(omega: float, damping: float, push: Array, step: float) -> Array:
     """y'' + 2 zeta w y' + w^2 y = w^2 push from rest, exact for a push that is straight between samples."""
+    from scipy.signal import cont2discrete, lfilter
+
     system = (np.array([omega**2]), np.array([1.0, 2.0 * damping * omega, omega**2]))
     above, under, _ = cont2discrete(system, step, method="foh")
     return np.asarray(lfilter(np.ravel(above), under, push))

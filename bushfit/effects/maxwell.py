@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import lfilter
 
 from bushfit.effects.contract import Array, Branch, Level, Parameter, Values, linear_stress
 from bushfit.effects.history import History
@@ -20,6 +19,8 @@ def relaxed(tau: float, values: Array, step: float) -> Array:
 
     y_n = r y_{n-1} + (1 - r) tau/step (x_n - x_{n-1}), r = exp(-step/tau).
     """
+    from scipy.signal import lfilter
+
     gain = -np.expm1(-step / tau) * tau / step
     return np.asarray(lfilter([gain, -gain], [1.0, -np.exp(-step / tau)], values, axis=-1))
 

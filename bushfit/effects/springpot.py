@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.signal import fftconvolve
+from scipy.fft import next_fast_len
 
 from bushfit.effects.contract import Array, Branch, Level, Parameter, Values, linear_stress
 from bushfit.effects.history import History
@@ -46,9 +46,9 @@ def fractional_derivative(alpha: float, values: Array, step: float) -> Array:
     First order in the step: the factor (1 - exp(-i omega step))^alpha stands for (i omega step)^alpha.
     """
     count = values.shape[-1]
-    weights = grunwald_letnikov_weights(alpha, count)
-    weights = weights.reshape((1,) * (values.ndim - 1) + (count,))
-    return step**-alpha * fftconvolve(values, weights, axes=-1)[..., :count]
+    length = next_fast_len(2 * count, real=True)
+    spectrum = np.fft.rfft(values, length) * np.fft.rfft(grunwald_letnikov_weights(alpha, count), length)
+    return step**-alpha * np.fft.irfft(spectrum, length)[..., :count]
 
 
 def stress(p: Values, history: History) -> Array:
