@@ -6,6 +6,7 @@ worker with it every time is given up, and the rest goes on.
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 import signal
@@ -32,7 +33,7 @@ _LARGEST_CHUNK = 64
 _AHEAD = 2
 #: A row that was alone with its worker this often when the worker died is to blame.
 _MOST_DEATHS = 3
-_WAIT_FOR_WORKERS = 60.0
+_CONNECT, _WAIT_FOR_WORKERS = 5.0, 60.0
 
 
 class Pool(Protocol):
@@ -105,8 +106,10 @@ class DaskPool:
             from distributed import Client
         except ImportError:
             raise BatchError("Dask is not installed", place="--scheduler", hint='pip install "bushfit[dask]"') from None
+        for name in ("distributed", "distributed.client", "distributed.core", "tornado.application", "asyncio"):
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what goes wrong is told once, in our words
         try:
-            self._client: Client = Client(address, timeout=_WAIT_FOR_WORKERS / 6, set_as_default=False)
+            self._client: Client = Client(address, timeout=_CONNECT, set_as_default=False)
             self._client.wait_for_workers(1, timeout=_WAIT_FOR_WORKERS)
         except (OSError, TimeoutError, ValueError) as error:
             raise BatchError(
