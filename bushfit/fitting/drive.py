@@ -266,7 +266,10 @@ def _basis(phase: Array, order: int) -> Array:
     """Columns 1, cos, -sin of each harmonic, (n, 2 order + 1)."""
     turn = np.exp(2j * np.pi * phase)
     powers = np.cumprod(np.broadcast_to(turn, (order, phase.size)), axis=0)
-    return np.vstack((np.ones(phase.size), powers.real, -powers.imag)).T
+    rows = np.empty((2 * order + 1, phase.size))
+    rows[0], rows[1 : order + 1] = 1.0, powers.real
+    np.negative(powers.imag, out=rows[order + 1 :])
+    return rows.T
 
 
 def _solve(basis: Array, values: Array) -> Array:
