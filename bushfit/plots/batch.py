@@ -19,6 +19,8 @@ _MISS, _LIMIT, _GOOD = "#c1272d", "#c1272d", "#31688e"
 _CLOUD = 200
 _MOST_NAMED = 4
 _MOST_LETTERS = 24
+#: Room of a name, as a share of the panel.
+_WIDE, _HIGH = 0.6, 0.07
 #: Values further out than this many robust standard deviations are drawn at the edge.
 _FURTHEST = 12.0
 _COLUMNS = 2
@@ -89,10 +91,8 @@ def _draw(axes: Axes, panel: Panel) -> None:
     axes.set_ylim(low - margin, high + margin)
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes.yaxis.get_offset_text().set_fontsize(SMALL)
-    axes.set_title(panel.title, fontsize=SMALL + 0.5, loc="left", color=_MISS if panel.missed else INK, pad=3)
-    if panel.missed:
-        count = f"{len(panel.missed)} out"
-        axes.set_title(count, fontsize=SMALL + 0.5, loc="right", color=_MISS, weight="bold", pad=3)
+    count = f": {len(panel.missed)} out" if panel.missed else ""
+    axes.set_title(panel.title + count, fontsize=SMALL, loc="left", color=_MISS if count else INK, pad=3)
     _name(axes, panel, (low, high))
     if cloud:
         _histogram(axes, shown)
@@ -112,18 +112,24 @@ def _reach(values: Array, allowed: Sequence[float]) -> tuple[float, float]:
 
 
 def _name(axes: Axes, panel: Panel, reach: tuple[float, float]) -> None:
-    """The bushings that are furthest out."""
+    """The bushings that are furthest out, where their names do not cover each other."""
     low, high = panel.allowed if panel.allowed else (-math.inf, math.inf)
-    worst = sorted(panel.missed, key=lambda k: min(high - panel.values[k], panel.values[k] - low))[:_MOST_NAMED]
-    for k in worst:
-        name, left = panel.missed[k], k < 0.6 * panel.values.size
-        short = name if len(name) <= _MOST_LETTERS else name[: _MOST_LETTERS - 1] + "…"
+    places: list[tuple[float, float]] = []
+    for k in sorted(panel.missed, key=lambda k: min(high - panel.values[k], panel.values[k] - low)):
+        value = float(np.clip(panel.values[k], *reach))
+        x, y = k / panel.values.size, (value - reach[0]) / (reach[1] - reach[0])
+        if any(abs(x - other) < _WIDE and abs(y - above) < _HIGH for other, above in places):
+            continue
+        if len(places) == _MOST_NAMED:
+            break
+        places.append((x, y))
+        name = panel.missed[k]
         axes.annotate(
-            short,
-            (k + 1, float(np.clip(panel.values[k], *reach))),
-            xytext=(4 if left else -4, 2),
+            name if len(name) <= _MOST_LETTERS else name[: _MOST_LETTERS - 1] + "…",
+            (k + 1, value),
+            xytext=(4 if x < 0.5 else -4, 2),
             textcoords="offset points",
-            ha="left" if left else "right",
+            ha="left" if x < 0.5 else "right",
             fontsize=SMALL - 1,
             color=_MISS,
             family=fonts(),

@@ -1,0 +1,44 @@
+"""The picture of a batch says what is out of limits, for ten bushings as for thousands."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bushfit.plots import to_png
+from bushfit.plots.batch import Panel, batch_figure
+
+
+def panel(count: int) -> Panel:
+    values = np.random.default_rng(3).normal(1.0, 0.02, count)
+    values[[1, 4]] = 1.5, np.nan
+    if count > 100:
+        values[50] = 40.0
+    missed = {int(k): f"$name {k}" for k in np.flatnonzero(values > 1.2)}
+    return Panel("mu [MPa]", values, (-np.inf, 1.2), missed)
+
+
+@pytest.mark.parametrize("count", [10, 20_000])
+def test_medians_limits_and_names(count: int) -> None:
+    one = panel(count)
+    figure = batch_figure(
+        [one, Panel("alpha [-]", np.full(count, 0.24))], "x", [str(n) for n in range(10)] if count == 10 else []
+    )
+    assert to_png(figure) == to_png(figure)
+    axes, other = figure.axes[:2]
+    heights = {float(line.get_ydata()[0]) for line in axes.lines if len(set(np.atleast_1d(line.get_ydata()))) == 1}
+    assert {float(np.nanmedian(one.values)), 1.2} <= heights
+    low, high = axes.get_ylim()
+    assert low < 1.0 < 1.2 < high
+    assert high < 2.0, "one far out must not squash the rest"
+    assert f"{len(one.missed)} out" in axes.get_title(loc="left")
+    assert {text.get_text() for text in axes.texts} <= set(one.missed.values())
+    assert axes.texts
+    points = sum(len(line.get_xdata()) for line in axes.lines if line.get_linestyle() == "None")
+    assert points == count - 1, "each bushing that has a value, once"
+    assert other.get_ylim()[0] < 0.24 < other.get_ylim()[1]
+
+
+def test_a_panel_of_which_all_are_out() -> None:
+    values = np.array([3.0, 4.0, 5.0])
+    to_png(batch_figure([Panel("mu [Pa]", values, (1.0, 2.0), {0: "a", 1: "b", 2: "c"})], "x"))
