@@ -28,6 +28,9 @@ _COMMANDS = {
     "simulate": ("simulate", "Model -> a simulated campaign of raw tests, with noise."),
 }
 
+#: Linear algebra on one thread: the matrices are small, and a sum split over threads ends in other digits.
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
 
 class _Commands(click.Group):
     """Commands that are imported when called."""
@@ -64,6 +67,7 @@ def cli() -> None:
 
 def main() -> None:
     """Entry point: one clear error and exit status 2 for whatever the user can put right."""
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
     try:
         sys.exit(cli.main(standalone_mode=False))
     except click.exceptions.Abort:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import random
 import signal
 import subprocess
@@ -49,6 +50,18 @@ def test_a_row_is_the_single_command_to_the_last_digit(typed: Callable[..., Any]
     single, joint = tree(shop / "one/2"), tree(shop / "one/joint")
     single["joint.json"] = joint.pop("model.json")
     assert tree(shop / "all/bushings/c") == single | joint
+
+
+def test_a_row_is_the_single_command_in_whatever_surroundings(
+    typed: Callable[..., Any], root: Path, tmp_path: Path
+) -> None:
+    """A user's terminal gives the linear algebra every core, and a sum split over threads ends in other digits."""
+    campaign, program = root / "configs/cmp_15961.toml", str(Path(sys.executable).with_name("bushfit"))
+    single = [program, "fit", str(campaign), "-o", str(tmp_path / "one"), "--no-plots", "-q"]
+    crowded = {**os.environ, "OPENBLAS_NUM_THREADS": "4", "OMP_NUM_THREADS": "4", "MKL_NUM_THREADS": "4"}
+    subprocess.run(single, check=True, env=crowded)
+    assert typed("batch", str(campaign.with_name("cmp_*.toml")), "-o", "all", "-q", "--no-plots").returncode == 0
+    assert tree(tmp_path / "all/bushings/cmp_15961").items() <= tree(tmp_path / "one").items()
 
 
 def test_the_table_is_in_order_with_units_and_the_numbers_of_the_models(typed: Callable[..., Any], shop: Path) -> None:
