@@ -81,5 +81,5 @@ def _check_utf8(data: bytes, file: Path, kind: type[BushfitError]) -> None:
             place=f"line {line}",
             found=f"byte 0x{data[bad]:02x}",
             expected="text in UTF-8, with or without byte order mark",
-            hint='save it as "CSV UTF-8" or convert it: iconv -f LATIN1 -t UTF-8 old > new',
+            hint="save it as UTF-8, or convert it: iconv -f LATIN1 -t UTF-8 old > new",
         )

@@ -95,11 +95,12 @@ class Model:
             if parameter.neutral is not None:
                 low, high = min(low, parameter.neutral), max(high, parameter.neutral)
             if not low <= value <= high:
+                unit = "" if parameter.unit == "1" else f" {parameter.unit}"
                 raise ModelError(
                     "impossible value",
                     place=name,
-                    found=f"{value:g} {parameter.unit}",
-                    expected=f"{low:g} to {high:g} {parameter.unit} ({parameter.meaning})",
+                    found=f"{value:g}{unit}",
+                    expected=f"{low:g} to {high:g}{unit} ({parameter.meaning})",
                 )
 
     def __reduce__(self) -> tuple[Any, ...]:

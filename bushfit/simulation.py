@@ -18,7 +18,7 @@ from bushfit import rig
 from bushfit.campaign import Campaign
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
-from bushfit.errors import CampaignError
+from bushfit.errors import CampaignError, ModelError
 from bushfit.geometry import Direction
 from bushfit.measurement import Loop, Sweep
 from bushfit.model import FIVE, Model
@@ -90,7 +90,11 @@ def model_of(campaign: Campaign) -> Model:
         )
     effects = campaign.simulate.effects
     values |= {f"{effect}.{name}": value for effect, table in effects.items() for name, value in table.items()}
-    return Model(campaign.bushing, (*BASE, *effects), values)
+    try:
+        return Model(campaign.bushing, (*BASE, *effects), values)
+    except ModelError as error:
+        error.file = campaign.path
+        raise
 
 
 def simulate(truth: Model, plan: SimulateSettings) -> Simulated:

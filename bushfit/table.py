@@ -127,11 +127,18 @@ class Table:
                 source = open_sheet(
                     data, file, stated.sheet, lambda sheet: len(vocabulary.roles(lay_out(sheet).headers)) > 1
                 )
+            elif stated.sheet:
+                raise MeasurementError(
+                    "this is no workbook", file=file, found=f'sheet = "{stated.sheet}"', expected="xlsx"
+                )
             else:
                 source = Text.open(data, file, stated.encoding)
             layout = lay_out(source)
         except csv.Error as error:
             raise MeasurementError("the table cannot be read", file=file, found=str(error)) from error
+        if stated.header_line not in (None, layout.header_line):
+            found = f"header_line = {stated.header_line}"
+            raise MeasurementError("there is no header on this line", file=file, found=found, hint="lines count from 1")
         table = cls(file, source, layout, {}, checksum, stated)
         table._check_header()
         return replace(table, roles=table._recognise(vocabulary, columns or {}, stated_units or {}))

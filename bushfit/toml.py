@@ -34,7 +34,9 @@ _SHAPES = {
     "string_too_short": "a text that is not empty",
     "bool_type": "true or false",
     "int_type": "a whole number",
+    "float_type": "a number",
 }
+_WORDS = {"None": "null", "True": "true", "False": "false"}
 
 
 def read_toml(path: Path, schema: type[T], *, what: str = "a campaign file", largest: int = _LARGEST_BYTES) -> T:
@@ -125,9 +127,10 @@ def _complaint(detail: ErrorDetails, schema: type, kind: type[BushfitError]) -> 
     elif detail["type"] == _UNKNOWN:
         error = unknown_key(str(location[-1]), _keys(_table_at(schema, location[:-1])))
     elif detail["type"] == "missing":
-        error = kind("a key is missing", expected=f"{location[-1]} = ...")
+        key = location[-1]
+        error = kind("a key is missing", expected=f"{key} = ..." if isinstance(key, str) else "a further value")
     else:
-        found = str(detail["input"])
+        found = _WORDS.get(str(detail["input"]), str(detail["input"]))
         expected = _SHAPES.get(detail["type"], detail["msg"].removeprefix("Input should be "))
         error = kind("this value is not understood", found=found, expected=expected)
     error.place = re.sub(r"\.(\d+)", lambda index: f" #{int(index[1]) + 1}", place.replace("fit.parameters.", "fit."))

@@ -29,6 +29,23 @@ _WIDTH = 100
 campaign_argument = click.argument("campaign", type=click.Path(path_type=Path))
 
 
+class _Folder(click.Path):
+    """A folder for results; an empty text, as of a variable that is not set, is none."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        return (
+            super().convert(value, param, ctx) if value else self.fail("this is no folder: an empty text", param, ctx)
+        )
+
+
+class _Share(click.FloatRange):
+    """A share above zero; nan is none."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        share = super().convert(value, param, ctx)
+        return share if math.isfinite(share) else self.fail(f"{value} is no share such as 0.02", param, ctx)
+
+
 @dataclass(frozen=True)
 class Options:
     """Options that every command takes."""
@@ -76,7 +93,7 @@ def shared_options(function: F) -> F:
     """-o, -v, -q, --json, --no-plots, --force, gathered into one `options` argument."""
 
     @click.option(
-        "-o", "--output", type=click.Path(path_type=Path), help="Folder for the results [results/<campaign name>]."
+        "-o", "--output", type=_Folder(path_type=Path), help="Folder for the results [results/<campaign name>]."
     )
     @click.option("-v", "--verbose", is_flag=True, help="Say more: all correlations, the equation, the files read.")
     @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
@@ -95,7 +112,7 @@ def shared_options(function: F) -> F:
 
 max_nrmse_option = click.option(
     "--max-nrmse",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=_Share(min=0.0, min_open=True),
     help="Exit with status 1 if the NRMSE is above this share (0.02 is 2 %).",
 )
 

@@ -26,11 +26,14 @@ def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | 
     try:
         if ":" in numbers:
             start, stop, step = (quantity(f"{number} {suffix}", unit) for number in numbers.split(":"))
-            if not (step > 0 and stop >= start and (stop - start) / step < _MOST):
+            if not (step > 0 and stop >= start > 0 and (stop - start) / step < _MOST):
                 raise UnitError("start:stop:step does not count upward", place=option, found=text, expected=expected)
             count = int((stop - start) / step * (1 + 1e-9)) + 1
             return tuple(start + i * step for i in range(count))
-        return tuple(quantity(f"{number} {suffix}", unit) for number in numbers.split(","))
+        values = tuple(quantity(f"{number} {suffix}", unit) for number in numbers.split(","))
+        if min(values) <= 0.0:
+            raise UnitError("frequencies and amplitudes are above zero", place=option, found=text, expected=expected)
+        return values
     except ValueError:
         raise UnitError("these are no values with a unit", place=option, found=repr(text), expected=expected) from None
     except BushfitError as error:

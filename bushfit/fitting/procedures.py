@@ -9,7 +9,7 @@ import numpy as np
 
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
-from bushfit.errors import FitError
+from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import Stage, cautions, covariance, measured_range, quality
 from bushfit.fitting.data import Data
 from bushfit.fitting.solve import Coordinates, Solution, solve
@@ -169,7 +169,18 @@ def _solve(data: Data, terms: Sequence[Term], effects: Sequence[str], held: Mapp
     """Fit what the campaign leaves free of a model, from start values taken from the data."""
     bushing = data.campaign.bushing
     start = {**start_values(bushing, terms, held), **data.given, **held}
-    model = Model.started(bushing, effects, start)
+    try:
+        model = Model.started(bushing, effects, start)
+    except ModelError as error:
+        if error.place is None or error.place in data.given:
+            raise
+        raise FitError(
+            "the tests are of a size that no bushing shows",
+            file=data.campaign.path,
+            found=f"{error.place} = {error.found}",
+            expected=error.expected,
+            hint="check the units of displacement and force, and the dimensions of the bushing",
+        ) from error
     names = [name for name in data.free(tuple(model.parameters)) if name not in held]
     return solve(model, terms, names, data.bounds)
 

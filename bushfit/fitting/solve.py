@@ -173,7 +173,7 @@ def solve(
     if fit.aborted and strict:
         raise FitError(
             "the fit did not converge",
-            found=str(fit.message),
+            found=f"no end after {fit.nfev} evaluations of the model",
             hint="hold a parameter with vary = false, or give bounds, in [fit] of the campaign",
         )
     return Solution(
