@@ -95,6 +95,8 @@ _CONVENTIONS: tuple[tuple[re.Pattern[str], AmplitudeConvention], ...] = (
     (_ZERO_TO_PEAK, "zero-to-peak"),
     (_PEAK_TO_PEAK, "peak-to-peak"),
 )
+#: Characters of a header.
+_LONGEST = 200
 _EMPTY_BRACKETS = re.compile(r"[\[(]\s*[\])]")
 _SPELLINGS: dict[int, int | str] = {
     **str.maketrans("\uff08\uff09\uff3b\uff3d\u2032\u2019\u00b4", "()[]'''"),
@@ -132,7 +134,7 @@ class Vocabulary:
     def heading(self, header: str) -> Heading | None:
         """What a header cell says; None where it names no role."""
         if header not in self._known:
-            self._known[header] = self._read(header)
+            self._known[header] = self._read(header) if len(header) <= _LONGEST else None
         return self._known[header]
 
     def roles(self, cells: Sequence[str]) -> set[str]:

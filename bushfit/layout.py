@@ -24,6 +24,8 @@ DELIMITERS = {"semicolon": ";", "tab": "\t", "pipe": "|", "comma": ",", "blanks"
 HEAD = 1 << 18
 MOST_LINES = 500
 MOST_COLUMNS = 1000
+#: Characters of a line, and of a header's.
+_LONGEST_LINE, _LONGEST_HEADER = 1 << 20, 10_000
 #: Filled lines below a header within which its units row and first numbers lie.
 _NEAR = 8
 _COMMENTS = ("#", "%", "//")
@@ -70,10 +72,12 @@ def split(content: Content, delimiter: str) -> list[str]:
     """The cells of a line, without blanks around them.
 
     Raises:
-        csv.Error: a quoted cell beyond all measure.
+        csv.Error: a line or a quoted cell beyond all measure.
     """
     if not isinstance(content, str):
         return [cell if isinstance(cell, str) else repr(cell) for cell in content]
+    if len(content) > _LONGEST_LINE:
+        raise csv.Error(f"a line of {len(content)} characters")
     if delimiter == " ":
         return content.split()
     if '"' in content:
@@ -142,6 +146,8 @@ def _candidates(
 
 def _header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
     """The ways to take a header apart, without empty cells at its end."""
+    if len(content) > _LONGEST_HEADER:
+        return
     ways = [split(content, delimiter)]
     if delimiter == " " and isinstance(content, str):
         ways = [_COLUMN_GAP.split(content.strip()), split(_BLANK_BEFORE_BRACKET.sub("", content), delimiter)]

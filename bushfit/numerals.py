@@ -15,6 +15,8 @@ from itertools import product
 #: Signs that part thousands, and the two minus signs.
 _BLANKS, _APOSTROPHES, _SIGN = " \u00a0\u2009\u202f", "'\u2019", "[+\\-\u2212]"
 _GROUPS = {",": ",", ".": r"\.", " ": f"[{_BLANKS}]", "'": f"[{_APOSTROPHES}]"}
+#: Characters of a number.
+_LONGEST = 400
 _LIKE = re.compile(rf"{_SIGN}?[.,]?\d[\d.,{_BLANKS}{_APOSTROPHES}]*(?:[eE]{_SIGN}?\d+)?", re.ASCII)
 
 #: A number that may have one group of thousands, and one with thousands that are not grouped.
@@ -44,7 +46,7 @@ class Numerals:
 
     def allows(self, text: str) -> bool:
         """Whether a cell, without blanks around it, is a number when written in this way."""
-        return self._pattern.fullmatch(text) is not None
+        return len(text) <= _LONGEST and self._pattern.fullmatch(text) is not None
 
     def value(self, text: str) -> float | None:
         """The number in a cell; None where it holds none."""
@@ -84,7 +86,7 @@ class Evidence:
 
 def is_like_number(text: str) -> bool:
     """Whether a cell is a number in some way to write them."""
-    return _LIKE.fullmatch(text) is not None and any(way.allows(text) for way in ALL)
+    return len(text) <= _LONGEST and _LIKE.fullmatch(text) is not None and any(way.allows(text) for way in ALL)
 
 
 def weigh(cells: Iterable[tuple[Place, str]], ways: tuple[Numerals, ...] = ALL, *, all_cells: bool = False) -> Evidence:

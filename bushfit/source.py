@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import os
 import re
@@ -195,8 +196,11 @@ def rows(source: Source, layout: Layout) -> Iterator[tuple[int, Sequence[str | f
     """Line and cells of each row of data, comments left out.
 
     Raises:
-        csv.Error: a quoted cell beyond all measure.
+        csv.Error: a line or a quoted cell beyond all measure.
     """
-    for line in source.lines(layout.lines_before_data):
-        if not is_comment(line.content, layout.delimiter):
-            yield line.number, split(line.content, layout.delimiter) if isinstance(line.content, str) else line.content
+    for number, content in source.lines(layout.lines_before_data):
+        if not is_comment(content, layout.delimiter):
+            try:
+                yield number, split(content, layout.delimiter) if isinstance(content, str) else content
+            except csv.Error as error:
+                raise csv.Error(f"{error}, line {number}") from error

@@ -1,0 +1,111 @@
+"""A loop of 10 million rows against the fastest library that loads it, and small files one by one:
+
+    pytest tests/benchmarks/test_reading_speed.py --benchmark-enable -s
+
+Every run is a process of its own, which tells its seconds without its imports, and its peak memory. In the ordinary
+test run the loop has some thousand rows, so that this cannot rot.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import polars
+import pytest
+from pytest_benchmark.fixture import BenchmarkFixture
+
+from bushfit import rig
+from bushfit.geometry import Direction
+from bushfit.model import Model
+from bushfit.reading import read_loop, read_sweep
+
+_WHOLE = """
+import json, resource, sys, time
+from pathlib import Path
+{imports}
+file = Path(sys.argv[1])
+begin = time.perf_counter()
+{work}
+seconds = time.perf_counter() - begin
+peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1 << 20)
+print(json.dumps(dict(seconds=seconds, peak=peak, found=found)))
+"""
+LIBRARIES = {
+    "polars": ("import polars", "found = len(polars.read_csv(file))"),
+    "pandas": ("import pandas", "found = len(pandas.read_csv(file))"),
+    "DuckDB": ("import duckdb", "found = len(duckdb.read_csv(str(file)).fetchnumpy()['time [s]'])"),
+}
+BUSHFIT = (
+    "import lmfit, pandas, scipy.optimize\n"
+    "from bushfit import units\n"
+    "units.factor('mm', 'm')  # imports what knows units\n"
+    "from bushfit.campaign import Campaign\n"
+    "from bushfit.fitting.data import Data\n"
+    "from bushfit.fitting.procedures import fit_static\n"
+    "from bushfit.geometry import Bushing, Direction\n"
+    "from bushfit.reading import read_loop",
+    "loop = read_loop(file, Direction.AXIAL)\n"
+    "bushing = Bushing('CMP 15 961', 0.010, 0.018, 0.034)\n"
+    "result = fit_static(Data.of(Campaign('c', file, bushing, (loop,))))\n"
+    "found = dict(result.model.values)",
+)
+
+
+def run(program: tuple[str, str], file: Path, times: int) -> dict[str, float]:
+    """The fastest of some runs."""
+    code = _WHOLE.format(imports=program[0], work=program[1])
+    outputs = [
+        subprocess.run([sys.executable, "-c", code, str(file)], check=True, capture_output=True, env=os.environ).stdout
+        for _ in range(times)
+    ]
+    found: list[dict[str, float]] = [json.loads(output) for output in outputs]
+    return min(found, key=lambda one: one["seconds"])
+
+
+@pytest.fixture
+def long_loop(paper_model: Model, tmp_path: Path, benchmark: BenchmarkFixture) -> tuple[Path, int]:
+    """100 cycles of the paper's loop, with noise on displacement and force."""
+    rows = 50_000 if benchmark.disabled else 10_000_000
+    cycle = rig.record(paper_model, Direction.AXIAL, 0.1, 1e-3, cycles=1, run_in=6, kind="loop")
+    time, rng = np.arange(rows) * (1000.0 / rows), np.random.default_rng(0)
+    motion, force = (np.interp(time % 10.0, cycle.time, column) for column in (cycle.displacement, cycle.force))
+    table = {
+        "time [s]": np.round(time, 5),
+        "displacement [mm]": np.round(1e3 * motion + 2e-4 * rng.standard_normal(rows), 6),
+        "force [N]": np.round(force + 1.4 * rng.standard_normal(rows), 3),
+    }
+    file = tmp_path / "loop.csv"
+    polars.DataFrame(table).write_csv(file)
+    return file, rows
+
+
+def test_a_loop_of_ten_million_rows(benchmark: BenchmarkFixture, long_loop: tuple[Path, int]) -> None:
+    file, rows = long_loop
+    times = 1 if benchmark.disabled else 3
+    libraries = {name: run(program, file, times) for name, program in LIBRARIES.items()}
+    whole = benchmark.pedantic(run, (BUSHFIT, file, times), rounds=1)
+    print(f"\n{rows} rows, {file.stat().st_size / 1e6:.0f} MB")
+    for name, figures in {**libraries, "bushfit: read, check, fit": whole}.items():
+        print(f"  {name:26} {figures['seconds']:.2f} s, peak {figures['peak']:.2f} GiB")
+    ratio = whole["seconds"] / min(figures["seconds"] for figures in libraries.values())
+    print(f"  bushfit over the fastest: {ratio:.2f} times the time")
+    benchmark.extra_info["over the fastest reader"] = ratio
+    assert {figures["found"] for figures in libraries.values()} == {rows}
+    assert whole["peak"] < 2.0
+
+
+def test_a_small_file(benchmark: BenchmarkFixture, root: Path) -> None:
+    """Three files a campaign: a loop of 3000 rows, two sweeps of 144."""
+    folder = root / "data/cmp_15961"
+
+    def read() -> None:
+        read_loop(folder / "loop_axial_1.csv", Direction.AXIAL)
+        read_sweep(folder / "sweep_axial.csv", Direction.AXIAL)
+        read_sweep(folder / "sweep_radial.csv", Direction.RADIAL)
+
+    benchmark(read)
