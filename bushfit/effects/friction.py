@@ -176,17 +176,17 @@ def _walk_all(eps_half: Array, history: History) -> tuple[Array, Array]:
     eps_half = np.atleast_1d(np.asarray(eps_half, dtype=float))
     turning, count = history.turning, history.value.shape[-1]
     if history.value.ndim == 1:
-        u, slope = _walk(turning.path[0], turning.turns[0], history.periodic, eps_half)
-        return u[..., turning.place[0]], slope[..., turning.place[0]]
+        both = _walk(turning.path[0], turning.turns[0], history.periodic, eps_half)
+        u, slope = (one.take(turning.place[0], axis=-1) for one in both)
+        return u, slope
     lead = np.broadcast_shapes(history.value.shape[:-1], eps_half.shape[:-1])
     row = np.broadcast_to(np.arange(turning.label.size).reshape(history.value.shape[:-1]), lead).ravel()
     scale = np.broadcast_to(eps_half, (*lead, 1)).reshape(-1, 1)
     u, slope = np.empty((row.size, count)), np.empty((row.size, count))
     for label, turns in enumerate(turning.turns):
-        group = np.flatnonzero(turning.label[row] == label)
-        chosen = row[group]
-        both = _walk(turning.path[chosen], turns, history.periodic, scale[group])
-        u[group], slope[group] = (np.take_along_axis(one, turning.place[chosen], axis=-1) for one in both)
+        group = np.flatnonzero(turning.label[row] == label) if len(turning.turns) > 1 else np.arange(row.size)
+        both = _walk(turning.path[row[group]], turns, history.periodic, scale[group])
+        u[group], slope[group] = (turning.at_samples(one, row[group]) for one in both)
     return u.reshape(*lead, count), slope.reshape(*lead, count)
 
 

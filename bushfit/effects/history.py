@@ -62,14 +62,19 @@ class History:
         count = self.value.shape[-1]
         rows = self.value.reshape(-1, count)
         if self.periodic:
-            tops = np.argmax(rows, axis=-1, keepdims=True)
-            path = np.take_along_axis(rows, (tops + np.arange(count + 1)) % count, axis=-1)
-            place = (np.arange(count) - tops) % count
+            tops = np.argmax(rows, axis=-1)
+            tops = tops[:1] if np.all(tops == tops[0]) else tops
+            order = (tops[:, None] + np.arange(count + 1)) % count
+            path = rows.take(order[0], axis=-1) if tops.size == 1 else np.take_along_axis(rows, order, axis=-1)
+            place = (np.arange(count) - tops[:, None]) % count
         else:
             path = np.concatenate([np.zeros((len(rows), 1)), rows], axis=-1)
-            place = np.broadcast_to(np.arange(1, count + 1), rows.shape)
-        turned, label = np.unique(np.packbits(reversals(path), axis=-1), axis=0, return_inverse=True)
-        turns = tuple(np.flatnonzero(np.unpackbits(row, count=count)) for row in turned)
+            place = np.arange(1, count + 1)[None]
+        turned = reversals(path)
+        if np.all(turned == turned[0]):
+            return Turning(path, place, np.zeros(len(rows), dtype=np.intp), (np.flatnonzero(turned[0]),))
+        packed, label = np.unique(np.packbits(turned, axis=-1), axis=0, return_inverse=True)
+        turns = tuple(np.flatnonzero(np.unpackbits(row, count=count)) for row in packed)
         return Turning(path, place, label.ravel(), turns)
 
     @cached_property
@@ -124,7 +129,7 @@ class Turning:
     Args:
         path: each row from where its memory begins, (rows, n + 1): from the rest before the first sample, or once
             around the steady cycle from its top.
-        place: where on the path each sample lies, (rows, n).
+        place: where on the path each sample lies, (rows, n), or (1, n) where it is the same for all rows.
         label: which set of turning points a row has, (rows,).
         turns: the sets, as places on the path.
     """
@@ -134,10 +139,18 @@ class Turning:
     label: Array
     turns: tuple[Array, ...]
 
+    def at_samples(self, along: Array, rows: Array) -> Array:
+        """What was followed along the paths of some rows, at their samples."""
+        if len(self.place) == 1:
+            return along.take(self.place[0], axis=-1)
+        return np.take_along_axis(along, self.place[rows], axis=-1)
+
 
 def reversals(value: Array) -> Array:
     """Whether the motion reverses at a sample, (..., n - 1); of level stretches the last sample counts."""
     step = np.sign(np.diff(value, axis=-1))
+    if step.all():
+        return np.concatenate([np.zeros((*step.shape[:-1], 1), dtype=bool), step[..., 1:] != step[..., :-1]], axis=-1)
     moving = np.maximum.accumulate(np.where(step != 0.0, np.arange(step.shape[-1]), -1), axis=-1)
     sense = np.where(moving >= 0, np.take_along_axis(step, np.maximum(moving, 0), axis=-1), 0.0)
     turned = np.zeros(step.shape, dtype=bool)
