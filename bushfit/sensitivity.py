@@ -1,8 +1,9 @@
 """Derivatives of a model's response with respect to its parameters.
 
 Where branches stand alone their slopes add up: the paper's three bring their own, the others are differenced one by
-one. Modifiers and layers mix everything, so there the whole response is differenced: central differences, all of
-them in one call with the values laid along a leading axis.
+one. Modifiers and layers mix everything, so there the whole response is differenced: all in one call, with the values
+laid along a leading axis. The differences are one-sided: good to a millionth, which a fit's steps and errors never
+notice, at half the price of central ones.
 """
 
 from __future__ import annotations
@@ -93,22 +94,19 @@ def _summed(
 
 
 def differences(model: Model, names: Sequence[str], respond: Callable[[Values], Array]) -> Array:
-    """Central differences of any response, one-sided at a bound, from one broadcast call: (len(names), ...)."""
+    """One-sided differences of any response, away from the bounds, from one broadcast call: (len(names), ...)."""
     count = len(names)
     stacked: dict[str, Value] = dict(model.values)
-    widths = np.empty(count)
+    steps = np.empty((count, 1))
     for i, name in enumerate(names):
-        low, high = _around(model.parameters[name], model.values[name])
-        column = np.full((2 * count, 1), model.values[name])
-        column[i], column[count + i] = high, low
-        stacked[name] = column
-        widths[i] = high - low
-    both = respond(cast(Values, stacked))
-    both = np.broadcast_to(both, (2 * count, both.shape[-1]))
-    return (both[:count] - both[count:]) / widths[:, None]
+        column = np.full((count + 1, 1), model.values[name])
+        column[i] += _step(model.parameters[name], model.values[name])
+        stacked[name], steps[i] = column, column[i] - model.values[name]
+    moved = respond(cast(Values, stacked))
+    moved = np.broadcast_to(moved, (count + 1, moved.shape[-1]))
+    return (moved[:count] - moved[count]) / steps
 
 
-def _around(parameter: Parameter, value: float) -> tuple[float, float]:
+def _step(parameter: Parameter, value: float) -> float:
     step = _STEP * (abs(value) if parameter.log and value else parameter.typical)
-    low, high = parameter.bounds
-    return max(value - step, min(low, value)), min(value + step, max(high, value))
+    return step if value + step <= parameter.bounds[1] else -step

@@ -11,6 +11,7 @@ from bushfit.geometry import Direction
 
 #: Samples of the cycle from which the first harmonic of the bent waveform is taken.
 SAMPLES = 64
+_FIRST = 2.0 / SAMPLES * np.exp(-2j * np.pi * np.arange(SAMPLES) / SAMPLES)
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
@@ -36,7 +37,7 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 def _harmonic(force: Array) -> Array:
     """Complex first harmonic of one cycle that starts at the top of the motion."""
-    return 2.0 / SAMPLES * np.fft.rfft(force)[..., 1]
+    return force @ _FIRST
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
