@@ -205,7 +205,7 @@ def copied(sweep: Sweep) -> Sweep:
 
 
 SWEEP_FAULTS: dict[str, tuple[Callable[[Sweep], Sweep], str]] = {
-    "copied block": (copied, "16 rows repeat another one digit by digit"),
+    "copied block": (copied, "16 rows repeat others digit by digit, the first of them at 5 Hz (row 1)"),
     "missing frequencies": (
         lambda x: without(x, (x.amplitude == 2e-4) & np.isin(x.frequency, (45.0, 55.0))),
         "0.2 mm, repeat 1, lacks 45, 55 Hz, which most others have",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +18,14 @@ _GAP, _UNEVEN = 5.0, 3.0
 _STUCK_ROWS, _STUCK_MOTION = 5, 0.02
 #: A top is cut off where so many rows hold the very same extreme, and so many times those just below it.
 _FLAT_ROWS, _FLAT_RATIO = 8, 5.0
+#: Values are equal, and just below the extreme, within these shares of the range.
+_EQUAL, _BELOW = 1e-9, 2e-3
 #: A row is wild beyond so many standard deviations from its neighbours, this share of the range, and this many times
 #: what a few rows a cycle make of a bend.
 _WILD, _WILD_SHARE, _BEND = 10.0, 0.03, 3.0
 _MOST_LISTED = 3
+#: Rows that are looked at in one go.
+_CHUNK = 1 << 18
 
 Flags = NDArray[np.bool_]
 
@@ -34,20 +39,33 @@ def clock(history: Loop) -> str:
     return f"uneven, every {steps.min():.3g} to {steps.max():.3g} s, mostly {usual:.3g} s"
 
 
+class Channel(NamedTuple):
+    """A recorded channel, and how it is shown."""
+
+    name: str
+    unit: str
+    factor: float
+    values: Floats
+
+    def shown(self, row: int) -> str:
+        return f"{self.factor * self.values[row]:.4g}"
+
+
 def odd_channels(history: Loop, rows_per_cycle: float) -> Iterator[str]:
     """Sentences on the channels of a loop or a raw history."""
     names = ("rotation", "moment") if history.direction is Direction.TORSION else ("displacement", "force")
-    shown = display_units(history.direction)
+    units = display_units(history.direction)
+    motion = Channel(names[0], *units["length"], history.displacement)
+    force = Channel(names[1], *units["force"], history.force)
     steps = np.diff(history.time)
     wide = steps > max(_GAP * np.median(steps), _UNEVEN * np.quantile(steps, 0.99))
-    still = (np.diff(history.displacement) == 0.0) & (np.diff(history.force) == 0.0)
+    still = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
     yield from _gaps(steps, wide)
-    yield from _stuck(history, still, names)
+    yield from _stuck(motion, force, still)
     whole = ~np.any(np.lib.stride_tricks.sliding_window_view(wide | still, 4), axis=1)
-    for name, kind, values in zip(names, ("length", "force"), (history.displacement, history.force), strict=True):
-        unit, factor = shown[kind]
-        yield from _cut_off(name, unit, factor, values)
-        yield from _wild(name, unit, factor, values, whole, rows_per_cycle)
+    for channel in (motion, force):
+        yield from _cut_off(channel)
+        yield from _wild(channel, history.time, whole, rows_per_cycle)
 
 
 def _gaps(steps: Floats, wide: Flags) -> Iterator[str]:
@@ -59,49 +77,67 @@ def _gaps(steps: Floats, wide: Flags) -> Iterator[str]:
         )
 
 
-def _stuck(history: Loop, still: Flags, names: tuple[str, str]) -> Iterator[str]:
+def _stuck(motion: Channel, force: Channel, still: Flags) -> Iterator[str]:
     edges = np.flatnonzero(np.diff(np.concatenate(([0], still.astype(np.int8), [0]))))
     starts, ends = edges[::2], edges[1::2]
     moved = np.zeros(starts.size)
-    inside = ends < history.displacement.size - 1
-    moved[inside] = np.abs(history.displacement[ends[inside] + 1] - history.displacement[starts[inside]])
-    stuck = (ends - starts + 1 >= _STUCK_ROWS) & (moved > _STUCK_MOTION * np.ptp(history.displacement))
+    inside = ends < motion.values.size - 1
+    moved[inside] = np.abs(motion.values[ends[inside] + 1] - motion.values[starts[inside]])
+    stuck = (ends - starts + 1 >= _STUCK_ROWS) & (moved > _STUCK_MOTION * np.ptp(motion.values))
     if stuck.any():
         longest = int(np.argmax(np.where(stuck, ends - starts, 0)))
         yield (
-            f"{ends[longest] - starts[longest] + 1} rows from row {starts[longest] + 1} on repeat one {names[0]} and "
-            f"{names[1]}, while the motion went on"
+            f"{ends[longest] - starts[longest] + 1} rows from row {starts[longest] + 1} on repeat one {motion.name} "
+            f"and {force.name}, while the motion went on"
         )
 
 
-def _cut_off(name: str, unit: str, factor: float, values: Floats) -> Iterator[str]:
-    span = float(np.ptp(values))
+def _cut_off(channel: Channel) -> Iterator[str]:
+    values, span = channel.values, float(np.ptp(channel.values))
     steps = np.abs(np.diff(values))
-    finest = float(steps[steps > 1e-9 * span].min(initial=span))
-    width = max(1.01 * finest, 2e-3 * span)
-    for side, extreme in (("top", float(values.max())), ("bottom", float(values.min()))):
-        depth = np.abs(values - extreme)
-        same = int(np.count_nonzero(depth <= 1e-9 * span))
+    finest = float(steps[steps > _EQUAL * span].min(initial=span))
+    width = max(1.01 * finest, _BELOW * span)
+    for side, row in (("top", int(np.argmax(values))), ("bottom", int(np.argmin(values)))):
+        depth = np.abs(values - values[row])
+        same = int(np.count_nonzero(depth <= _EQUAL * span))
         below = int(np.count_nonzero(depth <= width)) - same
         if same >= _FLAT_ROWS and same >= _FLAT_RATIO * below:
-            yield f"the {name} is cut off at its {side}: {same} rows hold exactly {factor * extreme:.4g} {unit}"
+            yield (
+                f"the {channel.name} is cut off at its {side}: {same} rows hold exactly {channel.shown(row)} "
+                f"{channel.unit}"
+            )
 
 
-def _wild(name: str, unit: str, factor: float, values: Floats, whole: Flags, rows_per_cycle: float) -> Iterator[str]:
-    # a cubic through two neighbours on either side, where no gap and no standstill is between them
-    middle = (4.0 * (values[1:-3] + values[3:-1]) - (values[:-4] + values[4:])) / 6.0
-    off = np.where(whole, np.abs(values[2:-2] - middle), 0.0)
+def _wild(channel: Channel, time: Floats, whole: Flags, rows_per_cycle: float) -> Iterator[str]:
+    values = channel.values
+    off = np.where(whole, np.abs(values[2:-2] - _between(time, values)), 0.0)
     noise = 1.4826 * float(np.median(off))
-    bend = _BEND * (2.0 * np.pi / rows_per_cycle) ** 2 / 2.0
-    limit = max(_WILD * noise, max(_WILD_SHARE, bend) * float(np.ptp(values)) / 2.0)
+    period = rows_per_cycle * float(time[-1] - time[0]) / (time.size - 1)
+    bend = _BEND * (2.0 * np.pi * (time[4:] - time[:-4]) / 3.0 / period) ** 2 / 2.0
+    limit = np.maximum(_WILD * noise, np.maximum(_WILD_SHARE, bend) * np.ptp(values) / 2.0)
+    far = np.flatnonzero(off > limit)
     # a wild row takes its neighbours along: the worst of five counts
-    worst = np.array([off[max(i - 2, 0) : i + 3].max() for i in np.flatnonzero(off > limit)])
-    rows = np.flatnonzero(off > limit)[off[off > limit] == worst] + 2
-    if rows.size:
+    rows = [int(row) + 2 for row in far if off[row] == off[max(row - 2, 0) : row + 3].max()]
+    if rows:
         listed = ", ".join(
-            f"row {row + 1} ({factor * values[row]:.4g} {unit} between {factor * values[row - 1]:.4g} and "
-            f"{factor * values[row + 1]:.4g})"
+            f"row {row + 1} ({channel.shown(row)} {channel.unit} between {channel.shown(row - 1)} and "
+            f"{channel.shown(row + 1)})"
             for row in rows[:_MOST_LISTED]
         )
-        more = f" and {rows.size - _MOST_LISTED} more" if rows.size > _MOST_LISTED else ""
-        yield f"the {name} is wild at {listed}{more}"
+        more = f" and {len(rows) - _MOST_LISTED} more" if len(rows) > _MOST_LISTED else ""
+        yield f"the {channel.name} is wild at {listed}{more}"
+
+
+def _between(time: Floats, values: Floats) -> Floats:
+    """What the two rows before and the two after each row, at their times, make of it by a cubic, (n - 4,)."""
+    middle = np.zeros(time.size - 4)
+    for start in range(0, middle.size, _CHUNK):
+        stop = min(start + _CHUNK, middle.size)
+        own = time[start + 2 : stop + 2]
+        nodes = {place: time[start + place : stop + place] - own for place in (0, 1, 3, 4)}
+        for place, node in nodes.items():
+            part = values[start + place : stop + place].copy()
+            for other in (nodes[key] for key in nodes if key != place):
+                part *= other / (other - node)
+            middle[start:stop] += part
+    return middle

@@ -91,9 +91,9 @@ def _changing(drive: Drive, names: tuple[str, str]) -> Iterator[str]:
     fitted = [
         _cycle(phase[part], np.stack((loop.force[part], loop.displacement[part]), axis=1), order) for part in parts
     ]
-    means, force = np.array([mean for mean, _ in fitted]), np.array([abs(first[0]) for _, first in fitted])
+    means, force = np.array([mean for mean, *_ in fitted]), np.array([abs(first[0]) for _, first, _ in fitted])
     half = np.ptp(loop.force) / 2.0
-    error = drive.noise * np.sqrt(1.0 / rows)
+    error = max(drive.noise, *(left for *_, left in fitted)) * np.sqrt(1.0 / rows)
     change = force[-1] - force[0]
     if abs(change) > max(_SURE * 2.0 * error, _SHARE * half):
         last = force[-1] - force[-2]
@@ -113,9 +113,10 @@ def _changing(drive: Drive, names: tuple[str, str]) -> Iterator[str]:
             yield f"the {name} drifts: its mean goes from {factor * mean[0]:.3g} to {factor * mean[-1]:.3g} {unit}"
 
 
-def _cycle(phase: Array, values: Array, order: int) -> tuple[Array, Array]:
-    """Mean and complex fundamental of the columns over one cycle."""
+def _cycle(phase: Array, values: Array, order: int) -> tuple[Array, Array, float]:
+    """Mean and complex fundamental of the columns over one cycle, and what the fit leaves of the first."""
     turns = 2.0 * np.pi * np.outer(phase, np.arange(1, order + 1))
     basis = np.hstack((np.ones((phase.size, 1)), np.cos(turns), -np.sin(turns)))
     solution = np.linalg.lstsq(basis, values, rcond=None)[0]
-    return solution[0], solution[1] + 1j * solution[1 + order]
+    left = float(np.std(values[:, 0] - basis @ solution[:, 0]))
+    return solution[0], solution[1] + 1j * solution[1 + order], left

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import linregress
+from scipy.stats import linregress, poisson
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.noise import SweepNoise, sweep_noise
@@ -23,8 +23,8 @@ _BLOCK_OFF, _BLOCK_SHARE, _FEWEST_BLOCKS = 8.0, 0.02, 5
 _DRIFT_P, _DRIFT_SHARE = 1e-4, 5e-3
 #: The amplitude reached is off that of the level by this share.
 _MISSED = 0.03
-#: Equal points are copies where chance would make them equal this rarely.
-_COPIED = 1e-3
+#: Equal points are copies where chance would make as many equal this rarely; phases of few digits agree this often.
+_COPIED, _SAME_PHASE = 1e-4, 0.05
 _MOST_LISTED = 4
 
 
@@ -54,26 +54,36 @@ def look_at_sweep(sweep: Sweep, file: Path) -> Looked:
 
 
 def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
-    """Rows that hold the same numbers as others at the same frequency and amplitude, digit by digit."""
-    table = np.stack((sweep.frequency, sweep.amplitude, np.abs(sweep.stiffness), np.angle(sweep.stiffness)))
-    _, first, count = np.unique(table.round(12), axis=1, return_index=True, return_counts=True)
-    copies = int((count - 1).sum())
-    if not copies:
-        return
-    chance = 1.0
-    scatter = np.sqrt(np.mean(np.square(list(noise.random.values())), axis=0))
-    for values, spread in ((table[2], scatter[0] * np.median(table[2])), (table[3], scatter[1])):
-        gaps = np.diff(np.unique(values))
-        finest = float(gaps.min(initial=np.inf))
-        chance *= min(finest / (2.0 * np.sqrt(np.pi) * spread), 1.0) if np.isfinite(finest) else 1.0
-    _, same = np.unique(table[:2], axis=1, return_counts=True)
-    pairs = float((same * (same - 1) / 2).sum())
-    if pairs * chance < _COPIED * copies:
-        row = int(first[np.argmax(count)])
+    """Rows that hold the same numbers as others at the same frequency and amplitude, digit by digit, where the digits
+    of the file and the noise would hardly make as many equal by chance."""
+    magnitude, phase = (_rounded(values) for values in (np.abs(sweep.stiffness), np.angle(sweep.stiffness)))
+    finest = _finest(magnitude)
+    copies, expected, first = 0, 0.0, sweep.frequency.size
+    for rows in _groups(sweep.frequency, sweep.amplitude):
+        points = np.stack((magnitude[rows], phase[rows]))
+        _, start, count = np.unique(points, axis=1, return_index=True, return_counts=True)
+        copies += int((count - 1).sum())
+        first = min([first, *rows[start[count > 1]].tolist()])
+        scatter = noise.random[sweep.name, float(sweep.amplitude[rows[0]])][0] * magnitude[rows[0]]
+        same = min(float(finest[rows[0]] / scatter), 1.0)  # two draws fall on the same last digit
+        expected += rows.size * (rows.size - 1) / 2.0 * same * max(same, _SAME_PHASE)
+    if copies and poisson.sf(copies - 1, expected) < _COPIED:
+        verb = "s repeat others" if copies > 1 else " repeats another"
         yield (
-            f"{copies} row{'s' * (copies > 1)} repeat another one digit by digit, the first of them that of "
-            f"{sweep.frequency[row]:.4g} Hz in row {row + 1}: copied, not measured again?"
+            f"{copies} row{verb} digit by digit, the first of them at {sweep.frequency[first]:.4g} Hz (row "
+            f"{first + 1}): copied, not measured again?"
         )
+
+
+def _rounded(values: Array) -> Array:
+    """Values without what units and roots leave in the last digits."""
+    return np.array([float(f"{value:.9g}") for value in values])
+
+
+def _finest(values: Array) -> Array:
+    """What the last digit of each value counts, if all have as many digits as the longest."""
+    digits = max(len(f"{value:.8e}".partition("e")[0].replace(".", "").rstrip("0")) for value in values)
+    return 10.0 ** (np.floor(np.log10(values)) + 1 - digits)
 
 
 def _missing(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
