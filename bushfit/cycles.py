@@ -11,9 +11,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bushfit.measurement import Floats
+from bushfit.measurement import Complex, Floats
 
-Complex = NDArray[np.complex128]
 Integers = NDArray[np.intp]
 
 #: A turning point stands out by so many standard deviations of the noise, steps of the converter, and this share of
@@ -23,6 +22,8 @@ _NOISE, _CONVERTER, _RANGE = 10.0, 4.0, 1e-3
 #: (those with the least motion) that count.
 _ORDER, _BLOCK, _MOST_BLOCKS, _QUIET = 6, 256, 2000, 0.1
 _DIFFERENCE_GAIN = 924.0**0.5  # square root of the sum of squared binomials of that order
+#: Rows that are looked at in one go.
+_CHUNK = 1 << 18
 #: Neighbours in one run differ by less than this, in ln of period and of range.
 _SAME_PERIOD, _SAME_RANGE = 0.1, 0.25
 #: A cycle has no hole longer than this share of it.
@@ -134,6 +135,28 @@ def least_turn(values: Floats) -> float:
         rough = np.median(np.abs(np.diff(blocks, _ORDER, axis=1)), axis=1) / (0.6745 * _DIFFERENCE_GAIN)
         least = max(least, _NOISE * float(np.quantile(rough, _QUIET)))
     return max(least, _CONVERTER * converter if converter < least else 0.0)
+
+
+def wild_rows(time: Floats, values: Floats) -> NDArray[np.bool_]:
+    """Rows that lie alone far off the cubic through the two before and the two after them: further than those spread,
+    and than noise goes. No sine does that, however few rows it has, nor the kink of dry friction."""
+    wild = np.zeros(values.size, dtype=bool)
+    least = least_turn(values)
+    for start in range(0, values.size - 4, _CHUNK):
+        rows = slice(start, start + _CHUNK + 4)
+        own, clock = values[rows], time[rows]
+        stop = own.size - 4
+        near = [own[place : stop + place] for place in (0, 1, 3, 4)]
+        apart = [clock[place : stop + place] - clock[2 : stop + 2] for place in (0, 1, 3, 4)]
+        middle = np.zeros(stop)
+        for value, node in zip(near, apart, strict=True):
+            part = value.copy()
+            for other in apart:
+                if other is not node:
+                    part *= other / (other - node)
+            middle += part
+        wild[start + 2 : start + 2 + stop] = np.abs(own[2:-2] - middle) > np.ptp(near, axis=0) + least
+    return wild
 
 
 def turning_points(values: Floats, least: float) -> Integers:

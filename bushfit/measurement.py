@@ -14,6 +14,7 @@ from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
 
 Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 Waveform = Literal["sine", "triangle"]
 
 #: A turning point of a loop stands out from its neighbours by at least this share of the range.

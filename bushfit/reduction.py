@@ -12,30 +12,22 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import fdtri
 
-from bushfit.cycles import Cycles, keeps_changing, mean_from_steady, pieces
+from bushfit.cycles import Cycles, keeps_changing, mean_from_steady, pieces, wild_rows
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
-from bushfit.measurement import Floats, Loop
+from bushfit.harmonics import HarmonicFit
+from bushfit.measurement import Complex, Floats, Loop
 
-Complex = NDArray[np.complex128]
-
-#: Overtones in the fit, as far as the rows can tell them apart.
-_HARMONICS = 15
-_WORST_CONDITION = 100.0
-#: Terms of the drift: mean, slope, curvature.
-_DRIFT = 3
-_CHUNK = 1 << 14
-#: The frequency is found when the phase drifts by no more than this over the whole step [cycles].
-_SETTLED = 1e-7
-#: Rows that the search for the frequency takes of a long step.
-_FREQUENCY_ROWS = 1 << 17
-#: Cycles disagree with white noise where that is this unlikely.
-_WHITE_P = 0.01
 _FEWEST_ROWS_PER_CYCLE = 5.0
 #: A frequency that changes by this share within a step, or differs by it between steps.
 _SAME_FREQUENCY = 2e-3
+#: While a controller swings in, the frequency may be off by this share, and a step by so much from start to end.
+_SWINGING = 0.01
+#: An amplitude that changes by this share within a step, and both by so many standard errors.
+_SAME_AMPLITUDE, _SURELY = 0.03, 4.0
+#: A sine that goes on after fewer cycles, as far from its phase as this [cycles], was interrupted and not stopped.
+_INTERRUPTED, _IN_PHASE = 3.1, 0.05
 #: Amplitudes further apart than this are levels of their own.
 _LEVEL_GAP = 0.1
 #: What is said: amplitudes off their level by this share, fewer rows a cycle, more distortion of the displacement, and
@@ -43,7 +35,7 @@ _LEVEL_GAP = 0.1
 _MISSED, _COARSE, _DISTORTED, _MOST_TOLD = 0.03, 12, 0.02, 5
 
 
-_CHANGING = "the frequency keeps changing"
+_CHANGING = "its frequency or amplitude keeps changing"
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,11 +93,13 @@ class Skipped:
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """What histories of one direction were reduced to; steps in the order of the histories and of time."""
+    """What histories of one direction were reduced to: steps in the order of the histories and of time, stretches
+    that make none, and the number of wild rows that were left out."""
 
     direction: Direction
     steps: tuple[Step, ...]
     skipped: tuple[Skipped, ...]
+    wild: int = 0
 
     def array(self, name: str) -> NDArray[np.generic]:
         """One quantity of all steps, (n,)."""
@@ -127,7 +121,9 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
     Raises:
         MeasurementError: no steady sine in any of them.
     """
-    found = [_steps_of(history, fewest_cycles) for history in histories]
+    sound = [_without_wild_rows(history) for history in histories]
+    wild = sum(one.time.size for one in histories) - sum(one.time.size for one in sound)
+    found = [_steps_of(history, fewest_cycles) for history in sound]
     steps = [step for some, _ in found for step in some]
     skipped = tuple(skip for _, some in found for skip in some)
     if not steps:
@@ -139,7 +135,13 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
             expected=f"a stepped sine with at least {fewest_cycles} whole cycles at one frequency and amplitude",
             hint="a slow loop needs no reduction: name it under [[loops]]",
         )
-    return Reduction(histories[0].direction, tuple(_grouped(steps, levels)), skipped)
+    return Reduction(histories[0].direction, tuple(_grouped(steps, levels)), skipped, wild)
+
+
+def _without_wild_rows(history: Loop) -> Loop:
+    """A history without the rows at which one of its channels lies alone far off; the fits need no even clock."""
+    kept = ~(wild_rows(history.time, history.displacement) | wild_rows(history.time, history.force))
+    return replace(history, **{name: getattr(history, name)[kept] for name in ("time", "displacement", "force")})
 
 
 def sines(history: Loop) -> list[tuple[float, float, int]]:
@@ -158,12 +160,11 @@ def sines(history: Loop) -> list[tuple[float, float, int]]:
 
 
 def _steps_of(history: Loop, fewest: int) -> tuple[list[Step], list[Skipped]]:
-    steps: list[Step] = []
+    found: list[tuple[float, float, Step]] = []
     skipped: list[Skipped] = []
     cycles = Cycles.of(history.time, history.displacement)
     for run in cycles.runs():
         motion, force = (cycles.fundamentals(run, values) for values in (history.displacement, history.force))
-        mine: list[Step] = []
         edges = cycles.edges[run.start : run.stop + 1]
         parts = pieces(edges, np.log(np.abs(motion)))
         if keeps_changing(edges, parts):
@@ -171,24 +172,39 @@ def _steps_of(history: Loop, fewest: int) -> tuple[list[Step], list[Skipped]]:
             continue
         for part in parts:
             inside = slice(run.start + part.start, run.start + part.stop)
+            start, end = float(edges[part.start]), float(edges[part.stop])
             why = _unusable(cycles, inside, fewest)
-            steady = part.stop - part.start >= fewest
             step = None if why else _step(history, cycles, inside, motion[part], force[part], fewest)
-            if step is None:
-                why = why or _CHANGING
-                start, end = float(edges[part.start]), float(edges[part.stop])
-                skipped.append(Skipped(history.name, start, end, why, steady))
-            elif mine and _same_point(mine[-1], step):  # a step in parts, for instance with an amplitude that creeps
-                mine[-1] = max(mine[-1], step, key=lambda one: one.cycles)
+            if step:
+                found.append((start, end, step))
             else:
-                mine.append(step)
-        steps += mine
-    return steps, skipped
+                steady = part.stop - part.start >= fewest
+                skipped.append(Skipped(history.name, start, end, why or _CHANGING, steady))
+    return _joined(found), skipped
+
+
+def _joined(found: Sequence[tuple[float, float, Step]]) -> list[Step]:
+    """Steps with the start and end of the cycles they were taken from; of two that are parts of one, the longer.
+
+    A wild row, or an amplitude that creeps, parts a step: the sine goes on in phase, after a cycle or two at most.
+    """
+    kept: list[Step] = []
+    last_end = -np.inf
+    for start, end, step in found:
+        gap = (start - last_end) * step.frequency
+        if gap < _INTERRUPTED and abs(gap - round(gap)) < _IN_PHASE and _same_point(kept[-1], step):
+            kept[-1] = max(kept[-1], step, key=lambda one: one.found)
+        else:
+            kept.append(step)
+        last_end = end
+    return kept
 
 
 def _same_point(one: Step, other: Step) -> bool:
+    """Whether two steps in a row are one: near in frequency and amplitude, or nearly so and one is brief."""
+    brief = 2 * min(one.found, other.found) < max(one.found, other.found)
     return (
-        abs(np.log(one.frequency / other.frequency)) < _SAME_FREQUENCY
+        abs(np.log(one.frequency / other.frequency)) < (_SWINGING if brief else _SAME_FREQUENCY)
         and abs(np.log(one.amplitude / other.amplitude)) < _LEVEL_GAP
     )
 
@@ -211,13 +227,12 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
     used = slice(inside.start + steady.start, inside.start + steady.stop)
     edges = cycles.edges[used.start : used.stop + 1]
     count = used.stop - used.start
-    number = np.arange(count + 1) - count / 2.0
-    if count > 3:
-        curve, slope, _ = np.polyfit(number, edges, 2)
-        if abs(2.0 * curve * count / slope) > _SAME_FREQUENCY + 10.0 * _slope_noise(edges) / slope:
-            return None
+    own = motion[steady]
+    starts = edges[:-1] - np.angle(1j * own) / (2.0 * np.pi) * np.diff(edges)  # nearer than single crossings are
+    if _creeps(np.log(np.diff(starts)), _SWINGING) or _creeps(np.log(np.abs(own)), _SAME_AMPLITUDE):
+        return None
     rows = slice(cycles.first_rows[used.start], cycles.first_rows[used.stop])
-    fit = _Fit.of(history.time[rows], history.displacement[rows], history.force[rows], edges)
+    fit = HarmonicFit.of(history.time[rows], history.displacement[rows], history.force[rows], edges)
     x, f = fit.coefficients[:, 1]
     errors = fit.errors()
     distortion = fit.distortion()
@@ -238,130 +253,16 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
     )
 
 
-def _slope_noise(edges: Floats) -> float:
-    """What the scatter of the crossings does to a period, over a whole step [s]."""
-    return float(np.median(np.abs(np.diff(edges, 2)))) / np.sqrt(edges.size)
-
-
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """Drift and harmonics of displacement and force over the whole cycles of one step, and what they leave.
-
-    Args:
-        frequency: [Hz].
-        solution: drift, then cosine and negative sine of each harmonic, of both channels, (p, 2).
-        covariance: of the solution for unit variance of the values, (p, p).
-        freedom: rows less unknowns.
-        squares: products of the residuals of the channels, summed over the rows, (2, 2).
-        left_over: what each cycle's fundamental differs by from the fit's, (2, cycles).
-    """
-
-    frequency: float
-    solution: Floats
-    covariance: Floats
-    freedom: int
-    squares: Floats
-    left_over: Complex
-
-    @classmethod
-    def of(cls, time: Floats, displacement: Floats, force: Floats, edges: Floats) -> _Fit:
-        """Fit with the frequency at which the phase of the displacement does not drift from cycle to cycle."""
-        middle = (edges[0] + edges[-1]) / 2.0
-        time, values = time - middle, np.stack((displacement, force))
-        count = edges.size - 1
-        frequency = count / float(edges[-1] - edges[0])
-        thin = slice(None, None, max(1, time.size // _FREQUENCY_ROWS))
-        number = np.arange(count) - (count - 1) / 2.0
-        for _ in range(4):
-            fit = cls._solved(time[thin], values[:, thin], count, frequency, 3)
-            phase = np.unwrap(np.angle(fit.coefficients[0, 1] + fit.left_over[0]))
-            drift = float(number @ phase / (number @ number)) / (2.0 * np.pi)
-            frequency *= 1.0 + drift
-            if abs(drift) * count < _SETTLED:
-                break
-        return cls._solved(time, values, count, frequency, _HARMONICS)
-
-    @classmethod
-    def _solved(cls, time: Floats, values: Floats, count: int, frequency: float, order: int) -> _Fit:
-        size = _DRIFT + 2 * max(1, min(order, (time.size - _DRIFT) // 4))
-        gram, moments = np.zeros((size, size)), np.zeros((size, 2))
-        for rows, basis in _bases(time, frequency, size):
-            gram += basis @ basis.T
-            moments += basis @ values[:, rows].T
-        scale = 1.0 / np.sqrt(np.diag(gram))
-        unit = gram * np.outer(scale, scale)
-        while size > _DRIFT + 2 and np.linalg.cond(unit[:size, :size]) > _WORST_CONDITION:
-            size -= 2
-        covariance = np.linalg.inv(unit[:size, :size]) * np.outer(scale[:size], scale[:size])
-        solution = covariance @ moments[:size]
-        squares, sums, rows_in = np.zeros((2, 2)), np.zeros((2, 2, count)), np.zeros(count)
-        for rows, basis in _bases(time, frequency, size):
-            left = values[:, rows] - solution.T @ basis
-            squares += left @ left.T
-            number = np.clip(time[rows] * frequency + count / 2.0, 0, count - 1).astype(np.intp)
-            rows_in += np.bincount(number, minlength=count)
-            for channel, part in np.ndindex(2, 2):  # times exp(-i omega t)
-                sums[channel, part] += np.bincount(number, left[channel] * basis[_DRIFT + part], count)
-        sums *= 2.0 / np.maximum(rows_in, 1.0)
-        left_over = sums[:, 0] + 1j * sums[:, 1]
-        return cls(frequency, solution, covariance, max(time.size - size, 1), squares, left_over)
-
-    @property
-    def coefficients(self) -> Complex:
-        """Complex harmonics of displacement and force, with the mean at 0: (2, order + 1)."""
-        waves = self.solution[_DRIFT::2] + 1j * self.solution[_DRIFT + 1 :: 2]
-        return np.vstack((self.solution[:1], waves)).T
-
-    @property
-    def chance(self) -> Floats:
-        """Expected square of each harmonic of white noise of unit variance, (order,)."""
-        return np.diag(self.covariance)[_DRIFT:].reshape(-1, 2).sum(axis=1)
-
-    def errors(self) -> tuple[float, float]:
-        """Standard errors of |K| relative to |K|, and of its phase [rad].
-
-        e = f - K x is what the noise of both channels leaves in the force. Its scatter over the rows gives the errors
-        where it is white; where the cycles scatter otherwise than white noise would let them (hum, slow wander; or
-        overtones beyond the fit, which repeat in each cycle), their own scatter does.
-        """
-        x, f = self.coefficients[:, 1]
-        k = f / x
-        (xx, xf), (_, ff) = self.squares
-        white = (ff - 2.0 * k.real * xf + abs(k) ** 2 * xx) / self.freedom * self.chance[0] / 2.0
-        variance = np.full(2, white)
-        cycles = self.left_over.shape[1]
-        if cycles > 2:
-            scatter = (self.left_over[1] - k * self.left_over[0]) / (f / abs(f))
-            own = np.array([scatter.real.var(ddof=1), scatter.imag.var(ddof=1)]) / cycles
-            low, high = fdtri(2 * (cycles - 1), self.freedom, [_WHITE_P / 2, 1 - _WHITE_P / 2])
-            if not low <= own.mean() / max(white, 1e-300) <= high:
-                variance = own
-        gain, phase = np.sqrt(variance) / abs(f)
-        return float(gain), float(phase)
-
-    def distortion(self) -> tuple[float, float]:
-        """Total harmonic distortion of displacement and force, less what noise alone would show."""
-        power = np.square(np.abs(self.coefficients[:, 1:]))
-        noise = np.outer(np.diag(self.squares) / self.freedom, self.chance)
-        overtones = np.maximum((power - noise)[:, 1:].sum(axis=1), 0.0)
-        displacement, force = np.sqrt(overtones / power[:, 0])
-        return float(displacement), float(force)
-
-
-def _bases(time: Floats, frequency: float, size: int) -> Iterator[tuple[slice, Floats]]:
-    """Chunk by chunk: its rows, and drift, then cosine and negative sine of each harmonic there, (size, m)."""
-    half = max(float(np.abs(time[[0, -1]]).max()), 1e-300)
-    for start in range(0, time.size, _CHUNK):
-        rows = slice(start, min(start + _CHUNK, time.size))
-        basis = np.empty((size, rows.stop - start))
-        span = time[rows] / half
-        basis[0], basis[1], basis[2] = 1.0, span, 1.5 * span**2 - 0.5
-        turn = np.exp(2j * np.pi * frequency * time[rows])
-        power = turn.copy()
-        for column in range(_DRIFT, size, 2):
-            basis[column], basis[column + 1] = power.real, -power.imag
-            power *= turn
-        yield rows, basis
+def _creeps(values: Floats, least: float) -> bool:
+    """Whether values change steadily from first to last, by that much and beyond their scatter."""
+    if values.size < 3:
+        return False
+    number = np.arange(values.size) - (values.size - 1) / 2.0
+    squares = float(number @ number)
+    slope = float(number @ values) / squares
+    left = values - values.mean() - slope * number
+    error = np.sqrt(float(left @ left) / max(values.size - 2, 1) / squares)
+    return bool(abs(slope) * values.size > least and abs(slope) > _SURELY * error)
 
 
 def _grouped(steps: Sequence[Step], levels: Sequence[float]) -> list[Step]:
@@ -395,6 +296,8 @@ def _clusters(values: Floats, gap: float) -> NDArray[np.intp]:
 def _warnings(reduction: Reduction) -> Iterator[str]:
     unit, factor = ("deg", 180.0 / np.pi) if reduction.direction is Direction.TORSION else ("mm", 1e3)
     steps = reduction.steps
+    if reduction.wild:
+        yield f"{reduction.wild} row{'s' * (reduction.wild > 1)} far off the rows around left out"
     slope = _amplitude_slope(steps)
     for level in sorted({step.level for step in steps}):
         mine = [step for step in steps if step.level == level]

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @file_options(*(key for key in KEYS if key not in ("rate", "frequency", "waveform", "amplitude")))
 @click.option("--levels", help='Amplitudes that were asked for, such as "0.1, 0.2, 0.5 mm" [found from the data].')
-@click.option("--cycles", type=click.IntRange(2, 1000), default=3, show_default=True, help="Fewest steady cycles.")
+@click.option("--cycles", type=click.IntRange(3, 1000), default=3, show_default=True, help="Fewest steady cycles.")
 @shared_options
 def command(
     files: tuple[Path, ...],

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bushfit.cycles import wild_rows
 from bushfit.geometry import Direction
 from bushfit.measurement import Floats, Loop
 from bushfit.sheets import display_units
@@ -20,12 +21,7 @@ _STUCK_ROWS, _STUCK_MOTION = 5, 0.02
 _FLAT_ROWS, _FLAT_RATIO = 8, 5.0
 #: Values are equal, and just below the extreme, within these shares of the range.
 _EQUAL, _BELOW = 1e-9, 2e-3
-#: A row is wild beyond so many standard deviations from its neighbours, this share of the range, and this many times
-#: what a few rows a cycle make of a bend.
-_WILD, _WILD_SHARE, _BEND = 10.0, 0.03, 3.0
 _MOST_LISTED = 3
-#: Rows that are looked at in one go.
-_CHUNK = 1 << 18
 
 Flags = NDArray[np.bool_]
 
@@ -51,7 +47,7 @@ class Channel(NamedTuple):
         return f"{self.factor * self.values[row]:.4g}"
 
 
-def odd_channels(history: Loop, rows_per_cycle: float) -> Iterator[str]:
+def odd_channels(history: Loop) -> Iterator[str]:
     """Sentences on the channels of a loop or a raw history."""
     names = ("rotation", "moment") if history.direction is Direction.TORSION else ("displacement", "force")
     units = display_units(history.direction)
@@ -62,10 +58,9 @@ def odd_channels(history: Loop, rows_per_cycle: float) -> Iterator[str]:
     still = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
     yield from _gaps(steps, wide)
     yield from _stuck(motion, force, still)
-    whole = ~np.any(np.lib.stride_tricks.sliding_window_view(wide | still, 4), axis=1)
     for channel in (motion, force):
         yield from _cut_off(channel)
-        yield from _wild(channel, history.time, whole, rows_per_cycle)
+        yield from _wild(channel, history.time)
 
 
 def _gaps(steps: Floats, wide: Flags) -> Iterator[str]:
@@ -108,36 +103,13 @@ def _cut_off(channel: Channel) -> Iterator[str]:
             )
 
 
-def _wild(channel: Channel, time: Floats, whole: Flags, rows_per_cycle: float) -> Iterator[str]:
-    values = channel.values
-    off = np.where(whole, np.abs(values[2:-2] - _between(time, values)), 0.0)
-    noise = 1.4826 * float(np.median(off))
-    period = rows_per_cycle * float(time[-1] - time[0]) / (time.size - 1)
-    bend = _BEND * (2.0 * np.pi * (time[4:] - time[:-4]) / 3.0 / period) ** 2 / 2.0
-    limit = np.maximum(_WILD * noise, np.maximum(_WILD_SHARE, bend) * np.ptp(values) / 2.0)
-    far = np.flatnonzero(off > limit)
-    # a wild row takes its neighbours along: the worst of five counts
-    rows = [int(row) + 2 for row in far if off[row] == off[max(row - 2, 0) : row + 3].max()]
-    if rows:
+def _wild(channel: Channel, time: Floats) -> Iterator[str]:
+    rows = np.flatnonzero(wild_rows(time, channel.values))
+    if rows.size:
         listed = ", ".join(
             f"row {row + 1} ({channel.shown(row)} {channel.unit} between {channel.shown(row - 1)} and "
             f"{channel.shown(row + 1)})"
             for row in rows[:_MOST_LISTED]
         )
-        more = f" and {len(rows) - _MOST_LISTED} more" if len(rows) > _MOST_LISTED else ""
+        more = f" and {rows.size - _MOST_LISTED} more" if rows.size > _MOST_LISTED else ""
         yield f"the {channel.name} is wild at {listed}{more}"
-
-
-def _between(time: Floats, values: Floats) -> Floats:
-    """What the two rows before and the two after each row, at their times, make of it by a cubic, (n - 4,)."""
-    middle = np.zeros(time.size - 4)
-    for start in range(0, middle.size, _CHUNK):
-        stop = min(start + _CHUNK, middle.size)
-        own = time[start + 2 : stop + 2]
-        nodes = {place: time[start + place : stop + place] - own for place in (0, 1, 3, 4)}
-        for place, node in nodes.items():
-            part = values[start + place : stop + place].copy()
-            for other in (nodes[key] for key in nodes if key != place):
-                part *= other / (other - node)
-            middle[start:stop] += part
-    return middle

@@ -50,7 +50,7 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
     }
     odd = [
         *wrong_labels(file, loop.direction, [drive.amplitude, half_motion], [drive.frequency]),
-        *odd_channels(loop, rows),
+        *odd_channels(loop),
         *([drive.note.removeprefix(f"{loop.name}: ")] if drive.note else []),
         *_changing(drive, names),
     ]

@@ -197,10 +197,9 @@ def _look_at_history(history: Loop, file: Path) -> Looked:
         "sampling": f"{clock(history)}, {min(step.rows_per_cycle for step in steps):.3g} rows a cycle at least",
         "noise": f"{100 * max(step.gain_error for step in steps):.2g} % of |K| at most, a point",
     }
-    rows = min(step.rows_per_cycle for step in steps)
     odd = (
         *wrong_labels(file, history.direction, levels, frequencies),
-        *odd_channels(history, rows),
+        *odd_channels(history),
         *reduction.warnings,
     )
     return Looked(facts, odd)
