@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -118,6 +118,30 @@ class Range:
     strain: tuple[float, float]
 
 
+@dataclass(frozen=True)
+class Outlier:
+    """A point that lies farther off than noise explains, beside neighbours that do not.
+
+    Args:
+        test: name of the loop or sweep.
+        file: it came from, as the campaign names it; None for a test that came from no file.
+        row: of its data, from 1; header, comments and blank lines do not count.
+        column: displacement, force or stiffness.
+        distance: from where it should be, in units of noise.
+    """
+
+    test: str
+    file: str | None
+    row: int
+    column: str
+    distance: float
+
+    @property
+    def place(self) -> str:
+        """Where it lies but for the row."""
+        return f"{self.file or self.test}, {self.column}"
+
+
 @dataclass(frozen=True, eq=False)
 class Result:
     """A fitted model, or one given by hand, as the JSON files hold it.
@@ -130,6 +154,7 @@ class Result:
         measured: None where the model was not fitted.
         warnings: what a user must know before using the numbers.
         inputs: the files behind it.
+        outliers: points that lie farther off than noise explains.
     """
 
     model: Model
@@ -139,6 +164,7 @@ class Result:
     measured: Range | None = None
     warnings: tuple[str, ...] = ()
     inputs: tuple[Source, ...] = ()
+    outliers: tuple[Outlier, ...] = ()
 
     def interval(self, name: str) -> tuple[float, float] | None:
         """95 % interval of a parameter, within its bounds: symmetric in the logarithm for strictly positive ones."""
@@ -178,6 +204,7 @@ class Result:
                 "strain": list(self.measured.strain),
             }
         document["warnings"] = list(self.warnings)
+        document["outliers"] = [asdict(outlier) for outlier in self.outliers]
         document["provenance"] = {
             "bushfit": __version__,
             "inputs": [{"file": str(source.file), "sha256": source.sha256} for source in self.inputs],
@@ -215,6 +242,7 @@ class Result:
                     Source(Path(entry["file"]), str(entry["sha256"]))
                     for entry in document.get("provenance", {}).get("inputs", ())
                 ),
+                tuple(_outlier(entry) for entry in document.get("outliers", ())),
             )
         except KeyError as missing:
             raise ModelError("a key is missing", place=str(missing.args[0])) from None
@@ -226,6 +254,17 @@ class Result:
 def _versions() -> dict[str, str]:
     """Of the packages that the numbers rest on; reading them takes as long as a tenth of a fit."""
     return {name: importlib.metadata.version(name) for name in _PACKAGES}
+
+
+def _outlier(entry: Mapping[str, Any]) -> Outlier:
+    file = entry["file"]
+    return Outlier(
+        str(entry["test"]),
+        None if file is None else str(file),
+        int(entry["row"]),
+        str(entry["column"]),
+        float(entry["distance"]),
+    )
 
 
 def _pair(values: Sequence[float]) -> tuple[float, float]:

@@ -20,6 +20,7 @@ from bushfit.table import FileFormat
 from bushfit.units import quantity
 
 Residuals = Literal["complex", "magnitude_loss_factor"]
+Loss = Literal["linear", "soft_l1"]
 
 _MOST_LISTED = 12
 _LARGEST_GRID = 100_000
@@ -90,7 +91,7 @@ def _parameter_units() -> dict[str, str]:
 
 def fit_keys() -> list[str]:
     """The keys that [fit] may have."""
-    return ["dynamic_amplitudes", "residuals", *_parameter_units()]
+    return ["dynamic_amplitudes", "residuals", "loss", *_parameter_units()]
 
 
 def _parameter(name: str, raw: Any) -> float:
@@ -236,11 +237,13 @@ class ParameterSetting:
 
 @dataclass(frozen=True)
 class FitSettings:
-    """[fit]: settings by parameter; amplitudes [m or rad] that fit-dynamic uses, none for the smallest; residuals."""
+    """[fit]: settings by parameter; amplitudes [m or rad] that fit-dynamic uses, none for the smallest; residuals; and
+    the loss: squares, or soft_l1 with wild points left out."""
 
     parameters: Annotated[Mapping[str, ParameterSetting], converted(_parameter_settings)] = field(default_factory=dict)
     dynamic_amplitudes: Annotated[tuple[Annotated[float, _si("m", "rad"), Field(gt=0)], ...], _FIRST_ERROR] = ()
     residuals: Residuals = "complex"
+    loss: Loss = "linear"
 
 
 @dataclass(frozen=True)

@@ -76,7 +76,7 @@ def loops_table(model: Model, terms: Sequence[LoopTerm]) -> pd.DataFrame:
                     f"displacement [{length}]": drive.displacement(drive.phase) * length_factor,
                     f"force [{force}]": drive.force * force_factor,
                     f"model force [{force}]": term.force(model) * force_factor,
-                    "residual [noise]": term.residual(model),
+                    "residual [noise]": term.shown(model),
                 }
             )
         )
@@ -92,7 +92,7 @@ def sweeps_table(model: Model, terms: Sequence[SweepTerm]) -> pd.DataFrame:
         units = display_units(term.direction)
         (length, length_factor), (stiffness, factor) = units["length"], units["stiffness"]
         modelled = term.stiffness(model)
-        gain, phase = np.split(term.residual(model), 2)
+        gain, phase = np.split(term.shown(model), 2)
         frames.append(
             pd.DataFrame(
                 {

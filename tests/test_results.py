@@ -31,7 +31,8 @@ def document(result: Result) -> dict[str, Any]:
 
 def test_schema_of_the_interface(document: dict[str, Any]) -> None:
     assert list(document) == [
-        "schema", "bushing", "effects", "parameters", "covariance", "fit", "warnings", "provenance",
+        "schema", "bushing", "effects", "parameters", "covariance", "fit", "warnings", "outliers",
+        "provenance",
     ]  # fmt: skip
     assert document["schema"] == SCHEMA == "bushfit/model/1"
     assert document["bushing"] == {

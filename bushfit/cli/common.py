@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 
@@ -17,9 +17,11 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from bushfit.campaign import Campaign
     from bushfit.jobs import Found, Job
     from bushfit.jobs.fits import Fitted
     from bushfit.results import Result
+    from bushfit.schema import Loss
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -117,18 +119,33 @@ max_nrmse_option = click.option(
 )
 
 
+loss_option = click.option(
+    "--loss",
+    type=click.Choice(["linear", "soft_l1"]),
+    help="linear: least squares [the campaign's, else this]. soft_l1: points far off pull less, wild ones not at all.",
+)
+
+
+def open_campaign(file: Path, loss: str | None) -> Campaign:
+    """A campaign as it is, or with another loss."""
+    from bushfit.campaign import load_campaign
+
+    loaded = load_campaign(file)
+    return replace(loaded, fit=replace(loaded.fit, loss=cast("Loss", loss))) if loss else loaded
+
+
 def perform(
     options: Options,
     campaign: Path,
     job: Job[Found],
     tell: Callable[[Options, str, Found], None],
     max_nrmse: float | None,
+    loss: str | None,
 ) -> None:
     """What every command on a campaign does: read, refuse to overwrite, work, tell, write, hold to a limit."""
-    from bushfit.campaign import load_campaign
     from bushfit.fitting.data import Data
 
-    loaded = load_campaign(campaign)
+    loaded = open_campaign(campaign, loss)
     folder = options.folder(loaded.slug)
     options.require_free(folder, job.names(loaded, options.formats))
     outcome = job.run(Data.of(loaded))

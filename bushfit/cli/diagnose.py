@@ -10,6 +10,7 @@ import click
 from bushfit.cli.common import (
     Options,
     campaign_argument,
+    loss_option,
     max_nrmse_option,
     new_table,
     number,
@@ -38,6 +39,7 @@ _COLOURS = {"consistent": "green", "named": "green", "ambiguous": "yellow", "par
 @click.option("--without", multiple=True, metavar="EFFECT", help="Do not consider this effect; may be given again.")
 @click.option("--max-effects", type=click.IntRange(0, 5), default=3, show_default=True, help="Effects to add at most.")
 @click.option("--tolerance", default="1 %", show_default=True, help="Gaps below this share of |K| do not count.")
+@loss_option
 @max_nrmse_option
 @shared_options
 def command(
@@ -47,6 +49,7 @@ def command(
     without: tuple[str, ...],
     max_effects: int,
     tolerance: str,
+    loss: str | None,
     max_nrmse: float | None,
     options: Options,
 ) -> None:
@@ -64,7 +67,7 @@ def command(
 
     settings = Settings(max_effects, _share(tolerance), adopt, without)
     job = Diagnose(settings, load_result(model).model if model else None)
-    perform(options, campaign, job, tell_diagnosis, max_nrmse)
+    perform(options, campaign, job, tell_diagnosis, max_nrmse, loss)
 
 
 def _share(text: str) -> float:

@@ -6,7 +6,15 @@ from pathlib import Path
 
 import click
 
-from bushfit.cli.common import Options, campaign_argument, max_nrmse_option, perform, shared_options, tell_fit
+from bushfit.cli.common import (
+    Options,
+    campaign_argument,
+    loss_option,
+    max_nrmse_option,
+    perform,
+    shared_options,
+    tell_fit,
+)
 
 
 @click.command("fit")
@@ -25,12 +33,14 @@ from bushfit.cli.common import Options, campaign_argument, max_nrmse_option, per
     metavar="NAME",
     help="Add an effect to the paper's three, such as inertia; may be given again. A wrong NAME lists them all.",
 )
+@loss_option
 @max_nrmse_option
 @shared_options
 def command(
     campaign: Path,
     directions: tuple[str, ...],
     effects: tuple[str, ...],
+    loss: str | None,
     max_nrmse: float | None,
     options: Options,
 ) -> None:
@@ -43,4 +53,4 @@ def command(
     from bushfit.jobs.fits import Fit
 
     job = Fit(tuple(Direction(direction) for direction in directions), effects)
-    perform(options, campaign, job, tell_fit, max_nrmse)
+    perform(options, campaign, job, tell_fit, max_nrmse, loss)

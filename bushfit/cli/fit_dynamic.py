@@ -6,7 +6,15 @@ from pathlib import Path
 
 import click
 
-from bushfit.cli.common import Options, campaign_argument, max_nrmse_option, perform, shared_options, tell_fit
+from bushfit.cli.common import (
+    Options,
+    campaign_argument,
+    loss_option,
+    max_nrmse_option,
+    perform,
+    shared_options,
+    tell_fit,
+)
 
 
 @click.command("fit-dynamic")
@@ -16,9 +24,10 @@ from bushfit.cli.common import Options, campaign_argument, max_nrmse_option, per
     type=click.Path(path_type=Path),
     help="Hold mu, sigma_fmax and eps_half at those of this static.json [fitted to the loops on the spot].",
 )
+@loss_option
 @max_nrmse_option
 @shared_options
-def command(campaign: Path, static: Path | None, max_nrmse: float | None, options: Options) -> None:
+def command(campaign: Path, static: Path | None, loss: str | None, max_nrmse: float | None, options: Options) -> None:
     """Fit m and alpha to the smallest-amplitude sweep of CAMPAIGN, the other three held.
 
     They are held at --static, and their errors are carried over. Without it the loops of CAMPAIGN are fitted first,
@@ -30,4 +39,4 @@ def command(campaign: Path, static: Path | None, max_nrmse: float | None, option
     from bushfit.results import load_result
 
     job = FitDynamic(load_result(static) if static else None)
-    perform(options, campaign, job, tell_fit, max_nrmse)
+    perform(options, campaign, job, tell_fit, max_nrmse, loss)

@@ -6,7 +6,15 @@ from pathlib import Path
 
 import click
 
-from bushfit.cli.common import Options, campaign_argument, max_nrmse_option, perform, shared_options, tell_fit
+from bushfit.cli.common import (
+    Options,
+    campaign_argument,
+    loss_option,
+    max_nrmse_option,
+    perform,
+    shared_options,
+    tell_fit,
+)
 
 
 @click.command("fit-static")
@@ -16,9 +24,10 @@ from bushfit.cli.common import Options, campaign_argument, max_nrmse_option, per
     type=click.Path(path_type=Path),
     help="Hold the springpot at m and alpha of this dynamic.json or model.json.",
 )
+@loss_option
 @max_nrmse_option
 @shared_options
-def command(campaign: Path, dynamic: Path | None, max_nrmse: float | None, options: Options) -> None:
+def command(campaign: Path, dynamic: Path | None, loss: str | None, max_nrmse: float | None, options: Options) -> None:
     """Fit mu, sigma_fmax and eps_half to the hysteresis loops of CAMPAIGN, the springpot held.
 
     m and alpha come from --dynamic, or from [fit] of the campaign where it gives both. Where they are not known
@@ -30,4 +39,4 @@ def command(campaign: Path, dynamic: Path | None, max_nrmse: float | None, optio
     from bushfit.results import load_result
 
     job = FitStatic(load_result(dynamic) if dynamic else None)
-    perform(options, campaign, job, tell_fit, max_nrmse)
+    perform(options, campaign, job, tell_fit, max_nrmse, loss)

@@ -11,9 +11,11 @@ from bushfit.cli.common import (
     Options,
     campaign_argument,
     enforce_nrmse,
+    loss_option,
     max_nrmse_option,
     new_table,
     number,
+    open_campaign,
     report,
     shared_options,
     tell_fit,
@@ -28,9 +30,10 @@ if TYPE_CHECKING:
 
 @click.command("run")
 @campaign_argument
+@loss_option
 @max_nrmse_option
 @shared_options
-def command(campaign: Path, max_nrmse: float | None, options: Options) -> None:
+def command(campaign: Path, loss: str | None, max_nrmse: float | None, options: Options) -> None:
     """Fit CAMPAIGN in every way, ask what the model lacks, and predict from the result.
 
     fit-static and fit-dynamic are repeated in turn until they agree (the paper's procedure), with the table of each
@@ -40,7 +43,6 @@ def command(campaign: Path, max_nrmse: float | None, options: Options) -> None:
     Writes static.json, dynamic.json, model.json (with what diagnose added; then joint.json is the plain fit),
     diagnosis.json, candidates.csv, and as CSV and PNG: loops, sweeps, gap, axial and radial.
     """
-    from bushfit.campaign import load_campaign
     from bushfit.cli.diagnose import tell_diagnosis
     from bushfit.cli.predict import tell_predictions
     from bushfit.fitting.data import Data
@@ -50,7 +52,7 @@ def command(campaign: Path, max_nrmse: float | None, options: Options) -> None:
     from bushfit.jobs.predict import Predict
     from bushfit.output import to_json
 
-    loaded = load_campaign(campaign)
+    loaded = open_campaign(campaign, loss)
     folder = options.folder(loaded.slug)
     names = [*Diagnose().names(loaded, options.formats), *Predict().names(loaded, options.formats)]
     options.require_free(folder, [*names, *artifact_names(tests_of(loaded), options.formats)])
@@ -76,11 +78,12 @@ def command(campaign: Path, max_nrmse: float | None, options: Options) -> None:
     final = results["model"]
     predicted = Predict().run(final, loaded)
     tell_predictions(options, predicted)
+    marked = data.without(final.outliers)
     documents = {**{name: result.to_document() for name, result in results.items()}, "diagnosis": diagnosed.document}
     files = {
         **{f"{name}.json": to_json(document) for name, document in documents.items()},
-        **loop_files(final.model, data.loops, options.formats),
-        **sweep_files(final.model, data.sweeps, options.formats),
+        **loop_files(final.model, marked.loops, options.formats),
+        **sweep_files(final.model, marked.sweeps, options.formats),
         **diagnosis_files(diagnosed.diagnosis, loaded.name, options.formats),
         **predicted.files(options.formats),
     }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from bushfit.diagnosis.close import Search
 from bushfit.diagnosis.evidence import fit
 from bushfit.diagnosis.record import Diagnosis, Settings
@@ -9,9 +11,11 @@ from bushfit.diagnosis.verdict import judge
 from bushfit.effects import BASE, effect_named
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
+from bushfit.fitting.robust import estimate, told
 from bushfit.fitting.starts import start_values
-from bushfit.fitting.terms import Term
+from bushfit.fitting.terms import SweepTerm, Term
 from bushfit.model import Model
+from bushfit.results import Outlier
 
 
 def diagnose(data: Data, model: Model | None = None, settings: Settings | None = None) -> Diagnosis:
@@ -43,9 +47,20 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     start = {name: value for name, value in start.items() if name in model.values and name not in held}
     for name in settings.adopt:
         model = model if name in model.effects else _adopted(model, name)
+    outliers: tuple[Outlier, ...] = ()
+    if data.robust:
+        names = [name for name in model.parameters if name not in held]
+        robust = estimate(model, terms, names, data.bounds, robust=True)
+        outliers, terms = robust.outliers, [_standing(term) for term in robust.terms]
     search = Search.begin(fit(model, terms, held, data.bounds), settings, start, held, data.bounds)
     grown, added = search.grow()
-    return judge(search, *search.reconsider(grown, added))
+    found = judge(search, *search.reconsider(grown, added))
+    notes = (*found.notes, *told(outliers, robust=True))
+    return replace(found, notes=notes, result=replace(found.result, outliers=outliers))
+
+
+def _standing(term: Term) -> Term:
+    return term.standing() if isinstance(term, SweepTerm) else term
 
 
 def _adopted(model: Model, name: str) -> Model:

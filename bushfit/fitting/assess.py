@@ -114,7 +114,7 @@ def _inflation(model: Model, terms: Sequence[Term], parameters: int) -> float:
 def quality(model: Model, terms: Sequence[Term], parameters: int) -> Quality:
     """NRMSE, reduced chi-square, number of residuals and relative noise over some terms."""
     relative = np.concatenate([np.abs(term.relative(model)) for term in terms])
-    noise = np.concatenate([np.full(term.size, term.relative_noise) for term in terms])
+    noise = np.repeat([term.relative_noise for term in terms], [term.counted for term in terms])
     return Quality(
         nrmse=float(np.sqrt(np.mean(relative**2))),
         reduced_chi_square=_reduced(model, terms, parameters)[0],

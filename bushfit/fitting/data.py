@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from bushfit.errors import FitError
 from bushfit.fitting.solve import Bounds
 from bushfit.fitting.terms import LoopTerm, SweepTerm, Term, loop_terms, sweep_terms
 from bushfit.geometry import Direction
+from bushfit.results import Outlier
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +29,23 @@ class Data:
         settings = campaign.fit.parameters
         return cls(
             campaign,
-            tuple(loop_terms(campaign.loops)),
+            tuple(loop_terms(campaign.loops, without_wild=campaign.fit.loss != "linear")),
             tuple(sweep_terms(campaign.sweeps, campaign.fit.residuals)),
             {name: (setting.min, setting.max) for name, setting in settings.items()},
         )
+
+    @property
+    def robust(self) -> bool:
+        """Whether wild points are left out."""
+        return self.campaign.fit.loss != "linear"
+
+    def without(self, outliers: Sequence[Outlier]) -> Data:
+        """The same data, those points of the sweeps without weight; wild rows of loops have none where `robust`."""
+        sweeps = []
+        for term in self.sweeps:
+            rows = [outlier.row - 1 for outlier in outliers if outlier.test == term.name]
+            sweeps.append(term.weighted(np.where(np.isin(term.order, rows), 0.0, 1.0)) if rows else term)
+        return replace(self, sweeps=tuple(sweeps))
 
     @property
     def given(self) -> dict[str, float]:

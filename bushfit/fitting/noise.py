@@ -15,6 +15,7 @@ import numpy as np
 from scipy.stats import bartlett
 
 from bushfit.effects.contract import Array
+from bushfit.fitting.outliers import MEDIAN_TO_SIGMA
 from bushfit.measurement import Sweep
 
 #: No rig measures better than this, relative to the largest force or to |K|.
@@ -28,6 +29,9 @@ _SMOOTH_DEGREE = 4
 #: A point this many (robust) standard deviations off is wild, and so is a pair of repeats whose shared variance is
 #: this many times the median: noise alone makes the one once in 1e9, the other once in 500 campaigns.
 _WILD_POINT, _WILD_PAIR = 6.0, 100.0
+
+#: Rounds of reweighting towards the least sum of distances.
+_ROUNDS = 25
 
 LevelKey = tuple[str, float]
 _ORIGINS = {
@@ -143,7 +147,7 @@ def _without_wild(difference: Array) -> Array:
     """Differences of two repeats less single wild points, which are faults and no measure of the noise."""
     parts = _parts(difference)
     off = np.abs(parts - np.median(parts, axis=0))
-    scale = 1.4826 * np.median(off, axis=0)
+    scale = MEDIAN_TO_SIGMA * np.median(off, axis=0)
     return difference[np.all((off <= _WILD_POINT * scale) | (scale == 0.0), axis=1)]
 
 
@@ -153,8 +157,27 @@ def _about_smooth_curve(log_frequency: Array, log_stiffness: Array) -> _Level:
         return _Level(np.full((1, 2), ASSUMED_SHARED[0]), 1, np.empty((0, 2)), 1)
     values = _parts(log_stiffness)
     basis = np.polynomial.legendre.legvander(_unit_interval(log_frequency), degree)
+    left = np.abs(values - basis @ _least_absolute(basis, values))
+    usual = np.median(np.sort(left, axis=0)[degree + 1 :], axis=0)  # the curve goes through as many as it has freedoms
+    sound = np.all(left <= np.maximum(_WILD_POINT * MEDIAN_TO_SIGMA * usual, FLOOR), axis=1)
+    freedom = int(np.count_nonzero(sound)) - degree - 1
+    if freedom < 1:
+        sound, freedom = np.ones_like(sound), log_frequency.size - degree - 1
+    basis, values = basis[sound], values[sound]
     residual = values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
-    return _Level(residual, log_frequency.size - degree - 1, np.empty((0, 2)), 1)
+    return _Level(residual, freedom, np.empty((0, 2)), 1)
+
+
+def _least_absolute(basis: Array, values: Array) -> Array:
+    """Coefficients with the least sum of distances |residual| of complex points, (n, 2) -> (k, 2), which wild points
+    do not bend: least squares, weighted anew by one over the distance."""
+    weight = np.ones(values.shape[0])
+    for _ in range(_ROUNDS):
+        root = np.sqrt(weight)[:, None]
+        solution = np.linalg.lstsq(basis * root, values * root, rcond=None)[0]
+        distance = np.linalg.norm(values - basis @ solution, axis=1)
+        weight = 1.0 / np.maximum(distance, 1e-3 * np.median(distance) + FLOOR**2)
+    return np.asarray(solution)
 
 
 def _unit_interval(x: Array) -> Array:

@@ -12,7 +12,8 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import Stage, cautions, covariance, measured_range, quality
 from bushfit.fitting.data import Data
-from bushfit.fitting.solve import Coordinates, Solution, solve
+from bushfit.fitting.robust import Estimate, estimate, told
+from bushfit.fitting.solve import Coordinates, Solution
 from bushfit.fitting.starts import start_values
 from bushfit.fitting.terms import LoopTerm, SweepTerm, Term
 from bushfit.geometry import Direction
@@ -51,8 +52,7 @@ def fit_joint(data: Data, *, effects: Sequence[str] = BASE, directions: Sequence
         FitError: no test in those directions, or data that cannot support the fit.
     """
     terms = data.chosen(directions)
-    solution = _solve(data, terms, effects, {})
-    return _result(solution, terms, [Stage(solution.coordinates.names, terms)])
+    return _result(data, [_solve(data, terms, effects, {})])
 
 
 def fit_static(data: Data, springpot: Result | None = None) -> Result:
@@ -68,9 +68,9 @@ def fit_static(data: Data, springpot: Result | None = None) -> Result:
     """
     terms = data.static_terms()
     held, known = _springpot(data, springpot)
-    solution = _solve(data, terms, BASE if held else ("elastic", "friction"), held)
-    notes = [] if held else [_without_springpot(data, solution, terms)]
-    return _result(solution, terms, [Stage(solution.coordinates.names, terms)], known, notes)
+    found = _solve(data, terms, BASE if held else ("elastic", "friction"), held)
+    notes = [] if held else [_without_springpot(data, found.solution, terms)]
+    return _result(data, [found], known, notes)
 
 
 def fit_dynamic(data: Data, static: Result) -> Result:
@@ -80,9 +80,7 @@ def fit_dynamic(data: Data, static: Result) -> Result:
     """
     terms: list[Term] = [data.smallest_sweep()]
     held = {name: static.model.values[name] for name in STATIC}
-    solution = _solve(data, terms, BASE, held)
-    stages = [Stage(solution.coordinates.names, terms)]
-    return _result(solution, terms, stages, static.covariance.restricted(STATIC))
+    return _result(data, [_solve(data, terms, BASE, held)], static.covariance.restricted(STATIC))
 
 
 def given_static(data: Data) -> Result | None:
@@ -106,16 +104,17 @@ def fit_two_step(data: Data) -> TwoStep:
     answered: list[Array] = []
     for _ in range(_MOST_PASSES):
         static = _solve(data, loops, BASE if springpot else ("elastic", "friction"), springpot)
-        dynamic = _solve(data, [sweep], BASE, {name: static.model.values[name] for name in STATIC})
-        passes.append(dict(dynamic.model.values))
+        found = static.solution.model.values
+        dynamic = _solve(data, [sweep], BASE, {name: found[name] for name in STATIC})
+        model = dynamic.solution.model
+        passes.append(dict(model.values))
         if len(passes) > 1 and _agree(passes[-2], passes[-1]):
-            stages = [Stage(static.coordinates.names, loops), Stage(dynamic.coordinates.names, [sweep])]
-            return TwoStep(tuple(passes), _result(dynamic, [*loops, sweep], stages))
-        coordinates = Coordinates.of(dynamic.model, DYNAMIC)
+            return TwoStep(tuple(passes), _result(data, [static, dynamic]))
+        coordinates = Coordinates.of(model, DYNAMIC)
         if springpot:
             asked.append(coordinates.point(springpot))
-            answered.append(coordinates.point(dynamic.model.values))
-        springpot = {name: dynamic.model.values[name] for name in DYNAMIC}
+            answered.append(coordinates.point(model.values))
+        springpot = {name: model.values[name] for name in DYNAMIC}
         if len(asked) > 1:
             springpot = coordinates.values(_anderson(asked, answered))
     raise FitError(
@@ -155,7 +154,7 @@ def _without_springpot(data: Data, solution: Solution, terms: Sequence[Term]) ->
     except FitError:  # no sweep, or none that goes with the loops: a typical rubber tells as much as can be told
         ratio, alpha = _TYPICAL_SPRINGPOT
         held = {"m": ratio * found["mu"], "alpha": alpha}
-        better = _solve(data, terms, BASE, held).model.values
+        better = _solve(data, terms, BASE, held).solution.model.values
         source = f"with the springpot of a typical filled rubber (m = {ratio} mu s^alpha, alpha = {alpha})"
     changes = ", ".join(f"{name} by {100 * (better[name] / found[name] - 1):+.1f} %" for name in STATIC)
     return (
@@ -165,7 +164,7 @@ def _without_springpot(data: Data, solution: Solution, terms: Sequence[Term]) ->
     )
 
 
-def _solve(data: Data, terms: Sequence[Term], effects: Sequence[str], held: Mapping[str, float]) -> Solution:
+def _solve(data: Data, terms: Sequence[Term], effects: Sequence[str], held: Mapping[str, float]) -> Estimate:
     """Fit what the campaign leaves free of a model, from start values taken from the data."""
     bushing = data.campaign.bushing
     start = {**start_values(bushing, terms, held), **data.given, **held}
@@ -182,26 +181,25 @@ def _solve(data: Data, terms: Sequence[Term], effects: Sequence[str], held: Mapp
             hint="check the units of displacement and force, and the dimensions of the bushing",
         ) from error
     names = [name for name in data.free(tuple(model.parameters)) if name not in held]
-    return solve(model, terms, names, data.bounds)
+    return estimate(model, terms, names, data.bounds, robust=data.robust)
 
 
-def _result(
-    solution: Solution,
-    terms: Sequence[Term],
-    stages: Sequence[Stage],
-    held: Covariance | None = None,
-    notes: Sequence[str] = (),
-) -> Result:
+def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = None, notes: Sequence[str] = ()) -> Result:
+    """What the steps of a procedure found, the last one's model, with the uncertainty of all of them."""
+    solution, terms = steps[-1].solution, [term for step in steps for term in step.terms]
+    stages = [Stage(step.solution.coordinates.names, step.weighed) for step in steps]
     fitted = tuple(name for stage in stages for name in stage.names)
     cov = covariance(solution.model, stages, held)
+    outliers = tuple(outlier for step in steps for outlier in step.outliers)
     return Result(
         solution.model,
         fitted,
         cov,
         quality(solution.model, terms, len(fitted)),
         measured_range(solution.model, terms),
-        (*notes, *_assumptions(terms), *cautions(solution, terms, cov)),
+        (*notes, *_assumptions(terms), *told(outliers, robust=data.robust), *cautions(solution, terms, cov)),
         tuple(term.source for term in terms if term.source is not None),
+        outliers,
     )
 
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.fitting.outliers import gross_rows
 from bushfit.measurement import Loop
 
 #: The motion comes again where it is the same a period later within this share of its range, for all but this share
@@ -32,8 +33,9 @@ def steady_part(loop: Loop) -> tuple[Loop, str | None]:
 
     After a run-in the first cycle still remembers it, and goes too where two more are left.
     """
-    step = -(-loop.time.size // _MOST_ROWS)
-    time, motion = loop.time[::step], loop.displacement[::step]
+    rows = np.arange(0, loop.time.size, -(-loop.time.size // _MOST_ROWS))
+    rows = np.delete(rows, gross_rows(loop.displacement[rows]))
+    time, motion = loop.time[rows], loop.displacement[rows]
     period = _period(time, motion)
     if period is None or time[-1] - time[0] <= period:
         return loop, None

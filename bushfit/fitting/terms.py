@@ -120,15 +120,29 @@ class LoopTerm:
 
     def noise_free(self, model: Model) -> LoopTerm:
         """The same test as the model would have it, without noise."""
-        return replace(self, drive=replace(self.drive, force=self.force(model)))
+        force = self.force(model)
+        return replace(self, drive=replace(self.drive, force=force, half_range=float(np.ptp(force)) / 2.0))
 
     def change(self, one: Model, other: Model) -> float:
         """Largest difference between two models, relative to half the force range."""
         return float(np.max(np.abs(self.force(one) - self.force(other)))) / self.drive.half_range
 
     def relative(self, model: Model) -> Array:
-        """Difference relative to half the force range, for NRMSE."""
-        return (self.force(model) - self.drive.force) / self.drive.half_range
+        """Difference relative to half the force range, for NRMSE, where the rows carry weight."""
+        return ((self.force(model) - self.drive.force) / self.drive.half_range)[self.drive.weight > 0.0]
+
+    def distance(self, model: Model) -> Array:
+        """How far each row lies off the model, in units of noise, (n,)."""
+        return np.abs(self.residual(model))
+
+    def shown(self, model: Model) -> Array:
+        """As `residual`, and of rows without weight how far one row lies off, in units of noise, (n,)."""
+        off = (self.force(model) - self.drive.force) / self.drive.noise
+        return np.where(self.drive.weight > 0.0, self.residual(model), off)
+
+    def weighted(self, weight: Array) -> LoopTerm:
+        """The same test with the weight of each row, (n,), times a share."""
+        return replace(self, drive=replace(self.drive, weight=self.drive.weight * weight))
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
         """Per estimated variance of the noise, what reacts to the whitened residuals by `influence`, (k, n), times the
@@ -145,13 +159,15 @@ class SweepTerm:
     """Dynamic stiffness, as relative complex residual or as magnitude and loss factor.
 
     The residual (K - K_meas)/K_meas has the gain error in its real and the phase error in its imaginary part.
-    Within a block of n points with random part s and shared part t the covariance is s^2 I + t^2 1 1^T; its
-    inverse root subtracts the share 1 - 1/sqrt(1 + n t^2/s^2) of the block's mean and divides by s.
+    Within a block of points with random parts s_i and a shared part t the covariance is V = diag(s_i^2) + t^2 1 1^T.
+    With a_i = 1/s_i, divided by s_i and less the share 1 - 1/sqrt(1 + t^2 sum a_i^2) of what lies along a, it is white.
+    A point of weight w has s_i^2 = s^2/w; without weight it is not there, for the block's shared error either.
     """
 
     sweep: Sweep
     noise: SweepNoise
     residuals: Residuals = "complex"
+    weight: Array | None = None
     kind: Literal["sweep"] = "sweep"
 
     @property
@@ -165,7 +181,7 @@ class SweepTerm:
     @property
     def counted(self) -> int:
         """Residuals that carry weight."""
-        return self.size
+        return 2 * int(np.count_nonzero(self.weights))
 
     @property
     def direction(self) -> Direction:
@@ -182,7 +198,15 @@ class SweepTerm:
 
     def at_amplitudes(self, amplitudes: Sequence[float]) -> SweepTerm:
         """The part of the sweep at some of its levels, with the same noise."""
-        kept = np.isin(self.sweep.amplitude, amplitudes)
+        return self._part(np.isin(self.sweep.amplitude, amplitudes))
+
+    def standing(self) -> SweepTerm:
+        """The part of the sweep that carries weight."""
+        kept = np.empty(self.frequency.size, dtype=bool)
+        kept[self.order] = self.weights > 0.0
+        return self if kept.all() else self._part(kept)
+
+    def _part(self, kept: Array) -> SweepTerm:
         part = replace(
             self.sweep,
             frequency=self.sweep.frequency[kept],
@@ -191,7 +215,11 @@ class SweepTerm:
             repeat=self.sweep.repeat[kept],
             reached=self.sweep.amplitude_reached[kept],
         )
-        return replace(self, sweep=part)
+        return replace(self, sweep=part, weight=None if self.weight is None else self.weight[kept[self.order]])
+
+    def weighted(self, weight: Array) -> SweepTerm:
+        """The same test with the weight of each point, (n,) in `order`, times a share."""
+        return replace(self, weight=self.weights * weight)
 
     def noise_free(self, model: Model) -> SweepTerm:
         """The same test as the model would have it, without noise."""
@@ -242,12 +270,36 @@ class SweepTerm:
         return distinct[0], distinct[1], place.ravel()
 
     def relative(self, model: Model) -> Array:
-        """|K - K_meas| / |K_meas| per point, for NRMSE."""
-        return np.abs(self.stiffness(model) / self.measured - 1.0)
+        """|K - K_meas| / |K_meas| of the points that carry weight, for NRMSE."""
+        return np.abs(self.stiffness(model) / self.measured - 1.0)[self.weights > 0.0]
+
+    def distance(self, model: Model) -> Array:
+        """How far each point lies off the model less what its block shares, in units of noise: one number for gain and
+        phase, their root mean square, (n,)."""
+        return self.apart(self.deviation(model)) / np.sqrt(2.0)
 
     def change(self, one: Model, other: Model) -> float:
         """Largest difference between two models, relative to |K| as measured."""
         return float(np.max(np.abs((self.stiffness(one) - self.stiffness(other)) / self.measured)))
+
+    def apart(self, deviation: Array, *, shared: bool = True) -> Array:
+        """Length of deviations, (n,), in units of the random noise, less the likeliest error that a block shares."""
+        return np.hypot(*self._own(deviation, shared=shared))
+
+    def _own(self, deviation: Array, *, shared: bool = True) -> list[Array]:
+        parts = []
+        for which, part in enumerate((deviation.real, deviation.imag)):
+            scale, share, weight = self._block_scales[which]
+            if shared:
+                mean = np.add.reduceat(part * scale**2, self.block_starts) / weight
+                part = part - np.repeat((1.0 - (1.0 - share) ** 2) * mean, self._block_sizes)
+            parts.append(part / self._random[which])
+        return parts
+
+    def shown(self, model: Model) -> Array:
+        """As `residual`, and of points without weight how far they lie off, in units of noise, (2 n,)."""
+        deviation = self.deviation(model)
+        return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), np.concatenate(self._own(deviation)))
 
     def deviation(self, model: Model, values: Values | None = None) -> Array:
         """Residual before whitening: gain in the real, phase (or loss factor) in the imaginary part, (..., n)."""
@@ -291,9 +343,13 @@ class SweepTerm:
         return np.concatenate([self._whiten(part, which) for which, part in enumerate(parts)], axis=-1)
 
     def _whiten(self, part: Array, which: int) -> Array:
-        scale, share = self._block_scales[which]
-        means = np.add.reduceat(part, self.block_starts, axis=-1) / self._block_sizes
-        return (part - np.repeat(means * share, self._block_sizes, axis=-1)) * scale
+        return self._less_shared(part * self._block_scales[which][0], which)
+
+    def _less_shared(self, part: Array, which: int) -> Array:
+        """Residuals over their noise, less the share of what lies along it in each block."""
+        scale, share, weight = self._block_scales[which]
+        along = np.add.reduceat(part * scale, self.block_starts, axis=-1) / weight
+        return part - np.repeat(along * share, self._block_sizes, axis=-1) * scale
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
         """Per estimated variance of the noise, what reacts to the whitened residuals by `influence`, (k, 2 n), times
@@ -302,19 +358,19 @@ class SweepTerm:
         Within a block V = s^2 I + t^2 1 1^T has the derivatives I and 1 1^T, whitened W^2 and (W 1)(W 1)^T. The
         estimate of t^2 is a mean of `freedom` squares that expect t^2 + s^2/n, and scatters no further down than to 0.
         """
-        gain, phase = np.split(influence, 2, axis=1)
-        whitened = np.split(self.whiten(gain + 1j * phase), 2, axis=1)
-        zero = np.zeros_like(gain)
+        zero = np.zeros_like(influence[:, : self.frequency.size])
         parts: dict[Hashable, Array] = {}
-        for which, (part, shared) in enumerate(zip(whitened, self.noise.shared, strict=True)):
-            scale, share = self._block_scales[which]
+        for which, part in enumerate(np.split(influence, 2, axis=1)):
+            scale, share, _ = self._block_scales[which]
             reactions = {}
             if self.noise.scatter_freedom:
-                reactions["scatter"] = self._whiten(part, which) / scale**2 * np.sqrt(2.0 / self.noise.scatter_freedom)
+                twice = self._less_shared(self._less_shared(part, which), which)
+                reactions["scatter"] = twice * np.sqrt(2.0 / self.noise.scatter_freedom)
             if self.noise.freedom:
-                expected = shared**2 + 1.0 / (scale[self.block_starts] ** 2 * self._block_sizes)
-                error = np.minimum(expected * np.sqrt(2.0 / self.noise.freedom), shared**2) * (1.0 - share)
-                block = np.add.reduceat(part, self.block_starts, axis=-1) * error
+                variance = self.noise.shared[which] ** 2
+                expected = variance + self._random[which][self.block_starts] ** 2 / self._block_sizes
+                error = np.minimum(expected * np.sqrt(2.0 / self.noise.freedom), variance) * (1.0 - share) ** 2
+                block = np.add.reduceat(part * scale, self.block_starts, axis=-1) * error
                 reactions["shared"] = np.repeat(block, self._block_sizes, axis=-1) * scale
             for kind, reaction in reactions.items():
                 parts[kind, which] = np.concatenate((zero, reaction) if which else (reaction, zero), axis=1)
@@ -325,14 +381,25 @@ class SweepTerm:
         return np.diff(np.append(self.block_starts, self.frequency.size))
 
     @cached_property
-    def _block_scales(self) -> list[tuple[Array, Array]]:
+    def weights(self) -> Array:
+        """Share of its weight that each point has, (n,)."""
+        return np.ones(self.frequency.size) if self.weight is None else self.weight
+
+    @cached_property
+    def _random(self) -> list[Array]:
+        """Standard deviation of each point's gain and phase, as if it had all its weight, (n,) each."""
+        levels = [self.noise.random[self.sweep.name, float(x)] for x in self.amplitude[self.block_starts]]
+        return [np.repeat(part, self._block_sizes) for part in np.array(levels).T]
+
+    @cached_property
+    def _block_scales(self) -> list[tuple[Array, Array, Array]]:
+        """For gain and phase: one over each point's noise, (n,), the share of what lies along it in a block that is
+        taken out, and the sum of its squares there."""
         scales = []
-        for which, shared in enumerate(self.noise.shared):
-            random = np.array(
-                [self.noise.random[self.sweep.name, float(x)][which] for x in self.amplitude[self.block_starts]]
-            )
-            share = 1.0 - 1.0 / np.sqrt(1.0 + self._block_sizes * (shared / random) ** 2)
-            scales.append((np.repeat(1.0 / random, self._block_sizes), share))
+        for random, shared in zip(self._random, self.noise.shared, strict=True):
+            scale = np.sqrt(self.weights) / random
+            weight = np.maximum(np.add.reduceat(scale**2, self.block_starts), np.finfo(float).tiny)
+            scales.append((scale, 1.0 - 1.0 / np.sqrt(1.0 + shared**2 * weight), weight))
         return scales
 
 
@@ -343,9 +410,9 @@ def _settles(model: Model) -> bool:
     return any(effect.settles for effect in model.records)
 
 
-def loop_terms(loops: Sequence[Loop]) -> list[LoopTerm]:
-    """One term per loop."""
-    return [LoopTerm(drive_of(loop)) for loop in loops]
+def loop_terms(loops: Sequence[Loop], *, without_wild: bool = False) -> list[LoopTerm]:
+    """One term per loop; rows that are wild carry no weight where they are to be left out."""
+    return [LoopTerm(drive_of(loop, without_wild=without_wild)) for loop in loops]
 
 
 def sweep_terms(sweeps: Sequence[Sweep], residuals: Residuals = "complex") -> list[SweepTerm]:

@@ -83,7 +83,8 @@ def _changing(drive: Drive, names: tuple[str, str]) -> Iterator[str]:
     units = display_units(loop.direction)
     phase = (loop.time - loop.time[0]) * drive.frequency
     numbers = sorted({*range(min(count, _ENDS)), *range(max(count - _ENDS, 0), count)})
-    parts = [np.flatnonzero((phase >= n) & (phase < n + 1)) for n in numbers]
+    wild = drive.wild["force"].rows
+    parts = [np.setdiff1d(np.flatnonzero((phase >= n) & (phase < n + 1)), wild) for n in numbers]
     rows = min(part.size for part in parts)
     order = int(np.clip(rows // 5, 1, _HARMONICS))
     if rows < 4 * order:

@@ -45,12 +45,12 @@ class Fitted:
         return self.result.to_document()
 
     def files(self, formats: Collection[str]) -> dict[str, bytes]:
-        model = self.result.model
+        model, data = self.result.model, self.data.without(self.result.outliers)
         files = {f"{self.stem}.json": to_json(self.document)}
         if "loops" in self.kinds:
-            files |= loop_files(model, self.data.loops, formats)
+            files |= loop_files(model, data.loops, formats)
         if "sweeps" in self.kinds:
-            files |= sweep_files(model, self.data.sweeps, formats)
+            files |= sweep_files(model, data.sweeps, formats)
         return files
 
 

@@ -14,7 +14,7 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.terms import LoopTerm, SweepTerm
 from bushfit.geometry import Direction
 from bushfit.model import Model
-from bushfit.plots.points import SECTORS, Points, means, over_sectors, turn
+from bushfit.plots.points import SECTORS, Points, means, over_sectors, turn, wild_points
 from bushfit.plots.prediction import FINE, draw, points_note
 from bushfit.plots.style import (
     DOT,
@@ -23,6 +23,7 @@ from bushfit.plots.style import (
     dress,
     explain,
     legend,
+    mark_wild,
     new_figure,
     noise_band,
     prefixed,
@@ -35,6 +36,7 @@ from bushfit.sheets import display_units
 _STRIP = 2.6 / 2.54
 _MOST_ROWS = 1600
 _RESIDUALS = "Residuals: model less measured in units of noise; 95 % of them should lie in the grey."
+_WILD = "Crosses: outliers, at the edge where they lie beyond it."
 _MEANS = f"Lines there: means over {360 // SECTORS} deg."
 
 
@@ -52,9 +54,9 @@ def sweeps_figure(model: Model, terms: Sequence[SweepTerm], title: str) -> Figur
         levels = np.unique(points.amplitude)
         draw(pair, direction, _model_lines(model, direction, points), points, "frequency", levels)
         for term in mine:
-            for strip, residual in zip(strips, term.residual(model).reshape(2, -1), strict=True):
+            for strip, residual in zip(strips, term.shown(model).reshape(2, -1), strict=True):
                 for style, level in zip(styles(levels.size, "amplitude"), levels, strict=True):
-                    at = term.amplitude == level
+                    at = (term.amplitude == level) & (term.weights > 0.0)
                     strip.plot(term.frequency[at], residual[at], style.marker, color=style.color, alpha=0.8, **DOT)
         for panel, strip, name in zip(pair, strips, ("gain", "phase"), strict=True):
             strip.sharex(panel)
@@ -63,7 +65,12 @@ def sweeps_figure(model: Model, terms: Sequence[SweepTerm], title: str) -> Figur
             panel.tick_params(labelbottom=False)
             panel.set_xlabel("")
             noise_band(strip)
-    explain(figure, "Lines: model.", points_note(terms), _RESIDUALS)
+        for term in mine:
+            wild = term.weights == 0.0
+            for strip, residual in zip(strips, term.shown(model).reshape(2, -1)[:, wild], strict=True):
+                mark_wild(strip, term.frequency[wild], residual)
+    note = _WILD if any((term.weights == 0.0).any() for term in terms) else ""
+    explain(figure, "Lines: model.", points_note(terms), _RESIDUALS, note)
     return figure
 
 
@@ -95,9 +102,13 @@ def loops_figure(model: Model, terms: Sequence[LoopTerm], title: str) -> Figure:
             middle, mean, _ = over_sectors(term, residual)
             phase_panel.plot(middle, mean, color=style.color, ls=style.dashes, lw=1.4)
         noise_band(phase_panel)
+        for term in mine:
+            phase, wild_force = wild_points(term)
+            mark_wild(loop_panel, length * term.drive.displacement(phase), force * wild_force)
         phase_panel.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
         loops_legend(phase_panel, mine, Line2D([], [], color=INK, lw=0.8))
-    explain(figure, "Left: measured force over the motion cleared of noise; black: model.", _RESIDUALS, _MEANS)
+    note = _WILD if any(term.drive.wild["force"].rows.size for term in terms) else ""
+    explain(figure, "Left: measured force over the motion cleared of noise; black: model.", _RESIDUALS, _MEANS, note)
     return figure
 
 
@@ -126,7 +137,10 @@ def _model_lines(model: Model, direction: Direction, points: Points) -> Points:
 
 
 def _drawn_rows(term: LoopTerm) -> Array:
-    """Rows of the first and last two cycles, thinned to what an eye can tell apart."""
+    """Rows of the first and last two cycles, thinned to what an eye can tell apart; wild ones are drawn as crosses."""
     phase = term.drive.phase
-    rows = np.flatnonzero((phase < 2.0) | (phase > phase[-1] - 2.0))
+    drawn = (phase < 2.0) | (phase > phase[-1] - 2.0)
+    if phase.size == term.loop.force.size:
+        drawn[term.drive.wild["force"].rows] = False
+    rows = np.flatnonzero(drawn)
     return rows[:: max(1, -(-rows.size // _MOST_ROWS))]

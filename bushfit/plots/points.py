@@ -62,7 +62,8 @@ class Repeats:
 
 
 def means(terms: Sequence[SweepTerm]) -> Points:
-    """Mean, least and largest of the repeats of each operating point."""
+    """Mean, least and largest of the repeats of each operating point, those without weight aside."""
+    terms = [term.standing() for term in terms]
     repeats = Repeats.of(terms)
     stiffness = np.concatenate([np.empty(0, dtype=complex), *(term.measured for term in terms)])
 
@@ -71,6 +72,12 @@ def means(terms: Sequence[SweepTerm]) -> Points:
         return Band(repeats.mean(values), *(repeats.summed(values, extreme) for extreme in (np.minimum, np.maximum)))
 
     return Points(repeats.frequency, repeats.amplitude, band(np.abs), band(lambda k: k.imag / k.real))
+
+
+def wild_points(term: LoopTerm) -> tuple[Array, Array]:
+    """Phase [cycles] and force [N or N m] of a loop's rows that are faults of the record, (k,) each."""
+    loop, rows = term.loop, term.drive.wild["force"].rows
+    return (loop.time[rows] - loop.time[0]) * term.drive.frequency, loop.force[rows]
 
 
 def turn(term: LoopTerm) -> Array:

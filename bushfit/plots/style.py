@@ -25,7 +25,7 @@ WIDTH, ROW, FRAME = (cm / 2.54 for cm in (16.0, 5.4, 2.0))
 TEXT, SMALL = 8.5, 7.5
 POINT: dict[str, Any] = {"ms": 4.2, "mec": "white", "mew": 0.4}
 DOT: dict[str, Any] = {"ms": 2.4, "mew": 0}
-INK, GREY = "#1a1a1a", "#595959"
+INK, GREY, WILD = "#1a1a1a", "#595959", "#c1121f"
 _DPI = 150
 _LEGEND: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5), "frameon": False, "handlelength": 3.2}
 #: Colours of what a figure tells apart: a scale each, so that no colour means two things. Loops stay off black.
@@ -108,6 +108,14 @@ def noise_band(axes: Axes) -> None:
     axes.axhspan(-Z95, Z95, color="#ebebeb", lw=0, zorder=0)
     axes.axhline(0.0, color=GREY, lw=0.6, zorder=1)
     least_span(axes, 7.0)
+
+
+def mark_wild(axes: Axes, x: Array, y: Array) -> None:
+    """Crosses at points that lie far off, drawn at the edge where they lie beyond it."""
+    low, high = axes.get_ylim()
+    if x.size:
+        axes.plot(x, np.clip(y, low, high), "x", color=WILD, ms=4.5, mew=1.2, zorder=5)
+    axes.set_ylim(low, high)
 
 
 def legend(axes: Axes, handles: Sequence[Line2D], labels: Sequence[str], title: str, **place: Any) -> None:

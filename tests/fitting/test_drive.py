@@ -9,7 +9,8 @@ import pytest
 
 from bushfit import rig
 from bushfit.errors import FitError
-from bushfit.fitting.drive import MOST_ROWS, drive_of
+from bushfit.fitting.drive import drive_of
+from bushfit.fitting.harmonics import MOST_ROWS
 from bushfit.fitting.terms import LoopTerm
 from bushfit.geometry import Direction
 from bushfit.measurement import Loop

@@ -1,0 +1,192 @@
+"""Robust fits: the loss soft_l1, and wild points left out and listed.
+
+A complex point counts as one: a wild one is wild in gain and phase together. The loss acts on each point's own error,
+beside what its block shares, so a wild point does not pull its block along; that is why it is found by reweighting,
+sqrt-weights into the noise of each point, and not by a loss on whitened residuals one by one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+from scipy.special import chdtri
+
+from bushfit.effects.contract import Array
+from bushfit.errors import FitError
+from bushfit.fitting.outliers import from_neighbours, limit
+from bushfit.fitting.solve import Bounds, Solution, solve
+from bushfit.fitting.terms import LoopTerm, SweepTerm, Term
+from bushfit.model import Model
+from bushfit.results import Outlier
+
+#: Distance, in units of noise, around which soft_l1 turns from squares to distances.
+_SOFT = 2.0
+#: Points of a block that are neighbours.
+_WINDOW = 5
+#: A reweighted fit has settled when it moves by less than this, in standard errors.
+_SETTLED, _MOST_ROUNDS = 0.01, 30
+#: Rows of a test that a sentence names.
+_SHOWN = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A fit and the data behind it.
+
+    Args:
+        solution: where it ended.
+        terms: the data, outliers without weight where the loss leaves them out.
+        weighed: the same with the weights that give its covariance.
+        wild: rows of each term that are wild, in the order of its data.
+    """
+
+    solution: Solution
+    terms: tuple[Term, ...]
+    weighed: tuple[Term, ...]
+    wild: tuple[Array, ...]
+
+    @property
+    def outliers(self) -> tuple[Outlier, ...]:
+        """The wild points by file and row."""
+        model, terms = self.solution.model, self.terms
+        return tuple(entry for term, rows in zip(terms, self.wild, strict=True) for entry in _listed(term, rows, model))
+
+
+def estimate(
+    model: Model, terms: Sequence[Term], names: Sequence[str], bounds: Bounds | None = None, *, robust: bool = False
+) -> Estimate:
+    """Fit the named parameters by least squares, or robustly: soft_l1, the wild points of sweeps left out.
+
+    soft_l1 minimises the sum of 2 C^2 (sqrt(1 + (z/C)^2) - 1) over the distances z of the points in units of noise.
+    The covariance is that of least squares with all weights at (E psi')^2/E psi^2 of normal noise, psi the loss's
+    slope. Wild rows of loops have no weight from the start, see `drive`.
+    """
+    if not robust:
+        solution = solve(model, terms, names, bounds)
+        wild = tuple(wild_points(term, solution.model) for term in terms)
+        return Estimate(solution, tuple(terms), tuple(terms), wild)
+    for _ in range(_MOST_ROUNDS):
+        wild = tuple(wild_points(term, model) for term in terms)
+        kept = tuple(_without(term, rows) for term, rows in zip(terms, wild, strict=True))
+        solution = solve(model, [_softened(term, model) for term in kept], names, bounds)
+        before = solution.coordinates.point(model.values)
+        moved = (solution.coordinates.point(solution.model.values) - before) @ solution.jacobian
+        model = solution.model
+        if float(moved @ moved) < _SETTLED**2:
+            weighed = tuple(term.weighted(np.full(_points(term), _efficiency(_parts(term)))) for term in kept)
+            return Estimate(solution, kept, weighed, wild)
+    raise FitError(
+        "the robust fit does not settle",
+        found=f"{_MOST_ROUNDS} rounds of reweighting",
+        hint="look at the rows that --loss linear warns of, and take them out of the file",
+    )
+
+
+def wild_points(term: Term, model: Model) -> Array:
+    """Points that lie farther off the model than noise reaches, and as far off their neighbours, in the term's order.
+
+    Where the same point was repeated, it must stand out from its repeats as well: what all of them do is no fault of
+    one row.
+    """
+    if isinstance(term, LoopTerm):
+        return term.drive.wild["force"].rows
+    deviation = term.deviation(model)
+    count = deviation.size
+    local = np.zeros_like(deviation)
+    for first, last in pairwise([*term.block_starts.tolist(), count]):
+        rows = np.arange(last - first)
+        parts = (from_neighbours(part[first:last], rows, _WINDOW) for part in (deviation.real, deviation.imag))
+        real, imag = parts
+        local[first:last] = real + 1j * imag
+    distance = term.apart(deviation)
+    reach = limit(count, 2, term.noise.scatter_freedom or np.inf) * _misfit(distance, 2)
+    rows = np.flatnonzero((distance > reach) & (term.apart(local, shared=False) > reach))
+    return rows[[_beside_repeats(term, local, row) > reach for row in rows.tolist()]] if rows.size else rows
+
+
+def _beside_repeats(term: SweepTerm, local: Array, row: int) -> float:
+    same = (term.frequency == term.frequency[row]) & (term.amplitude == term.amplitude[row])
+    same[row] = False
+    if not same.any():
+        return np.inf
+    middle = complex(np.median(local[same].real), np.median(local[same].imag))
+    return float(term.apart(local - middle, shared=False)[row])
+
+
+def _without(term: Term, rows: Array) -> Term:
+    """A sweep without some of its points."""
+    if isinstance(term, LoopTerm) or not rows.size:
+        return term
+    weight = np.ones(term.frequency.size)
+    weight[rows] = 0.0
+    return term.weighted(weight)
+
+
+def _softened(term: Term, model: Model) -> Term:
+    distance = term.distance(model)
+    scale = _SOFT * _misfit(distance[distance > 0.0] * np.sqrt(_parts(term)), _parts(term))
+    return term.weighted(1.0 / np.sqrt(1.0 + (distance / scale) ** 2))
+
+
+def _parts(term: Term) -> int:
+    """Numbers that make up a point."""
+    return 1 if isinstance(term, LoopTerm) else 2
+
+
+def _points(term: Term) -> int:
+    return term.size // _parts(term)
+
+
+def _misfit(distance: Array, parts: int) -> float:
+    """How far the bulk of all points lies off, over what noise alone makes; at least 1."""
+    if not distance.size:
+        return 1.0
+    return max(1.0, float(np.median(distance) / np.sqrt(chdtri(parts, 0.5))))
+
+
+@lru_cache(maxsize=4)
+def _efficiency(parts: int) -> float:
+    """(E psi')^2/E psi^2 of soft_l1 under normal noise of so many parts a point."""
+    z = np.linspace(0.0, 12.0, 4001)[1:]
+    density = z ** (parts - 1) * np.exp(-(z**2) / 2.0)
+    density /= density.sum()
+    ratio = z**2 / (parts * _SOFT**2)
+    weight = 1.0 / np.sqrt(1.0 + ratio)
+    slope = density @ (weight - ratio / parts * weight**3)
+    return float(slope**2 * parts / (density @ (weight * z) ** 2))
+
+
+def _listed(term: Term, rows: Array, model: Model) -> Iterator[Outlier]:
+    file = str(term.source.file) if term.source else None
+    if isinstance(term, LoopTerm):
+        for column, (wild, off) in term.drive.wild.items():
+            for row, distance in zip(wild.tolist(), off.tolist(), strict=True):
+                yield Outlier(term.name, file, row + term.drive.first_row + 1, column, distance)
+    elif rows.size:
+        distance = term.apart(term.deviation(model)) / np.sqrt(2.0)
+        for row, off in sorted(zip((term.order[rows] + 1).tolist(), distance[rows].tolist(), strict=True)):
+            yield Outlier(term.name, file, row, "stiffness", off)
+
+
+def told(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
+    """A sentence on the outliers, the first of each test by row; none where there are none."""
+    if not outliers:
+        return []
+    rows: Mapping[str, list[int]] = {entry.place: [] for entry in outliers}
+    for entry in outliers:
+        rows[entry.place].append(entry.row)
+    places = "; ".join(f"{place} {_first(numbers)}" for place, numbers in rows.items())
+    count = f"{len(outliers)} point{'s lie' if len(outliers) > 1 else ' lies'} farther off than noise explains"
+    if robust:
+        return [f"{count}, left out of the fit: {places}"]
+    return [f"{count} and the fit follows them: {places}; --loss soft_l1 leaves them out"]
+
+
+def _first(rows: Sequence[int]) -> str:
+    shown = ", ".join(str(row) for row in rows[:_SHOWN])
+    more = f" and {len(rows) - _SHOWN} more" if len(rows) > _SHOWN else ""
+    return f"row{'s' if len(rows) > 1 else ''} {shown}{more}"

@@ -1,0 +1,208 @@
+"""Robust fits: wild points are found and listed, move no parameter, and clean tests have none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bushfit.campaign import Campaign
+from bushfit.fitting.data import Data
+from bushfit.fitting.drive import drive_of
+from bushfit.fitting.harmonics import MOST_ROWS
+from bushfit.fitting.outliers import limit
+from bushfit.fitting.procedures import fit_joint, fit_two_step
+from bushfit.geometry import Direction
+from bushfit.measurement import Loop, Sweep
+from bushfit.model import FIVE, Model
+from bushfit.results import Result
+from bushfit.schema import FitSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
+
+Rig = Callable[..., Campaign]
+SHARE = 0.03
+SOFT = FitSettings(loss="soft_l1")
+#: What becomes of a value, by kind of fault; "stuck" and "bursts" are done by hand.
+FACTORS = {"spikes": 3.0, "zeros": 0.0, "flips": -1.0}
+KINDS = (*FACTORS, "stuck", "bursts")
+
+
+def spoilt(values: np.ndarray, kind: str, rng: np.random.Generator) -> np.ndarray:
+    """3 % of a loop's rows made wild: one by one, three at a time, or as one stretch that repeats a value."""
+    wrong, count = values.copy(), round(SHARE * values.size)
+    if kind == "stuck":
+        start = rng.integers(0, values.size - count)
+        wrong[start : start + count] = wrong[start]
+    elif kind == "bursts":
+        for start in rng.choice(values.size - 3, count // 3, replace=False):
+            wrong[start : start + 3] = 3.0 * values[start : start + 3]
+    else:
+        wrong[rng.choice(values.size, count, replace=False)] *= FACTORS[kind]
+    return wrong
+
+
+def spoilt_sweep(sweep: Sweep, kind: str, rng: np.random.Generator) -> Sweep:
+    """3 % of a sweep's points made wild; a stiffness of nothing at all is refused by the reader."""
+    wrong = sweep.stiffness.copy()
+    rows = rng.choice(wrong.size, round(SHARE * wrong.size), replace=False)
+    wrong[rows] = wrong[rows - 1] if kind == "stuck" else wrong[rows] * ({**FACTORS, "bursts": 0.3}[kind] or 1e-3)
+    return replace(sweep, stiffness=wrong)
+
+
+def spoilt_campaign(campaign: Campaign, kind: str, seed: int) -> Campaign:
+    rng = np.random.default_rng(seed)
+    loops = tuple(replace(loop, force=spoilt(loop.force, kind, rng)) for loop in campaign.loops)
+    return replace(campaign, loops=loops, sweeps=tuple(spoilt_sweep(sweep, kind, rng) for sweep in campaign.sweeps))
+
+
+def robust(campaign: Campaign) -> Result:
+    return fit_joint(Data.of(replace(campaign, fit=SOFT)))
+
+
+def moved(one: Result, other: Result) -> np.ndarray:
+    """Difference of the five in standard errors of the second."""
+    pairs = [(one.model.values[n] - other.model.values[n], other.covariance.stderr(n) or np.nan) for n in FIVE]
+    return np.array([difference / error for difference, error in pairs])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("shared", [False, True])
+def test_three_percent_wild_points_move_no_parameter_by_a_standard_error(
+    rig: Rig,
+    paper_noise: SimulateSettings,
+    shared_noise: SimulateSettings,
+    paper_model: Model,
+    kind: str,
+    shared: bool,
+) -> None:
+    shifts, found = [], []
+    for seed in range(8):
+        clean = rig(paper_model, shared_noise if shared else paper_noise, seed)
+        before, dirty = fit_joint(Data.of(clean)), spoilt_campaign(clean, kind, seed)
+        after = robust(dirty)
+        shifts.append(moved(after, before))
+        found.append(len(after.outliers))
+        assert (after.quality.reduced_chi_square if after.quality else 0.0) == pytest.approx(1.0, abs=0.1)
+    worst = np.max(np.abs(shifts), axis=0)
+    shown = ", ".join(f"{name} {value:.2f}" for name, value in zip(FIVE, worst, strict=True))
+    print(f"{kind}, block errors {shared}: moved by at most {shown} standard errors; {np.mean(found):.0f} points found")
+    assert np.max(worst) < 1.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_wild_rows_do_not_spoil_the_bins_of_a_long_loop(
+    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, kind: str
+) -> None:
+    loops = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=12),)
+    sweep = SimulatedSweep(Direction.AXIAL, (1e-4, 5e-4), tuple(np.arange(5.0, 156.0, 25.0)))
+    clean = rig(paper_model, replace(paper_noise, loops=loops, sweeps=(sweep,)), 3)
+    assert clean.loops[0].force.size > MOST_ROWS
+    shift = moved(robust(spoilt_campaign(clean, kind, 3)), fit_joint(Data.of(clean)))
+    print(f"{kind}, {clean.loops[0].force.size} rows in bins: moved by {np.max(np.abs(shift)):.2f} standard errors")
+    assert np.max(np.abs(shift)) < 1.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_wild_displacement_does_not_disturb_the_motion(
+    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, kind: str
+) -> None:
+    for seed in range(4):
+        (loop,) = rig(paper_model, paper_noise, seed).loops
+        clean, rng = drive_of(loop), np.random.default_rng(seed)
+        drive = drive_of(replace(loop, displacement=spoilt(loop.displacement, kind, rng)))
+        print(f"{kind}: frequency {drive.frequency:.8f} Hz, amplitude {drive.amplitude / clean.amplitude - 1:+.1e}")
+        assert drive.frequency == pytest.approx(clean.frequency, rel=1e-4)
+        assert drive.amplitude == pytest.approx(clean.amplitude, rel=1e-3)
+        assert kind == "stuck" or drive.wild["displacement"].rows.size > 0.8 * SHARE * loop.force.size
+
+
+def test_clean_tests_have_no_outliers_and_the_same_answer(
+    rig: Rig, paper_noise: SimulateSettings, shared_noise: SimulateSettings, other_models: dict[str, Model]
+) -> None:
+    found, shifts = [], []
+    for model in other_models.values():
+        for noise in (paper_noise, shared_noise):
+            for seed in range(6):
+                campaign = rig(model, noise, seed)
+                before, after = fit_joint(Data.of(campaign)), robust(campaign)
+                found.append(len(before.outliers) + len(after.outliers))
+                shifts.append(moved(after, before))
+    worst = np.max(np.abs(shifts))
+    print(
+        f"{len(found)} clean campaigns: {np.count_nonzero(found)} with outliers; soft_l1 moves by {worst:.2f} at most"
+    )
+    assert np.count_nonzero(found) == 0
+    assert worst < 0.5
+
+
+@pytest.mark.parametrize("effect", ["bump_stop", "clearance", "fixture_resonance", "mullins_softening"])
+def test_physics_that_the_model_lacks_makes_no_outliers(
+    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, effect: str
+) -> None:
+    values = {
+        "bump_stop": {"bump_stop.gap": 3e-4, "bump_stop.stiffness": 3e5},
+        "clearance": {"clearance.delta": 2e-5},
+        "fixture_resonance": {
+            "fixture_resonance.mass": 0.05, "fixture_resonance.frequency": 170.0, "fixture_resonance.damping": 0.02,
+        },
+        "mullins_softening": {"mullins_softening.share": 0.2, "mullins_softening.cycles": 1.0},
+    }[effect]  # fmt: skip
+    result = fit_joint(Data.of(rig(paper_model.with_effect(effect, values), paper_noise, 1)))
+    print(f"{effect}: reduced chi-square {result.quality and result.quality.reduced_chi_square:.3g}")
+    assert result.outliers == ()
+
+
+def test_outliers_are_listed_by_file_and_row_and_told(
+    rig: Rig, paper_noise: SimulateSettings, paper_model: Model
+) -> None:
+    campaign = rig(paper_model, paper_noise, 0)
+    sweep, loop = campaign.sweeps[0], campaign.loops[0]
+    stiffness, force = sweep.stiffness.copy(), loop.force.copy()
+    stiffness[[4, 70]] *= 1.1
+    force[123] *= -1.0
+    dirty = replace(campaign, loops=(replace(loop, force=force),), sweeps=(replace(sweep, stiffness=stiffness),))
+    linear, soft = fit_joint(Data.of(dirty)), robust(dirty)
+    places = [(entry.test, entry.row, entry.column) for entry in soft.outliers]
+    print(*linear.warnings[:1], *soft.warnings[:1], sep="\n")
+    assert places == [("loop_axial_1", 124, "force"), ("sweep_axial", 5, "stiffness"), ("sweep_axial", 71, "stiffness")]
+    assert all(entry.distance > 5.0 for entry in soft.outliers)
+    assert [(entry.test, entry.row) for entry in linear.outliers] == [place[:2] for place in places]
+    assert any("--loss soft_l1" in line and "rows 5, 71" in line for line in linear.warnings)
+    assert any("left out of the fit" in line and "row 124" in line for line in soft.warnings)
+    assert Result.from_document(soft.to_document()).outliers == soft.outliers
+
+
+def test_without_repeats_a_wild_point_is_found(rig: Rig, paper_noise: SimulateSettings, paper_model: Model) -> None:
+    campaign = rig(paper_model, replace(paper_noise, repeats=1), 2)
+    stiffness = campaign.sweeps[0].stiffness.copy()
+    stiffness[[5, 40]] *= np.array([3.0, 0.4])
+    dirty = replace(campaign, sweeps=(replace(campaign.sweeps[0], stiffness=stiffness), *campaign.sweeps[1:]))
+    shift = moved(robust(dirty), fit_joint(Data.of(campaign)))
+    assert [entry.row for entry in robust(dirty).outliers] == [6, 41]
+    assert np.max(np.abs(shift)) < 1.0
+
+
+def test_the_two_step_procedure_is_robust_too(rig: Rig, paper_noise: SimulateSettings, paper_model: Model) -> None:
+    campaign = rig(paper_model, paper_noise, 5)
+    before = fit_two_step(Data.of(campaign)).result
+    after = fit_two_step(Data.of(replace(spoilt_campaign(campaign, "spikes", 5), fit=SOFT))).result
+    shift = moved(after, before)
+    print(f"two-step, spikes: moved by {np.max(np.abs(shift)):.2f} standard errors")
+    assert np.max(np.abs(shift)) < 1.0
+
+
+def test_the_limit_grows_with_the_rows_and_with_what_is_not_known() -> None:
+    assert limit(1, 1, np.inf) == pytest.approx(2.5758, rel=1e-3)
+    assert limit(10_000, 2, np.inf) == pytest.approx(np.sqrt(2.0 * np.log(1e6)), rel=1e-3)
+    assert limit(100, 2, 10) > 1.5 * limit(100, 2, 1000)
+
+
+def test_a_loop_of_few_rows_keeps_its_corners(paper_model: Model) -> None:
+    """Forty rows a cycle of a triangle: its corners stand out from their neighbours, and are no outliers."""
+    phase = np.arange(120) / 40.0
+    triangle = 1e-3 * (2.0 / np.pi) * np.arcsin(np.sin(2.0 * np.pi * phase))
+    noise = np.random.default_rng(0).standard_normal((2, 120)) * 1e-3
+    loop = Loop("l", Direction.AXIAL, phase / 0.1, triangle + 1e-3 * noise[0], 460.0 * (1e3 * triangle + noise[1]))
+    shifted = replace(loop, force=np.roll(loop.force, -1))
+    assert all(found.rows.size == 0 for found in drive_of(shifted).wild.values())
