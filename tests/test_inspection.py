@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bushfit.errors import FitError
+from bushfit.errors import BushfitError, FitError
 from bushfit.geometry import Direction
 from bushfit.inspection.draft import file_text
 from bushfit.inspection.labels import labelled
@@ -317,6 +317,50 @@ def test_a_history_points_to_reduce(root: Path) -> None:
     assert "bushfit reduce" in file_text(seen, root)
     assert tomllib.loads(file_text(seen, root)) == {}
     assert seen.looked.facts["frequencies"] == "5, from 10 to 155 Hz"
+
+
+def damaged(values: np.ndarray, kind: int, random: np.random.Generator) -> np.ndarray:
+    """Rows of a file cut out, thinned, mixed up, or with a column that is constant, noisy, coarse or scaled."""
+    column = random.integers(values.shape[1])
+    match kind:
+        case 0:
+            return values[: random.integers(1, 60)]
+        case 1:
+            return values[:: random.integers(2, 400)]
+        case 2:
+            return values[random.integers(values.shape[0]) :]
+        case 3:
+            return values[np.sort(random.integers(0, values.shape[0], random.integers(1, 300)))]
+        case 4:
+            values[:, column] = random.choice([0.0, 1.0, -5.0, 1e30])
+        case 5:
+            values[:, column] += random.standard_normal(values.shape[0]) * 10.0 ** random.integers(-6, 4)
+        case 6:
+            values[:, column] *= np.where(random.random(values.shape[0]) < 0.01, 10.0 ** random.integers(-3, 13), 1.0)
+        case 7:
+            values[:, 1:] = values[:, 1:].round(random.integers(0, 3))
+    return values
+
+
+def test_damaged_files_are_told_or_refused(root: Path, tmp_path: Path) -> None:
+    """Whatever a file holds: a look at it, or one of bushfit's errors; no warning of NumPy's, no other exception."""
+    files = "cmp_15961/loop_axial_1.csv", "cmp_15961/sweep_axial.csv", "cmp_15961_raw/stepped_sine_axial.csv"
+    told = refused = 0
+    for seed in range(96):
+        random = np.random.default_rng(seed)
+        name = ("cmp_15961/loop_axial_1.csv", "cmp_15961/sweep_axial.csv", "cmp_15961_raw/stepped_sine_axial.csv")[
+            seed % 3
+        ]
+        table = pd.read_csv(root / "data" / name)
+        rows = damaged(table.to_numpy(dtype=float).copy(), seed // 3 % 8, random)
+        pd.DataFrame(rows, columns=list(table)).to_csv(tmp_path / "axial.csv", index=False, float_format="%.9g")
+        try:
+            told += bool(file_text(inspect(tmp_path / "axial.csv", {})))
+        except BushfitError:
+            refused += 1
+    print(f"{told} told, {refused} refused")
+    assert told > 40
+    assert refused > 25
 
 
 def test_a_sweep_in_another_dialect(sweep: Sweep, tmp_path: Path) -> None:

@@ -145,6 +145,8 @@ def _level(sweep: Sweep, amplitude: float) -> _Level:
 
 def _without_wild(difference: Array) -> Array:
     """Differences of two repeats less single wild points, which are faults and no measure of the noise."""
+    if not difference.size:
+        return difference
     parts = _parts(difference)
     off = np.abs(parts - np.median(parts, axis=0))
     scale = MEDIAN_TO_SIGMA * np.median(off, axis=0)

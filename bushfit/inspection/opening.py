@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -180,7 +181,8 @@ def _look(measured: Loop, file: Path) -> tuple[Kind, Looked]:
     found = sines(measured)
     points = {(round(np.log(frequency), 2), round(np.log(amplitude), 1)) for frequency, amplitude, _ in found}
     if len(points) > 1 or any(frequency > _QUASI_STATIC for frequency, *_ in found):
-        return "history", _look_at_history(measured, file)
+        with suppress(MeasurementError):  # no steady sine after all
+            return "history", _look_at_history(measured, file)
     return "loop", look_at_loop(measured, file)
 
 

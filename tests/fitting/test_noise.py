@@ -73,6 +73,13 @@ def test_a_noisier_level_keeps_noise_of_its_own(noisy_sweep: Callable[..., Sweep
     assert len(set(same.values())) == 1
 
 
+def test_repeats_without_a_common_frequency() -> None:
+    frequency = np.array([5.0, 15.0, 25.0, 35.0, 45.0, 55.0, 65.0, 75.0])
+    stiffness = 6e5 * frequency**0.05 * np.exp(0.1j)
+    sweep = Sweep("x", Direction.AXIAL, frequency, np.full(8, 1e-4), stiffness, np.array([1, 2] * 4))
+    assert sweep_noise([sweep]).origin == "assumed"
+
+
 def test_missing_points_do_not_matter(noisy_sweep: Callable[..., Sweep]) -> None:
     whole = noisy_sweep(3, 5e-3, 4e-3, 3e-3)
     keep = np.random.default_rng(0).random(whole.frequency.size) > 0.15
