@@ -24,7 +24,7 @@ from bushfit.numerals import Numerals
 #: In SI; far beyond every rig, and its square is still a number.
 LARGEST = 1e100
 #: Bytes that are read at a time.
-_PIECE = 1 << 20
+_PIECE = 1 << 22
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 #: Other signs than ASCII that, inside a number, part thousands.
 _SEPARATORS = ("\u2019", "\u00a0", "\u2009", "\u202f")

@@ -93,9 +93,8 @@ def test_a_loop_of_ten_million_rows(benchmark: BenchmarkFixture, long_loop: tupl
     whole = benchmark.pedantic(run, (BUSHFIT, file, times), rounds=1)
     print(f"\n{rows} rows, {file.stat().st_size / 1e6:.0f} MB")
     for name, figures in {**libraries, "bushfit: read, check, fit": whole}.items():
-        print(
-            f"  {name:26} {figures['seconds']:.2f} s, {figures['cpu']:.2f} s of both cores, peak {figures['peak']:.2f} GiB"
-        )
+        seconds, cpu, peak = (figures[key] for key in ("seconds", "cpu", "peak"))
+        print(f"  {name:26} {seconds:.2f} s, {cpu:.2f} s of both cores together, peak {peak:.2f} GiB")
     ratio = whole["seconds"] / min(figures["seconds"] for figures in libraries.values())
     print(f"  bushfit over the fastest: {ratio:.2f} times the time")
     benchmark.extra_info["over the fastest reader"] = ratio
