@@ -10,9 +10,11 @@ from __future__ import annotations
 
 import codecs
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from bushfit.errors import MeasurementError
+from bushfit.files import Bytes
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -20,14 +22,14 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
-_CHUNK = 1 << 24
+_CHUNK = 1 << 20
 _SAMPLE = 1 << 16
 _HIGH_RUN = re.compile(rb"[\x80-\xff]+")
 #: Two bytes of GB2312: its punctuation and its 3755 commonest characters. Western accents make few such pairs.
 _COMMON_CHINESE = re.compile(rb"(?:[\xa1-\xa3\xb0-\xd7][\xa1-\xfe])+")
 
 
-def to_utf8(data: bytes, file: Path, stated: str | None = None) -> tuple[bytes, str]:
+def to_utf8(data: Bytes, file: Path, stated: str | None = None) -> tuple[Bytes, str]:
     """A text as UTF-8 without byte order mark, and the encoding it had.
 
     Args:
@@ -38,8 +40,9 @@ def to_utf8(data: bytes, file: Path, stated: str | None = None) -> tuple[bytes, 
     Raises:
         MeasurementError: no text, or not in the encoding stated.
     """
-    if data.isascii() and stated is None and 0 not in data:
+    if stated is None and data.find(b"\0") < 0 and all(part.isascii() for part in _parts(data)):
         return data, "utf-8"
+    data = data[:]
     encoding = stated or detect(data)
     if encoding in ("utf-8", "utf-8-sig"):
         without_mark = data.removeprefix(codecs.BOM_UTF8)
@@ -58,6 +61,10 @@ def to_utf8(data: bytes, file: Path, stated: str | None = None) -> tuple[bytes, 
             expected='a name such as "utf-8", "utf-16", "cp1252", "latin-1" or "gb18030"',
         ) from None
     return text.removeprefix("\ufeff").encode(), encoding
+
+
+def _parts(data: Bytes) -> Iterator[bytes]:
+    return (data[start : start + _CHUNK] for start in range(0, len(data), _CHUNK))
 
 
 def detect(data: bytes) -> str:
@@ -88,11 +95,11 @@ def _not_utf8(data: bytes) -> int | None:
     if (zero := data.find(0)) >= 0:
         return zero
     decoder = codecs.getincrementaldecoder("utf-8")()
-    for start in range(0, len(data), _CHUNK):
+    for number, part in enumerate(_parts(data)):
         try:
-            decoder.decode(data[start : start + _CHUNK], final=start + _CHUNK >= len(data))
+            decoder.decode(part, final=(number + 1) * _CHUNK >= len(data))
         except UnicodeDecodeError as error:
-            return min(start + error.start, len(data) - 1)
+            return min(number * _CHUNK + error.start, len(data) - 1)
     return None
 
 

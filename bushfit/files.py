@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import mmap
+from collections.abc import Callable
 from difflib import get_close_matches
 from pathlib import Path
+from typing import TypeVar
 
 from bushfit.errors import BushfitError
 
 #: A loop of 10 million rows has a tenth of this.
 _LARGEST_BYTES = 4 << 30
+
+
+#: A large file is looked at where the system keeps it, not copied.
+Bytes = bytes | mmap.mmap
+_AnyBytes = TypeVar("_AnyBytes", bytes, Bytes)
+_LARGE, _HEAD = 1 << 24, 1 << 16
 
 
 def read_bytes(
@@ -25,6 +34,28 @@ def read_bytes(
     Raises:
         kind: the file is missing, no regular file, not readable, empty, or too large.
     """
+    return _checked(file, kind, largest, hint, Path.read_bytes)
+
+
+def view_bytes(file: Path, kind: type[BushfitError]) -> Bytes:
+    """The bytes of a file that may be large.
+
+    Raises:
+        kind: as `read_bytes`.
+    """
+    return _checked(file, kind, _LARGEST_BYTES, "thin it out", _view)
+
+
+def _view(file: Path) -> Bytes:
+    with file.open("rb") as stream:
+        if file.stat().st_size < _LARGE:
+            return stream.read()
+        return mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
+
+
+def _checked(
+    file: Path, kind: type[BushfitError], largest: int, hint: str, read: Callable[[Path], _AnyBytes]
+) -> _AnyBytes:
     try:
         if not file.exists():
             raise _missing(file, kind)
@@ -34,10 +65,10 @@ def read_bytes(
         if (size := file.stat().st_size) > largest:
             limit = f"at most {largest} bytes"
             raise kind("the file is too large", file=file, found=f"{size} bytes", expected=limit, hint=hint)
-        data = file.read_bytes()
+        data = read(file)
     except OSError as error:
         raise kind("the file cannot be read", file=file, found=error.strerror or str(error)) from error
-    if not data or data.isspace():
+    if (data[:_HEAD].isspace() and data[:].isspace()) or not data:
         raise kind("the file is empty", file=file, expected="text", hint="export it again")
     return data
 

@@ -12,22 +12,26 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import islice, pairwise
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from bushfit.encoding import to_utf8
+from bushfit.files import Bytes
 from bushfit.layout import HEAD, MOST_LINES, Layout, Line, is_comment, split
 from bushfit.measurement import Floats
 from bushfit.numerals import Numerals
 
+if TYPE_CHECKING:
+    from _typeshed import WriteableBuffer
+
 #: In SI; far beyond every rig, and its square is still a number.
 LARGEST = 1e100
-#: Bytes that are read at a time.
-_PIECE = 1 << 22
+#: Bytes that are read at a time, in columns and in lines.
+_PIECE, _BUFFER = 1 << 21, 1 << 16
 _LINE_END = re.compile(rb"\r\n|\n|\r")
-#: Other signs than ASCII that, inside a number, part thousands.
-_SEPARATORS = ("\u2019", "\u00a0", "\u2009", "\u202f")
+#: Signs that, inside a number, part thousands.
+_SEPARATORS = ("'", "\u2019", "\u00a0", "\u2009", "\u202f")
 _GROUP_BY_BLANK = re.compile(rb"\d \d{3}(?!\d)")
 
 
@@ -65,12 +69,12 @@ class Source(Protocol):
 class Text:
     """A text: its bytes in UTF-8, and the encoding they had."""
 
-    data: bytes
+    data: Bytes
     encoding: str | None
     sheet: str | None = None
 
     @classmethod
-    def open(cls, data: bytes, file: Path, encoding: str | None) -> Text:
+    def open(cls, data: Bytes, file: Path, encoding: str | None) -> Text:
         """Decode a text.
 
         Raises:
@@ -84,9 +88,7 @@ class Text:
 
     def lines(self, after: int) -> Iterator[Line]:
         """All filled lines after a line."""
-        start = io.BytesIO(self.data)
-        start.seek(self._offset(after))
-        return _lines(start, after)
+        return _lines(io.BufferedReader(_View(self.data, self._offset(after)), _BUFFER), after)
 
     def may_have_comma(self, layout: Layout) -> bool:
         """Whether cells below the header may have a comma in them."""
@@ -97,7 +99,7 @@ class Text:
         offset = self._offset(layout.lines_before_data)
         if self.may_have_comma(layout) if decimal == "." else self._has(".", offset):
             return True
-        if self._has("'", offset) or (not self.data.isascii() and any(self._has(sign, offset) for sign in _SEPARATORS)):
+        if self._has("'", offset) or (any(self._has(sign, offset) for sign in _SEPARATORS)):
             return True
         return layout.delimiter != " " and self._has(" ", offset) and bool(_GROUP_BY_BLANK.search(self.data, offset))
 
@@ -156,7 +158,23 @@ class Text:
         return 0 if after == 0 else ends[-1] if len(ends) == after else len(self.data)
 
 
-def _lines(data: io.BytesIO, after: int) -> Iterator[Line]:
+class _View(io.RawIOBase):
+    """The bytes of a file from a place on, as a stream that copies nothing ahead."""
+
+    def __init__(self, data: Bytes, start: int) -> None:
+        self._rest = memoryview(data)[start:]
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: WriteableBuffer) -> int:
+        place = memoryview(buffer)
+        count = min(len(place), len(self._rest))
+        place[:count], self._rest = self._rest[:count], self._rest[count:]
+        return count
+
+
+def _lines(data: io.BytesIO | io.BufferedReader, after: int) -> Iterator[Line]:
     for number, line in enumerate(io.TextIOWrapper(data, encoding="utf-8", errors="replace"), start=after + 1):
         if line.strip(" \t\r\n,;|"):
             yield Line(number, line.rstrip("\n"))

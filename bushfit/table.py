@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from bushfit import units
 from bushfit.errors import MeasurementError, UnitError
-from bushfit.files import read_bytes
+from bushfit.files import Bytes, view_bytes
 from bushfit.headers import AmplitudeConvention, Vocabulary, split_convention
 from bushfit.layout import DELIMITERS, Layout, find_layout, fits
 from bushfit.measurement import Floats
@@ -113,7 +113,7 @@ class Table:
             UnitError: two different units for one column.
         """
         stated = stated or FileFormat()
-        data = read_bytes(file, MeasurementError)
+        data = view_bytes(file, MeasurementError)
         checksum = _checksum(data)
         vocabulary = Vocabulary(names, columns or {})
 
@@ -125,7 +125,7 @@ class Table:
             source: Source
             if is_workbook(data):
                 source = open_sheet(
-                    data, file, stated.sheet, lambda sheet: len(vocabulary.roles(lay_out(sheet).headers)) > 1
+                    data[:], file, stated.sheet, lambda sheet: len(vocabulary.roles(lay_out(sheet).headers)) > 1
                 )
             elif stated.sheet:
                 raise MeasurementError(
@@ -433,7 +433,7 @@ class Table:
         )
 
 
-def _checksum(data: bytes) -> Future[str]:
+def _checksum(data: Bytes) -> Future[str]:
     """SHA-256 of a file's bytes, of large ones in a thread."""
     if len(data) >= _LARGE:
         with_thread = ThreadPoolExecutor(max_workers=1)
@@ -445,7 +445,7 @@ def _checksum(data: bytes) -> Future[str]:
     return done
 
 
-def _sha256(data: bytes) -> str:
+def _sha256(data: Bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 

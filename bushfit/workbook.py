@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bushfit.errors import MeasurementError
+from bushfit.files import Bytes
 from bushfit.source import Sheet
 
 if TYPE_CHECKING:
@@ -27,9 +28,9 @@ _ROW, _CELL = re.compile(rb"""<(?:\w+:)?row\b[^>]*?\sr=["'](\d+)"""), re.compile
 _LONGEST_TAG = 256
 
 
-def is_workbook(data: bytes) -> bool:
+def is_workbook(data: Bytes) -> bool:
     """Whether a file is a workbook by its first bytes, or another archive."""
-    return data.startswith((_ZIP, _OLD))
+    return data[: len(_ZIP)] in (_ZIP, _OLD)
 
 
 def open_sheet(data: bytes, file: Path, name: str | None, is_usable: Callable[[Sheet], bool]) -> Sheet:
