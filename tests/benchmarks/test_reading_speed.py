@@ -56,17 +56,13 @@ BUSHFIT = (
 )
 
 
-def run(program: tuple[str, str], file: Path, times: int) -> dict[str, float]:
-    """The fastest of some runs."""
+def run(program: tuple[str, str], file: Path) -> dict[str, float]:
+    """One run in a process of its own."""
     code = _WHOLE.format(imports=program[0], work=program[1])
-    outputs = [
-        subprocess.run([sys.executable, "-c", code, str(file)], check=True, capture_output=True, env=os.environ).stdout
-        for _ in range(times)
-    ]
-    found: list[dict[str, float]] = [
-        json.loads(output.splitlines()[-1]) for output in outputs
-    ]  # DuckDB draws a progress bar
-    return min(found, key=lambda one: one["seconds"])
+    arguments = [sys.executable, "-c", code, str(file)]
+    output = subprocess.run(arguments, check=True, capture_output=True, env=os.environ).stdout
+    figures: dict[str, float] = json.loads(output.splitlines()[-1])  # DuckDB draws a progress bar
+    return figures
 
 
 @pytest.fixture
@@ -88,17 +84,21 @@ def long_loop(paper_model: Model, tmp_path: Path, benchmark: BenchmarkFixture) -
 
 def test_a_loop_of_ten_million_rows(benchmark: BenchmarkFixture, long_loop: tuple[Path, int]) -> None:
     file, rows = long_loop
-    times = 1 if benchmark.disabled else 3
-    libraries = {name: run(program, file, times) for name, program in LIBRARIES.items()}
-    whole = benchmark.pedantic(run, (BUSHFIT, file, times), rounds=1)
+    programs = {**LIBRARIES, "bushfit: read, check, fit": BUSHFIT}
+    rounds = [{name: run(program, file) for name, program in programs.items()}]
+    if not benchmark.disabled:  # in turn, so that what else the machine does meets all alike
+        rounds += [{name: run(program, file) for name, program in programs.items()} for _ in range(4)]
+    benchmark.pedantic(run, (BUSHFIT, file), rounds=1)
+    best = {name: min((one[name] for one in rounds), key=lambda figures: figures["seconds"]) for name in programs}
     print(f"\n{rows} rows, {file.stat().st_size / 1e6:.0f} MB")
-    for name, figures in {**libraries, "bushfit: read, check, fit": whole}.items():
+    for name, figures in best.items():
         seconds, cpu, peak = (figures[key] for key in ("seconds", "cpu", "peak"))
         print(f"  {name:26} {seconds:.2f} s, {cpu:.2f} s of both cores together, peak {peak:.2f} GiB")
-    ratio = whole["seconds"] / min(figures["seconds"] for figures in libraries.values())
-    print(f"  bushfit over the fastest: {ratio:.2f} times the time")
+    whole = best.pop("bushfit: read, check, fit")
+    ratio, of_cores = (whole[key] / min(figures[key] for figures in best.values()) for key in ("seconds", "cpu"))
+    print(f"  bushfit over the fastest: {ratio:.2f} times the time, {of_cores:.2f} times the work of both cores")
     benchmark.extra_info["over the fastest reader"] = ratio
-    assert {figures["found"] for figures in libraries.values()} == {rows}
+    assert {figures["found"] for figures in best.values()} == {rows}
     assert whole["peak"] < 2.0
 
 
