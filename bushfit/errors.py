@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 #: What was found is quoted up to here.
 _LONGEST_QUOTE = 300
+_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 
 class BushfitError(Exception):
@@ -40,15 +42,20 @@ class BushfitError(Exception):
 
     def __str__(self) -> str:
         where = ", ".join(part for part in (str(self.file) if self.file else None, self.place) if part)
-        text = f"{where}: {self.problem}" if where else self.problem
+        lines = [_printable(f"{where}: {self.problem}" if where else self.problem)]
         for label, value in (("found", self.found), ("expected", self.expected), ("try", self.hint)):
             if value:
-                text += f"\n  {label}: {value}"
-        return text
+                lines.append(f"  {label}: {_printable(value)}")
+        return "\n".join(lines)
 
     def __reduce__(self) -> tuple[object, ...]:
         state = {key: getattr(self, key) for key in ("file", "place", "found", "expected", "hint")}
         return _rebuild, (type(self), self.problem, state)
+
+
+def _printable(text: str) -> str:
+    """What a file holds may not steer the terminal that shows it."""
+    return _CONTROL.sub(lambda character: character[0].encode("unicode_escape").decode(), text)
 
 
 def _rebuild(kind: type[BushfitError], problem: str, state: dict[str, str | None]) -> BushfitError:

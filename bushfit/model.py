@@ -85,7 +85,7 @@ class Model:
         object.__setattr__(self, "effects", tuple(self.effects))
         object.__setattr__(self, "values", MappingProxyType(dict(self.values)))
         known = self.parameters
-        for name in known.keys() | self.values.keys():
+        for name in dict.fromkeys([*known, *self.values]):
             if name not in self.values:
                 raise ModelError("a parameter has no value", place=name, expected=f"a number [{known[name].unit}]")
             if name not in known:

@@ -12,6 +12,7 @@ from pydantic import Field
 
 from bushfit.errors import ModelError
 from bushfit.files import read_utf8
+from bushfit.schema import Name
 from bushfit.toml import check_tables
 
 #: A hundred times what a model with every effect of the library takes.
@@ -25,7 +26,7 @@ Interval = tuple[Number, Number]
 
 @dataclass(frozen=True)
 class BushingEntry:
-    name: Text
+    name: Name
     inner_radius_m: Number
     outer_radius_m: Number
     length_m: Number

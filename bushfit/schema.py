@@ -169,6 +169,8 @@ def _roles(known: Collection[str]) -> BeforeValidator:
 
 
 Text = Annotated[str, Field(min_length=1)]
+#: What tables, plots, folders and the terminal are headed with.
+Name = Annotated[str, Field(strict=True, min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]*$")]
 Length = Annotated[float, _si("m"), Field(gt=0)]
 Angle = Annotated[float, _si("rad"), Field(gt=0)]
 Frequency = Annotated[float, _si("Hz"), Field(gt=0)]
@@ -182,7 +184,7 @@ Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
 class BushingTable:
     """[bushing]: geometry [m]."""
 
-    name: Text
+    name: Name
     inner_radius: Length
     outer_radius: Length
     length: Length
@@ -312,7 +314,7 @@ class CampaignFile:
     __pydantic_config__ = ConfigDict(extra="forbid")
 
     bushing: BushingTable
-    name: Text | None = None
+    name: Name | None = None
     loops: tuple[LoopFile, ...] = ()
     sweeps: tuple[SweepFile, ...] = ()
     fit: Annotated[FitSettings, converted(_fit_table)] = field(default_factory=FitSettings)

@@ -32,6 +32,8 @@ _SHAPES = {
     "too_short": "at least one value",
     "string_type": "a text in quotes",
     "string_too_short": "a text that is not empty",
+    "string_pattern_mismatch": "one line without control characters",
+    "string_unicode": "text in Unicode",
     "bool_type": "true or false",
     "int_type": "a whole number",
     "float_type": "a number",
@@ -131,7 +133,7 @@ def _complaint(detail: ErrorDetails, schema: type, kind: type[BushfitError]) -> 
         error = kind("a key is missing", expected=f"{key} = ..." if isinstance(key, str) else "a further value")
     else:
         found = _WORDS.get(str(detail["input"]), str(detail["input"]))
-        expected = _SHAPES.get(detail["type"], detail["msg"].removeprefix("Input should be "))
+        expected = _SHAPES.get(detail["type"], re.sub("^(Input|String) should (be|have) ", "", detail["msg"]))
         error = kind("this value is not understood", found=found, expected=expected)
     error.place = re.sub(r"\.(\d+)", lambda index: f" #{int(index[1]) + 1}", place.replace("fit.parameters.", "fit."))
     return error

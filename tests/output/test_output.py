@@ -7,6 +7,8 @@ import stat
 from pathlib import Path
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from bushfit.errors import OutputError
 from bushfit.output import check_free, folder_name, write_files
@@ -94,3 +96,16 @@ def test_folder_names_never_lead_out(name: str, folder: str) -> None:
     assert folder_name(name).strip(".") == folder.strip(".")
     assert not {"/", "\\"} & set(folder_name(name))
     assert folder_name("x" * 500) == "x" * 60
+
+
+@given(st.text(max_size=300))
+@example("con")
+@example("Aux .txt")
+@example("../" * 50)
+def test_a_name_is_one_folder_on_every_system(name: str) -> None:
+    folder = folder_name(name)
+    assert (Path("base") / folder).parent == Path("base")
+    assert folder.strip(" .") == folder
+    assert 0 < len(folder.encode()) < 250
+    assert not set(folder) & set('/\\:*?"<>|\n')
+    assert folder.partition(".")[0].upper() not in {"CON", "PRN", "AUX", "NUL", "COM1", "LPT9"}
