@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 
 import atheris
@@ -10,5 +11,6 @@ with atheris.instrument_imports(include=["bushfit", "tomllib"]):
     from targets import ready
 
 if __name__ == "__main__":
-    atheris.Setup([sys.argv[0], *sys.argv[2:]], ready(sys.argv[1]))
+    again = shlex.join([sys.executable, *sys.argv[:2]])  # libFuzzer calls itself by this where it merges
+    atheris.Setup([again, *sys.argv[2:]], ready(sys.argv[1]))
     atheris.Fuzz()

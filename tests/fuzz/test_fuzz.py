@@ -24,7 +24,7 @@ def kept(name: str) -> list[bytes]:
 def test_the_corpus(name: str) -> None:
     run, inputs = ready(name), kept(name)
     print(f"{name}: {len(inputs)} inputs, {sum(map(len, inputs))} bytes")
-    assert len(inputs) >= 10
+    assert inputs
     for data in inputs:
         run(data)
 
