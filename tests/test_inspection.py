@@ -348,10 +348,7 @@ def test_damaged_files_are_told_or_refused(root: Path, tmp_path: Path) -> None:
     told = refused = 0
     for seed in range(96):
         random = np.random.default_rng(seed)
-        name = ("cmp_15961/loop_axial_1.csv", "cmp_15961/sweep_axial.csv", "cmp_15961_raw/stepped_sine_axial.csv")[
-            seed % 3
-        ]
-        table = pd.read_csv(root / "data" / name)
+        table = pd.read_csv(root / "data" / files[seed % 3])
         rows = damaged(table.to_numpy(dtype=float).copy(), seed // 3 % 8, random)
         pd.DataFrame(rows, columns=list(table)).to_csv(tmp_path / "axial.csv", index=False, float_format="%.9g")
         try:

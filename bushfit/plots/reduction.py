@@ -98,7 +98,7 @@ def _draw_points(pair: Sequence[Axes], reduction: Reduction, looks: dict[float, 
         axes.tick_params(labelbottom=False)
         readable(axes, np.array([step.frequency for step in steps]))
     handles = [look.handle(True) for look in looks.values()]
-    legend(pair[-1], handles, [f"{length * level:.4g} {unit}" for level in looks], "amplitude")
+    legend(pair[-1], handles, [f"{length * level:.3g} {unit}" for level in looks], "amplitude")
 
 
 def _draw_quality(pair: Sequence[Axes], reduction: Reduction, looks: dict[float, Style]) -> None:
