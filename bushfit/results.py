@@ -155,6 +155,7 @@ class Result:
         warnings: what a user must know before using the numbers.
         inputs: the files behind it.
         outliers: points that lie farther off than noise explains.
+        profile: 95 % intervals by profile likelihood, where they were asked for; None is an open end.
     """
 
     model: Model
@@ -165,6 +166,7 @@ class Result:
     warnings: tuple[str, ...] = ()
     inputs: tuple[Source, ...] = ()
     outliers: tuple[Outlier, ...] = ()
+    profile: Mapping[str, tuple[float | None, float | None]] = field(default_factory=dict)
 
     def interval(self, name: str) -> tuple[float, float] | None:
         """95 % interval of a parameter, within its bounds: symmetric in the logarithm for strictly positive ones."""
@@ -187,6 +189,8 @@ class Result:
             interval = self.interval(name)
             entry["stderr"] = self.covariance.stderr(name)
             entry["ci95"] = None if interval is None else list(interval)
+            if name in self.profile:
+                entry["profile95"] = list(self.profile[name])
             entry["vary"] = name in self.fitted
         document["covariance"] = {
             "names": list(self.covariance.names),
@@ -243,6 +247,11 @@ class Result:
                     for entry in document.get("provenance", {}).get("inputs", ())
                 ),
                 tuple(_outlier(entry) for entry in document.get("outliers", ())),
+                {
+                    name: _ends(entry["profile95"])
+                    for name, entry in document["parameters"].items()
+                    if entry.get("profile95") is not None
+                },
             )
         except KeyError as missing:
             raise ModelError("a key is missing", place=str(missing.args[0])) from None
@@ -265,6 +274,11 @@ def _outlier(entry: Mapping[str, Any]) -> Outlier:
         str(entry["column"]),
         float(entry["distance"]),
     )
+
+
+def _ends(values: Sequence[float | None]) -> tuple[float | None, float | None]:
+    low, high = (None if value is None else float(value) for value in values)
+    return low, high
 
 
 def _pair(values: Sequence[float]) -> tuple[float, float]:

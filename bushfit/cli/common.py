@@ -210,16 +210,18 @@ def new_table(title: str, *columns: str) -> Table:
 
 
 def parameter_table(title: str, result: Result) -> Table:
-    """The paper's Table 1 with uncertainty: value, standard error, 95 % interval, unit."""
-    table = new_table(title, "parameter", "value", "std error", "95 % interval", "unit")
+    """The paper's Table 1 with uncertainty: value, standard error, 95 % interval (by profile, if any), unit."""
+    kind = "95 % by profile" if result.profile else "95 % interval"
+    table = new_table(title, "parameter", "value", "std error", kind, "unit")
     for name, parameter in result.model.parameters.items():
-        value, stderr, interval = result.model.values[name], result.covariance.stderr(name), result.interval(name)
+        value, stderr = result.model.values[name], result.covariance.stderr(name)
+        interval = result.profile.get(name) or result.interval(name)
         digits = _digits(value, stderr)
         table.add_row(
             name if name in result.fitted else f"{name} (held)",
             number(value, digits),
             "" if stderr is None else number(stderr, 2),
-            "" if interval is None else " to ".join(number(end, digits) for end in interval),
+            "" if interval is None else " to ".join("open" if end is None else number(end, digits) for end in interval),
             "-" if parameter.unit == "1" else parameter.unit,
         )
     return table

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import Stage, cautions, covariance, measured_range, quality
 from bushfit.fitting.data import Data
+from bushfit.fitting.profile import profile95
 from bushfit.fitting.robust import Estimate, estimate, told
 from bushfit.fitting.solve import Coordinates, Solution
 from bushfit.fitting.starts import start_values
@@ -40,19 +41,31 @@ class TwoStep:
     result: Result
 
 
-def fit_joint(data: Data, *, effects: Sequence[str] = BASE, directions: Sequence[Direction] | None = None) -> Result:
+def fit_joint(
+    data: Data,
+    *,
+    effects: Sequence[str] = BASE,
+    directions: Sequence[Direction] | None = None,
+    profile: Callable[[str, int], None] | None = None,
+) -> Result:
     """All parameters of a model together, from loops and sweeps.
 
     Args:
         data: the campaign.
         effects: the model; the paper's three branches unless told.
         directions: tests to use; the axial ones by default, as in the paper.
+        profile: called with the name of each parameter when its profile likelihood is done, and how many are left;
+            None asks for none.
 
     Raises:
         FitError: no test in those directions, or data that cannot support the fit.
     """
-    terms = data.chosen(directions)
-    return _result(data, [_solve(data, terms, effects, {})])
+    found = _solve(data, data.chosen(directions), effects, {})
+    result = _result(data, [found])
+    if profile is None:
+        return result
+    intervals = profile95(result.model, result.fitted, found.minimised, result.covariance, data.bounds, profile)
+    return replace(result, profile=intervals)
 
 
 def fit_static(data: Data, springpot: Result | None = None) -> Result:

@@ -40,12 +40,14 @@ class Estimate:
     Args:
         solution: where it ended.
         terms: the data, outliers without weight where the loss leaves them out.
+        minimised: the same with the weights at which the solution is the least sum of squares.
         weighed: the same with the weights that give its covariance.
         wild: rows of each term that are wild, in the order of its data.
     """
 
     solution: Solution
     terms: tuple[Term, ...]
+    minimised: tuple[Term, ...]
     weighed: tuple[Term, ...]
     wild: tuple[Array, ...]
 
@@ -68,17 +70,18 @@ def estimate(
     if not robust:
         solution = solve(model, terms, names, bounds)
         wild = tuple(wild_points(term, solution.model) for term in terms)
-        return Estimate(solution, tuple(terms), tuple(terms), wild)
+        return Estimate(solution, tuple(terms), tuple(terms), tuple(terms), wild)
     for _ in range(_MOST_ROUNDS):
         wild = tuple(wild_points(term, model) for term in terms)
         kept = tuple(_without(term, rows) for term, rows in zip(terms, wild, strict=True))
-        solution = solve(model, [_softened(term, model) for term in kept], names, bounds)
+        softened = tuple(_softened(term, model) for term in kept)
+        solution = solve(model, softened, names, bounds)
         before = solution.coordinates.point(model.values)
         moved = (solution.coordinates.point(solution.model.values) - before) @ solution.jacobian
         model = solution.model
         if float(moved @ moved) < _SETTLED**2:
             weighed = tuple(term.weighted(np.full(_points(term), _efficiency(_parts(term)))) for term in kept)
-            return Estimate(solution, kept, weighed, wild)
+            return Estimate(solution, kept, softened, weighed, wild)
     raise FitError(
         "the robust fit does not settle",
         found=f"{_MOST_ROUNDS} rounds of reweighting",

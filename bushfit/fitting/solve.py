@@ -126,7 +126,7 @@ def solve(
     if points <= len(names):
         raise FitError("too few points for the fit", found=f"{points} points for {len(names)} parameters")
     coordinates = Coordinates.of(model, names)
-    low, high = _walls(coordinates, bounds or {})
+    low, high = walls(coordinates, bounds or {})
     inside = 1e-6 * (high - low)
     lifted = {name: value or model.parameters[name].bounds[0] for name, value in model.values.items()}
     start = np.clip(coordinates.point(lifted), low + inside, high - inside)
@@ -190,7 +190,7 @@ class _WallMetError(Exception):
     """A step leaves the bounds."""
 
 
-def _walls(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, Array]:
+def walls(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, Array]:
     """Lower and upper bound of each coordinate, (k,) each."""
     ends = []
     for name, parameter in zip(coordinates.names, coordinates.parameters, strict=True):

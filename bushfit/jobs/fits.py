@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -99,16 +99,22 @@ def _static_on_the_spot(data: Data) -> Result:
 
 @dataclass(frozen=True)
 class Fit:
-    """All parameters together: of the paper's branches and further effects, from the tests of some directions."""
+    """All parameters together: of the paper's branches and further effects, from the tests of some directions.
+
+    `profile`, where it is given, asks for profile likelihoods, and is called with each parameter that has one and
+    how many are left.
+    """
 
     directions: tuple[Direction, ...] = ()
     effects: tuple[str, ...] = ()
+    profile: Callable[[str, int], None] | None = None
 
     def names(self, campaign: Campaign, formats: Collection[str]) -> list[str]:
         return ["model.json", *artifact_names(tests_of(campaign), formats)]
 
     def run(self, data: Data) -> Fitted:
-        result = fit_joint(data, effects=(*BASE, *self.effects), directions=self.directions or None)
+        effects = (*BASE, *self.effects)
+        result = fit_joint(data, effects=effects, directions=self.directions or None, profile=self.profile)
         return Fitted("model", tests_of(data.campaign), data, (("joint fit", result),))
 
 

@@ -1,0 +1,102 @@
+"""Profile likelihood: the symmetric interval's twin where the data are good, honest where they leave a side open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bushfit.campaign import Campaign
+from bushfit.errors import FitError
+from bushfit.fitting.data import Data
+from bushfit.fitting.procedures import fit_joint
+from bushfit.geometry import Direction
+from bushfit.model import FIVE, Model
+from bushfit.results import Result
+from bushfit.schema import FitSettings, ParameterSetting, SimulatedLoop, SimulatedSweep, SimulateSettings
+
+SEEDS = 60
+FREQUENCIES = (5.0, 15.0, 45.0, 100.0, 155.0)
+
+
+def plan(largest: float, **noise: float) -> SimulateSettings:
+    """One loop at an amplitude [m], a sweep at a fifth and a half of it."""
+    return SimulateSettings(
+        repeats=3,
+        noise=5e-3,
+        force_noise=3e-3,
+        displacement_noise=2e-4,
+        loops=(SimulatedLoop(Direction.AXIAL, largest, 0.1, cycles=1),),
+        sweeps=(SimulatedSweep(Direction.AXIAL, (0.2 * largest, 0.5 * largest), FREQUENCIES),),
+        **noise,
+    )
+
+
+def profiled(campaign: Campaign) -> Result:
+    return fit_joint(Data.of(campaign), profile=lambda *_: None)
+
+
+def test_good_data_make_it_the_symmetric_interval(rig: Callable[..., Campaign], paper_model: Model) -> None:
+    told: list[tuple[str, int]] = []
+    data = Data.of(rig(paper_model, plan(1e-3), 1))
+    result = fit_joint(data, profile=lambda *done: told.append(done))
+    assert told == [(name, 4 - place) for place, name in enumerate(FIVE)]
+    assert fit_joint(data).profile == {}
+    assert fit_joint(data).to_document()["covariance"] == result.to_document()["covariance"]
+    for name in FIVE:
+        symmetric, profile = result.interval(name), result.profile[name]
+        assert symmetric is not None
+        off = (np.array(profile, dtype=float) - symmetric) / np.ptp(symmetric)
+        print(f"{name}: {symmetric}, by profile {profile}")
+        assert np.all(np.abs(off) < 0.05)
+
+
+def test_what_the_data_leave_open_stays_open(rig: Callable[..., Campaign], paper_model: Model) -> None:
+    """Tests that end at a tenth of eps_half show mu + sigma_fmax/eps_half alone: without friction that ever gives way,
+    all of the stiffness may be friction's."""
+    result = profiled(rig(paper_model, plan(2e-5), 0))
+    print(result.profile)
+    low, high = result.profile["mu"]
+    assert low is None
+    assert high is not None
+    assert high > paper_model.values["mu"]
+    for name in ("sigma_fmax", "eps_half"):
+        low, high = result.profile[name]
+        assert low is not None
+        assert high is None or high > 4.0 * low
+    assert None not in result.profile["alpha"]
+
+
+def test_profiles_are_kept_in_the_document(rig: Callable[..., Campaign], paper_model: Model) -> None:
+    result = profiled(rig(paper_model, plan(1e-3), 2))
+    again = Result.from_document(result.to_document())
+    assert again.profile == result.profile
+    open_end = replace(result, profile={"mu": (1.0, None)})
+    assert Result.from_document(open_end.to_document()).profile == {"mu": (1.0, None)}
+
+
+def test_a_single_parameter_has_no_profile(rig: Callable[..., Campaign], paper_model: Model) -> None:
+    held = {name: ParameterSetting(paper_model.values[name], vary=False) for name in FIVE[1:]}
+    campaign = replace(rig(paper_model, plan(1e-3), 0), fit=FitSettings(held))
+    with pytest.raises(FitError, match="two parameters or more"):
+        profiled(campaign)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("shared", [False, True], ids=["independent", "shared"])
+def test_profiles_hold_the_truth_as_often_as_they_say(
+    rig: Callable[..., Campaign], paper_model: Model, shared: bool
+) -> None:
+    noise = {"gain_error": 4e-3, "phase_error": 3.5e-3} if shared else {}
+    inside = []
+    for seed in range(SEEDS):
+        result = profiled(rig(paper_model, plan(1e-3, **noise), seed))
+        for name in FIVE:
+            low, high = result.profile[name]
+            truth = paper_model.values[name]
+            inside.append((low is None or low <= truth) and (high is None or truth <= high))
+    share, each = np.mean(inside), np.mean(np.reshape(inside, (SEEDS, -1)), axis=0)
+    print(f"profile intervals, block errors {shared}, {SEEDS} seeds: {share:.3f}, {dict(zip(FIVE, each, strict=True))}")
+    assert 0.93 <= share <= 0.97
