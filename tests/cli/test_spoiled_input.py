@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import re
 import subprocess
@@ -14,6 +15,7 @@ from unittest import mock
 import pytest
 from spoiled import FILES, ROWS, Spoiled
 
+from bushfit import disk
 from bushfit.cli import cli, main
 
 ERROR = re.compile(r"^(bushfit: error: |Error: )", re.MULTILINE)
@@ -46,9 +48,7 @@ def assert_refused(row: Spoiled, status: int, out: str, err: str) -> None:
         assert words in err, err
 
 
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
-def test_one_error_and_nothing_written(row: Spoiled, folder: Path) -> None:
-    before = lay_out(folder, row)
+def call(row: Spoiled) -> tuple[int, str, str]:
     out, err = io.StringIO(), io.StringIO()
     with (
         contextlib.redirect_stdout(out),
@@ -57,7 +57,13 @@ def test_one_error_and_nothing_written(row: Spoiled, folder: Path) -> None:
         pytest.raises(SystemExit) as left,
     ):
         main()
-    assert_refused(row, left.value.code, out.getvalue(), err.getvalue())
+    return int(left.value.code or 0), out.getvalue(), err.getvalue()
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
+def test_one_error_and_nothing_written(row: Spoiled, folder: Path) -> None:
+    before = lay_out(folder, row)
+    assert_refused(row, *call(row))
     assert {path.name for path in folder.iterdir()} == before
 
 
@@ -67,6 +73,20 @@ def test_the_same_of_the_installed_command(row: Spoiled, folder: Path) -> None:
     command = [sys.executable, "-W", "error", str(Path(sys.executable).with_name("bushfit")), *row.arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=False, encoding="utf-8")
     assert_refused(row, done.returncode, done.stdout, done.stderr)
+    assert {path.name for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize("command", ["predict", "simulate"])
+def test_a_disk_that_fills_up_after_the_work(command: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(files: list[int]) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(disk, "flush", full)
+    row = Spoiled(
+        command, (command, "model.json", "--json", "-q"), ("x: the results cannot be written", "free some space")
+    )
+    before = lay_out(folder, row)
+    assert_refused(row, *call(row))
     assert {path.name for path in folder.iterdir()} == before
 
 
