@@ -24,7 +24,7 @@ def kept(name: str) -> list[bytes]:
 def test_the_corpus(name: str) -> None:
     run, inputs = ready(name), kept(name)
     print(f"{name}: {len(inputs)} inputs, {sum(map(len, inputs))} bytes")
-    assert inputs
+    assert len(inputs) >= 10
     for data in inputs:
         run(data)
 
