@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +51,12 @@ class Covariance:
 
     def root(self) -> Array:
         """B with B B^T the covariance, so that |B^T slope| is a standard error however ill-conditioned it is."""
-        return _root(self.matrix)
+        return self._roots[0]
+
+    @cached_property
+    def _roots(self) -> list[Array]:
+        """Of the matrix, and of each spread."""
+        return [_root(part) for part in (self.matrix, *self.spread)]
 
     def half_width(self, slopes: Array) -> Array:
         """Half width of the 95 % interval of quantities with these slopes by parameter, (k, n) -> (n,).
@@ -59,8 +64,7 @@ class Covariance:
         Student's t with the effective degrees of freedom of Satterthwaite (1946): 2 v^2 over the variance of v, which
         is the sum of squares of what each spread adds to the quantity's variance v.
         """
-        variance = np.sum(np.square(self.root().T @ slopes), axis=0)
-        moved = [np.sum(np.square(_root(part).T @ slopes), axis=0) for part in self.spread]
+        variance, *moved = (np.sum(np.square(root.T @ slopes), axis=0) for root in self._roots)
         unsure = np.sqrt(np.sum(np.square(moved), axis=0)) if moved else np.zeros_like(variance)
         least = np.sqrt(2.0 / _MOST_FREEDOM)
         share = np.divide(unsure, variance, out=np.zeros_like(variance), where=variance > 0.0)

@@ -56,7 +56,7 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
         slope = jacobian(model, stage.terms, names)
         basis = np.linalg.qr(slope[own].T)[0]
         system[own] = basis.T @ slope.T
-        inflation = np.sqrt(_inflation(model, stage.terms, len(stage.names)))
+        inflation = np.sqrt(_inflation(*_reduced(model, stage.terms, len(stage.names))))
         root[own, own] = inflation * np.eye(len(stage.names))
         bases.append((own, inflation * basis.T))
         begin = own.stop
@@ -106,8 +106,7 @@ def _reduced(model: Model, terms: Sequence[Term], parameters: int) -> tuple[floa
     return float(residuals @ residuals) / freedom, freedom
 
 
-def _inflation(model: Model, terms: Sequence[Term], parameters: int) -> float:
-    reduced, freedom = _reduced(model, terms, parameters)
+def _inflation(reduced: float, freedom: int) -> float:
     return reduced if reduced > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else 1.0
 
 
@@ -173,10 +172,11 @@ def _pair_reason(one: str, other: str, model: Model, reach: Range) -> str:
 
 
 def _misfit(model: Model, terms: Sequence[Term], parameters: int) -> list[str]:
-    if _inflation(model, terms, parameters) == 1.0:
+    reduced, freedom = _reduced(model, terms, parameters)
+    if _inflation(reduced, freedom) == 1.0:
         return []
     return [
         "the model misses the data by more than their noise "
-        f"(reduced chi-square {_reduced(model, terms, parameters)[0]:.2g}): "
+        f"(reduced chi-square {reduced:.2g}): "
         "standard errors are scaled up; bushfit diagnose looks for what is missing"
     ]

@@ -144,9 +144,10 @@ def solve(
     def slopes(parameters: lmfit.Parameters) -> Array:
         return jacobian(at(parameters), terms, coordinates.names)
 
+    walls = list(zip(low.tolist(), high.tolist(), strict=True))
+
     def within(parameters: lmfit.Parameters) -> Array:
-        point = np.array([parameter.value for parameter in parameters.values()])
-        if np.any((point < low) | (point > high)):
+        if not all(least <= u.value <= most for u, (least, most) in zip(parameters.values(), walls, strict=True)):
             raise _WallMetError
         return misfit(parameters)
 

@@ -54,7 +54,7 @@ class LoopTerm:
     def size(self) -> int:
         return int(self.drive.force.size)
 
-    @property
+    @cached_property
     def counted(self) -> int:
         """Residuals that carry weight."""
         return int(np.count_nonzero(self.drive.weight))
@@ -307,7 +307,11 @@ class SweepTerm:
 
     def residual(self, model: Model, values: Values | None = None) -> Array:
         """(..., 2 n): all gain residuals, then all phase residuals."""
-        return self.whiten(self.deviation(model, values))
+        return self._residual(model) if values is None else self.whiten(self.deviation(model, values))
+
+    @_kept
+    def _residual(self, model: Model) -> Array:
+        return self.whiten(self.deviation(model))
 
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
         """(len(names), 2 n)"""

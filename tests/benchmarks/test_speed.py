@@ -1,32 +1,59 @@
-"""How fast, as ratios within one run:
+"""How fast, as ratios within one run, one table at the end:
 
-    pytest tests/benchmarks --benchmark-enable -s
+    pytest tests/benchmarks/test_speed.py --benchmark-enable -s
 
-In the ordinary test run each is called once, so that it cannot rot. No time is asserted; the ratios are printed.
+In the ordinary test run everything is called once, so that it cannot rot. No time is asserted; the table prints what
+was found and what is wanted. Times are processor times, the least of several taken in turns, so that what else the
+machine does weighs little.
 """
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.optimize import leastsq
 
-from bushfit import rig
 from bushfit.campaign import load_campaign
+from bushfit.diagnosis.hidden import hidden_campaign
+from bushfit.diagnosis.record import Settings
+from bushfit.diagnosis.workflow import diagnose
+from bushfit.effects import BASE, History
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import STATIC, fit_dynamic, fit_joint, fit_two_step
-from bushfit.fitting.solve import Coordinates, jacobian, residual
-from bushfit.fitting.terms import SweepTerm
+from bushfit.fitting.solve import Coordinates, jacobian, residual, solve
+from bushfit.fitting.starts import start_values
+from bushfit.fitting.terms import SweepTerm, Term, loop_terms, sweep_terms
 from bushfit.geometry import Direction
+from bushfit.measurement import Loop, Sweep
 from bushfit.model import FIVE, Model
+from bushfit.prediction import PAPER_AMPLITUDES, PAPER_FREQUENCIES, predict
 from bushfit.results import Result
+
+#: Cycles and steps of the stepped rig that keep it within 1e-4 of the steady state: m and alpha answer with ten times
+#: that.
+RUN_IN, STEPS = 10, 2048
+
+Rows = list[tuple[str, str, str]]
+
+
+@pytest.fixture(scope="module")
+def table() -> Iterator[Rows]:
+    """Rows of what, figure and target; printed once all are there."""
+    rows: Rows = []
+    yield rows
+    widths = [max(len(row[i]) for row in rows) for i in range(3)]
+    print()
+    for row in rows:
+        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
 
 
 @pytest.fixture(scope="module")
@@ -39,80 +66,60 @@ def static(data: Data) -> Result:
     return fit_two_step(data).result
 
 
-def seconds(work: Callable[[], Any], repeats: int) -> float:
-    """Least time of a call."""
-    times = []
+def seconds(works: Sequence[Callable[[], object]], repeats: int) -> list[float]:
+    """Least processor time of a call of each, taken in turns."""
+    least = [np.inf] * len(works)
     for _ in range(repeats):
-        begin = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - begin)
-    return min(times)
+        for number, work in enumerate(works):
+            begin = time.process_time()
+            work()
+            least[number] = min(least[number], time.process_time() - begin)
+    return least
 
 
-def by_time_stepping(term: SweepTerm, static: Result, start: dict[str, float]) -> dict[str, float]:
-    """The paper's dynamic fit: every residual puts every operating point on the rig, steps Eqs. 3 and 5 through a
-    run-in and a cycle, and locks in; MINPACK differences it. Run-in and steps are those that keep the rig within
-    1e-4 of the steady state, because m and alpha answer with ten times that."""
-    base = static.model
-
-    def misfit(point: np.ndarray) -> np.ndarray:
-        model = base.with_values({"m": float(np.exp(point[0])), "alpha": float(np.clip(point[1], 0.02, 1.0))})
-        points, where = np.unique(np.stack((term.frequency, term.amplitude)), axis=1, return_inverse=True)
-        stiffness = rig.dynamic_stiffness(model, term.direction, *points)
-        return term.whiten(stiffness[where.ravel()] / term.measured - 1.0)
-
-    best, _ = leastsq(misfit, [np.log(start["m"]), start["alpha"]], epsfcn=1e-6, xtol=1e-6, ftol=1e-8)
-    return {"m": float(np.exp(best[0])), "alpha": float(best[1])}
-
-
-def test_fit_dynamic_against_time_stepping(benchmark: BenchmarkFixture, data: Data, static: Result) -> None:
-    term = data.smallest_sweep()
-    start = {"m": 0.5 * static.model.values["m"], "alpha": 0.3}
-    begin = time.perf_counter()
-    stepped = by_time_stepping(term, static, start)
-    slow = time.perf_counter() - begin
-    found = benchmark(fit_dynamic, data, static)
-    fast = seconds(lambda: fit_dynamic(data, static), 5)
-    apart = max(abs(found.model.values[name] / stepped[name] - 1.0) for name in ("m", "alpha"))
-    print(
-        f"\nfit-dynamic {1e3 * fast:.1f} ms, by time stepping {1e3 * slow:.0f} ms: 1/{slow / fast:.0f} of the time; "
-        f"same answer within {100 * apart:.2f} %"
-    )
-    benchmark.extra_info["time stepping over closed form"] = slow / fast
-    assert apart < 0.005
-    assert set(STATIC) | {"m", "alpha"} == set(found.model.values)
-
-
-def test_dynamic_stiffness_against_bare_numpy(benchmark: BenchmarkFixture, paper_model: Model) -> None:
-    """What the house of effects costs over the closed form written out, for 100 000 operating points."""
-    frequency, amplitude = np.linspace(5.0, 155.0, 100_000), np.linspace(1e-5, 1e-3, 100_000)
-    p, bushing = paper_model.values, paper_model.bushing
+def bare_stiffness(model: Model, frequency: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
+    """The closed form of the paper's model as one would type it in."""
+    p, bushing = model.values, model.bushing
     factor, per = bushing.stiffness_per_modulus(Direction.AXIAL), bushing.unit_strain(Direction.AXIAL)
-
-    def bare() -> np.ndarray:
-        e0, omega = per * amplitude, 2.0 * np.pi * frequency
-        x = e0 / p["eps_half"]
-        y = (np.sqrt(x * x + 6.0 * x + 1.0) - x - 1.0) / 2.0
-        scale, c = p["sigma_fmax"] * (1.0 + y), p["eps_half"] * (1.0 + y)
-        big = 1.0 + c / e0
-        in_phase = 2.0 * scale * (c / e0) * (big / np.sqrt(big * big - 1.0) - 1.0)
-        quadrature = 2.0 / np.pi * (2.0 * p["sigma_fmax"] - scale * (c / e0) * np.log((big + 1.0) / (big - 1.0)))
-        modulus = p["mu"] + 0.5 * p["m"] * (1j * omega) ** p["alpha"] + (in_phase + 1j * quadrature) / (2.0 * e0)
-        return factor * modulus
-
-    found = benchmark(paper_model.stiffness, Direction.AXIAL, frequency, amplitude)
-    np.testing.assert_allclose(found, bare(), rtol=1e-8)
-    ratio = seconds(lambda: paper_model.stiffness(Direction.AXIAL, frequency, amplitude), 5) / seconds(bare, 5)
-    print(f"\nModel.stiffness over bare NumPy, 100 000 points: {ratio:.2f} times the time")
-    benchmark.extra_info["over bare NumPy"] = ratio
+    e0, omega = per * amplitude, 2.0 * np.pi * frequency
+    x = e0 / p["eps_half"]
+    y = (np.sqrt(x * x + 6.0 * x + 1.0) - x - 1.0) / 2.0
+    scale, c = p["sigma_fmax"] * (1.0 + y), p["eps_half"] * (1.0 + y)
+    big = 1.0 + c / e0
+    in_phase = 2.0 * scale * (c / e0) * (big / np.sqrt(big * big - 1.0) - 1.0)
+    quadrature = 2.0 / np.pi * (2.0 * p["sigma_fmax"] - scale * (c / e0) * np.log((big + 1.0) / (big - 1.0)))
+    return factor * (p["mu"] + 0.5 * p["m"] * (1j * omega) ** p["alpha"] + (in_phase + 1j * quadrature) / (2.0 * e0))
 
 
-def test_joint_fit_against_bare_minpack(benchmark: BenchmarkFixture, data: Data) -> None:
-    """What lmfit, covariance and advice cost over MINPACK with the same residual and Jacobian and start."""
+@pytest.mark.parametrize("points", [16, 48, 1000, 100_000])
+def test_stiffness_against_bare_numpy(
+    benchmark: BenchmarkFixture, paper_model: Model, table: Rows, points: int
+) -> None:
+    frequency, amplitude = np.linspace(5.0, 155.0, points), np.linspace(1e-5, 1e-3, points)
+
+    def ours() -> np.ndarray:
+        return paper_model.stiffness(Direction.AXIAL, frequency, amplitude)
+
+    found = benchmark(ours)
+    np.testing.assert_allclose(found, bare_stiffness(paper_model, frequency, amplitude), rtol=1e-8)
+    calls, repeats = (max(1, 20_000 // points), 15) if benchmark.enabled else (1, 1)
+    fast, bare = seconds(
+        [
+            lambda: [ours() for _ in range(calls)],
+            lambda: [bare_stiffness(paper_model, frequency, amplitude) for _ in range(calls)],
+        ],
+        repeats,
+    )
+    what = f"stiffness of {points} operating points over bare NumPy"
+    table.append((what, f"{fast / bare:.2f}", "<= 1.3"))
+
+
+def test_joint_fit_against_bare_minpack(benchmark: BenchmarkFixture, data: Data, table: Rows) -> None:
+    """lmfit, covariance and advice over MINPACK with the same residual, Jacobian, start and tolerance."""
     found = benchmark(fit_joint, data)
     terms = data.chosen(None)
     coordinates = Coordinates.of(found.model, FIVE)
-    start = coordinates.point({**found.model.values, "mu": 1e6, "m": 1e5, "alpha": 0.3, "sigma_fmax": 3e4})
+    start = coordinates.point(start_values(data.campaign.bushing, terms, {}))
 
     def model_at(point: np.ndarray) -> Model:
         return found.model.with_values(coordinates.values(point))
@@ -131,18 +138,210 @@ def test_joint_fit_against_bare_minpack(benchmark: BenchmarkFixture, data: Data)
     best = coordinates.values(bare())
     for name in FIVE:
         assert best[name] == pytest.approx(found.model.values[name], rel=1e-4)
-    ratio = seconds(lambda: fit_joint(data), 5) / seconds(bare, 5)
-    print(f"\njoint fit over bare MINPACK: {ratio:.2f} times the time")
-    benchmark.extra_info["over bare MINPACK"] = ratio
+    ours, theirs = seconds([lambda: fit_joint(data), bare], 40 if benchmark.enabled else 1)
+    table.append((f"five-parameter fit, {1e3 * ours:.1f} ms, over bare MINPACK", f"{ours / theirs:.2f}", "<= 1.5"))
 
 
-def test_a_sweep_of_a_thousand_bootstraps_is_one_call(benchmark: BenchmarkFixture, paper_model: Model) -> None:
+def stepped(model: Model, frequency: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
+    """The paper's procedure: Eqs. 3 and 5 through a run-in and a cycle, then lock-in. All operating points at once,
+    and the Gruenwald-Letnikov sums of all steps by one transform, which no time step that looks back could beat."""
+    wave = np.sin(2.0 * np.pi * np.arange((RUN_IN + 1) * STEPS + 1) / STEPS)
+    motion, rate = amplitude[:, None] * wave, frequency[:, None]
+    force = model.force(Direction.AXIAL, History(motion, 1.0 / (rate * STEPS), periodic=False, frequency=rate))
+    turn = np.exp(-2j * np.pi * np.arange(STEPS) / STEPS)
+    return (force[:, -STEPS:] @ turn) / (motion[:, -STEPS:] @ turn)
+
+
+def by_time_stepping(term: SweepTerm, static: Result, start: dict[str, float]) -> dict[str, float]:
+    """The paper's dynamic fit, differenced by MINPACK."""
+    points, where = np.unique(np.stack((term.frequency, term.amplitude)), axis=1, return_inverse=True)
+
+    def misfit(point: np.ndarray) -> np.ndarray:
+        values = {"m": float(np.exp(point[0])), "alpha": float(np.clip(point[1], 0.02, 1.0))}
+        stiffness = stepped(static.model.with_values(values), *points)
+        return term.whiten(stiffness[where.ravel()] / term.measured - 1.0)
+
+    best, _ = leastsq(misfit, [np.log(start["m"]), start["alpha"]], epsfcn=1e-6, xtol=1e-6, ftol=1e-8)
+    return {"m": float(np.exp(best[0])), "alpha": float(best[1])}
+
+
+def test_fit_dynamic_against_time_stepping(
+    benchmark: BenchmarkFixture, data: Data, static: Result, table: Rows
+) -> None:
+    term = data.smallest_sweep()
+    start = {"m": 0.5 * static.model.values["m"], "alpha": 0.3}
+    slow_answer = by_time_stepping(term, static, start)
+    found = benchmark(fit_dynamic, data, static)
+    apart = max(abs(found.model.values[name] / slow_answer[name] - 1.0) for name in ("m", "alpha"))
+    fast, slow = seconds(
+        [lambda: fit_dynamic(data, static), lambda: by_time_stepping(term, static, start)],
+        7 if benchmark.enabled else 1,
+    )
+    what = f"fit-dynamic, {1e3 * fast:.1f} ms: times faster than time stepping (apart by {100 * apart:.2f} %)"
+    table.append((what, f"{slow / fast:.0f}", ">= 300"))
+    assert apart < 0.005
+    assert set(STATIC) | {"m", "alpha"} == set(found.model.values)
+
+
+def test_predict_against_time_stepping(benchmark: BenchmarkFixture, static: Result, table: Rows) -> None:
+    """The paper's table with its bands: the stiffness, and its derivatives by five parameters."""
+    amplitude, frequency = (x.ravel() for x in np.meshgrid(PAPER_AMPLITUDES, PAPER_FREQUENCIES, indexing="ij"))
+
+    def slowly() -> list[np.ndarray]:
+        moved = [{name: 1.0001 * static.model.values[name]} for name in FIVE]
+        return [stepped(static.model.with_values(values), frequency, amplitude) for values in ({}, *moved)]
+
+    def ours() -> np.ndarray:
+        table = predict(static, Direction.AXIAL, PAPER_FREQUENCIES, PAPER_AMPLITUDES)
+        return table.stiffness.value
+
+    np.testing.assert_allclose(benchmark(ours), np.abs(slowly()[0]), rtol=1e-3)
+    fast, slow = seconds([ours, slowly], 5 if benchmark.enabled else 1)
+    what = f"predict with bands, {1e3 * fast:.1f} ms: times faster than time stepping"
+    table.append((what, f"{slow / fast:.0f}", ">= 300"))
+
+
+def command_seconds(*command: str) -> float:
+    """Processor time of a whole command."""
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    assert process.returncode == 0
+    return used.ru_utime + used.ru_stime
+
+
+def test_whole_commands(benchmark: BenchmarkFixture, root: Path, tmp_path: Path, table: Rows) -> None:
+    program = str(Path(sys.executable).with_name("bushfit"))
+    campaign = str(root / "configs/cmp_15961.toml")
+    pairs = {
+        ("bushfit fit --no-plots over import lmfit, pandas", "<= 1.5"): (
+            (program, "fit", campaign, "--no-plots", "-q", "--force", "-o", str(tmp_path / "fit")),
+            (sys.executable, "-c", "import lmfit, pandas"),
+        ),
+        ("bushfit --help over import click", "<= 3"): (
+            (program, "--help"),
+            (sys.executable, "-c", "import click"),
+        ),
+    }
+    for (what, target), (command, imports) in pairs.items():
+        turns = [(command_seconds(*command), command_seconds(*imports)) for _ in range(9 if benchmark.enabled else 1)]
+        ours, theirs = np.min(turns, axis=0)
+        table.append((f"{what}, {1e3 * ours:.0f} ms", f"{ours / theirs:.2f}", target))
+    benchmark.pedantic(command_seconds, pairs["bushfit --help over import click", "<= 3"][0], rounds=1)
+
+
+@pytest.mark.parametrize(
+    ("kind", "hidden", "without"),
+    [
+        ("nothing", (), ()),
+        ("one effect", ("second_friction",), ()),
+        ("two effects", ("inertia", "viscous"), ()),
+        ("an effect that the library lacks", ("maxwell",), ("maxwell",)),
+    ],
+)
+def test_diagnose(
+    benchmark: BenchmarkFixture, table: Rows, kind: str, hidden: tuple[str, ...], without: tuple[str, ...]
+) -> None:
+    simulated, _ = hidden_campaign(5, hidden)
+    campaign = simulated.campaign()
+
+    def work() -> object:
+        return diagnose(Data.of(campaign), None, Settings(without=without))
+
+    benchmark.pedantic(work, rounds=1)
+    (once,) = seconds([work], 3 if benchmark.enabled else 1)
+    table.append((f"diagnose where {kind} is hidden, seconds", f"{once:.2f}", "<= 2"))
+
+
+def sweep(model: Model, frequencies: int, amplitudes: int) -> Sweep:
+    """Half a per cent of noise on a grid, each point three times."""
+    axes = np.linspace(5.0, 155.0, frequencies), np.geomspace(1e-4, 5e-4, amplitudes), np.arange(1, 4)
+    frequency, amplitude, repeat = (axis.ravel() for axis in np.meshgrid(*axes, indexing="ij"))
+    random = np.random.default_rng(0)
+    noise = 1.0 + 0.005 * (random.standard_normal(frequency.size) + 1j * random.standard_normal(frequency.size))
+    stiffness = model.stiffness(Direction.AXIAL, frequency, amplitude) * noise
+    return Sweep("grid", Direction.AXIAL, frequency, amplitude, stiffness, repeat)
+
+
+def loop(model: Model, rows: int) -> Loop:
+    """One cycle of 1 mm at 0.1 Hz with 0.3 % of noise."""
+    phase = np.arange(rows) / rows
+    motion = 1e-3 * np.sin(2.0 * np.pi * phase)
+    force = model.force(Direction.AXIAL, History.steady(motion, 0.1))
+    force = force + 0.003 * force.max() * np.random.default_rng(0).standard_normal(rows)
+    return Loop("loop", Direction.AXIAL, 10.0 * phase, motion, force)
+
+
+def fitted(model: Model, loops: Sequence[Loop], sweeps: Sequence[Sweep]) -> Callable[[], object]:
+    """From measurements to a solution."""
+
+    def work() -> object:
+        terms: list[Term] = [*loop_terms(loops), *sweep_terms(sweeps)]
+        names = [name for name in model.parameters if name in FIVE]
+        return solve(model, terms, names)
+
+    return work
+
+
+ADDED = ("viscous", "second_friction", "inertia", "delay")
+
+
+@pytest.mark.parametrize("axis", ["rows of a loop", "frequencies", "amplitudes"])
+def test_growth(benchmark: BenchmarkFixture, paper_model: Model, table: Rows, axis: str) -> None:
+    """Where time is fixed cost + n times something, its slope in a log-log plot rises to 1 and stays there."""
+    standard = loop(paper_model, 1000)
+    start = paper_model.with_values({name: 1.2 * value for name, value in paper_model.values.items()})
+    match axis:
+        case "rows of a loop":
+            works = {n: fitted(start, [loop(paper_model, n)], []) for n in (4000, 16000, 64000, 256000)}
+        case "frequencies":
+            works = {n: fitted(start, [standard], [sweep(paper_model, n, 3)]) for n in (100, 400, 1600, 6400)}
+        case _:
+            works = {n: fitted(start, [standard], [sweep(paper_model, 16, n)]) for n in (20, 80, 320, 1280)}
+    benchmark.pedantic(works[min(works)], rounds=1)
+    chosen = works if benchmark.enabled else {min(works): works[min(works)]}
+    times = seconds(list(chosen.values()), 3 if benchmark.enabled else 1)
+    shown = ", ".join(f"{n}: {1e3 * t:.0f} ms" for n, t in zip(chosen, times, strict=True))
+    slopes = np.diff(np.log(times)) / np.diff(np.log(list(chosen)))
+    figure = f"{slopes.max():.2f}" if slopes.size else "-"
+    table.append((f"growth with {axis} ({shown}), steepest exponent", figure, "about 1"))
+
+
+def test_growth_with_effects(benchmark: BenchmarkFixture, paper_model: Model, table: Rows) -> None:
+    """An effect costs among others what it costs alone."""
+    grid = sweep(paper_model, 1000, 10)
+
+    def asked(added: Sequence[str]) -> Callable[[], object]:
+        model = Model.started(paper_model.bushing, (*BASE, *added), paper_model.values)
+        return lambda: [model.stiffness(Direction.AXIAL, grid.frequency, grid.amplitude) for _ in range(5)]
+
+    works = [asked(()), *(asked([name]) for name in ADDED), asked(ADDED)]
+    benchmark.pedantic(works[0], rounds=1)
+    base, *each, every = seconds(works, 9 if benchmark.enabled else 1)
+    alone = sum(one - base for one in each)
+    table.append(
+        (
+            f"growth with effects: {len(ADDED)} together over the sum of each alone",
+            f"{(every - base) / alone:.2f}",
+            "about 1",
+        )
+    )
+
+
+def test_a_sweep_of_a_thousand_bootstraps_is_one_call(
+    benchmark: BenchmarkFixture, paper_model: Model, table: Rows
+) -> None:
     rng, count = np.random.default_rng(0), 1000
     frequency, amplitude = np.tile(np.arange(5.0, 156.0, 10.0), 3), np.repeat([1e-4, 2e-4, 5e-4], 16)
     stacked = {n: v * (1.0 + 0.01 * rng.standard_normal((count, 1))) for n, v in paper_model.values.items()}
     found = benchmark(paper_model.stiffness, Direction.AXIAL, frequency, amplitude, values=stacked)
     assert found.shape == (count, 48)
     models = [replace(paper_model, values={n: float(v[i, 0]) for n, v in stacked.items()}) for i in range(50)]
-    one = seconds(lambda: [m.stiffness(Direction.AXIAL, frequency, amplitude) for m in models], 3) * count / len(models)
-    both = seconds(lambda: paper_model.stiffness(Direction.AXIAL, frequency, amplitude, values=stacked), 3)
-    print(f"\n{count} models in one call: {one / both:.1f} times as fast as one by one")
+    one, both = seconds(
+        [
+            lambda: [model.stiffness(Direction.AXIAL, frequency, amplitude) for model in models],
+            lambda: paper_model.stiffness(Direction.AXIAL, frequency, amplitude, values=stacked),
+        ],
+        5 if benchmark.enabled else 1,
+    )
+    table.append((f"{count} models in one call, times faster than one by one", f"{20 * one / both:.1f}", ""))
