@@ -99,15 +99,18 @@ def wild_points(term: Term, model: Model) -> Array:
         return term.drive.wild["force"].rows
     deviation = term.deviation(model)
     count = deviation.size
+    distance = term.apart(deviation)
+    reach = limit(count, 2, term.noise.scatter_freedom or np.inf) * _misfit(distance, 2)
+    far = distance > reach
+    if not far.any():
+        return np.flatnonzero(far)
     local = np.zeros_like(deviation)
     for first, last in pairwise([*term.block_starts.tolist(), count]):
         rows = np.arange(last - first)
         parts = (from_neighbours(part[first:last], rows, _WINDOW) for part in (deviation.real, deviation.imag))
         real, imag = parts
         local[first:last] = real + 1j * imag
-    distance = term.apart(deviation)
-    reach = limit(count, 2, term.noise.scatter_freedom or np.inf) * _misfit(distance, 2)
-    rows = np.flatnonzero((distance > reach) & (term.apart(local, shared=False) > reach))
+    rows = np.flatnonzero(far & (term.apart(local, shared=False) > reach))
     return rows[[_beside_repeats(term, local, row) > reach for row in rows.tolist()]] if rows.size else rows
 
 
