@@ -144,10 +144,10 @@ def solve(
     def slopes(parameters: lmfit.Parameters) -> Array:
         return jacobian(at(parameters), terms, coordinates.names)
 
-    walls = list(zip(low.tolist(), high.tolist(), strict=True))
+    ends = list(zip(low.tolist(), high.tolist(), strict=True))
 
     def within(parameters: lmfit.Parameters) -> Array:
-        if not all(least <= u.value <= most for u, (least, most) in zip(parameters.values(), walls, strict=True)):
+        if not all(least <= u.value <= most for u, (least, most) in zip(parameters.values(), ends, strict=True)):
             raise _WallMetError
         return misfit(parameters)
 
