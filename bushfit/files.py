@@ -17,7 +17,7 @@ _LARGEST_BYTES = 4 << 30
 #: A large file is looked at where the system keeps it, not copied.
 Bytes = bytes | mmap.mmap
 _AnyBytes = TypeVar("_AnyBytes", bytes, Bytes)
-_LARGE, _HEAD = 1 << 24, 1 << 16
+_LARGE, _HEAD = 1 << 22, 1 << 16
 
 
 def read_bytes(

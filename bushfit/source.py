@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
-import os
+import mmap
 import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import islice, pairwise
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -27,8 +26,8 @@ if TYPE_CHECKING:
 
 #: In SI; far beyond every rig, and its square is still a number.
 LARGEST = 1e100
-#: Bytes that are read at a time, in columns and in lines.
-_PIECE, _BUFFER = 1 << 21, 1 << 16
+#: Bytes of lines that are read at a time.
+_BUFFER = 1 << 16
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 #: Signs that, inside a number, part thousands.
 _SEPARATORS = ("'", "\u2019", "\u00a0", "\u2009", "\u202f")
@@ -67,8 +66,9 @@ class Source(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """A text: its bytes in UTF-8, and the encoding they had."""
+    """A text: its file, its bytes in UTF-8, and the encoding they had."""
 
+    file: Path
     data: Bytes
     encoding: str | None
     sheet: str | None = None
@@ -80,7 +80,7 @@ class Text:
         Raises:
             MeasurementError: no text, or not in the encoding stated.
         """
-        return cls(*to_utf8(data, file, encoding))
+        return cls(file, *to_utf8(data, file, encoding))
 
     def head(self) -> list[Line]:
         """The filled lines at its start."""
@@ -108,46 +108,39 @@ class Text:
     ) -> dict[int, Floats] | None:
         """Columns by index times their scale, each (n,); None where the rows are not so tidy that pandas reads them.
 
-        pandas lets go of the interpreter while it reads, so large files are read in pieces by as many threads as there
-        are cores, and each piece is scaled into its place while it is still in the cache.
+        pandas reads a large file on all cores if it is given the path, so that it has to be plain UTF-8.
         """
         import pandas as pd
 
-        def parse(piece: slice) -> pd.DataFrame:
-            return pd.read_csv(
-                io.BytesIO(self.data[piece]),
-                sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
-                header=None,
-                names=list(range(width)),
-                index_col=False,
-                decimal=numerals.decimal,
-                dtype={index: np.float64 if index in scales else str for index in range(width)},
-                na_filter=False,
-            )
-
-        pieces = self._pieces(self._offset(layout.lines_before_data))
-        most_rows = sum(piece.stop - piece.start for piece in pieces) // (2 * width) + 1  # untouched, so not in memory
-        values, count = {index: np.empty(most_rows) for index in scales}, 0
+        before = self._offset(layout.lines_before_data)
+        from_path = isinstance(self.data, mmap.mmap) and b'"' not in self.data[:before]
+        rest = io.BytesIO(b"" if from_path else self.data)
+        rest.seek(before)
         try:
-            with warnings.catch_warnings(), ThreadPoolExecutor(min(len(pieces), os.cpu_count() or 1)) as pool:
+            with warnings.catch_warnings():
                 warnings.simplefilter("error", pd.errors.ParserWarning)
-                for frame in pool.map(parse, pieces) if len(pieces) > 1 else map(parse, pieces):
-                    for index, scale in scales.items():
-                        place = values[index][count : count + len(frame)]
-                        np.multiply(frame[index].to_numpy(), scale, out=place)
-                        if not (place.min() >= -LARGEST and place.max() <= LARGEST):  # not a number fails this too
-                            return None
-                    count += len(frame)
+                frame = pd.read_csv(
+                    self.file if from_path else rest,
+                    skiprows=layout.lines_before_data if from_path else None,
+                    sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
+                    header=None,
+                    names=list(range(width)),
+                    index_col=False,
+                    decimal=numerals.decimal,
+                    dtype={index: np.float64 if index in scales else str for index in range(width)},
+                    na_filter=False,
+                    compression=None,
+                )
         except (ValueError, pd.errors.ParserWarning):
             return None
-        return {index: column[:count] for index, column in values.items()}
-
-    def _pieces(self, start: int) -> list[slice]:
-        """The bytes from a place on, cut at line ends."""
-        cuts = [start]
-        while len(self.data) - cuts[-1] > _PIECE and (end := self.data.find(b"\n", cuts[-1] + _PIECE)) >= 0:
-            cuts.append(end + 1)
-        return [slice(*ends) for ends in pairwise([*cuts, len(self.data)])]
+        columns = {}
+        for index, scale in scales.items():
+            column = frame[index].to_numpy()
+            columns[index] = column if scale == 1.0 else column * scale
+            low, high = column.min(initial=np.inf), column.max(initial=-np.inf)
+            if not (min(low * scale, high * scale) >= -LARGEST and max(low * scale, high * scale) <= LARGEST):
+                return None  # not a number fails this too
+        return columns
 
     def _has(self, sign: str, offset: int) -> bool:
         return self.data.find(sign.encode(), offset) >= 0

@@ -155,6 +155,25 @@ def test_peak_to_peak_is_halved(tmp_path: Path) -> None:
     assert sweep_from(SWEEP, tmp_path, amplitude="peak-to-peak").amplitude[0] == pytest.approx(0.05e-3)
 
 
+@pytest.mark.parametrize("lead", ["", "# rig 3\n\n", 'Operator "A"\n', "\ufeff", "Prüfstand 3\n"])
+def test_a_large_file_reads_like_a_small_one(lead: str, tmp_path: Path) -> None:
+    """5 MB, which pandas reads on all cores; an error late in the file still has its line."""
+    count = 300_000
+    numbers = np.column_stack((np.arange(count), np.arange(count) % 7 + 0.125, np.arange(count) % 7 - 0.25))
+    rows = [f"{t},{x},{f}" for t, x, f in zip(*numbers.T.tolist(), strict=True)]
+    text = lead + "\n".join(["time [s],displacement [mm],force [kN]", *rows]) + "\n"
+    assert len(text) > 1 << 22
+    loop = loop_from(text, tmp_path)
+    assert np.array_equal(loop.time, numbers[:, 0])
+    assert np.array_equal(loop.displacement, numbers[:, 1] * 1e-3)
+    assert np.array_equal(loop.force, numbers[:, 2] * 1e3)
+    assert loop.source is not None
+    assert loop.source.sha256 == hashlib.sha256(text.encode()).hexdigest()
+    last = lead.count("\n") + 1 + count
+    with pytest.raises(MeasurementError, match=rf'line {last}, column "force \[kN\]"[\s\S]*"abc"'):
+        loop_from(text.rsplit(",", 1)[0] + ",abc\n", tmp_path)
+
+
 NEVER = [f"{i},{i},7" for i in range(20)]
 BAD_LOOPS: list[tuple[str, str | bytes, list[str]]] = [
     ("empty", "", ["empty"]),

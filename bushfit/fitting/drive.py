@@ -161,15 +161,14 @@ def drive_of(loop: Loop, *, without_wild: bool = False) -> Drive:
     half_motion, half_force = np.ptp(series(motion, np.arange(GRID) / GRID)) / 2.0, float(np.ptp(sound)) / 2.0
     noise = loop.noise * half_force if loop.noise is not None else force_noise
     from_rest = first == 0 and _from_rest(loop, frequency, half_motion, half_force, noise)
-    clock, force = loop.time - loop.time[0], loop.force
-    weight = np.ones(force.size)
-    if without_wild and force.size > MOST_ROWS and rows.size:
-        clock, force = np.delete(clock, rows), sound
-    elif without_wild:
-        weight[rows] = 0.0
-    phase = clock * frequency
-    if loop.force.size > MOST_ROWS:
+    clock, force = (loop.time - loop.time[0] if loop.time[0] else loop.time), loop.force
+    if force.size > MOST_ROWS:
+        if without_wild and rows.size:
+            clock, force = np.delete(clock, rows), sound
         phase, force, weight = _binned(clock, force, frequency, cycles, each_cycle=from_rest)
+    else:
+        phase, weight = clock * frequency, np.ones(force.size)
+        weight[rows] = 0.0 if without_wild else 1.0
     noise = max(noise, FLOOR * half_force)
     off_zero = not from_rest and abs(motion[0]) > _CENTRED * half_motion
     datum = force_mean if off_zero else None
