@@ -345,7 +345,7 @@ USAGE = [
     ("init|loop.csv|--direction|axial|--inner-radius|20 mm|--outer-radius|18 mm|--length|34 mm", "--inner-radius, --outer-radius: impossible bushing", "check that radii were given, not diameters, and that they are not swapped"),
     ("reduce|lost.csv", "lost.csv: there is no such file", 'did you mean "loop.csv"?'),
     ("reduce|sweep.csv", "sweep.csv, line 1: this is a sweep already", "name it in the campaign under [[sweeps]]"),
-    ("reduce|loop.csv|--cycles|1", "Invalid value for '--cycles': 1 is not in the range 2<=x<=1000."),
+    ("reduce|loop.csv|--cycles|1", "Invalid value for '--cycles': 1 is not in the range 3<=x<=1000."),
     ("reduce|loop.csv|--levels|0.1", "loop.csv: nothing says in which direction this was tested", "state it: --direction axial (or radial, torsion)"),
     ("reduce|loop.csv|--direction|axial|--levels|-1 mm", "--levels: frequencies and amplitudes are above zero", 'such as "5:155:10 Hz" (start:stop:step) or "0.1, 0.2, 0.5 mm", with one unit at the end'),
     ("batch|lost.toml", "lost.toml: there is no such file", 'did you mean "more.toml"?'),

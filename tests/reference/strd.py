@@ -23,10 +23,11 @@ _REACH = 1e7
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Stands for the model: named values, each with its bounds and its scale."""
+    """Stands for the model: named values, each with its bounds and its scale; fitted as the paper's effects are."""
 
     values: Mapping[str, float]
     parameters: Mapping[str, Parameter]
+    effects: tuple[str, ...] = ()
 
     def with_values(self, values: Mapping[str, float]) -> Curve:
         return replace(self, values={**self.values, **values})
@@ -103,6 +104,14 @@ class CurveTerm:
     @property
     def size(self) -> int:
         return self.problem.response.size
+
+    @property
+    def counted(self) -> int:
+        return self.size
+
+    def unsure(self, slopes: Array) -> dict[Any, Array]:
+        """No variance of the noise was estimated beforehand."""
+        return {}
 
     def residual(self, curve: Curve) -> Array:
         return (self.problem.of(curve.values) - self.problem.response) / self.noise

@@ -66,7 +66,7 @@ def test_certified_values_from_both_starts(agree: Agree) -> None:
         apart.pop(at)
     worst = max(apart, key=apart.__getitem__)
     print(f"at the fits' tolerance at most {apart[worst]:.1e} standard errors off, {worst}")
-    assert apart[worst] < 0.01
+    assert apart[worst] < 2e-4
     agree("values, 53 of 54 starts, as fits stop", [min(default.values())])
     agree("values, 53 of 54 starts, stopped later", [min(values.values())])
     agree("standard errors, 53 of 54 starts", [min(errors.values())])
