@@ -108,7 +108,7 @@ class Text:
     ) -> dict[int, Floats] | None:
         """Columns by index times their scale, each (n,); None where the rows are not so tidy that pandas reads them.
 
-        pandas reads a large file on all cores if it is given the path, so that it has to be plain UTF-8.
+        pandas rounds correctly from 3.1 on, and reads a large file on all cores if it is given the path of plain UTF-8.
         """
         import pandas as pd
 
