@@ -33,6 +33,8 @@ _LARGEST_CHUNK = 64
 _AHEAD = 2
 #: A row that was alone with its worker this often when the worker died is to blame.
 _MOST_DEATHS = 3
+#: Let a worker keep the memory that one row frees for the next: glibc hands it back otherwise, a tenth of the time.
+_HEAP = {"MALLOC_TRIM_THRESHOLD_": "134217728", "MALLOC_MMAP_THRESHOLD_": "33554432"}
 _CONNECT, _WAIT_FOR_WORKERS = 5.0, 60.0
 
 
@@ -62,6 +64,7 @@ class LocalPool:
     def executor(self) -> Executor:
         if self._executor is None:
             # No fork of this process: it has threads. A server forks instead, with all imported already.
+            os.environ.update(_HEAP)  # read by the C library of processes to come
             kind = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
             context = multiprocessing.get_context(kind)
             if kind == "forkserver":

@@ -31,6 +31,8 @@ _SIGNIFICANT = 4.0
 _CORNER, _MOST_ROUNDS = 0.5, 10
 #: A motion is a triangle where that leaves no more than this times what free harmonics leave.
 _ALIKE = 1.02
+#: A third harmonic so many times the noise off that of a triangle rules it out, before all its corners are drawn.
+_FAR = 3.0
 
 
 class WildRows(NamedTuple):
@@ -96,7 +98,9 @@ def harmonics(loop: Loop, frequency: float, cycles: float) -> Harmonics:
     keep[:2] = True
     motion = np.where(keep, coefficients, 0.0)[: int(np.flatnonzero(keep)[-1]) + 1]
     triangle = _triangle(motion[0], motion[1])
-    if np.std((values[:, 0] - series(triangle, phase))[of_motion]) < _ALIKE * motion_noise:
+    third = abs(coefficients[3] - triangle[3]) if coefficients.size > 3 else 0.0
+    alike = third < _FAR * motion_noise
+    if alike and np.std((values[:, 0] - series(triangle, phase))[of_motion]) < _ALIKE * motion_noise:
         motion = triangle
     return Harmonics(motion, float(solution[0, 1]), force_noise, wild)
 
@@ -109,7 +113,10 @@ def order(rows_per_cycle: float, most: int) -> int:
 def basis(phase: Array, order: int) -> Array:
     """Columns 1, cos, -sin of each harmonic, (n, 2 order + 1)."""
     turn = np.exp(2j * np.pi * phase)
-    powers = np.cumprod(np.broadcast_to(turn, (order, phase.size)), axis=0)
+    powers = np.empty((order, phase.size), dtype=complex)
+    powers[0] = turn
+    for k in range(1, order):
+        np.multiply(powers[k - 1], turn, out=powers[k])
     rows = np.empty((2 * order + 1, phase.size))
     rows[0], rows[1 : order + 1] = 1.0, powers.real
     np.negative(powers.imag, out=rows[order + 1 :])

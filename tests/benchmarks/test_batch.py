@@ -42,13 +42,16 @@ def bushings(paper_model: Model, tmp_path_factory: pytest.TempPathFactory) -> Pa
         place.mkdir()
         for name, content in to_files(simulate(model, replace(plan, seed=number))).items():
             (place / name).write_bytes(content)
+        light = (place / "campaign.toml").read_text(encoding="utf-8").partition("[[loops]]")[0]
+        light += '[[sweeps]]\nfile = "sweep_axial.csv"\ndirection = "axial"\n'
+        (place / "light.toml").write_text(light, encoding="utf-8")
     return folder
 
 
-def manifest(bushings: Path, count: int) -> Path:
+def manifest(bushings: Path, count: int, name: str = "campaign") -> Path:
     """So many rows."""
-    file = bushings / f"many_{count}.csv"
-    file.write_text("campaign\n" + "".join(f"kind_{n % _KINDS}/campaign.toml\n" for n in range(count)))
+    file = bushings / f"{name}_{count}.csv"
+    file.write_text("campaign\n" + "".join(f"kind_{n % _KINDS}/{name}.toml\n" for n in range(count)))
     return file
 
 
@@ -99,8 +102,8 @@ def peaks(command: list[str]) -> tuple[int, int]:
 
 
 def batch_of(bushings: Path, count: int, output: Path) -> tuple[int, int]:
-    """Peaks of a batch of so many."""
-    file = str(manifest(bushings, count))
+    """Peaks of a batch of so many; of one sweep each, because they are to be many."""
+    file = str(manifest(bushings, count, "light"))
     return peaks([_PROGRAM, "batch", file, "-o", str(output / str(count)), "--no-plots", "-q"])
 
 
