@@ -1,4 +1,4 @@
-"""What a solution is worth: covariance, quality, and what the data cannot tell."""
+"""What a solution is worth: covariance and quality."""
 
 from __future__ import annotations
 
@@ -9,15 +9,11 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.solve import Coordinates, Solution, jacobian, residual
+from bushfit.fitting.solve import Coordinates, jacobian, residual
 from bushfit.fitting.terms import Term
 from bushfit.model import Model
 from bushfit.results import Covariance, Quality, Range
 
-#: Relative standard error beyond which a parameter counts as not determined.
-_UNDETERMINED = 0.3
-#: Correlation beyond which a pair is said to trade off.
-_TRADE_OFF = 0.95
 #: Reduced chi-square beyond which noise alone is no explanation, in standard deviations.
 _LACK_OF_FIT = 5.0
 
@@ -129,49 +125,8 @@ def measured_range(model: Model, terms: Sequence[Term]) -> Range:
     return Range((float(f.min()), float(f.max())), (float(e.min()), float(e.max())))
 
 
-def cautions(solution: Solution, terms: Sequence[Term], cov: Covariance) -> list[str]:
-    """What the data cannot tell, in words: bounds met, parameters not determined, pairs that trade off."""
-    model, names = solution.model, solution.coordinates.names
-    reach = measured_range(model, terms)
-    lines = []
-    for name in names:
-        stderr, parameter = cov.stderr(name), model.parameters[name]
-        scale = abs(model.values[name]) if parameter.log else max(abs(model.values[name]), parameter.typical)
-        reason = _reason(name, model, reach)
-        if name in solution.at_bound:
-            lines.append(f"{name} ended at the edge of what is possible: the data do not determine it{reason}")
-        elif stderr is not None and stderr > _UNDETERMINED * scale:
-            size = f"{100 * stderr / scale:.0f} %" if stderr < 10.0 * scale else "beyond 1000 %"
-            lines.append(f"{name} is not determined: standard error {size}{reason}")
-    for one, other, value in cov.correlations():
-        if abs(value) > _TRADE_OFF and {one, other} <= set(names):
-            reason = _pair_reason(one, other, model, reach)
-            lines.append(f"{one} and {other} trade off (correlation {value:+.3f}): use them together{reason}")
-    return lines + _misfit(model, terms, len(names))
-
-
-def _reason(name: str, model: Model, reach: Range) -> str:
-    eps_half = model.values.get("eps_half", 0.0)
-    if name in ("sigma_fmax", "eps_half") and reach.strain[1] < eps_half:
-        return f"; amplitudes stop at {reach.strain[1] / eps_half:.2g} of eps_half, so only sigma_fmax/eps_half shows"
-    if name in ("mu", "m", "alpha") and "alpha" in model.values and reach.frequency[1] < 3.0 * reach.frequency[0]:
-        return f"; all tests run near {reach.frequency[0]:.2g} Hz, too alike in rate to tell springpot from elasticity"
-    if name in ("mu", "sigma_fmax", "eps_half") and reach.strain[1] < 1.5 * reach.strain[0]:
-        return "; one amplitude alone cannot tell friction from elasticity"
-    return ""
-
-
-def _pair_reason(one: str, other: str, model: Model, reach: Range) -> str:
-    if {one, other} == {"sigma_fmax", "eps_half"}:
-        ratio = reach.strain[1] / model.values["eps_half"]
-        return f"; strains reach {ratio:.2g} of eps_half, and larger amplitudes would separate them"
-    if {one, other} <= {"mu", "m", "alpha"}:
-        low, high = reach.frequency
-        return f"; frequencies span {low:.3g} to {high:.3g} Hz, and a wider span would separate them"
-    return ""
-
-
-def _misfit(model: Model, terms: Sequence[Term], parameters: int) -> list[str]:
+def misfit(model: Model, terms: Sequence[Term], parameters: int) -> list[str]:
+    """A sentence where the model misses the data by more than their noise."""
     reduced, freedom = _reduced(model, terms, parameters)
     if _inflation(reduced, freedom) == 1.0:
         return []

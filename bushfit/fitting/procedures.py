@@ -10,8 +10,9 @@ import numpy as np
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.assess import Stage, cautions, covariance, measured_range, quality
+from bushfit.fitting.assess import Stage, covariance, measured_range, misfit, quality
 from bushfit.fitting.data import Data
+from bushfit.fitting.identify import left_open
 from bushfit.fitting.profile import profile95
 from bushfit.fitting.robust import Estimate, estimate, told
 from bushfit.fitting.solve import Coordinates, Solution
@@ -210,10 +211,24 @@ def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = Non
         cov,
         quality(solution.model, terms, len(fitted)),
         measured_range(solution.model, terms),
-        (*notes, *_assumptions(terms), *told(outliers, robust=data.robust), *cautions(solution, terms, cov)),
+        (*notes, *_assumptions(terms), *told(outliers, robust=data.robust), *_cautions(steps)),
         tuple(term.source for term in terms if term.source is not None),
         outliers,
     )
+
+
+def _cautions(steps: Sequence[Estimate]) -> list[str]:
+    """What the data of each step cannot tell: bounds met, what stays open, and a model that does not fit."""
+    lines = []
+    for step in steps:
+        solution = step.solution
+        names, model = solution.coordinates.names, steps[-1].solution.model
+        lines += [
+            f"{name} ended at the edge of what is possible: the data do not determine it" for name in solution.at_bound
+        ]
+        lines += left_open(model, step.terms, [name for name in names if name not in solution.at_bound])
+        lines += misfit(model, step.terms, len(names))
+    return lines
 
 
 def _assumptions(terms: Sequence[Term]) -> list[str]:

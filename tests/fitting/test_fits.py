@@ -247,44 +247,6 @@ def with_tests(campaign: Campaign, **tests: object) -> Data:
     return Data.of(replace(campaign, **tests))  # type: ignore[arg-type]
 
 
-def test_amplitudes_below_eps_half_are_named(rig: Rig, paper_noise: SimulateSettings, paper_model: Model) -> None:
-    small = 0.2 * paper_model.values["eps_half"] / paper_model.bushing.unit_strain(Direction.AXIAL)
-    plan = replace(
-        paper_noise,
-        loops=(SimulatedLoop(Direction.AXIAL, small, 0.1),),
-        sweeps=(SimulatedSweep(Direction.AXIAL, (small / 2.0, small), (5.0, 50.0, 155.0)),),
-    )
-    warnings = fit_joint(Data.of(rig(paper_model, plan, 1))).warnings
-    print(*warnings, sep="\n")
-    told = [line for line in warnings if "sigma_fmax" in line or "eps_half" in line]
-    assert any(line.startswith(("sigma_fmax is not determined", "eps_half is not determined")) for line in told) or any(
-        "trade off" in line for line in told
-    )
-    assert any("of eps_half" in line for line in told)
-
-
-def test_one_rate_is_named(rig: Rig, paper_noise: SimulateSettings, paper_model: Model) -> None:
-    campaign = rig(paper_model, replace(paper_noise, loops=(SimulatedLoop(Direction.AXIAL, 1e-3, 0.1),)), 1)
-    result = fit_joint(Data.of(campaign))
-    print(*result.warnings, sep="\n")
-    for name in ("mu", "m", "alpha"):
-        lines = [line for line in result.warnings if line.startswith(f"{name} ")]
-        assert any("all tests run near 0.1 Hz" in line for line in lines)
-
-
-def test_one_amplitude_is_named(rig: Rig, paper_noise: SimulateSettings, paper_model: Model) -> None:
-    sweep = SimulatedSweep(Direction.AXIAL, (2e-4,), tuple(np.arange(5.0, 156.0, 10.0)))
-    result = fit_joint(Data.of(rig(paper_model, replace(paper_noise, sweeps=(sweep,)), 1)))
-    print(*result.warnings, sep="\n")
-    named = [name for name in FIVE if any(line.startswith(f"{name} ") for line in result.warnings)]
-    assert {"sigma_fmax", "eps_half"} & set(named)
-    assert any("one amplitude alone" in line or "of eps_half" in line for line in result.warnings)
-
-
-def test_a_good_campaign_names_nothing_as_undetermined(measured: Data) -> None:
-    assert not any("determine" in line or "misses" in line for line in fit_joint(measured).warnings)
-
-
 def test_hidden_physics_is_told_and_widens_the_errors(
     rig: Rig, paper_noise: SimulateSettings, paper_model: Model
 ) -> None:

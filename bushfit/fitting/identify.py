@@ -1,0 +1,220 @@
+"""What tests leave open, in words: from the singular values of the Jacobian, scaled by noise and parameter size.
+
+A singular value s is the inverse of the relative standard error along its direction. Directions that noise leaves open
+are named by the parameters in them, with the reason that lies in the tests, the combination that is known all the same,
+and the further test that would help most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.fitting.assess import measured_range
+from bushfit.fitting.solve import jacobian
+from bushfit.fitting.terms import LoopTerm, SweepTerm, Term
+from bushfit.measurement import Sweep
+from bushfit.model import Model
+
+#: Relative standard error beyond which a direction counts as open, and a parameter as not determined.
+_OPEN = 0.15
+#: Share of the worst error from which on a parameter is open with it, however well it is known.
+_PARTNER = 0.3
+#: Frequencies, and strains, that differ by less than this factor are one.
+_ALIKE_RATE, _ALIKE_STRAIN = 3.0, 1.5
+#: A combination is known where its error is below this, and below this share of that of its parts.
+_KNOWN, _BETTER = 0.1, 0.34
+_FRICTION, _RATE = ("sigma_fmax", "eps_half"), ("mu", "m", "alpha")
+
+
+@dataclass(frozen=True, eq=False)
+class _Information:
+    """What tests tell about parameters, each relative to its size: J J^T, (k, k)."""
+
+    names: tuple[str, ...]
+    matrix: Array
+
+    @classmethod
+    def of(cls, model: Model, terms: Sequence[Term], names: Sequence[str]) -> _Information:
+        slope = jacobian(model, terms, names) * _sizes(model, names)[:, None]
+        return cls(tuple(names), slope @ slope.T)
+
+    def with_more(self, model: Model, terms: Sequence[Term]) -> _Information:
+        return replace(self, matrix=self.matrix + _Information.of(model, terms, self.names).matrix)
+
+    def directions(self) -> tuple[Array, Array]:
+        """Relative standard error of each direction, (k,), and the directions, (k, k) by column."""
+        values, vectors = np.linalg.eigh(self.matrix)
+        return 1.0 / np.sqrt(np.maximum(values, np.finfo(float).eps * values.max())), vectors
+
+    def errors(self) -> Array:
+        """Relative standard error of each parameter, (k,)."""
+        errors, vectors = self.directions()
+        return np.linalg.norm(vectors * errors, axis=1)
+
+    def error(self, weights: dict[str, float]) -> float:
+        """Standard error of a sum of relative changes."""
+        errors, vectors = self.directions()
+        row = np.array([weights.get(name, 0.0) for name in self.names])
+        return float(np.linalg.norm(row @ vectors * errors))
+
+
+def _sizes(model: Model, names: Sequence[str]) -> Array:
+    """From a fit's coordinates to changes relative to a parameter's size, (k,)."""
+    sizes = []
+    for name in names:
+        parameter, value = model.parameters[name], abs(model.values[name])
+        sizes.append(1.0 if parameter.log else max(value / parameter.typical, 0.05))
+    return np.array(sizes)
+
+
+def left_open(model: Model, terms: Sequence[Term], names: Sequence[str]) -> list[str]:
+    """Sentences on what the tests leave open of a fitted model; none where everything is determined."""
+    if not names:
+        return []
+    known = _Information.of(model, terms, names)
+    errors, vectors = known.directions()
+    weak = errors > _OPEN
+    if not weak.any():
+        return []
+    each, by_weak = known.errors(), np.linalg.norm((vectors * errors)[:, weak], axis=1)
+    least = min(_OPEN, _PARTNER * float(by_weak.max()))
+    involved = [name for name, error in zip(names, by_weak, strict=True) if error > least]
+    told = ", ".join(f"{name} {_percent(float(each[known.names.index(name)]))}" for name in involved)
+    reasons = "; ".join(_reasons(model, terms, involved)) or "these tests do not tell"
+    if set(involved) == set(_FRICTION) and known.error(dict(zip(_FRICTION, (1.0, -1.0), strict=True))) < _KNOWN:
+        meaning = "sigma_fmax and eps_half are known only as a ratio"
+    elif len(involved) > 1:
+        meaning = f"{', '.join(involved[:-1])} and {involved[-1]} cannot be told from one another"
+    else:
+        meaning = f"{involved[0]} is not determined"
+    lines = [f"{reasons}: {meaning} (standard errors: {told})"]
+    combinations = [*_combinations(model, terms, known, involved)]
+    if combinations:
+        lines.append("what is known all the same: " + "; ".join(combinations))
+    lines += _next(model, terms, known)
+    return lines
+
+
+def _percent(error: float) -> str:
+    return f"{100.0 * error:.2g} %" if error < 10.0 else "beyond 1000 %"
+
+
+def _reasons(model: Model, terms: Sequence[Term], involved: Sequence[str]) -> Iterator[str]:
+    reach = measured_range(model, terms)
+    (slow, fast), (small, large) = reach.frequency, reach.strain
+    loops = [term for term in terms if isinstance(term, LoopTerm)]
+    if set(involved) & set(_FRICTION) and "eps_half" in model.values:
+        ratio = large / model.values["eps_half"]
+        if ratio < 1.0:
+            yield f"amplitudes stop at {ratio:.2g} of eps_half"
+        elif large < _ALIKE_STRAIN * small:
+            yield "one amplitude"
+        else:
+            yield f"amplitudes span {small / model.values['eps_half']:.2g} to {ratio:.2g} of eps_half"
+    if set(involved) & set(_RATE) and "alpha" in model.values:
+        if fast < _ALIKE_RATE * slow:
+            yield f"one {'loop rate' if len(loops) == len(terms) else 'frequency'}, {slow:.3g} Hz"
+        else:
+            yield f"frequencies span {slow:.3g} to {fast:.3g} Hz"
+    if not loops and set(involved) & {*_FRICTION, "mu"}:
+        yield "there is no loop"
+
+
+def _combinations(model: Model, terms: Sequence[Term], known: _Information, involved: Sequence[str]) -> Iterator[str]:
+    """Combinations of what is open that are known well, with their errors."""
+    values, worst = model.values, known.errors()
+    least = min(float(worst[known.names.index(name)]) for name in involved)
+    slow = measured_range(model, terms).frequency[0]
+    if set(_FRICTION) <= set(known.names) and set(_FRICTION) & set(involved):
+        error = known.error({"sigma_fmax": 1.0, "eps_half": -1.0})
+        if error < min(_KNOWN, _BETTER * least):
+            yield f"sigma_fmax/eps_half = {values['sigma_fmax'] / values['eps_half']:.4g} Pa to {_percent(error)}"
+    if not {"m", "alpha"} & set(involved) or "alpha" not in values:
+        return
+    omega = 2.0 * np.pi * slow
+    power, turn = omega ** values["alpha"], np.pi * values["alpha"] / 2.0
+    if {"m", "alpha"} <= set(known.names):
+        error = known.error({"m": 1.0, "alpha": values["alpha"] * float(np.log(omega))})
+        if error < min(_KNOWN, _BETTER * least):
+            yield f"m omega^alpha at {slow:.3g} Hz = {values['m'] * power:.4g} Pa to {_percent(error)}"
+    if {"mu", "m", "alpha"} <= set(known.names):
+        storage = values["mu"] + 0.5 * values["m"] * power * np.cos(turn)
+        share = 0.5 * values["m"] * power / storage
+        slope = values["alpha"] * (np.log(omega) * np.cos(turn) - np.pi / 2.0 * np.sin(turn))
+        error = known.error({"mu": values["mu"] / storage, "m": share * np.cos(turn), "alpha": float(share * slope)})
+        if error < min(_KNOWN, _BETTER * least):
+            yield f"mu + m/2 omega^alpha cos(pi alpha/2) at {slow:.3g} Hz = {storage:.4g} Pa to {_percent(error)}"
+
+
+def _next(model: Model, terms: Sequence[Term], known: _Information) -> list[str]:
+    """The further test that shrinks the worst error most, and to what."""
+    before = known.errors()
+    worst = int(np.argmax(before))
+    after = {words: known.with_more(model, more).errors() for words, more in _further(model, terms)}
+    best = min(after, key=lambda words: float(after[words].max()), default=None)
+    if best is None or after[best].max() > 0.8 * before[worst]:
+        return []
+    return [
+        f"the further test that would help most: {best}; the standard error of {known.names[worst]} would fall from "
+        f"{_percent(float(before[worst]))} to {_percent(float(after[best][worst]))}"
+    ]
+
+
+def _further(model: Model, terms: Sequence[Term]) -> Iterator[tuple[str, list[Term]]]:
+    """Tests a lab could add, each as the terms it would make, with the campaign's own noise."""
+    loops = [term for term in terms if isinstance(term, LoopTerm)]
+    sweeps = [term for term in terms if isinstance(term, SweepTerm)]
+    yield "every test once more", list(terms)
+    if loops:
+        largest = max(loops, key=lambda term: term.drive.amplitude * model.bushing.unit_strain(term.direction))
+        for factor in (3.0, 10.0):
+            yield f"a loop of {factor:g} times the largest amplitude", [_loop(largest, model, amplitude=factor)]
+        for words, factor in (("a tenth of", 0.1), ("ten times", 10.0)):
+            yield f"a loop at {words} the rate", [_loop(largest, model, rate=factor)]
+    reach = measured_range(model, terms)
+    direction = terms[0].direction
+    strain = model.bushing.unit_strain(direction)
+    small, large = (x / strain for x in reach.strain)
+    slow, fast = reach.frequency
+    band = (5.0, 150.0) if fast < 2.0 else (slow, fast)
+    if sweeps:
+        yield f"a sweep to {2.0 * fast:.3g} Hz", [_sweep(model, sweeps, terms[-1], (fast, 2.0 * fast), (small, large))]
+        yield (
+            f"a sweep down to {slow / 10.0:.3g} Hz",
+            [_sweep(model, sweeps, terms[-1], (slow / 10.0, slow), (small, large))],
+        )
+    yield (
+        f"a sweep from {band[0]:.3g} to {band[1]:.3g} Hz at a tenth and all of the largest amplitude",
+        [_sweep(model, sweeps, terms[-1], band, (0.1 * large, large))],
+    )
+    yield (
+        f"a sweep from {band[0]:.3g} to {band[1]:.3g} Hz at three times the largest amplitude",
+        [_sweep(model, sweeps, terms[-1], band, (3.0 * large,))],
+    )
+
+
+def _loop(term: LoopTerm, model: Model, *, amplitude: float = 1.0, rate: float = 1.0) -> LoopTerm:
+    drive = term.drive
+    moved = replace(drive, coefficients=drive.coefficients * amplitude, frequency=drive.frequency * rate)
+    fresh = LoopTerm(moved).noise_free(model)
+    noise = drive.noise / drive.half_range * fresh.drive.half_range
+    return LoopTerm(replace(fresh.drive, noise=noise))
+
+
+def _sweep(
+    model: Model, sweeps: Sequence[SweepTerm], like: Term, band: tuple[float, float], amplitudes: Sequence[float]
+) -> SweepTerm:
+    """Nine frequencies at each amplitude, with the noise of the campaign's sweeps, or that of most rigs."""
+    from bushfit.fitting.noise import ASSUMED_SHARED, SweepNoise
+
+    frequency, amplitude = (x.ravel() for x in np.meshgrid(np.geomspace(*band, 9), amplitudes))
+    direction = sweeps[0].direction if sweeps else like.direction
+    stiffness = model.stiffness(direction, frequency, amplitude)
+    shared = sweeps[0].noise.shared if sweeps else ASSUMED_SHARED
+    random = sweeps[0].relative_noise if sweeps else ASSUMED_SHARED[0]
+    noise = SweepNoise({("new", float(x)): (random, random) for x in amplitudes}, shared, "stated", 0)
+    return SweepTerm(Sweep("new", direction, frequency, amplitude, stiffness), noise)

@@ -1,0 +1,78 @@
+"""What tests leave open is said with its reason, what is known all the same, and what would help; and only then."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from bushfit.campaign import Campaign
+from bushfit.fitting.data import Data
+from bushfit.fitting.procedures import fit_joint
+from bushfit.geometry import Direction
+from bushfit.model import Model
+from bushfit.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+
+Rig = Callable[..., Campaign]
+BAND = tuple(float(f) for f in range(5, 156, 10))
+
+
+def loop(amplitude: float, rate: float) -> SimulatedLoop:
+    return SimulatedLoop(Direction.AXIAL, amplitude, rate)
+
+
+def sweep(*amplitudes: float, band: tuple[float, ...] = BAND) -> SimulatedSweep:
+    return SimulatedSweep(Direction.AXIAL, amplitudes, band)
+
+
+#: Tests that lack something: loops, sweeps, what must be said, what is known, the further test.
+LACKING = {
+    "small amplitudes": (
+        (loop(3e-5, 0.1),), (sweep(1e-5, 3e-5),),
+        "of eps_half: sigma_fmax and eps_half", "", "times the largest amplitude",
+    ),
+    "one loop": ((loop(1e-3, 0.1),), (), "one loop rate, 0.1 Hz", "mu + m/2 omega^alpha", "the rate"),
+    "loops of one rate": (
+        (loop(1e-3, 0.1), loop(3e-4, 0.1)), (), "mu, m and alpha cannot be told", "mu + m/2 omega^alpha", "the rate",
+    ),
+    "one frequency": (
+        (loop(1e-3, 10.0),), (sweep(1e-4, 5e-4, band=(10.0,)),), "one frequency, 10 Hz", "at 10 Hz", "rate",
+    ),
+    "one amplitude": ((), (sweep(2e-4),), "one amplitude; ", "", "tenth and all of the largest amplitude"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", LACKING)
+def test_what_is_lacking_is_said_with_what_is_known_and_what_would_help(
+    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, case: str
+) -> None:
+    loops, sweeps, reason, known, further = LACKING[case]
+    plan = replace(paper_noise, loops=loops, sweeps=sweeps)
+    for seed in (1, 2):
+        lines = fit_joint(Data.of(rig(paper_model, plan, seed))).warnings
+        print(case, *lines, sep="\n  ")
+        said = [line for line in lines if "standard errors:" in line]
+        assert len(said) == 1
+        assert reason in said[0]
+        if known:
+            assert any(line.startswith("what is known all the same") and known in line for line in lines)
+        assert any(line.startswith("the further test that would help most") and further in line for line in lines)
+
+
+def test_complete_tests_leave_nothing_open(
+    rig: Rig,
+    paper_noise: SimulateSettings,
+    shared_noise: SimulateSettings,
+    paper_model: Model,
+    other_models: dict[str, Model],
+) -> None:
+    count = 0
+    for model in (paper_model, *other_models.values()):
+        for noise in (paper_noise, shared_noise):
+            for seed in range(5):
+                assert fit_joint(Data.of(rig(model, noise, seed))).warnings == ()
+                count += 1
+    sweeps_only = replace(paper_noise, sweeps=(sweep(1e-4, 2e-4, 5e-4),))
+    assert fit_joint(Data.of(rig(paper_model, sweeps_only, 1))).warnings == ()
+    print(f"{count + 1} campaigns that lack nothing: none warned of")
