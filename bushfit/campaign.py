@@ -10,6 +10,7 @@ from typing import Any
 
 from bushfit.errors import CampaignError, ModelError
 from bushfit.geometry import Bushing
+from bushfit.layout import FileFormat
 from bushfit.measurement import Loop, Sweep
 from bushfit.output import folder_name
 from bushfit.reading import read_loop, read_sweep
@@ -21,7 +22,6 @@ from bushfit.schema import (
     SimulateSettings,
     SweepFile,
 )
-from bushfit.table import FileFormat
 from bushfit.toml import read_toml
 
 

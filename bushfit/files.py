@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import mmap
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TypeVar
@@ -114,3 +116,19 @@ def _check_utf8(data: bytes, file: Path, kind: type[BushfitError]) -> None:
             expected="text in UTF-8, with or without byte order mark",
             hint="save it as UTF-8, or convert it: iconv -f LATIN1 -t UTF-8 old > new",
         )
+
+
+def sha256(data: Bytes) -> Future[str]:
+    """SHA-256 of a file's bytes, of large ones in a thread."""
+    if len(data) >= _LARGE:
+        with_thread = ThreadPoolExecutor(max_workers=1)
+        future = with_thread.submit(_sha256, data)
+        with_thread.shutdown(wait=False)
+        return future
+    done: Future[str] = Future()
+    done.set_result(_sha256(data))
+    return done
+
+
+def _sha256(data: Bytes) -> str:
+    return hashlib.sha256(data).hexdigest()

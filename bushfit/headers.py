@@ -107,6 +107,19 @@ _CUT = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
 
 
 @dataclass(frozen=True)
+class Column:
+    """A column of the file: the role it plays, its header, its place, its unit as stated, that unit in SI, and how
+    its header says that it counts amplitudes."""
+
+    role: str
+    header: str
+    index: int
+    unit: str | None
+    scale: float = 1.0
+    convention: AmplitudeConvention | None = None
+
+
+@dataclass(frozen=True)
 class Heading:
     """What a header says of its column: its role, its unit as written, and how it counts an amplitude."""
 

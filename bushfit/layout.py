@@ -12,7 +12,7 @@ import csv
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from bushfit import units
 from bushfit.headers import Vocabulary, split_convention
@@ -42,6 +42,27 @@ class Line(NamedTuple):
 
     number: int
     content: Content
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileFormat:
+    """What a user states of a file's format; None where the file itself settles it.
+
+    Args:
+        encoding: by Python's name, such as "cp1252".
+        delimiter: what parts columns.
+        decimal: decimal mark.
+        thousands: what parts thousands; "none" where nothing does.
+        header_line: line of the header, from 1; in a workbook the row.
+        sheet: sheet of a workbook.
+    """
+
+    encoding: str | None = None
+    delimiter: Literal["comma", "semicolon", "tab", "pipe", "blanks"] | None = None
+    decimal: Literal[".", ","] | None = None
+    thousands: Literal[".", ",", " ", "'", "none"] | None = None
+    header_line: int | None = None
+    sheet: str | None = None
 
 
 @dataclass(frozen=True)

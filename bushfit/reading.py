@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.geometry import Direction
-from bushfit.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
+from bushfit.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention, Column
+from bushfit.layout import FileFormat
 from bushfit.measurement import Floats, Loop, Source, Sweep, Waveform, rebuild_time
-from bushfit.table import Column, FileFormat, Table
+from bushfit.table import Table
 
 #: The pairs of columns that a complex stiffness can be read from, in order of preference.
 STIFFNESS_PAIRS = (("stiffness", "loss_factor"), ("stiffness", "phase"), ("storage_stiffness", "loss_stiffness"))

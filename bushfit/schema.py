@@ -15,8 +15,8 @@ from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo
 from bushfit.errors import BushfitError, CampaignError
 from bushfit.geometry import Direction
 from bushfit.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
+from bushfit.layout import FileFormat
 from bushfit.measurement import Waveform
-from bushfit.table import FileFormat
 from bushfit.units import quantity
 
 Residuals = Literal["complex", "magnitude_loss_factor"]

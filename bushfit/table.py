@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import csv
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bushfit import units
 from bushfit.errors import MeasurementError, UnitError
-from bushfit.files import Bytes, view_bytes
-from bushfit.headers import AmplitudeConvention, Vocabulary, split_convention
-from bushfit.layout import DELIMITERS, Layout, find_layout, fits
+from bushfit.files import sha256, view_bytes
+from bushfit.headers import Column, Vocabulary, split_convention
+from bushfit.layout import DELIMITERS, FileFormat, Layout, find_layout, fits
 from bushfit.measurement import Floats
 from bushfit.numerals import ALL, Numerals, is_like_number, weigh
 from bushfit.source import LARGEST, Source, Text, rows
@@ -31,43 +29,7 @@ _LONGEST_FOUND = 200
 _CHUNK = 1 << 16
 #: Cells that may settle the decimal mark.
 _FIRST_CELLS = 1000
-#: Bytes from which on a checksum is worth a thread.
-_LARGE = 1 << 22
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
-
-
-@dataclass(frozen=True, kw_only=True)
-class FileFormat:
-    """What a user states of a file's format; None where the file itself settles it.
-
-    Args:
-        encoding: by Python's name, such as "cp1252".
-        delimiter: what parts columns.
-        decimal: decimal mark.
-        thousands: what parts thousands; "none" where nothing does.
-        header_line: line of the header, from 1; in a workbook the row.
-        sheet: sheet of a workbook.
-    """
-
-    encoding: str | None = None
-    delimiter: Literal["comma", "semicolon", "tab", "pipe", "blanks"] | None = None
-    decimal: Literal[".", ","] | None = None
-    thousands: Literal[".", ",", " ", "'", "none"] | None = None
-    header_line: int | None = None
-    sheet: str | None = None
-
-
-@dataclass(frozen=True)
-class Column:
-    """A column of the file: the role it plays, its header, its place, its unit as stated, that unit in SI, and how
-    its header says that it counts amplitudes."""
-
-    role: str
-    header: str
-    index: int
-    unit: str | None
-    scale: float = 1.0
-    convention: AmplitudeConvention | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +76,7 @@ class Table:
         """
         stated = stated or FileFormat()
         data = view_bytes(file, MeasurementError)
-        checksum = _checksum(data)
+        checksum = sha256(data)
         vocabulary = Vocabulary(names, columns or {})
 
         def lay_out(source: Source) -> Layout:
@@ -431,22 +393,6 @@ class Table:
             found=f'"{cell}"',
             expected=f"a number such as 12{self.numerals.decimal}5",
         )
-
-
-def _checksum(data: Bytes) -> Future[str]:
-    """SHA-256 of a file's bytes, of large ones in a thread."""
-    if len(data) >= _LARGE:
-        with_thread = ThreadPoolExecutor(max_workers=1)
-        future = with_thread.submit(_sha256, data)
-        with_thread.shutdown(wait=False)
-        return future
-    done: Future[str] = Future()
-    done.set_result(_sha256(data))
-    return done
-
-
-def _sha256(data: Bytes) -> str:
-    return hashlib.sha256(data).hexdigest()
 
 
 def _label(role: str) -> str:

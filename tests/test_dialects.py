@@ -21,10 +21,11 @@ from bushfit.encoding import detect
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
 from bushfit.headers import LOOP_COLUMNS
+from bushfit.layout import FileFormat
 from bushfit.measurement import Floats, Loop, Sweep
 from bushfit.numerals import Numerals
 from bushfit.reading import read_loop, read_sweep
-from bushfit.table import FileFormat, Table
+from bushfit.table import Table
 
 #: Typographic separators, as the plain ones that they count as.
 SEPARATORS = {"\u00a0": " ", "\u202f": " ", "\u2019": "'"}

@@ -15,8 +15,8 @@ from dialects import HEADERS, NUMBERS, UNITS
 
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
+from bushfit.layout import FileFormat
 from bushfit.reading import read_loop, read_sweep
-from bushfit.table import FileFormat
 
 Sheets = dict[str, list[list[object]]]
 

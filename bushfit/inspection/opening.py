@@ -20,12 +20,13 @@ from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.loops import look_at_loop
 from bushfit.inspection.record import ColumnSeen, Inspected, Kind, Looked
 from bushfit.inspection.sweeps import look_at_sweep
+from bushfit.layout import FileFormat
 from bushfit.measurement import Loop, Sweep
 from bushfit.reading import STIFFNESS_PAIRS, read_loop, read_sweep
 from bushfit.reduction import reduce, sines
 from bushfit.schema import LoopFile, SweepFile
 from bushfit.sheets import display_units
-from bushfit.table import FileFormat, Table
+from bushfit.table import Table
 from bushfit.toml import check_tables
 
 #: Slower than this, one sine is a quasi-static loop; faster, it is a step of a stepped sine [Hz].
