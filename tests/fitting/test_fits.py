@@ -123,7 +123,8 @@ def test_two_step_errors_are_those_of_300_campaigns(
     print(f"two-step, scatter over stated error: {listed(ratio)}")
     print(f"two-step, worst correlation off by {np.max(np.abs(correlation[0] - correlation[1])):.3f}")
     np.testing.assert_allclose(ratio, 1.0, atol=0.12)
-    np.testing.assert_allclose(correlation[0], correlation[1], atol=0.1)
+    chance = 3.0 * (1.0 - correlation[1] ** 2) / np.sqrt(300)  # of a correlation over so many campaigns
+    assert np.all(np.abs(correlation[0] - correlation[1]) <= chance + 0.02)
 
 
 def test_100_random_starts_end_at_one_minimum(measured: Data) -> None:
