@@ -44,7 +44,7 @@ class Data:
         sweeps = []
         for term in self.sweeps:
             rows = [outlier.row - 1 for outlier in outliers if outlier.test == term.name]
-            sweeps.append(term.weighted(np.where(np.isin(term.order, rows), 0.0, 1.0)) if rows else term)
+            sweeps.append(term.weighted(np.where(np.isin(term.rows, rows), 0.0, 1.0)) if rows else term)
         return replace(self, sweeps=tuple(sweeps))
 
     @property

@@ -174,7 +174,7 @@ def _listed(term: Term, rows: Array, model: Model) -> Iterator[Outlier]:
                 yield Outlier(term.name, file, row + term.drive.first_row + 1, column, distance)
     elif rows.size:
         distance = term.apart(term.deviation(model)) / np.sqrt(2.0)
-        for row, off in sorted(zip((term.order[rows] + 1).tolist(), distance[rows].tolist(), strict=True)):
+        for row, off in sorted(zip((term.rows[rows] + 1).tolist(), distance[rows].tolist(), strict=True)):
             yield Outlier(term.name, file, row, "stiffness", off)
 
 

@@ -162,12 +162,14 @@ class SweepTerm:
     Within a block of points with random parts s_i and a shared part t the covariance is V = diag(s_i^2) + t^2 1 1^T.
     With a_i = 1/s_i, divided by s_i and less the share 1 - 1/sqrt(1 + t^2 sum a_i^2) of what lies along a, it is white.
     A point of weight w has s_i^2 = s^2/w; without weight it is not there, for the block's shared error either.
+    Of a sweep in part, `part` holds the rows of the whole, (n,).
     """
 
     sweep: Sweep
     noise: SweepNoise
     residuals: Residuals = "complex"
     weight: Array | None = None
+    part: Array | None = None
     kind: Literal["sweep"] = "sweep"
 
     @property
@@ -207,7 +209,7 @@ class SweepTerm:
         return self if kept.all() else self._part(kept)
 
     def _part(self, kept: Array) -> SweepTerm:
-        part = replace(
+        sweep = replace(
             self.sweep,
             frequency=self.sweep.frequency[kept],
             amplitude=self.sweep.amplitude[kept],
@@ -215,7 +217,8 @@ class SweepTerm:
             repeat=self.sweep.repeat[kept],
             reached=self.sweep.amplitude_reached[kept],
         )
-        return replace(self, sweep=part, weight=None if self.weight is None else self.weight[kept[self.order]])
+        weight = None if self.weight is None else self.weight[kept[self.order]]
+        return replace(self, sweep=sweep, weight=weight, part=self._whole[kept])
 
     def weighted(self, weight: Array) -> SweepTerm:
         """The same test with the weight of each point, (n,) in `order`, times a share."""
@@ -231,6 +234,15 @@ class SweepTerm:
     def order(self) -> Array:
         """Rows of the sweep sorted by block (amplitude, repeat), then frequency."""
         return np.lexsort((self.sweep.frequency, self.sweep.repeat, self.sweep.amplitude))
+
+    @property
+    def rows(self) -> Array:
+        """Row of the whole sweep at which each point stands, from 0, (n,) in `order`."""
+        return self._whole[self.order]
+
+    @property
+    def _whole(self) -> Array:
+        return np.arange(self.sweep.frequency.size) if self.part is None else self.part
 
     @cached_property
     def frequency(self) -> Array:

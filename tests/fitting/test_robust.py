@@ -13,7 +13,7 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.drive import drive_of
 from bushfit.fitting.harmonics import MOST_ROWS
 from bushfit.fitting.outliers import limit
-from bushfit.fitting.procedures import fit_joint, fit_two_step
+from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, fit_two_step
 from bushfit.geometry import Direction
 from bushfit.measurement import Loop, Sweep
 from bushfit.model import FIVE, Model
@@ -181,6 +181,28 @@ def test_without_repeats_a_wild_point_is_found(rig: Rig, paper_noise: SimulateSe
     shift = moved(robust(dirty), fit_joint(Data.of(campaign)))
     assert [entry.row for entry in robust(dirty).outliers] == [6, 41]
     assert np.max(np.abs(shift)) < 1.0
+
+
+def test_a_fit_of_one_level_names_the_row_of_the_file(
+    rig: Rig, paper_noise: SimulateSettings, paper_model: Model
+) -> None:
+    """A file that begins at its largest amplitude: the smallest, which fit-dynamic takes, stands at its end."""
+    campaign = rig(paper_model, paper_noise, 0)
+    sweep = campaign.sweeps[0]
+    down = np.argsort(-sweep.amplitude, kind="stable")
+    wild = down.size - 7
+    stiffness = sweep.stiffness[down]
+    stiffness[wild] *= 1.1
+    falling = replace(
+        sweep, frequency=sweep.frequency[down], amplitude=sweep.amplitude[down], stiffness=stiffness,
+        repeat=sweep.repeat[down], reached=None,
+    )  # fmt: skip
+    data = Data.of(replace(campaign, sweeps=(falling, *campaign.sweeps[1:]), fit=SOFT))
+    dynamic, joint = fit_dynamic(data, fit_static(data)), fit_joint(data)
+    print(f"row {wild + 1}: fit-dynamic lists {dynamic.outliers}, fit {joint.outliers}")
+    assert [entry.row for entry in dynamic.outliers] == [entry.row for entry in joint.outliers] == [wild + 1]
+    marked = data.without(dynamic.outliers).sweeps[0]
+    assert marked.order[marked.weights == 0.0].tolist() == [wild]
 
 
 def test_the_two_step_procedure_is_robust_too(rig: Rig, paper_noise: SimulateSettings, paper_model: Model) -> None:
