@@ -54,7 +54,11 @@ _SPELLINGS = {
 }
 #: Words that only some spellings of are known, and capitals that pint takes for other units.
 _EXACT = {"Grad": "deg", "GRAD": "deg", "DEG": "deg", "Deg": "deg", "MM": "mm", "KN": "kN", "SEC": "s", "Sec": "s"}
+_EXACT |= {"RPM": "rpm", "Inch": "inch", "INCH": "inch", "Mpa": "MPa", "MPA": "MPa", "LBF": "lbf", "Lbf": "lbf"}
+#: Words that mean one thing to some and another to others, and what says it clearly.
+_UNCLEAR = {"grad": '"deg" or "gon"', "mil": '"thou" (0.001 inch) or "mrad"', "mils": '"thou" (0.001 inch) or "mrad"'}
 _WORD = re.compile(r"[^\W\d_]+|[º˚]")
+_POWER = re.compile(r"(?<=[^\W\d_])(?=[23](?!\d))")
 _JOINT = re.compile(r"(?<=[^\W\d_])[.-](?=[^\W\d_])")
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*")
 
@@ -82,7 +86,8 @@ def factor(text: str, expected: str) -> float:
     """
     scale, base = _resolve(text)
     if base != _resolve(expected)[1]:
-        raise UnitError("the unit does not fit", found=f'"{text}"', expected=describe(expected))
+        hint = 'a pound of force is "lbf"' if {"lb", "lbs"} & set(_WORD.findall(text)) else None
+        raise UnitError("the unit does not fit", found=f'"{text}"', expected=describe(expected), hint=hint)
     return scale
 
 
@@ -169,11 +174,12 @@ def _resolve(text: str) -> tuple[float, str]:
         "unknown unit", found=f'"{text[:_LONGEST]}"', expected="a unit such as mm, N, kN/mm, deg, Hz or %"
     )
     if len(text) <= _LONGEST:
-        text = _JOINT.sub("*", _WORD.sub(_usual, text))
+        text = _POWER.sub("^", _JOINT.sub("*", _WORD.sub(_usual, text)))
     if len(text) > _LONGEST or not _UNIT.fullmatch(text):
         raise unknown
-    if re.search(r"\bgrad\b", text):
-        raise UnitError("a unit that can be read in two ways", found=f'"{text}"', expected='"deg" or "gon"')
+    for word in _WORD.findall(text):
+        if word in _UNCLEAR:
+            raise UnitError("a unit that can be read in two ways", found=f'"{text}"', expected=_UNCLEAR[word])
     registry = _registry()
     try:
         unit = registry.parse_units(text.replace("⋅", "*"))

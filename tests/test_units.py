@@ -103,7 +103,7 @@ def test_split_header(header: str, parts: tuple[str, str | None]) -> None:
     assert units.split_header(header) == parts
 
 
-FIELD = """m mm cm um µm in inch inches ft mil thou rad mrad deg ° gon grade arcmin s ms sec min h Hz kHz rpm 1/s
+FIELD = """m mm cm um µm in inch inches ft thou rad mrad deg ° gon grade arcmin s ms sec min h Hz kHz rpm 1/s
 N kN mN MN daN dyn kgf gf tf lbf kip ozf N*m N*mm kN*m lbf*in lbf*ft kgf*m N/m N/mm kN/mm lbf/in
 kip/in kgf/mm N*m/rad N*m/deg lbf*in/deg Pa kPa MPa GPa bar mbar psi ksi atm N/mm^2 kgf/cm^2 m/s mm/s mm/min in/s mph
 km/h knot rad/s deg/s g kg t lb oz slug % ppm V mV A mA W kW hp J Wh ohm K m/s^2 l"""
@@ -115,3 +115,30 @@ def test_units_of_the_field_are_as_large_as_in_the_whole_list_of_pint() -> None:
         one = whole.Quantity(1.0, text).to_base_units()
         scale, base = units._resolve(text)
         assert (scale, base) == (pytest.approx(one.magnitude, rel=1e-14), str(one.units)), text
+
+
+@pytest.mark.parametrize(
+    ("text", "expected", "value"),
+    [
+        ("1 N/mm2", "Pa", 1e6),
+        ("1 kp/mm", "N/m", 9806.65),
+        ("1 kgf/cm2", "Pa", 98066.5),
+        ("1 Ncm", "N*m", 1e-2),
+        ("2 Inch", "m", 0.0508),
+        ("30 RPM", "rad/s", 3.141592653589793),
+    ],
+)
+def test_spellings_of_rigs_and_data_sheets(text: str, expected: str, value: float) -> None:
+    assert units.quantity(text, expected) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(("unit", "said"), [("mil", "thou"), ("mils", "mrad"), ("grad", "gon")])
+def test_units_of_two_readings_are_refused(unit: str, said: str) -> None:
+    with pytest.raises(UnitError, match=rf"two ways(.|\n)*{said}"):
+        units.factor(unit, "m")
+
+
+@pytest.mark.parametrize("unit", ["lb", "lbs/in", "in-lb"])
+def test_pounds_of_mass_are_told_from_pounds_of_force(unit: str) -> None:
+    with pytest.raises(UnitError, match='a pound of force is "lbf"'):
+        units.factor(unit, "N")
