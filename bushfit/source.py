@@ -133,6 +133,8 @@ class Text:
                 )
         except (ValueError, pd.errors.ParserWarning):
             return None
+        if self._has('"', before) and len(frame) != sum(1 for _ in self.lines(layout.lines_before_data)):
+            return None  # a quote left open took lines into its cell
         columns = {}
         for index, scale in scales.items():
             column = frame[index].to_numpy()

@@ -75,6 +75,15 @@ def test_loops_in_every_dialect(text: str, tmp_path: Path) -> None:
     assert loop.source.sha256 == hashlib.sha256(text.encode()).hexdigest()
 
 
+@pytest.mark.parametrize(("first", "last"), [('"rerun', '"ok'), ('5" rig', '"x'), ('"rerun', "")])
+def test_a_quote_left_open_in_a_remark_takes_no_rows(first: str, last: str, tmp_path: Path) -> None:
+    """A library would read everything up to the next quote as one cell, lines and all."""
+    remarks = {5: first, 30: last}
+    lines = [f"{line},{remarks.get(number, '')}" for number, line in enumerate(LOOP.splitlines())]
+    loop = loop_from("\n".join([LOOP.splitlines()[0] + ",remark", *lines[1:]]), tmp_path)
+    assert np.array_equal(loop.force, loop_from(LOOP, tmp_path).force)
+
+
 def test_names_and_units_from_the_campaign(tmp_path: Path) -> None:
     text = LOOP.replace("force [N]", "Kraft").replace("displacement [mm]", "Weg [mm]")
     columns = {"force": "Kraft", "displacement": "weg"}
