@@ -9,6 +9,7 @@ is outside. A bushing is as good as the worst of its quantities.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -182,6 +183,15 @@ class Limits:
     reduced_chi_square: Ratio | None = None
     verdicts: tuple[Literal["consistent", "named", "ambiguous", "partly", "unexplained"], ...] = ()
     guard: Annotated[bool, Field(strict=True)] = False
+
+    def __post_init__(self) -> None:
+        for tables, what in ((self.stiffness, STIFFNESS), (self.loss_factor, LOSS_FACTOR)):
+            names = Counter(at_point(bounds.at, what).name for bounds in tables)
+            for name, count in names.items():
+                if count > 1:
+                    raise ValueError(
+                        CampaignError(f"{count} tables for one point", found=name, hint="put them in one table")
+                    )
 
     @property
     def points(self) -> tuple[Point, ...]:

@@ -133,6 +133,15 @@ def test_a_bushing_is_as_good_as_its_worst_and_the_words_say_why(tmp_path: Path)
         ("[[stiffness]]\nmax = '1 N/mm'", ["a key is missing", "at"]),
         ("[[stiffness]]\nat = 'axial 25 Hz 0.1 mm'\nmax = '1 N'", ["stiffness #1.max", "a stiffness"]),
         ("[[stiffness]]\nat = 'axial 25'\nmax = '1 N/mm'", ["stiffness #1.at", "no operating point"]),
+        (
+            "[[stiffness]]\nat = 'axial 25 Hz 0.1 mm'\nmax = '9 N/mm'\n"
+            "[[stiffness]]\nat = 'axial 0.025 kHz 100 um'\nsigma = 3",
+            ["2 tables for one point", "stiffness axial 25 Hz 0.1 mm", "put them in one table"],
+        ),
+        (
+            "[[loss_factor]]\nat = 'axial 25 Hz 0.1 mm'\nmax = 0.1\n" * 3,
+            ["3 tables for one point", "loss factor axial", "put them in one table"],
+        ),
         ("verdict = ['named']", ["unknown key", 'mean "verdicts"']),
         ("verdicts = ['good']", ["verdicts #1"]),
         ("guard = true", ["there is no limit"]),
