@@ -65,7 +65,7 @@ def fit_joint(
     result = _result(data, [found])
     if profile is None:
         return result
-    intervals = profile95(result.model, result.fitted, found.minimised, result.covariance, data.bounds, profile)
+    intervals = profile95(found.solution, found.minimised, result.covariance, data.bounds, profile)
     return replace(result, profile=intervals)
 
 

@@ -6,51 +6,102 @@ anew, and looks where chi-square has risen too far. The two differ where a param
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import erf
+from scipy.optimize import brentq
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.solve import Bounds, Coordinates, jacobian, residual, walls
+from bushfit.fitting.assess import quality
+from bushfit.fitting.solve import Bounds, Coordinates, Solution, solve, walls
 from bushfit.fitting.terms import Term
 from bushfit.model import Model
 from bushfit.results import Z95, Covariance
 
-_LEVEL = 0.95
-#: lmfit steps by the standard error only where that is less than the value, and ends within 5e-5 of the value.
-_CENTRE = 10.0
+#: Longest first step, in coordinates, which are of order one; each further step is longer by the growth.
+_STEP, _GROWTH = 0.3, 1.5
+#: An end is known well enough when it is known to this share of the first step.
+_PRECISION = 2e-3
+#: Most evaluations for the fit of the others at one point, and the relative change at which it stops.
+_EVALUATIONS, _TOLERANCE = 100, 1e-7
+#: A singular value below this share of the largest is zero but for rounding.
+_FLOOR = 1e-12
+#: Noise that was itself estimated widens an interval by no more than this (Student's t of two degrees of freedom).
+_WIDEST = 2.2
+#: Where more than this share of the rise is due to the bounds of others, and the end lies more than a decade away, it
+#: is these bounds that hold it and not the data.
+_OTHERS, _FAR = 0.1, float(np.log(10.0))
 
 Interval = tuple[float | None, float | None]
 
 
 @dataclass(frozen=True, eq=False)
-class _Scale:
-    """Parameters counted in standard errors of a linear fit, from _CENTRE at the best values."""
+class _Profile:
+    """The rise of chi-square by the coordinate of one parameter, the others fitted anew.
 
-    coordinates: Coordinates
-    best: Array
-    unit: Array
+    Each fit starts from the nearest model that is known already.
+    """
 
-    def values(self, counted: Sequence[float] | Array) -> dict[str, float]:
-        return self.coordinates.values(self.best + (np.asarray(counted) - _CENTRE) * self.unit)
+    name: str
+    best: Solution
+    terms: Sequence[Term]
+    bounds: Bounds
+    known: dict[float, Model]
 
-    def counted(self, point: Array) -> Array:
-        return (point - self.best) / self.unit + _CENTRE
+    def fitted(self, at: float) -> Solution:
+        """The fit of the others, with the parameter held there."""
+        near = self.known[min(self.known, key=lambda known: abs(known - at))]
+        least, most = near.parameters[self.name].bounds  # exp(log(bound)) may lie beyond it
+        value = float(np.clip(Coordinates.of(near, [self.name]).values([at])[self.name], least, most))
+        others = [name for name in self.best.coordinates.names if name != self.name]
+        found = solve(
+            near.with_values({self.name: value}),
+            self.terms,
+            others,
+            self.bounds,
+            evaluations=_EVALUATIONS,
+            tolerance=_TOLERANCE,
+            strict=False,
+        )
+        self.known[at] = found.model
+        return found
+
+    def root_rise(self, at: float) -> float:
+        """Root of the rise over the least chi-square."""
+        return float(np.sqrt(max(self.fitted(at).chi_square - self.best.chi_square, 0.0)))
+
+    def end(self, start: float, wall: float, step: float, allowed: float) -> float | None:
+        """Where the root of the rise reaches what is allowed, from the best value on towards a bound."""
+        inner, stride = start, float(np.copysign(step, wall - start))
+        while inner != wall:
+            outer = inner + stride if abs(inner + stride - start) < abs(wall - start) else wall
+            if self.root_rise(outer) > allowed:
+                end = brentq(lambda at: self.root_rise(at) - allowed, inner, outer, xtol=_PRECISION * step)
+                far = abs(end - start) > _FAR
+                return None if far and self._walled(end) > _OTHERS * allowed**2 else float(end)
+            inner, stride = outer, stride * _GROWTH
+        return None
+
+    def _walled(self, end: float) -> float:
+        """How far chi-square would fall there if others could leave the bounds that they met on the way."""
+        found = self.fitted(end)
+        free = [i for i, name in enumerate(found.coordinates.names) if name not in self.best.at_bound]
+        if set(found.at_bound) <= set(self.best.at_bound):
+            return 0.0
+        basis = np.linalg.qr(found.jacobian[free].T)[0]
+        return float(np.sum(np.square(basis.T @ found.residual)))
 
 
 def profile95(
-    model: Model,
-    names: Sequence[str],
+    best: Solution,
     terms: Sequence[Term],
     covariance: Covariance,
     bounds: Bounds,
     advance: Callable[[str, int], None],
 ) -> Mapping[str, Interval]:
-    """95 % intervals of the fitted parameters by profile likelihood, with lmfit's conf_interval.
+    """95 % intervals of the fitted parameters by profile likelihood.
 
     The residuals are in units of a known noise, so the rise of chi-square itself is the measure, 3.84 for 95 %, and
     not an F-test that takes its scale from the misfit. What the covariance counts beyond that (noise that was itself
@@ -58,70 +109,49 @@ def profile95(
     chi-square may rise to the square of that interval's half width over the linear standard error.
 
     Args:
-        model: at the best values.
-        names: of the parameters that were fitted.
+        best: the fit.
         terms: the data.
         covariance: of the fit.
         bounds: limits inside the parameters' own.
         advance: called with the name of each parameter when it is done, and how many are left.
 
     Returns:
-        Lower and upper end by name; None where the data leave that side open up to the bound.
+        Lower and upper end by name; None where the data leave that side open up to the bound, or
+        hold it only a decade away, by another parameter's bound.
 
     Raises:
         FitError: fewer than two parameters were fitted.
     """
-    import lmfit
-
+    names = best.coordinates.names
     if len(names) < 2:
         raise FitError(
             "a profile needs two parameters or more",
             found=f"{len(names)} fitted",
             hint="leave out --profile, or hold fewer parameters in [fit]",
         )
-    coordinates = Coordinates.of(model, names)
-    slope = jacobian(model, terms, names)
-    linear = np.sqrt(np.diag(np.linalg.inv(slope @ slope.T)))
-    scale = _Scale(coordinates, coordinates.point(model.values), linear)
-    ends = scale.counted(np.array(walls(coordinates, bounds)))
-    start = lmfit.Parameters()
-    for i, (least, most) in enumerate(ends.T):
-        start.add(f"u{i}", value=_CENTRE, min=least, max=most)
-
-    def at(parameters: lmfit.Parameters) -> Model:
-        return model.with_values(scale.values([parameter.value for parameter in parameters.values()]))
-
-    def misfit(parameters: lmfit.Parameters) -> Array:
-        return residual(at(parameters), terms)
-
-    def slopes(parameters: lmfit.Parameters) -> Array:
-        free = [i for i, parameter in enumerate(parameters.values()) if parameter.vary]
-        return jacobian(at(parameters), terms, [names[i] for i in free]) * scale.unit[free, None]
-
-    minimizer = lmfit.Minimizer(misfit, start, scale_covar=False, Dfun=slopes, col_deriv=True)
-    best = minimizer.leastsq()
-    wide = covariance.half_width(np.eye(len(covariance.names)))
-    wide = wide / Coordinates.of(model, covariance.names).slopes(model.values)
+    start, walled = best.coordinates.point(best.model.values), np.transpose(walls(best.coordinates, bounds))
+    linear = _linear(best)
+    allowed = _allowed(best, terms, covariance, linear)
     found: dict[str, Interval] = {}
     for i, name in enumerate(names):
-        allowed = wide[covariance.names.index(name)] / scale.unit[i]
-
-        def probability(best: object, other: object, allowed: float = allowed) -> float:
-            rise = max(other.chisqr - best.chisqr, 0.0)  # type: ignore[attr-defined]
-            return float(erf(np.sqrt(rise) / allowed * Z95 / np.sqrt(2.0)))
-
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # an end that stays open comes back as infinite
-            table = lmfit.conf_interval(minimizer, best, [f"u{i}"], sigmas=[_LEVEL], prob_func=probability)
-        low, high = (_value(scale, name, i, table[f"u{i}"][end][1]) for end in (0, -1))
+        profile = _Profile(name, best, terms, bounds, {start[i]: best.model})
+        step = min(1.1 * allowed[i] * linear[i], _STEP)
+        ends = (profile.end(start[i], wall, step, allowed[i]) for wall in walled[i])
+        low, high = (None if end is None else profile.known[end].values[name] for end in ends)
         found[name] = low, high
         advance(name, len(names) - len(found))
     return found
 
 
-def _value(scale: _Scale, name: str, index: int, counted: float) -> float | None:
-    if not np.isfinite(counted):
-        return None
-    point = np.full(scale.best.shape, _CENTRE)
-    point[index] = counted
-    return scale.values(point)[name]
+def _linear(best: Solution) -> Array:
+    """Standard errors of a linear fit, in coordinates; finite where the data leave a combination wholly open."""
+    _, values, vectors = np.linalg.svd(best.jacobian.T, full_matrices=False)
+    return np.linalg.norm(vectors.T / np.maximum(values, _FLOOR * values.max()), axis=1)
+
+
+def _allowed(best: Solution, terms: Sequence[Term], covariance: Covariance, linear: Array) -> Array:
+    """Root of the rise of chi-square that each parameter's interval may reach."""
+    names = best.coordinates.names
+    half = covariance.half_width(np.eye(len(covariance.names)))[[covariance.names.index(name) for name in names]]
+    excess = max(quality(best.model, terms, len(names)).reduced_chi_square, 1.0)
+    return np.clip(half / best.coordinates.slopes(best.model.values) / linear, Z95, _WIDEST * Z95 * np.sqrt(excess))

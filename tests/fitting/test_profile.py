@@ -12,6 +12,7 @@ from bushfit.campaign import Campaign
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
+from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
 from bushfit.model import FIVE, Model
 from bushfit.results import Result
@@ -67,6 +68,67 @@ def test_what_the_data_leave_open_stays_open(rig: Callable[..., Campaign], paper
         assert low is not None
         assert high is None or high > 4.0 * low
     assert None not in result.profile["alpha"]
+
+
+@pytest.mark.parametrize("largest", [1e-3, 1e-4], ids=["good", "weak"])
+def test_an_end_is_where_chi_square_has_risen_as_far_as_is_allowed(
+    rig: Callable[..., Campaign], paper_model: Model, largest: float
+) -> None:
+    data = Data.of(rig(paper_model, replace(plan(largest), loops=()), 3))
+    terms = data.chosen(None)
+    result = profiled(data.campaign)
+    best = solve(result.model, terms, FIVE)
+    linear = np.sqrt(np.diag(np.linalg.inv(best.jacobian @ best.jacobian.T)))
+    slopes = best.coordinates.slopes(best.model.values)
+    allowed = result.covariance.half_width(np.eye(5)) / slopes / linear
+    rises = {}
+    for name, ratio in zip(FIVE, allowed, strict=True):
+        others = [other for other in FIVE if other != name]
+        for end in result.profile[name]:
+            if end is not None:
+                refit = solve(result.model.with_values({name: end}), terms, others)
+                rises[name, end] = (refit.chi_square - best.chi_square) / ratio**2
+    print(rises)
+    assert len(rises) >= (10 if largest == 1e-3 else 5)
+    assert all(abs(rise - 1.0) < 0.02 for rise in rises.values())
+
+
+def test_one_loop_bounds_mu_from_above_alone(rig: Callable[..., Campaign], paper_model: Model) -> None:
+    """The storage of one loop is mu + m/2 omega^alpha cos(pi alpha/2): all may be mu's, and all the springpot's."""
+    result = profiled(rig(paper_model, replace(plan(1e-3), sweeps=()), 3))
+    print(result.profile)
+    values, omega = paper_model.values, 2.0 * np.pi * 0.1
+    turn = np.pi * values["alpha"] / 2.0
+    springpot = values["m"] / 2.0 * omega ** values["alpha"]
+    low, high = result.profile["mu"]
+    assert low is None
+    assert high == pytest.approx(values["mu"] + springpot * np.cos(turn), rel=0.01)
+    low, high = result.profile["m"]
+    damper = 2.0 * springpot * np.sin(turn) / omega
+    assert low is not None
+    assert 0.7 * damper < low < damper
+    assert high is None
+    assert result.profile["alpha"] == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "frequencies", "open_ones"),
+    [((2e-4,), FREQUENCIES, ("eps_half",)), ((1e-4, 5e-4), (50.0,), ("m",))],
+    ids=["one amplitude", "one frequency"],
+)
+def test_a_singular_campaign_has_open_ends(
+    rig: Callable[..., Campaign],
+    paper_model: Model,
+    amplitudes: tuple[float, ...],
+    frequencies: tuple[float, ...],
+    open_ones: tuple[str, ...],
+) -> None:
+    sweep = SimulatedSweep(Direction.AXIAL, amplitudes, frequencies)
+    result = profiled(rig(paper_model, replace(plan(1e-3), loops=(), sweeps=(sweep,)), 1))
+    print(result.profile)
+    assert result.profile["mu"][0] is None
+    for name in open_ones:
+        assert result.profile[name] == (None, None)
 
 
 def test_profiles_are_kept_in_the_document(rig: Callable[..., Campaign], paper_model: Model) -> None:
