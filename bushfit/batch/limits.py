@@ -3,14 +3,15 @@
 A value with its 95 % interval meets a limit in one of four ways (the words are those of ILAC-G8:09/2019 for
 statements of conformity): pass, the whole interval is within; conditional pass, the value is within but the interval
 reaches over the limit; conditional fail, the value is outside but the interval reaches back; fail, the whole interval
-is outside. A bushing is as good as the worst of its quantities.
+is outside. A bushing is as good as the worst of its quantities; what is not known of it cannot be said to be within,
+and fails.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
@@ -19,6 +20,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import ConfigDict, Field, ValidationInfo
 
+from bushfit.batch.manifest import Row
 from bushfit.batch.points import At, Point
 from bushfit.batch.quantities import (
     CHI_SQUARE,
@@ -226,6 +228,24 @@ def read_limits(path: Path) -> Limits:
     return limits
 
 
+def check_judged(limits: Limits, path: Path, rows: Iterable[Row]) -> None:
+    """Refuse limits that no work on these rows could answer.
+
+    Raises:
+        CampaignError: `verdicts`, and a row without diagnose.
+    """
+    silent = [row.name for row in rows if "diagnose" not in (row.settings.commands or ())] if limits.verdicts else []
+    if silent:
+        more = f" and {len(silent) - 1} more" if len(silent) > 1 else ""
+        raise CampaignError(
+            "a limit on verdicts needs diagnose",
+            file=path,
+            place="verdicts",
+            found=f"{silent[0]}{more} without it",
+            hint='--command diagnose, or commands = ["diagnose"] in the manifest',
+        )
+
+
 @dataclass(frozen=True)
 class Judgement:
     """The verdict on a bushing: its worst; what misses a limit and what is only just within, in words by name."""
@@ -257,8 +277,10 @@ class Judge:
 
     def __call__(self, record: Record) -> Judgement:
         worst, missed, edge = Verdict.PASS, dict[str, str](), dict[str, str]()
-        for name, found in figures(record):
-            if name not in self.allowed:
+        known = dict(figures(record))
+        for name in self.allowed:
+            if (found := known.get(name)) is None:
+                worst, missed[name] = Verdict.FAIL, f"{name} is not known: fail"
                 continue
             verdict = judge(found, *self.allowed[name])
             worst = max(worst, verdict)
@@ -266,8 +288,8 @@ class Judge:
                 missed[name] = self._words(name, found, verdict)
             elif verdict is not Verdict.PASS:
                 edge[name] = self._words(name, found, verdict)
-        said = record.get("verdict")
-        if self._limits.verdicts and said and said not in self._limits.verdicts:
+        said = record.get("verdict", "is not known")
+        if self._limits.verdicts and said not in self._limits.verdicts:
             worst = Verdict.FAIL
             missed["verdict"] = f"verdict {said}, allowed {', '.join(self._limits.verdicts)}"
         return Judgement(worst, missed, edge)

@@ -50,9 +50,10 @@ def parameter_quantities(names: Iterable[str]) -> list[Quantity]:
 
 
 def figures(record: Record) -> Iterator[tuple[str, Figures]]:
-    """All quantities of a row's record, by name."""
+    """All quantities of a row's record that are known, by name."""
     for name, (value, low, high, stderr, _) in record.get("parameters", {}).items():
-        yield name, (value, low, high, stderr)
+        if value is not None:
+            yield name, (value, low, high, stderr)
     for quantity, key in ((NRMSE, "nrmse"), (CHI_SQUARE, "reduced_chi_square")):
         if record.get(key) is not None:
             yield quantity.name, (record[key], None, None, None)

@@ -213,7 +213,11 @@ def _draw(
             quantity.header,
             columns[name] * quantity.factor,
             tuple(limit * quantity.factor for limit in (judge.allowed.get(name, ()) if judge else ())),
-            {number: plan.rows[number].name for number, names in missed.items() if name in names},
+            {
+                number: plan.rows[number].name
+                for number, names in missed.items()
+                if name in names and np.isfinite(columns[name][number])
+            },
         )
         for name, quantity in quantities.items()
         if name in columns and (np.isfinite(columns[name]).sum() >= _LEAST_DRAWN or (judge and name in judge.allowed))

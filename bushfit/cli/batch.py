@@ -72,7 +72,7 @@ def command(
 
     Writes batch.csv (a row a bushing), batch.png, and bushings/<name>/ with model.json of each.
     """
-    from bushfit.batch.limits import read_limits
+    from bushfit.batch.limits import check_judged, read_limits
     from bushfit.batch.manifest import Settings, read_manifest
     from bushfit.batch.pool import DaskPool, LocalPool
     from bushfit.batch.run import Plan, check_free, run
@@ -87,6 +87,8 @@ def command(
     )
     read = read_manifest(manifest, given)
     judged_by = read_limits(limits) if limits else None
+    if limits and judged_by:
+        check_judged(judged_by, limits, read.rows)
     points = (*read.points, *_points(at), *(judged_by.points if judged_by else ()))
     formats = tuple(kind for kind, wanted in (("csv", tables), ("png", plots and options.plots)) if wanted)
     output = options.folder(read.stem).absolute()

@@ -125,6 +125,24 @@ def test_limits_decide_the_exit_status_and_are_named(typed: Callable[..., Any], 
     )
 
 
+def test_limits_on_what_a_row_does_not_have(typed: Callable[..., Any], shop: Path) -> None:
+    (shop / "limits.toml").write_text('verdicts = ["consistent"]\n')
+    refused = typed("batch", PATTERN, "-o", "all", "--limits", "limits.toml")
+    assert refused.returncode == 2
+    assert all(word in refused.stderr for word in ("limits.toml, verdicts", "b0 and 4 more", "--command diagnose"))
+    assert not (shop / "all").exists()
+    (shop / "limits.toml").write_text("[parameters.'inertia.mass']\nmax = '1 kg'\n")
+    (shop / "m.csv").write_text(
+        "campaign,name,effects\nbushings/b0/bushing.toml,without,\nbushings/b0/bushing.toml,with,inertia\n"
+    )
+    done = typed("batch", "m.csv", "-o", "all", "--limits", "limits.toml", "-q")
+    assert done.returncode == 1, done.stderr
+    without, with_ = rows(shop / "all")
+    assert (without["limits"], without["out of limits"]) == ("fail", "inertia.mass is not known: fail")
+    assert float(with_["inertia.mass [kg]"]) < 1
+    assert (shop / "all/batch.png").exists(), "the picture shows what is known"
+
+
 def test_results_that_stand_are_refused_resumed_or_replaced(typed: Callable[..., Any], shop: Path) -> None:
     assert typed("batch", PATTERN, "-o", "all", "-q").returncode == 0
     before, files = stamps(shop / "all/bushings"), tree(shop / "all")

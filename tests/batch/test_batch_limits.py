@@ -102,9 +102,20 @@ def test_the_batch_s_own_scatter_needs_bushings_that_differ(tmp_path: Path) -> N
     assert few.allowed == same.allowed == {"mu": (-math.inf, math.inf)}
 
 
+FEW = """
+verdicts = ["consistent", "named"]
+[parameters.mu]
+min = "1 MPa"
+max = "1.2 MPa"
+[parameters.alpha]
+nominal = 0.24
+tolerance = "5 %"
+"""
+
+
 def test_a_bushing_is_as_good_as_its_worst_and_the_words_say_why(tmp_path: Path) -> None:
-    read = limits(tmp_path, ALL)
-    quantities = {q.name: q for q in parameter_quantities(["mu", "alpha", "sigma_fmax"])}
+    read = limits(tmp_path, FEW)
+    quantities = {q.name: q for q in parameter_quantities(["mu", "alpha"])}
     judged = Judge(read, {}, quantities)
     record = {
         "parameters": {"mu": [1.19e6, 1.17e6, 1.21e6, 1e4, "Pa"], "alpha": [0.26, 0.25, 0.27, 5e-3, "1"]},
@@ -116,9 +127,27 @@ def test_a_bushing_is_as_good_as_its_worst_and_the_words_say_why(tmp_path: Path)
     assert dict(found.edge) == {
         "mu": "mu = 1.19e+06 (1.17e+06 to 1.21e+06) Pa, min 1e+06 max 1.2e+06: conditional pass"
     }
-    assert judged({"verdict": "partly"}).verdict is Verdict.FAIL
-    guarded = Judge(limits(tmp_path, "guard = true\n" + ALL), {}, quantities)
+    partly = judged({**record, "verdict": "partly"})
+    assert partly.verdict is Verdict.FAIL
+    assert partly.missed["verdict"] == "verdict partly, allowed consistent, named"
+    guarded = Judge(limits(tmp_path, "guard = true\n" + FEW), {}, quantities)
     assert set(guarded(record).missed) == {"mu", "alpha"}
+
+
+def test_what_is_not_known_is_no_pass(tmp_path: Path) -> None:
+    point, read = "axial 25 Hz 0.1 mm", limits(tmp_path, ALL + "[parameters.'inertia.mass']\nmax = '0.1 kg'\n")
+    record = {
+        "parameters": {"mu": [None, None, None, None, "Pa"], "alpha": [0.24, 0.23, 0.25, 5e-3, "1"]},
+        "nrmse": None,
+        "reduced_chi_square": 1.0,
+        "points": {point: {"stiffness": [None, None, None], "loss factor": [0.1, 0.09, 0.11]}},
+    }
+    judged = Judge(read, {}, {})(record)
+    unknown = ["mu", "sigma_fmax", "inertia.mass", f"stiffness {point}", "stiffness torsion 10 Hz 1 deg", "NRMSE"]
+    assert dict(judged.missed) == {name: f"{name} is not known: fail" for name in unknown} | {
+        "verdict": "verdict is not known, allowed consistent, named"
+    }
+    assert judged.verdict is Verdict.FAIL
 
 
 @pytest.mark.parametrize(
