@@ -23,6 +23,8 @@ _FEWEST_SWEEP_ROWS = 3
 _MOST_REPEATS = 1_000_000
 #: Noise may push a loss factor below zero; what lies outside these limits is no measured bushing.
 _LOSS_FACTOR_RANGE = (-0.5, 5.0)
+#: No rubber loses less than this throughout; columns that say the same agree within this share of |K|.
+_LEAST_LOSS_FACTOR, _AGREE = 0.005, 0.02
 
 
 def read_loop(
@@ -144,7 +146,10 @@ def read_sweep(
     }
     also = (role for role in ("amplitude_reached", "repeat") if role in table.roles)
     roles = ["frequency", "amplitude", *pair, *also]
-    wanted = {role: table.column(role, expected.get(role, direction.stiffness_unit)) for role in roles}
+    units_of = {role: expected.get(role, direction.stiffness_unit) for role in SWEEP_COLUMNS}
+    again = (role for other in STIFFNESS_PAIRS if set(other) <= set(table.roles) for role in other)
+    roles += [role for role in again if units_of[role] == "1" or table.agrees(role, units_of[role])]
+    wanted = {role: table.column(role, units_of[role]) for role in roles}
     convention = _convention(table, wanted["amplitude"], amplitude)
     values = table.read(wanted, fewest_rows=_FEWEST_SWEEP_ROWS)
 
@@ -153,6 +158,7 @@ def read_sweep(
         table.refuse(values[role] <= 0.0, wanted[role], f"the {label} is not positive", "a number above zero")
     with np.errstate(over="ignore"):
         stiffness, loss_factor = _complex_stiffness(pair, values[pair[0]], values[pair[1]])
+    _check_loss(table, wanted[pair[1]], loss_factor)
     low, high = _LOSS_FACTOR_RANGE
     table.refuse(
         ~((loss_factor >= low) & (loss_factor <= high)),
@@ -161,6 +167,7 @@ def read_sweep(
         f"a loss factor (loss over storage stiffness) from {low:g} to {high:g}",
         "check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]",
     )
+    _check_agreement(table, pair, values, stiffness)
     counted = 0.5 if convention == "peak-to-peak" else 1.0
     zero_to_peak = counted * values["amplitude"]
     reached = counted * values["amplitude_reached"] if "amplitude_reached" in values else None
@@ -182,6 +189,46 @@ def _check_not_swapped(table: Table, direction: Direction) -> None:
             expected="a displacement in units of displacement, and a force in units of force",
             hint="correct the header, or name the columns in the campaign: columns = "
             f'{{ displacement = "{force}", force = "{displacement}" }}',
+        )
+
+
+def _check_loss(table: Table, column: Column, loss_factor: Floats) -> None:
+    """Refuse a loss that is below zero throughout, and a loss factor in % whose values are ratios."""
+    if np.median(loss_factor) < -_LEAST_LOSS_FACTOR:
+        raise table.error(
+            "the loss counts the other way",
+            column=column,
+            found=f"{int(np.count_nonzero(loss_factor < 0.0))} of {loss_factor.size} rows below zero",
+            expected="a force that leads the displacement: phase, loss factor and loss stiffness above zero",
+            hint="turn the sign of this column in the file",
+        )
+    largest = float(np.abs(loss_factor).max())
+    if column.role == "loss_factor" and column.scale != 1.0 and 0.0 < largest < _LEAST_LOSS_FACTOR:
+        raise table.error(
+            "no rubber loses so little",
+            column=column,
+            found=f"{largest / column.scale:.3g} {column.unit} at most",
+            expected=f"a loss factor above {_LEAST_LOSS_FACTOR / column.scale:g} {column.unit} somewhere",
+            hint=f'if these are ratios, write "[-]" for "[{column.unit}]" in the header',
+        )
+
+
+def _check_agreement(
+    table: Table, pair: tuple[str, str], values: Mapping[str, Floats], stiffness: NDArray[np.complex128]
+) -> None:
+    """Refuse rows in which another of STIFFNESS_PAIRS says something else; the sign of its loss is left open."""
+    for other in STIFFNESS_PAIRS:
+        if other == pair or not set(other) <= set(values):
+            continue
+        again, _ = _complex_stiffness(other, values[other[0]], values[other[1]])
+        apart = np.hypot(again.real - stiffness.real, np.abs(again.imag) - np.abs(stiffness.imag))
+        own, others = (" and ".join(f'"{table.roles[role].header}"' for role in both) for both in (pair, other))
+        table.refuse(
+            ~(apart <= _AGREE * np.abs(stiffness)),
+            table.roles[other[1] if other[0] == pair[0] else other[0]],
+            "the columns contradict each other",
+            f"the complex stiffness of {own}, within {100 * _AGREE:g} %, in {others}",
+            "correct the columns that are wrong, or take them out",
         )
 
 

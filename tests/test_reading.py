@@ -240,6 +240,29 @@ def test_spoiled_loops_have_one_clear_error(text: str | bytes, words: list[str],
     assert all(word in message for word in ["loop.csv", *words]), message
 
 
+#: |K|, loss factor, phase, K' and K'' of the same stiffness, rounded as files are.
+ALL_PAIRS = "\n".join(
+    [
+        f"{SWEEP_HEADER},phase [deg],K' [N/mm],K'' [N/mm]",
+        *(
+            f"{5 + 10 * i},0.1,{abs(k):.1f},{k.imag / k.real:.3f},"
+            f"{np.degrees(np.angle(k)):.1f},{k.real:.0f},{k.imag:.0f}"
+            for i, k in enumerate(np.array([600.0, 610.0, 620.0, 630.0]) * np.exp(0.11j))
+        ),
+    ]
+)
+
+
+def test_columns_that_say_the_same_may_be_rounded_or_count_a_phase_the_other_way(tmp_path: Path) -> None:
+    stiffness = sweep_from(ALL_PAIRS, tmp_path).stiffness
+    np.testing.assert_allclose(stiffness, 1e3 * np.array([600.0, 610.0, 620.0, 630.0]) * np.exp(0.11j), rtol=1e-3)
+    assert np.array_equal(sweep_from(ALL_PAIRS.replace(",6.", ",-6."), tmp_path).stiffness, stiffness)
+
+
+def test_noise_about_no_loss_is_no_loss_the_other_way(tmp_path: Path) -> None:
+    assert np.median(sweep_from(SWEEP.replace("0.1\n", "-0.002\n"), tmp_path).stiffness.imag) < 0.0
+
+
 BAD_SWEEPS = [
     ("no pair", SWEEP.replace("loss factor [-]", "x"), ["line 1", "no pair", "storage stiffness"]),
     ("frequency unit", SWEEP.replace("[Hz]", "[rad/s]"), ["line 1", "does not fit", "a frequency"]),
@@ -262,6 +285,18 @@ BAD_SWEEPS = [
         ),
         ["line 3", "loss"],
     ),
+    (
+        "phase the other way",
+        SWEEP.replace("loss factor [-]", "phase [deg]").replace("0.1\n", "-6.5\n"),
+        ["the loss counts the other way", '"phase [deg]"', "8 of 8 rows", "turn the sign"],
+    ),
+    ("ratio as percent", SWEEP.replace("[-]", "[%]"), ['"loss factor [%]"', "0.1 % at most", "0.5 %", '"[-]"']),
+    (
+        "pairs that contradict",
+        with_line(ALL_PAIRS, 4, ALL_PAIRS.splitlines()[3].replace(",6.", ",9.")),
+        ["line 4", "contradict", '"phase [deg]"', '"loss factor [-]"'],
+    ),
+    ("another stiffness", ALL_PAIRS.replace("K' [N/mm]", "K' [kN/mm]"), ["line 2", "contradict", "K' [kN/mm]"]),
     ("repeat", SWEEP.replace("0.1\n", "0.1,1.5\n").replace("[-]", "[-],repeat"), ["line 2", "no repeat", '"1.5"']),
     ("few rows", "\n".join(SWEEP.splitlines()[:3]), ["too few rows", "2", "3"]),
 ]
