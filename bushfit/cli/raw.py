@@ -49,7 +49,7 @@ def file_options(*keys: str) -> Callable[[F], F]:
             click.option(
                 "--direction",
                 type=click.Choice(["axial", "radial", "torsion"]),
-                help="Of the files whose names and columns do not say it.",
+                help="Of all files given [found from their names and columns].",
             ),
             click.option("--column", "columns", multiple=True, metavar="ROLE=HEADER", help='Such as "force=Fz".'),
             click.option("--unit", "units", multiple=True, metavar="ROLE=UNIT", help='Such as "force=kN".'),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from bushfit.campaign import reader_keywords
-from bushfit.directions import direction_of_file
+from bushfit.directions import direction_of_file, named_direction
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.geometry import Direction
 from bushfit.headers import LOOP_COLUMNS, SWEEP_COLUMNS
@@ -64,6 +64,9 @@ def inspect(file: Path, stated: Mapping[str, Any]) -> Inspected:
         _column(header, next((c for c in table.roles.values() if c.index == index), None), ranges)
         for index, header in enumerate(table.headers)
     )
+    named = named_direction([file.stem])
+    if direction and named and named is not direction:
+        odd.append(f"the name says {named}, it is taken for {direction} as stated")
     looked = Looked(looked.facts, (*odd, *looked.odd))
     counted = is_sweep and table.roles["amplitude"].convention is not None
     return Inspected(file, kind, direction, _written(table), columns, looked, entry, measured, counted)
@@ -90,10 +93,24 @@ def read_history(file: Path, stated: Mapping[str, Any]) -> tuple[Loop, Direction
 
 
 def _direction(file: Path, table: Table, stated: Mapping[str, Any]) -> Direction | None:
-    """The direction that the file says, or else the user."""
+    """The direction that the user states, or else the file.
+
+    Raises:
+        MeasurementError: units of torsion where the user states another direction.
+    """
     turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
     found = direction_of_file(file, table.headers, turns=turns)
-    return found or (Direction(stated["direction"]) if "direction" in stated else None)
+    if "direction" not in stated:
+        return found
+    if turns and stated["direction"] != Direction.TORSION:
+        raise table.error(
+            "the units say torsion",
+            line=table.layout.header_line,
+            found=f"{', '.join(table.headers)}; stated: {stated['direction']}",
+            expected="one direction",
+            hint="state --direction torsion, or none",
+        )
+    return Direction(stated["direction"])
 
 
 def _recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
