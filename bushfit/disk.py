@@ -6,7 +6,7 @@ import ctypes
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -58,14 +58,21 @@ def locked(folder: Path) -> Iterator[None]:
         held.close()
 
 
-def claim(folder: Path) -> Claim:
-    """Show other runs that a folder is in use, until the claim is closed or this process ends."""
-    return Claim(_lock(folder, wait=True))
+def claim(folder: Path, *, wait: bool = True) -> Claim:
+    """Show other runs that a folder is in use, until the claim is closed or this process ends.
+
+    Raises:
+        BlockingIOError: another holds it, and `wait` is False.
+    """
+    return Claim(_lock(folder, wait=wait))
 
 
 def is_abandoned(folder: Path) -> bool:
     """Whether nobody claims a folder; False where that cannot be told."""
-    descriptor = _lock(folder, wait=False)
+    try:
+        descriptor = _lock(folder, wait=False)
+    except BlockingIOError:
+        return False
     Claim(descriptor).close()
     return descriptor is not None
 
@@ -82,20 +89,27 @@ class Claim:
 
 
 def _lock(folder: Path, *, wait: bool) -> int | None:
-    """A descriptor that holds the folder; None where it is held, or cannot be."""
+    """A descriptor that holds the folder; None where it cannot be held.
+
+    Raises:
+        BlockingIOError: another holds it, and `wait` is False.
+    """
     if sys.platform == "win32":
         return None
     import fcntl
 
-    with suppress(OSError):
+    try:
         descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-        except OSError:
-            os.close(descriptor)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except OSError as error:
+        os.close(descriptor)
+        if isinstance(error, BlockingIOError):
             raise
-        return descriptor
-    return None
+        return None
+    return descriptor
 
 
 @cache

@@ -13,14 +13,15 @@ import json
 import os
 import shutil
 import uuid
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from bushfit import __version__
+from bushfit import __version__, disk
 from bushfit.batch.manifest import Row
 from bushfit.batch.points import Point
+from bushfit.errors import OutputError
 
 SCHEMA = "bushfit/row/1"
 RECORD, ROWS, ASIDE = "row.json", "bushings", ".aside"
@@ -89,12 +90,24 @@ def to_line(record: Record) -> bytes:
     return json.dumps(record, allow_nan=False, ensure_ascii=False, separators=(",", ":")).encode() + b"\n"
 
 
-def prepare(output: Path) -> None:
-    """Make the folders, and clear away what a killed run left half written."""
-    shutil.rmtree(output / ASIDE, ignore_errors=True)
-    for folder in (ROWS, ASIDE):
-        os.makedirs(output / folder, exist_ok=True)  # noqa: PTH103
+@contextlib.contextmanager
+def held(output: Path) -> Iterator[None]:
+    """Hold the batch's folder against other batches; what a killed run left half written is cleared away.
 
-
-def finish(output: Path) -> None:
-    shutil.rmtree(output / ASIDE, ignore_errors=True)
+    Raises:
+        OutputError: another batch is at work there.
+    """
+    os.makedirs(output / ROWS, exist_ok=True)  # noqa: PTH103
+    try:
+        claim = disk.claim(output / ROWS, wait=False)
+    except BlockingIOError:
+        raise OutputError(
+            "another batch is at work there", file=output, hint="wait for its end, or name another folder with -o"
+        ) from None
+    try:
+        shutil.rmtree(output / ASIDE, ignore_errors=True)
+        os.makedirs(output / ASIDE, exist_ok=True)  # noqa: PTH103
+        yield
+    finally:
+        shutil.rmtree(output / ASIDE, ignore_errors=True)
+        claim.close()

@@ -126,12 +126,11 @@ def run(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Summary:
 
     Raises:
         BatchError: the workers are gone for good; what was done is kept.
-        OutputError: the results cannot be written.
+        OutputError: the results cannot be written, or another batch is at work in the folder.
     """
     begin, output = time.perf_counter(), plan.orders.output
     try:
-        ledger.prepare(output)
-        with Spool(output / ledger.ASIDE / "records", len(plan.rows)) as spool:
+        with ledger.held(output), Spool(output / ledger.ASIDE / "records", len(plan.rows)) as spool:
             task = partial(work, orders=plan.orders)
             for number, (status, line) in pool.run(plan.rows, task, given_up, workers):
                 spool.put(number, line)
@@ -141,8 +140,6 @@ def run(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Summary:
         raise OutputError(
             "the results cannot be written", file=output, found=error.strerror or str(error), hint="free some space"
         ) from error
-    finally:
-        ledger.finish(output)
 
 
 def _report(plan: Plan, spool: Spool, seconds: float) -> Summary:

@@ -221,6 +221,23 @@ def test_killed_at_any_moment_and_resumed_it_is_as_if_it_had_run_through(typed: 
     assert tree(shop / "killed") == tree(shop / "whole")
 
 
+def test_two_batches_do_not_share_a_folder(typed: Callable[..., Any], shop: Path) -> None:
+    (shop / "many.csv").write_text("campaign\n" + "".join(f"bushings/b{n % 5}/bushing.toml\n" for n in range(150)))
+    first = subprocess.Popen(command(Path("all"), "-q", "--jobs", "1"), cwd=shop)
+    while first.poll() is None and not list((shop / "all").glob("bushings/*/row.json")):
+        time.sleep(0.001)
+    for option in ("--force", "--resume"):
+        second = typed("batch", PATTERN, "-o", "all", option)
+        assert first.poll() is None, "refused at once"
+        assert (second.returncode, second.stdout) == (2, "")
+        assert "another batch is at work there" in second.stderr
+        assert "Traceback" not in second.stderr
+        assert (shop / "all" / ledger.ASIDE).exists()
+    assert first.wait() == 0
+    assert [row["status"] for row in rows(shop / "all")] == ["done"] * 150
+    assert typed("batch", PATTERN, "-o", "all", "--resume", "-q").returncode == 0
+
+
 def test_plain_lines_where_standard_error_is_no_terminal(typed: Callable[..., Any], shop: Path) -> None:
     done = typed("batch", PATTERN, "-o", "all", "--jobs", "1", "--no-plots")
     assert done.returncode == 0
