@@ -17,7 +17,7 @@ from bushfit.measurement import Sweep
 from bushfit.model import FIVE, Model
 from bushfit.prediction import PAPER_AMPLITUDES, PAPER_FREQUENCIES, default_grid, left_out, predict
 from bushfit.results import Covariance, Range, Result
-from bushfit.schema import SimulateSettings
+from bushfit.schema import SimulatedSweep, SimulateSettings
 from bushfit.sheets import prediction_table
 from bushfit.simulation import measure, undisturbed
 
@@ -51,6 +51,29 @@ def test_table_is_that_of_the_interface(result: Result) -> None:
     for name in FOUR:
         assert (table[f"{name}, low"] < table[name]).all()
         assert (table[f"{name}, high"] > table[name]).all()
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "frequencies"),
+    [((2e-4,), PAPER_FREQUENCIES), ((1e-4, 2e-4, 5e-4), (50.0,))],
+    ids=["one amplitude", "one frequency"],
+)
+def test_bands_of_an_open_model_are_narrow_where_it_was_measured_and_only_there(
+    paper_model: Model, amplitudes: tuple[float, ...], frequencies: tuple[float, ...]
+) -> None:
+    """The direction that such sweeps leave wholly open cancels where the stiffness does not depend on it."""
+    plan = SimulateSettings(repeats=3, noise=5e-3, sweeps=(SimulatedSweep(Direction.AXIAL, amplitudes, frequencies),))
+    result = fit_joint(Data.of(measure(undisturbed(paper_model, plan), plan).campaign()))
+
+    def width(frequency: float, amplitude: float) -> float:
+        band = predict(result, Direction.AXIAL, [frequency], [amplitude]).stiffness
+        return float(((band.high - band.low) / band.value)[0])
+
+    there = [width(frequency, amplitude) for frequency in frequencies for amplitude in amplitudes]
+    elsewhere = width(2.0 * frequencies[-1], 3.0 * amplitudes[-1])
+    print(f"widths {min(there):.3g} to {max(there):.3g}, elsewhere {elsewhere:.3g}")
+    assert max(there) < 0.04
+    assert elsewhere > 0.2
 
 
 def test_torsion_has_its_own_units(result: Result) -> None:

@@ -68,6 +68,7 @@ def command(
     options.require_free(folder, job.names(loaded, options.formats))
     outcome = job.run(result, loaded)
     tell_predictions(options, outcome)
+    warn(options, [f"of the fit: {line}" for line in result.warnings])
     options.write(folder, outcome.files(options.formats))
     options.tell(outcome.document)
 

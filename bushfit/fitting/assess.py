@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.errors import FitError
 from bushfit.fitting.solve import Coordinates, jacobian, residual
 from bushfit.fitting.terms import Term
 from bushfit.model import Model
@@ -16,6 +15,8 @@ from bushfit.results import Covariance, Quality, Range
 
 #: Reduced chi-square beyond which noise alone is no explanation, in standard deviations.
 _LACK_OF_FIT = 5.0
+#: Largest standard error of a combination of parameters, in a fit's coordinates, which are of order one.
+_OPEN = 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +36,8 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
     the one-stage case, cov = (J J^T)^-1. Parameters `held` with a known covariance enter as they are. Where a
     stage's residuals exceed its noise, its share is inflated by the reduced chi-square. The noise that weighs the
     data is itself an estimate: what its error adds is counted as Kenward and Roger (1997) do, and how far the
-    covariance may be off for it goes along as `spread`.
-
-    Raises:
-        FitError: the data leave some combination of the parameters wholly open.
+    covariance may be off for it goes along as `spread`. A combination that the data leave wholly open has a standard
+    error of _OPEN coordinates: beyond all bounds, and small enough to cancel where a quantity does not depend on it.
     """
     held = held or Covariance()
     names = (*held.names, *(name for stage in stages for name in stage.names))
@@ -56,14 +55,8 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
         root[own, own] = inflation * np.eye(len(stage.names))
         bases.append((own, inflation * basis.T))
         begin = own.stop
-    try:
-        answer, reaction = np.linalg.solve(system, root), np.linalg.inv(system)
-    except np.linalg.LinAlgError:
-        raise FitError(
-            "the data leave a combination of parameters wholly open",
-            found="a singular Jacobian in " + ", ".join(names),
-            hint="hold one of them with vary = false in [fit], or measure another amplitude, frequency or rate",
-        ) from None
+    reaction = _inverse(system)
+    answer = reaction @ root
     by_value, reaction = answer * slopes[:, None], reaction * slopes[:, None]
     carried = reaction[:, : len(held.names)] / slopes[: len(held.names)]
     spread = [carried @ part @ carried.T for part in held.spread]
@@ -72,6 +65,17 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
         spread.append(part)
         matrix = matrix + 2.0 * lost
     return Covariance(names, matrix, tuple(spread))
+
+
+def _inverse(system: Array) -> Array:
+    left, values, right = np.linalg.svd(system)
+    return (right.T / np.maximum(values, 1.0 / _OPEN)) @ left.T
+
+
+def linear_errors(slope: Array) -> Array:
+    """Standard errors (k,) of parameters from the derivatives (k, n) of whitened residuals, as `covariance` takes
+    them; in coordinates."""
+    return np.linalg.norm(_inverse(np.linalg.qr(slope.T)[1]), axis=1)
 
 
 def _unsure(stages: Sequence[Stage], reactions: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.assess import quality
+from bushfit.fitting.assess import linear_errors, quality
 from bushfit.fitting.solve import Bounds, Coordinates, Solution, solve, walls
 from bushfit.fitting.terms import Term
 from bushfit.model import Model
@@ -26,13 +26,11 @@ _STEP, _GROWTH = 0.3, 1.5
 _PRECISION = 2e-3
 #: Most evaluations for the fit of the others at one point, and the relative change at which it stops.
 _EVALUATIONS, _TOLERANCE = 100, 1e-7
-#: A singular value below this share of the largest is zero but for rounding.
-_FLOOR = 1e-12
 #: Noise that was itself estimated widens an interval by no more than this (Student's t of two degrees of freedom).
 _WIDEST = 2.2
-#: Where more than this share of the rise is due to the bounds of others, and the end lies more than a decade away, it
-#: is these bounds that hold it and not the data.
-_OTHERS, _FAR = 0.1, float(np.log(10.0))
+#: Where more than this share of the rise is due to the bounds of others, and the end lies more than a coordinate
+#: away (a factor e), it is these bounds that hold it and not the data.
+_OTHERS, _FAR = 0.1, 1.0
 
 Interval = tuple[float | None, float | None]
 
@@ -117,7 +115,7 @@ def profile95(
 
     Returns:
         Lower and upper end by name; None where the data leave that side open up to the bound, or
-        hold it only a decade away, by another parameter's bound.
+        hold it only far away, by another parameter's bound.
 
     Raises:
         FitError: fewer than two parameters were fitted.
@@ -130,7 +128,7 @@ def profile95(
             hint="leave out --profile, or hold fewer parameters in [fit]",
         )
     start, walled = best.coordinates.point(best.model.values), np.transpose(walls(best.coordinates, bounds))
-    linear = _linear(best)
+    linear = linear_errors(best.jacobian)
     allowed = _allowed(best, terms, covariance, linear)
     found: dict[str, Interval] = {}
     for i, name in enumerate(names):
@@ -141,12 +139,6 @@ def profile95(
         found[name] = low, high
         advance(name, len(names) - len(found))
     return found
-
-
-def _linear(best: Solution) -> Array:
-    """Standard errors of a linear fit, in coordinates; finite where the data leave a combination wholly open."""
-    _, values, vectors = np.linalg.svd(best.jacobian.T, full_matrices=False)
-    return np.linalg.norm(vectors.T / np.maximum(values, _FLOOR * values.max()), axis=1)
 
 
 def _allowed(best: Solution, terms: Sequence[Term], covariance: Covariance, linear: Array) -> Array:

@@ -10,7 +10,6 @@ import pytest
 from agreement import Agree, digits
 from strd import Problem, problems
 
-from bushfit.errors import FitError
 from bushfit.fitting.assess import Stage, covariance
 from bushfit.fitting.solve import Solution, solve
 
@@ -73,9 +72,11 @@ def test_certified_values_from_both_starts(agree: Agree) -> None:
 
 
 @pytest.mark.parametrize(("name", "start"), UNSOLVED)
-def test_what_is_not_solved_is_an_error(name: str, start: int) -> None:
+def test_what_is_not_solved_has_an_error_beyond_all_values(name: str, start: int) -> None:
     problem = next(problem for problem in PROBLEMS if problem.name == name)
     names = tuple(problem.certified)
     solution = fitted(problem, start)
-    with pytest.raises(FitError, match="wholly open"):
-        covariance(solution.model, [Stage(names, [problem.term()])])
+    cov = covariance(solution.model, [Stage(names, [problem.term()])])
+    relative = {each: cov.stderr(each) / abs(solution.model.values[each]) for each in names}
+    print(f"{name}, start {start}: {relative}")
+    assert max(relative.values()) > 100.0
