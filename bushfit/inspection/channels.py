@@ -67,8 +67,8 @@ def _gaps(steps: Floats, wide: Flags) -> Iterator[str]:
     if wide.any():
         first, count = int(np.argmax(wide)), int(wide.sum())
         yield (
-            f"{count} gap{'s' * (count > 1)} in time, the first after row {first + 1}: {steps[first]:.3g} s without a "
-            f"row, else mostly {np.median(steps):.3g} s"
+            f"{count} gap{'s' * (count > 1)} in time, the first after data row {first + 1}: {steps[first]:.3g} s "
+            f"without a row, else mostly {np.median(steps):.3g} s"
         )
 
 
@@ -82,8 +82,8 @@ def _stuck(motion: Channel, force: Channel, still: Flags) -> Iterator[str]:
     if stuck.any():
         longest = int(np.argmax(np.where(stuck, ends - starts, 0)))
         yield (
-            f"{ends[longest] - starts[longest] + 1} rows from row {starts[longest] + 1} on repeat one {motion.name} "
-            f"and {force.name}, while the motion went on"
+            f"{ends[longest] - starts[longest] + 1} rows from data row {starts[longest] + 1} on repeat one "
+            f"{motion.name} and {force.name}, while the motion went on"
         )
 
 
@@ -107,7 +107,7 @@ def _wild(channel: Channel, time: Floats) -> Iterator[str]:
     rows = np.flatnonzero(wild_rows(time, channel.values))
     if rows.size:
         listed = ", ".join(
-            f"row {row + 1} ({channel.shown(row)} {channel.unit} between {channel.shown(row - 1)} and "
+            f"data row {row + 1} ({channel.shown(row)} {channel.unit} between {channel.shown(row - 1)} and "
             f"{channel.shown(row + 1)})"
             for row in rows[:_MOST_LISTED]
         )

@@ -22,6 +22,8 @@ _TRIANGLE, _LIKE = 1.0 / 9.0, 0.03
 _SURE, _SHARE = 6.0, 2e-3
 #: A loop's zero is off by this share of half the range.
 _OFF_ZERO = 0.02
+#: Harmonics that swing beyond the range of the rows by this factor do so where there are no rows.
+_BEYOND = 1.1
 #: At most so many cycles are looked at from either end, with so many harmonics.
 _ENDS, _HARMONICS = 6, 7
 
@@ -38,22 +40,30 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
     names = ("rotation", "moment") if loop.direction is Direction.TORSION else ("displacement", "force")
     rows = loop.time.size / drive.cycles
     half_motion, half_force = np.ptp(loop.displacement) / 2.0, np.ptp(loop.force) / 2.0
-    mean_motion, mean_force = drive.coefficients[0].real, _mean(drive)
+    amplitude, mean_motion, mean_force = drive.amplitude, drive.coefficients[0].real, _mean(drive)
+    swings = amplitude > _BEYOND * half_motion
+    if swings:
+        amplitude, mean_motion = half_motion, float(loop.displacement.min() + half_motion)
     facts = {
         "cycles": f"{drive.cycles:.4g}, {'from rest' if drive.from_rest else 'settled or run in'}",
         "frequency": f"{drive.frequency:.4g} Hz, {_waveform(drive)}",
         "sampling": f"{clock(loop)}, {rows:.4g} rows a cycle",
-        "amplitude": f"{to_length * drive.amplitude:.4g} {length} zero-to-peak",
+        "amplitude": f"{to_length * amplitude:.4g} {length} zero-to-peak",
         f"mean {names[0]}": f"{to_length * mean_motion:.3g} {length}",
         f"mean {names[1]}": f"{to_force * mean_force:.3g} {force}",
         "noise": f"{100 * drive.noise / half_force:.2g} % of half the {names[1]}'s range, a row",
     }
     odd = [
-        *wrong_labels(file, loop.direction, [drive.amplitude, half_motion], [drive.frequency]),
+        *wrong_labels(file, loop.direction, [amplitude, half_motion], [drive.frequency]),
         *odd_channels(loop),
         *([drive.note.removeprefix(f"{loop.name}: ")] if drive.note else []),
         *_changing(drive, names),
     ]
+    if swings:
+        odd.append(
+            f"no harmonics follow the {names[0]} without swinging far beyond its rows, as across a gap: its frequency "
+            "and waveform are not to be relied on, nor is a fit; keep the whole cycles before the gap or after it"
+        )
     if abs(mean_motion) > _OFF_ZERO * half_motion and not drive.from_rest:
         odd.append(
             f"the motion is off zero by {to_length * mean_motion:.3g} {length}, {100 * mean_motion / half_motion:.2g} "

@@ -70,7 +70,7 @@ def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
     if copies and poisson.sf(copies - 1, expected) < _COPIED:
         verb = "s repeat others" if copies > 1 else " repeats another"
         yield (
-            f"{copies} row{verb} digit by digit, the first of them at {sweep.frequency[first]:.4g} Hz (row "
+            f"{copies} row{verb} digit by digit, the first of them at {sweep.frequency[first]:.4g} Hz (data row "
             f"{first + 1}): copied, not measured again?"
         )
 
@@ -112,7 +112,7 @@ def _wild(sweep: Sweep, noise: SweepNoise, unit: str, factor: float) -> Iterator
     far = np.any((np.abs(parts) > _WILD * random) & (np.abs(parts) > _WILD_SHARE), axis=1)
     for row in np.flatnonzero(far)[:_MOST_LISTED]:
         yield (
-            f"row {row + 1} ({sweep.frequency[row]:.4g} Hz, {factor * sweep.amplitude[row]:.4g} {unit}, repeat "
+            f"data row {row + 1} ({sweep.frequency[row]:.4g} Hz, {factor * sweep.amplitude[row]:.4g} {unit}, repeat "
             f"{sweep.repeat[row]}) is {100 * np.expm1(parts[row, 0]):+.2g} % in |K| and "
             f"{np.degrees(parts[row, 1]):+.2g} deg off its repeats"
         )
