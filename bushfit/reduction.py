@@ -30,6 +30,8 @@ _SAME_AMPLITUDE, _SURELY = 0.03, 4.0
 _INTERRUPTED, _IN_PHASE = 3.1, 0.05
 #: Amplitudes further apart than this are levels of their own.
 _LEVEL_GAP = 0.1
+#: A step belongs to a level that is stated if it lies within this share of it.
+_LEVEL_REACH = 0.3
 #: What is said: amplitudes off their level by this share, fewer rows a cycle, more distortion of the displacement, and
 #: how many stretches that make no point.
 _MISSED, _COARSE, _DISTORTED, _MOST_TOLD = 0.03, 12, 0.02, 5
@@ -119,7 +121,7 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
         levels: amplitudes the test was meant to have [m or rad]; without them amplitudes group where they lie close.
 
     Raises:
-        MeasurementError: no steady sine in any of them.
+        MeasurementError: no steady sine in any of them, or one far off every level.
     """
     sound = [_without_wild_rows(history) for history in histories]
     wild = sum(one.time.size for one in histories) - sum(one.time.size for one in sound)
@@ -135,7 +137,9 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
             expected=f"a stepped sine with at least {fewest_cycles} whole cycles at one frequency and amplitude",
             hint="a slow loop needs no reduction: name it under [[loops]]",
         )
-    return Reduction(histories[0].direction, tuple(_grouped(steps, levels)), skipped, wild)
+    direction = histories[0].direction
+    _check_reach(steps, levels, direction)
+    return Reduction(direction, tuple(_grouped(steps, levels)), skipped, wild)
 
 
 def _without_wild_rows(history: Loop) -> Loop:
@@ -265,6 +269,21 @@ def _creeps(values: Floats, least: float) -> bool:
     return bool(abs(slope) * values.size > least and abs(slope) > _SURELY * error)
 
 
+def _check_reach(steps: Sequence[Step], levels: Sequence[float], direction: Direction) -> None:
+    """Refuse a step far off every level that is stated."""
+    unit, factor = _shown(direction)
+    for step in steps:
+        if levels and min(abs(step.amplitude / level - 1.0) for level in levels) > _LEVEL_REACH:
+            raise MeasurementError(
+                "a step is at none of the levels",
+                place=f"{step.name}, {step.start:.4g} to {step.end:.4g} s",
+                found=f"{factor * step.amplitude:.4g} {unit} at {step.frequency:.4g} Hz",
+                expected=f"within {100 * _LEVEL_REACH:g} % of "
+                + " or ".join(f"{factor * level:.4g} {unit}" for level in levels),
+                hint="name all levels, zero-to-peak, or leave --levels out",
+            )
+
+
 def _grouped(steps: Sequence[Step], levels: Sequence[float]) -> list[Step]:
     """The steps with their nominal frequency, level and repeat."""
     frequency = np.array([step.frequency for step in steps])
@@ -279,8 +298,8 @@ def _grouped(steps: Sequence[Step], levels: Sequence[float]) -> list[Step]:
     grouped = []
     for step, group, level, middle in zip(steps, groups.tolist(), rank.tolist(), nominal, strict=True):
         seen[group, level] = repeat = seen.get((group, level), 0) + 1
-        mean = float(amplitude[rank == level].mean())
-        grouped.append(replace(step, nominal_frequency=float(middle), level=mean, repeat=repeat))
+        asked = float(levels[level] if levels else amplitude[rank == level].mean())
+        grouped.append(replace(step, nominal_frequency=float(middle), level=asked, repeat=repeat))
     return grouped
 
 
@@ -293,8 +312,13 @@ def _clusters(values: Floats, gap: float) -> NDArray[np.intp]:
     return groups
 
 
+def _shown(direction: Direction) -> tuple[str, float]:
+    """Unit of amplitudes in messages, and the factor from SI to it."""
+    return ("deg", 180.0 / np.pi) if direction is Direction.TORSION else ("mm", 1e3)
+
+
 def _warnings(reduction: Reduction) -> Iterator[str]:
-    unit, factor = ("deg", 180.0 / np.pi) if reduction.direction is Direction.TORSION else ("mm", 1e3)
+    unit, factor = _shown(reduction.direction)
     steps = reduction.steps
     if reduction.wild:
         yield f"{reduction.wild} row{'s' * (reduction.wild > 1)} far off the rows around left out"

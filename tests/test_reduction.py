@@ -195,7 +195,16 @@ def test_repeats_and_levels(paper_model: Model) -> None:
     assert reduction.array("repeat").tolist() == [1, 1, 2, 2, 3, 3]
     assert np.unique(reduction.array("level")).tolist() == [pytest.approx(reduction.array("amplitude").mean())]
     named = reduce([first.history, second.history], levels=(0.97e-4, 1.03e-4))
-    assert np.unique(named.array("level")).size == 2
+    assert np.unique(named.array("level")).tolist() == [0.97e-4, 1.03e-4]
+
+
+def test_a_step_at_none_of_the_levels_stated_is_no_repeat_of_the_next(paper_model: Model) -> None:
+    history = stepped(paper_model, [(10.0, 1e-4), (10.0, 2e-4), (10.0, 5e-4)]).history
+    with pytest.raises(
+        MeasurementError, match=r"none of the levels[\s\S]*0.5 mm at 10 Hz[\s\S]*30 % of 0.1 mm or 0.2 mm"
+    ):
+        reduce([history], levels=(1e-4, 2e-4))
+    assert reduce([history], levels=(1e-4, 2e-4, 6e-4)).array("level").tolist() == [1e-4, 2e-4, 6e-4]
 
 
 def test_what_a_missed_set_point_does_to_the_stiffness_is_said(paper_model: Model) -> None:
