@@ -8,7 +8,7 @@ import io
 import os
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from pathlib import Path
@@ -26,6 +26,14 @@ from bushfit.schema import Share, Text, converted, unknown_key
 from bushfit.toml import check_tables, read_toml
 
 Command = Literal["fit", "diagnose", "predict"]
+
+_DEFAULT: tuple[Command, ...] = ("fit",)
+#: Which commands look at a setting.
+_READERS: dict[str, tuple[Command, ...]] = {
+    **dict.fromkeys(("directions", "effects"), ("fit",)),
+    **dict.fromkeys(("adopt", "without", "max_effects", "tolerance"), ("diagnose",)),
+    "model": ("diagnose", "predict"),
+}
 
 _LARGEST_BYTES = 200_000_000
 _WILD = re.compile(r"[*?\[]")
@@ -197,9 +205,10 @@ def _rows(entries: Sequence[Entry], base: Path, given: Settings, source: str) ->
     """
     if not entries:
         raise CampaignError("the manifest has no rows", file=source, expected="a campaign on each line")
+    _check_used(given, {entry.commands or given.commands or _DEFAULT for entry in entries}, source)
     stems = Counter(Path(entry.campaign).stem for entry in entries)
     taken: set[str] = set()
-    merged = cache(lambda settings: _complete(settings.over(given), base, source))
+    merged = cache(lambda settings: _complete(settings, given, base, source))
     rows = []
     for entry in entries:
         path = Path(entry.campaign)
@@ -211,13 +220,40 @@ def _rows(entries: Sequence[Entry], base: Path, given: Settings, source: str) ->
             folder = f"{first} {count}"
         taken.add(folder.casefold())
         own = Settings(**{key: getattr(entry, key) for key in _keys(Settings)})
-        rows.append(Row(name, folder, entry.campaign, os.path.abspath(base / path), merged(own)))  # noqa: PTH100 - links stay as named
+        try:
+            settings = merged(own)
+        except CampaignError as error:
+            error.place = f"{entry.campaign}, {error.place}"
+            raise
+        rows.append(Row(name, folder, entry.campaign, os.path.abspath(base / path), settings))  # noqa: PTH100 - links stay as named
     return rows
 
 
-def _complete(settings: Settings, base: Path, source: str) -> Settings:
-    """Settings with every default filled in, checked against each other."""
-    commands = settings.commands or ("fit",)
+def _check_used(settings: Settings, rows: Collection[tuple[Command, ...]], source: str) -> None:
+    """Refuse a setting that none of the rows, by their commands, looks at."""
+    for name, readers in _READERS.items():
+        if getattr(settings, name) is not None and not any(_reads(commands, name) for commands in rows):
+            raise CampaignError(
+                "this setting does nothing here",
+                file=source,
+                place=name,
+                found=f"commands {', '.join(sorted({command for commands in rows for command in commands}))}",
+                expected=f"it goes with {' or '.join(readers)}",
+                hint=f"--command {readers[0]} too, or leave {name} out",
+            )
+
+
+def _reads(commands: tuple[Command, ...], name: str) -> bool:
+    if name == "model" and "fit" in commands:  # predict goes on from what fit finds
+        return "diagnose" in commands
+    return not set(commands).isdisjoint(_READERS[name])
+
+
+def _complete(own: Settings, given: Settings, base: Path, source: str) -> Settings:
+    """A row's settings with every default filled in, checked against each other."""
+    settings = own.over(given)
+    commands = settings.commands or _DEFAULT
+    _check_used(own, [commands], source)
     if commands == ("predict",) and not settings.model:
         raise CampaignError(
             "predict has no model to predict from",

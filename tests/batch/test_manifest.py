@@ -38,6 +38,13 @@ def test_toml_rows_take_what_they_do_not_say_from_the_top(tmp_path: Path) -> Non
     assert manifest.stem == "m"
 
 
+def test_a_setting_at_the_top_may_be_for_some_of_the_rows(tmp_path: Path) -> None:
+    rows = '[[bushings]]\ncampaign = "b.toml"\ncommands = ["predict"]\n' + ROW + 'commands = ["diagnose"]\n'
+    manifest = read(tmp_path, 'model = "m.json"\ntolerance = "2 %"\neffects = ["inertia"]\n' + rows + ROW)
+    assert [row.settings.commands for row in manifest.rows] == [("predict",), ("diagnose",), ("fit",)]
+    assert {row.settings.model for row in manifest.rows} == {str(tmp_path / "m.json")}
+
+
 @pytest.mark.parametrize("delimiter", [",", ";", "\t"])
 def test_csv_of_any_delimiter_with_a_byte_order_mark(tmp_path: Path, delimiter: str) -> None:
     lines = [["campaign", "name", "commands"], ["a.toml", "A", "fit predict"], [], ["b.toml", "", ""]]
@@ -79,6 +86,15 @@ BAD = [
     ("m.toml", ROW + 'commands = ["fitt"]', ["bushings #1.commands #1", "'fit'"]),
     ("m.toml", ROW + "commands = []", ["bushings #1.commands", "at least one"]),
     ("m.toml", ROW + 'commands = ["predict"]', ["predict has no model", '"fit", "predict"']),
+    ("m.toml", ROW + 'tolerance = "2 %"', ["tolerance", "does nothing here", "commands fit", "goes with diagnose"]),
+    ("m.toml", ROW + 'commands = ["diagnose"]\neffects = ["inertia"]', ["effects", "does nothing", "--command fit"]),
+    ("m.toml", ROW + 'commands = ["fit", "predict"]\nmodel = "m.json"', ["model", "does nothing", "fit, predict"]),
+    ("m.toml", "max_effects = 1\n" + ROW, ["max_effects", "does nothing", "commands fit"]),
+    (
+        "m.csv",
+        "campaign,directions,commands\na.toml,axial,fit\nb.toml,axial,diagnose",
+        ["b.toml", "directions", "commands diag"],
+    ),
     ("m.toml", ROW + 'effects = ["inertai"]', ["bushings #1.effects #1", "did you mean inertia?"]),
     ("m.toml", ROW + "max_effects = 9", ["bushings #1.max_effects", "9"]),
     ("m.toml", 'at = ["axial 25 Hz"]\n' + ROW, ["at", "no operating point", "axial 25 Hz"]),
