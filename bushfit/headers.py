@@ -23,14 +23,14 @@ LOOP_COLUMNS = {
         *("displacement", "disp", "deflection", "stroke", "travel", "position", "extension"),
         *("rotation", "angle", "twist", "phi"),
         *("Weg", "Verschiebung", "Auslenkung", "Hub", "Federweg", "Prüfweg", "Kolbenweg", "Winkel", "Drehwinkel"),
-        *("Verdrehung", "Verdrehwinkel"),
+        *("Verdrehung", "Verdrehwinkel", "Standardweg", "Traversenweg", "Axialweg", "Radialweg", "Verformung"),
         *("déplacement", "course", "flèche", "enfoncement", "rotation", "angle de torsion", "rotación"),
         *("desplazamiento", "recorrido", "carrera", "deformación", "ángulo", "giro", "ángulo de giro"),
         *("位移", "行程", "角度", "转角"),
     ),
     "force": (
         *("force", "load", "torque", "moment", "F"),
-        *("Kraft", "Prüfkraft", "Last", "Drehmoment", "Torsionsmoment"),
+        *("Kraft", "Prüfkraft", "Standardkraft", "Axialkraft", "Radialkraft", "Last", "Drehmoment", "Torsionsmoment"),
         *("effort", "charge", "couple", "moment de torsion"),
         *("fuerza", "carga", "par", "momento", "par de torsión"),
         *("力", "载荷", "负荷", "扭矩"),
@@ -48,17 +48,19 @@ SWEEP_COLUMNS = {
     "stiffness": (
         *("stiffness", "dynamic stiffness", "stiffness magnitude", "complex stiffness", "kdyn", "cdyn", "|k|", "K*"),
         *("Steifigkeit", "dynamische Steifigkeit", "Federsteifigkeit", "Drehsteifigkeit", "dyn Steifigkeit"),
+        *("Federrate", "dynamische Federrate", "dyn Federrate", "dyn. Federrate", "Federkonstante", "|K*|", "c*"),
         *("raideur", "rigidité", "raideur dynamique", "rigidité dynamique"),
         *("rigidez", "rigidez dinámica", "刚度", "动刚度"),
     ),
     "loss_factor": (
         *("loss factor", "tan delta", "tandelta", "tan d", "eta", "η", "tan δ"),
-        *("Verlustfaktor", "facteur de perte", "facteur de pertes", "facteur d'amortissement"),
+        *("Verlustfaktor", "Dämpfung tan d", "Dämpfung tan delta"),
+        *("facteur de perte", "facteur de pertes", "facteur d'amortissement"),
         *("factor de pérdida", "factor de pérdidas", "损耗因子"),
     ),
     "phase": (
         *("phase", "phase angle", "loss angle", "delta", "δ", "phi"),
-        *("Phasenwinkel", "Verlustwinkel", "Phasenverschiebung"),
+        *("Phasenwinkel", "Verlustwinkel", "Phasenverschiebung", "Dämpfungswinkel", "Verlustwinkel δ"),
         *("déphasage", "angle de phase", "angle de perte", "angle de pertes"),
         *("fase", "ángulo de fase", "ángulo de pérdida", "ángulo de pérdidas", "desfase", "相位", "相位角", "损耗角"),
     ),
@@ -73,7 +75,7 @@ SWEEP_COLUMNS = {
         *("rigidez de pérdida", "rigidez de pérdidas", "损耗刚度"),
     ),
     "repeat": (
-        *("repeat", "repetition", "Wiederholung", "Wdh", "répétition", "repetición", "重复"),
+        *("repeat", "repetition", "Wiederholung", "Wdh", "Messung", "répétition", "repetición", "重复"),
     ),
 }  # fmt: skip
 #: Words that say where or how a channel was recorded, and not what it is.

@@ -208,16 +208,22 @@ def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> int:
 def _likeliest(
     lines: Sequence[Line], before: Sequence[int], end: int, delimiters: Sequence[str]
 ) -> tuple[int, str, list[str]]:
-    """A line that might have been meant as the header, where none names the columns of a test: the one above the
-    first rows of numbers, if it has as many cells, or else that row itself; the first line where there is no row."""
-    has_rows = end < len(lines)
-    row = lines[end if has_rows else before[0] if before else 0].content
-    delimiter = max(delimiters, key=lambda mark: len(split(row, mark)) if mark != " " or has_rows else 0)
-    index = before[-1] if has_rows and before else before[0] if before else 0
-    cells = split(lines[index].content, delimiter)
-    if has_rows and not fits(split(row, delimiter), len(cells)):
-        index, cells = end, split(row, delimiter)
-    return index, delimiter, cells
+    """A line that might have been meant as the header, where none names the columns of a test: the last one above the
+    first rows of numbers that has as many cells and is no units row, or else that row itself; the first line where
+    there is no row."""
+    if end == len(lines):
+        content = lines[before[0] if before else 0].content
+        delimiter = max(delimiters, key=lambda mark: len(split(content, mark)) if mark != " " else 0)
+        return before[0] if before else 0, delimiter, split(content, delimiter)
+    rows = [(mark, split(lines[end].content, mark)) for mark in delimiters]
+    rows = [(mark, cells) for mark, cells in rows if len(cells) > 1 and all(map(is_like_number, cells))] or rows
+    for delimiter, row in rows:
+        for index in reversed(before):
+            cells = split(lines[index].content, delimiter)
+            if fits(row, len(cells)) and not _is_units_row([cell.strip("[]() ") for cell in cells]):
+                return index, delimiter, cells
+    delimiter, row = max(rows, key=lambda entry: len(entry[1]))
+    return end, delimiter, row
 
 
 def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence[str]) -> Layout:

@@ -37,7 +37,8 @@ def inspection_figure(files: Sequence[Inspected]) -> Figure:
         elif seen.measured is not None:
             first = _draw_history(figure, place, seen.measured, loop=seen.kind == "loop")
         first.set_title(title, fontsize=8.5, loc="left", color=GREY)
-    explain(figure, "Sweeps: every point as measured, lines through the means of the repeats.")
+    if any(isinstance(seen.measured, Sweep) for seen in files):
+        explain(figure, "Sweeps: every point as measured, lines through the means of the repeats.")
     return figure
 
 
