@@ -156,9 +156,10 @@ class Model:
     def equation(self) -> str:
         """The model as text: its first-harmonic stiffness, the rubber inside, layers and modifiers named."""
         branches = " + ".join(effect.equation for effect in self._structure.branches)
-        lines = [f"K = G ({branches})"]
+        lines = [f"K = k ({branches}), k the stiffness of this shape per modulus"]
         lines += [f"  {effect.name}: {effect.equation}" for effect in self.records if not isinstance(effect, Branch)]
-        lines += [f"  {name} = {self.values[name]:.6g} {self.parameters[name].unit}" for name in self.parameters]
+        units = {name: parameter.unit.removesuffix("1") for name, parameter in self.parameters.items()}
+        lines += [f"  {name} = {self.values[name]:.6g} {unit}".rstrip() for name, unit in units.items()]
         return "\n".join(lines)
 
     def to_document(self) -> dict[str, Any]:

@@ -117,7 +117,7 @@ def test_a_model_does_not_change(paper_model: Model) -> None:
 def test_equation_is_text(paper_model: Model) -> None:
     text = paper_model.with_effect("inertia", {"inertia.mass": 0.1}).equation()
     assert text.isascii()
-    assert "K = G (mu + m/2 (i omega)^alpha + (A + iB)/(2 e0)" in text
+    assert "K = k (mu + m/2 (i omega)^alpha + (A + iB)/(2 e0)" in text
     assert "inertia: " in text
     assert "mu = 1.09e+06 Pa" in text
     assert "inertia.mass = 0.1 kg" in text

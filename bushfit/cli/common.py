@@ -95,7 +95,10 @@ def shared_options(function: F) -> F:
     """-o, -v, -q, --json, --no-plots, --force, gathered into one `options` argument."""
 
     @click.option(
-        "-o", "--output", type=_Folder(path_type=Path), help="Folder for the results [results/<campaign name>]."
+        "-o",
+        "--output",
+        type=_Folder(path_type=Path),
+        help="Folder for the results [results/<campaign or file>].",
     )
     @click.option("-v", "--verbose", is_flag=True, help="Say more: all correlations, the equation, the files read.")
     @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")

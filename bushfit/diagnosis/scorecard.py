@@ -213,7 +213,7 @@ def card(outcomes: Sequence[Outcome]) -> list[Row]:
     rows.append(Row("size of the sets of names, mean / largest", members, len(sizes), "", None))
     took = f"{np.median(seconds):.1f} s / {max(seconds):.1f} s" if seconds else "no case"
     met = bool(max(seconds) <= _SLOWEST) if seconds else None
-    rows.append(Row("time of one diagnosis, median / longest", took, len(seconds), "<= 2 s", met))
+    rows.append(Row("processor time of one diagnosis, median / longest", took, len(seconds), "<= 2 s", met))
     return rows
 
 

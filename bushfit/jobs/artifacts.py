@@ -56,7 +56,8 @@ def prediction_files(
     for prediction in predictions:
         over = [term for term in measured if term.direction is prediction.direction]
         curves = predict(result, prediction.direction, *fine_grid(prediction))
-        note = ". ".join(filter(None, (left_out(result), *prediction.warnings)))
+        notes = filter(None, (left_out(result), *prediction.warnings))
+        note = ". ".join(text[0].upper() + text[1:] for text in notes)
         title = result.model.bushing.name
         files[f"{prediction.direction}.png"] = to_png(
             prediction_figure(prediction, over, title, curves=curves, note=note)

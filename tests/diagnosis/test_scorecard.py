@@ -179,7 +179,7 @@ def test_the_card_counts() -> None:
     assert figures["95 % interval covers the truth, where named"] == "100.0 %"
     assert rows["false alarm on clean campaigns"].met is False
     assert rows["  of these a disturbance of the rig"].met is None
-    assert rows["time of one diagnosis, median / longest"].met is True
+    assert rows["processor time of one diagnosis, median / longest"].met is True
 
 
 def test_confusion_is_by_truth() -> None:
