@@ -8,7 +8,7 @@ relative to |K|.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -71,12 +71,17 @@ class SweepNoise:
 @dataclass(frozen=True)
 class _Level:
     """What one amplitude of one sweep tells: scatter (k, 2) with its degrees of freedom, and the variances
-    its repeats share, (pairs, 2)."""
+    its repeats share, (pairs, 2). Without repeats `calmer` is the scatter less the point that adds most to it."""
 
     scatter: Array
     freedom: int
     shared: Array
     repeats: int
+    calmer: Array | None = None
+
+    @property
+    def variance(self) -> Array:
+        return np.asarray(np.square(self.scatter).sum(axis=0) / max(self.freedom, 1))
 
 
 def sweep_noise(sweeps: Sequence[Sweep]) -> SweepNoise:
@@ -86,21 +91,23 @@ def sweep_noise(sweeps: Sequence[Sweep]) -> SweepNoise:
     twice the random variance, and the square of its mean estimates twice (shared variance + random variance
     / number of frequencies). Pairs are pooled within a level and over levels; levels keep a random part of
     their own where Bartlett's test finds them unequal. Without repeats the random part is the scatter about
-    a smooth curve in ln f, and the shared part is ASSUMED_SHARED. A `noise` stated in the campaign replaces
-    the random part.
+    a smooth curve in ln f, pooled in the same way, and the shared part is ASSUMED_SHARED. A `noise` stated in
+    the campaign replaces the random part.
     """
     levels = {
         (sweep.name, float(amplitude)): _level(sweep, amplitude)
         for sweep in sweeps
         for amplitude in np.unique(sweep.amplitude)
     }
-    variances = {key: np.square(level.scatter).sum(axis=0) / max(level.freedom, 1) for key, level in levels.items()}
+    variances = {key: level.variance for key, level in levels.items()}
     repeated = [key for key, level in levels.items() if level.repeats > 1]
     scatter_freedom = min(level.freedom for level in levels.values())
-    if repeated and not _unequal([levels[key] for key in repeated]):
-        freedoms = np.array([levels[key].freedom for key in repeated], dtype=float)
-        pooled = np.average([variances[key] for key in repeated], axis=0, weights=freedoms)
-        variances |= dict.fromkeys(levels, pooled)
+    measured = [level for level in levels.values() if level.repeats > 1 or (not repeated and level.calmer is not None)]
+    alike = _alike(measured)
+    if alike:
+        freedoms = np.array([level.freedom for level in alike], dtype=float)
+        pooled = np.average([level.variance for level in alike], axis=0, weights=freedoms)
+        variances = dict.fromkeys(levels, pooled)
         scatter_freedom = int(freedoms.sum())
     if any(sweep.noise is not None for sweep in sweeps):
         scatter_freedom = 0
@@ -165,9 +172,16 @@ def _about_smooth_curve(log_frequency: Array, log_stiffness: Array) -> _Level:
     freedom = int(np.count_nonzero(sound)) - degree - 1
     if freedom < 1:
         sound, freedom = np.ones_like(sound), log_frequency.size - degree - 1
-    basis, values = basis[sound], values[sound]
-    residual = values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
-    return _Level(residual, freedom, np.empty((0, 2)), 1)
+    beside = _beside(basis)
+    adds = np.square(beside @ (beside.T @ values)).sum(axis=1) / np.maximum(np.square(beside).sum(axis=1), FLOOR**2)
+    worst = int(np.argmax(adds))
+    calmer = _beside(np.delete(basis, worst, axis=0)).T @ np.delete(values, worst, axis=0)
+    return _Level(_beside(basis[sound]).T @ values[sound], freedom, np.empty((0, 2)), 1, calmer)
+
+
+def _beside(basis: Array) -> Array:
+    """Orthonormal basis of what a curve (n, k) leaves free, (n, n - k): its coordinates scatter independently."""
+    return np.linalg.qr(basis, mode="complete")[0][:, basis.shape[1] :]
 
 
 def _least_absolute(basis: Array, values: Array) -> Array:
@@ -188,6 +202,15 @@ def _unit_interval(x: Array) -> Array:
 
 def _parts(values: Array) -> Array:
     return np.stack([np.real(values), np.imag(values)], axis=-1)
+
+
+def _alike(levels: Sequence[_Level]) -> list[_Level]:
+    """Levels of equal noise, those that a single wild point sets apart without it; none where they are unequal."""
+    alike = sorted(levels, key=lambda level: -float(level.variance.sum()))
+    for place, level in enumerate(alike):
+        if _unequal(alike) and level.calmer is not None and level.calmer.size:
+            alike[place] = replace(level, scatter=level.calmer, freedom=level.calmer.shape[0])
+    return [] if _unequal(alike) else alike
 
 
 def _unequal(levels: Sequence[_Level]) -> bool:

@@ -106,6 +106,16 @@ def test_no_repeats_fall_back_to_a_smooth_curve_and_an_assumption(noisy_sweep: C
     assert "assumed" in found[0].describe()
 
 
+def test_levels_without_repeats_are_pooled(noisy_sweep: Callable[..., Sweep]) -> None:
+    noise = sweep_noise([noisy_sweep(0, repeats=1)])
+    assert len(set(noise.random.values())) == 1
+    assert noise.scatter_freedom >= len(AMPLITUDES) * (FREQUENCIES.size - 5) - 1  # it may take one point for wild
+    quiet, loud = noisy_sweep(1, 1e-3, repeats=1), noisy_sweep(2, 2e-2, repeats=1)
+    mixed = replace(quiet, stiffness=np.where(quiet.amplitude == 5e-4, loud.stiffness, quiet.stiffness))
+    random = sweep_noise([mixed]).random
+    assert random["sweep", 5e-4][0] > 8.0 * random["sweep", 1e-4][0]
+
+
 def test_the_smooth_curve_bends_enough_for_the_model(noisy_sweep: Callable[..., Sweep]) -> None:
     clean = sweep_noise([noisy_sweep(0, 0.0, repeats=1)])
     assert max(max(pair) for pair in clean.random.values()) <= 2e-4

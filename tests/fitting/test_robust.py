@@ -183,6 +183,27 @@ def test_without_repeats_a_wild_point_is_found(rig: Rig, paper_noise: SimulateSe
     assert np.max(np.abs(shift)) < 1.0
 
 
+@pytest.mark.parametrize(("factor", "missed"), [(0.7, 0), (1.1, 2)])
+def test_one_wild_point_of_a_short_sweep_without_repeats_is_found_at_any_row(
+    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, factor: float, missed: int
+) -> None:
+    """Nine points a level leave four degrees of freedom beside the smooth curve, which the wild one bends, at an end
+    so far that a small one may hide."""
+    short = SimulatedSweep(Direction.AXIAL, (1e-4, 2e-4, 5e-4), tuple(np.linspace(5.0, 125.0, 9)))
+    settings = replace(paper_noise, repeats=1, sweeps=(short,))
+    found = []
+    for row in range(27):
+        campaign = rig(paper_model, settings, row)
+        assert robust(campaign).outliers == ()
+        stiffness = campaign.sweeps[0].stiffness.copy()
+        stiffness[row] *= factor
+        dirty = replace(campaign, sweeps=(replace(campaign.sweeps[0], stiffness=stiffness),))
+        found.append([entry.row - 1 for entry in robust(dirty).outliers])
+    print(f"times {factor}: {sum(map(len, found))} points found of {len(found)}")
+    assert all(rows in ([row], []) for row, rows in enumerate(found))
+    assert found.count([]) <= missed
+
+
 def test_a_fit_of_one_level_names_the_row_of_the_file(
     rig: Rig, paper_noise: SimulateSettings, paper_model: Model
 ) -> None:
