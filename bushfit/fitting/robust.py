@@ -17,7 +17,7 @@ from scipy.special import chdtri
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.outliers import from_neighbours, limit
+from bushfit.fitting.outliers import WINDOW, from_neighbours, limit
 from bushfit.fitting.solve import Bounds, Solution, solve
 from bushfit.fitting.terms import LoopTerm, SweepTerm, Term
 from bushfit.model import Model
@@ -93,34 +93,45 @@ def wild_points(term: Term, model: Model) -> Array:
     """Points that lie farther off the model than noise reaches, and as far off their neighbours, in the term's order.
 
     Where the same point was repeated, it must stand out from its repeats as well: what all of them do is no fault of
-    one row.
+    one row. Where two repeats or more agree against it that is enough, so that wild neighbours do not hide each other.
     """
     if isinstance(term, LoopTerm):
         return term.drive.wild["force"].rows
     deviation = term.deviation(model)
-    count = deviation.size
     distance = term.apart(deviation)
-    reach = limit(count, 2, term.noise.scatter_freedom or np.inf) * _misfit(distance, 2)
+    reach = limit(deviation.size, 2, term.noise.scatter_freedom or np.inf) * _misfit(distance, 2)
     far = distance > reach
     if not far.any():
         return np.flatnonzero(far)
-    local = np.zeros_like(deviation)
-    for first, last in pairwise([*term.block_starts.tolist(), count]):
+    local = _from_neighbours(term, deviation, _WINDOW)
+    repeats, beside = _from_repeats(term, local)
+    alone = np.minimum(term.apart(local, shared=False), np.where(repeats > 0, term.apart(beside, shared=False), np.inf))
+    against = _from_neighbours(term, _from_repeats(term, deviation)[1], WINDOW)
+    agreed = term.apart(against, shared=False) / np.sqrt(1.0 + np.pi / 2.0 / np.maximum(repeats, 1))
+    return np.flatnonzero(far & (np.where(repeats > 1, agreed, alone) > reach))
+
+
+def _from_neighbours(term: SweepTerm, values: Array, window: int) -> Array:
+    """Distance of each point from the median of those around it in its block, complex (n,)."""
+    local = np.zeros_like(values)
+    for first, last in pairwise([*term.block_starts.tolist(), values.size]):
         rows = np.arange(last - first)
-        parts = (from_neighbours(part[first:last], rows, _WINDOW) for part in (deviation.real, deviation.imag))
-        real, imag = parts
+        real, imag = (from_neighbours(part[first:last], rows, window) for part in (values.real, values.imag))
         local[first:last] = real + 1j * imag
-    rows = np.flatnonzero(far & (term.apart(local, shared=False) > reach))
-    return rows[[_beside_repeats(term, local, row) > reach for row in rows.tolist()]] if rows.size else rows
+    return local
 
 
-def _beside_repeats(term: SweepTerm, local: Array, row: int) -> float:
-    same = (term.frequency == term.frequency[row]) & (term.amplitude == term.amplitude[row])
-    same[row] = False
-    if not same.any():
-        return np.inf
-    middle = complex(np.median(local[same].real), np.median(local[same].imag))
-    return float(term.apart(local - middle, shared=False)[row])
+def _from_repeats(term: SweepTerm, values: Array) -> tuple[Array, Array]:
+    """How many other repeats each point has, (n,), and its distance from their median, 0 without any, complex (n,)."""
+    repeats, distance = np.zeros(values.size, dtype=int), np.zeros_like(values)
+    points = np.stack((term.frequency, term.amplitude))
+    _, place = np.unique(points, axis=1, return_inverse=True)
+    for row, same in enumerate(place == place[:, None]):
+        same[row] = False
+        repeats[row] = np.count_nonzero(same)
+        if repeats[row]:
+            distance[row] = values[row] - np.median(values[same].real) - 1j * np.median(values[same].imag)
+    return repeats, distance
 
 
 def _without(term: Term, rows: Array) -> Term:

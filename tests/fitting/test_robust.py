@@ -204,6 +204,19 @@ def test_one_wild_point_of_a_short_sweep_without_repeats_is_found_at_any_row(
     assert found.count([]) <= missed
 
 
+def test_wild_neighbours_do_not_hide_each_other_from_their_repeats(
+    rig: Rig, paper_noise: SimulateSettings, paper_model: Model
+) -> None:
+    for seed in range(4):
+        campaign = rig(paper_model, paper_noise, seed)
+        stiffness = campaign.sweeps[0].stiffness.copy()
+        rows = 20 + seed + np.arange(3)
+        stiffness[rows] *= 1.1
+        found = robust(replace(campaign, sweeps=(replace(campaign.sweeps[0], stiffness=stiffness),))).outliers
+        print(f"rows {rows} wild, found {[entry.row - 1 for entry in found]}")
+        assert [entry.row - 1 for entry in found] == rows.tolist()
+
+
 def test_a_fit_of_one_level_names_the_row_of_the_file(
     rig: Rig, paper_noise: SimulateSettings, paper_model: Model
 ) -> None:
