@@ -162,10 +162,9 @@ def _keys(table: type) -> list[str]:
 def _csv_entries(path: Path) -> Iterator[Entry]:
     """The lines of a CSV manifest; a header names the columns."""
     text = read_utf8(path, CampaignError).decode("utf-8-sig")
-    text = text.lstrip()
-    delimiter = max(_DELIMITERS, key=text.partition("\n")[0].count)
+    delimiter = max(_DELIMITERS, key=text.lstrip().partition("\n")[0].count)
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
-    header = [cell.strip() for cell in next(reader)]
+    header = next((cells for line in reader if any(cells := [cell.strip() for cell in line])), [])
     for column in header:
         if column not in (known := _keys(Entry)):
             error = unknown_key(column, known)

@@ -105,6 +105,8 @@ BAD = [
     ("m.toml", "", ["empty"]),
     ("m.csv", "campaing\na.toml", ["header", "unknown key", 'mean "campaign"']),
     ("m.csv", "campaign,commands\na.toml,fit\nb.toml,fitt", ["line 3", "commands #1"]),
+    ("m.csv", "\n\n \ncampaign\na.toml,b.toml", ["line 5", "more cells"]),
+    ("m.csv", ",,\n", ["no rows"]),
     ("m.csv", "campaign\na.toml,b.toml", ["line 2", "more cells"]),
     ("m.csv", "name\nx", ["line 2", "a key is missing", "campaign"]),
     ("m.csv", "campaign,name\n", ["no rows"]),
