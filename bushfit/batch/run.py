@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -32,6 +33,7 @@ from bushfit.batch.table import Table
 from bushfit.batch.work import Orders, given_up, work
 from bushfit.effects.contract import Array
 from bushfit.errors import OutputError
+from bushfit.output import check_free as check_writable
 from bushfit.output import write_files
 
 SCHEMA = "bushfit/batch/1"
@@ -100,20 +102,34 @@ def check_free(plan: Plan, *, force: bool) -> None:
     """Refuse to replace results that stand, unless asked to go on or to replace.
 
     Raises:
-        OutputError: the folder is a file, or holds a batch.
+        OutputError: the folder cannot be written or holds a batch, or the report cannot be written.
     """
-    output = plan.orders.output
-    if output.exists() and not output.is_dir():
-        raise OutputError("the output is not a folder", file=output, expected="a folder", hint="another -o/--output")
-    places = [output / name for name in (TABLE, PICTURE, ledger.ROWS)] + ([plan.junit] if plan.junit else [])
-    found = [place for place in places if place.exists()]
-    if found and not (force or plan.orders.resume):
+    output, replace = plan.orders.output, force or plan.orders.resume
+    check_writable(output, [TABLE, PICTURE], force=True)
+    found = [name for name in (TABLE, PICTURE, ledger.ROWS) if (output / name).exists()]
+    if found and not replace:
         raise OutputError(
             "results stand there already",
             file=output,
-            found=", ".join(place.name for place in found),
+            found=", ".join(found),
             hint="--resume does what is missing; --force does all again; -o/--output names another folder",
         )
+    if plan.junit:
+        with _blamed_on(plan.junit):
+            if output / ledger.ROWS in plan.junit.absolute().parents:
+                raise OutputError("the report cannot stand among the results of the rows")
+            check_writable(plan.junit.parent, [plan.junit.name], force=replace)
+
+
+@contextmanager
+def _blamed_on(junit: Path) -> Iterator[None]:
+    """Errors of the report's own folder name the option that chose it."""
+    try:
+        yield
+    except OutputError as error:
+        error.file, error.place = junit, "--junit"
+        error.hint = "name another file with --junit; --force replaces a report that stands"
+        raise
 
 
 def run(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Summary:
@@ -177,7 +193,8 @@ def _report(plan: Plan, spool: Spool, seconds: float) -> Summary:
     if plan.picture:
         _draw(plan, columns, quantities, judge, missed)
     if report and plan.junit:
-        write_files(plan.junit.parent, {plan.junit.name: report.to_xml()}, force=True)
+        with _blamed_on(plan.junit):
+            write_files(plan.junit.parent, {plan.junit.name: report.to_xml()}, force=True)
     return Summary(
         status,
         kept,

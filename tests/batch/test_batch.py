@@ -238,6 +238,27 @@ def test_two_batches_do_not_share_a_folder(typed: Callable[..., Any], shop: Path
     assert typed("batch", PATTERN, "-o", "all", "--resume", "-q").returncode == 0
 
 
+@pytest.mark.parametrize(
+    ("report", "words"),
+    [
+        ("old.xml", "results stand there already"),
+        ("old.xml/r.xml", "not a folder"),
+        ("bushings", "a folder stands where a file goes"),
+        ("all/bushings/b0/r.xml", "among the results"),
+    ],
+)
+def test_a_report_that_cannot_be_written_is_refused_before_the_work(
+    typed: Callable[..., Any], shop: Path, report: str, words: str
+) -> None:
+    (shop / "old.xml").write_text("old")
+    done = typed("batch", PATTERN, "-o", "all", "--junit", report)
+    assert done.returncode == 2
+    assert all(part in done.stderr for part in (f"{report}, --junit: ", words, "another file with --junit"))
+    assert "--output" not in done.stderr
+    assert not (shop / "all").exists()
+    assert (shop / "old.xml").read_text() == "old"
+
+
 def test_plain_lines_where_standard_error_is_no_terminal(typed: Callable[..., Any], shop: Path) -> None:
     done = typed("batch", PATTERN, "-o", "all", "--jobs", "1", "--no-plots")
     assert done.returncode == 0
