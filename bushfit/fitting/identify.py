@@ -14,19 +14,22 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.assess import measured_range
+from bushfit.fitting.drive import Drive
 from bushfit.fitting.solve import jacobian
 from bushfit.fitting.terms import LoopTerm, SweepTerm, Term
-from bushfit.measurement import Sweep
+from bushfit.measurement import Loop, Sweep
 from bushfit.model import Model
 
 #: Relative standard error beyond which a direction counts as open, and a parameter as not determined.
 _OPEN = 0.15
 #: Share of the worst error from which on a parameter is open with it, however well it is known.
 _PARTNER = 0.3
-#: Frequencies, and strains, that differ by less than this factor are one.
-_ALIKE_RATE, _ALIKE_STRAIN = 3.0, 1.5
+#: Frequencies, or strains, that differ by less than this factor are one; by less than those, they tell little.
+_ONE, _NARROW_RATE, _NARROW_STRAIN = 1.05, 5.0, 2.0
 #: A combination is known where its error is below this, and below this share of that of its parts.
 _KNOWN, _BETTER = 0.1, 0.34
+#: A loop that is proposed where there is none: its rate [Hz], rows, and noise over half its force range.
+_NEW_RATE, _ROWS, _FORCE_NOISE = 0.1, 400, 5e-3
 _FRICTION, _RATE = ("sigma_fmax", "eps_half"), ("mu", "m", "alpha")
 
 
@@ -100,7 +103,7 @@ def left_open(model: Model, terms: Sequence[Term], names: Sequence[str]) -> list
 
 
 def _percent(error: float) -> str:
-    return f"{100.0 * error:.2g} %" if error < 10.0 else "beyond 1000 %"
+    return f"{float(f'{100.0 * error:.2g}'):g} %" if error < 10.0 else "beyond 1000 %"
 
 
 def _reasons(model: Model, terms: Sequence[Term], involved: Sequence[str]) -> Iterator[str]:
@@ -109,17 +112,20 @@ def _reasons(model: Model, terms: Sequence[Term], involved: Sequence[str]) -> It
     loops = [term for term in terms if isinstance(term, LoopTerm)]
     if set(involved) & set(_FRICTION) and "eps_half" in model.values:
         ratio = large / model.values["eps_half"]
+        span = f"{small / model.values['eps_half']:.2g} to {ratio:.2g} of eps_half"
         if ratio < 1.0:
             yield f"amplitudes stop at {ratio:.2g} of eps_half"
-        elif large < _ALIKE_STRAIN * small:
+        elif large < _ONE * small:
             yield "one amplitude"
-        else:
-            yield f"amplitudes span {small / model.values['eps_half']:.2g} to {ratio:.2g} of eps_half"
+        elif large < _NARROW_STRAIN * small:
+            yield f"amplitudes span only {span}"
+        elif small > model.values["eps_half"]:
+            yield f"amplitudes begin at {small / model.values['eps_half']:.2g} of eps_half"
     if set(involved) & set(_RATE) and "alpha" in model.values:
-        if fast < _ALIKE_RATE * slow:
+        if fast < _ONE * slow:
             yield f"one {'loop rate' if len(loops) == len(terms) else 'frequency'}, {slow:.3g} Hz"
-        else:
-            yield f"frequencies span {slow:.3g} to {fast:.3g} Hz"
+        elif fast < _NARROW_RATE * slow:
+            yield f"frequencies span only {slow:.3g} to {fast:.3g} Hz"
     if not loops and set(involved) & {*_FRICTION, "mu"}:
         yield "there is no loop"
 
@@ -175,6 +181,9 @@ def _further(model: Model, terms: Sequence[Term]) -> Iterator[tuple[str, list[Te
             yield f"a loop of {factor:g} times the largest amplitude", [_loop(largest, model, amplitude=factor)]
         for words, factor in (("a tenth of", 0.1), ("ten times", 10.0)):
             yield f"a loop at {words} the rate", [_loop(largest, model, rate=factor)]
+    else:
+        for times, words in ((1.0, ""), (3.0, "three times ")):
+            yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", [_new_loop(model, terms, times)]
     reach = measured_range(model, terms)
     direction = terms[0].direction
     strain = model.bushing.unit_strain(direction)
@@ -203,6 +212,19 @@ def _loop(term: LoopTerm, model: Model, *, amplitude: float = 1.0, rate: float =
     fresh = LoopTerm(moved).noise_free(model)
     noise = drive.noise / drive.half_range * fresh.drive.half_range
     return LoopTerm(replace(fresh.drive, noise=noise))
+
+
+def _new_loop(model: Model, terms: Sequence[Term], times: float) -> LoopTerm:
+    """Two cycles of a slow sine where the campaign has no loop, with the noise of most force sensors."""
+    direction = terms[0].direction
+    amplitude = times * max(float(term.amplitude.max()) for term in terms if term.direction is direction)
+    phase = 2.0 * np.arange(_ROWS) / _ROWS
+    motion, nil = amplitude * np.sin(2.0 * np.pi * phase), np.zeros(_ROWS)
+    loop = Loop("new", direction, phase / _NEW_RATE, motion, nil)
+    coefficients = np.array([0.0, -1j * amplitude])
+    silent = Drive(loop, _NEW_RATE, 2.0, True, phase, nil, np.ones(_ROWS), 1.0, coefficients, 1.0)
+    fresh = LoopTerm(silent).noise_free(model)
+    return LoopTerm(replace(fresh.drive, noise=_FORCE_NOISE * fresh.drive.half_range))
 
 
 def _sweep(

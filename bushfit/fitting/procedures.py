@@ -15,7 +15,7 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.identify import left_open
 from bushfit.fitting.profile import profile95
 from bushfit.fitting.robust import Estimate, estimate, told
-from bushfit.fitting.solve import Coordinates, Solution
+from bushfit.fitting.solve import Bounds, Coordinates, Solution
 from bushfit.fitting.starts import start_values
 from bushfit.fitting.terms import LoopTerm, SweepTerm, Term
 from bushfit.geometry import Direction
@@ -211,24 +211,34 @@ def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = Non
         cov,
         quality(solution.model, terms, len(fitted)),
         measured_range(solution.model, terms),
-        (*notes, *_assumptions(terms), *told(outliers, robust=data.robust), *_cautions(steps)),
+        (*notes, *_assumptions(terms), *told(outliers, robust=data.robust), *_cautions(steps, data.bounds)),
         tuple(term.source for term in terms if term.source is not None),
         outliers,
     )
 
 
-def _cautions(steps: Sequence[Estimate]) -> list[str]:
+def _cautions(steps: Sequence[Estimate], bounds: Bounds) -> list[str]:
     """What the data of each step cannot tell: bounds met, what stays open, and a model that does not fit."""
     lines = []
     for step in steps:
         solution = step.solution
         names, model = solution.coordinates.names, steps[-1].solution.model
-        lines += [
-            f"{name} ended at the edge of what is possible: the data do not determine it" for name in solution.at_bound
-        ]
+        lines += [_at_edge(name, model, bounds) for name in solution.at_bound]
         lines += left_open(model, step.terms, [name for name in names if name not in solution.at_bound])
         lines += misfit(model, step.terms, len(names))
     return lines
+
+
+def _at_edge(name: str, model: Model, bounds: Bounds) -> str:
+    limits = model.parameters[name].bounds
+    distance = [
+        abs(model.values[name] - (least if own is None else own))
+        for least, own in zip(limits, bounds.get(name, (None, None)), strict=True)
+    ]
+    end = int(np.argmin(distance))
+    if bounds.get(name, (None, None))[end] is not None:
+        return f"{name} rests on the {('min', 'max')[end]} given in [fit]"
+    return f"{name} ended at the edge of what is possible: the data do not determine it"
 
 
 def _assumptions(terms: Sequence[Term]) -> list[str]:

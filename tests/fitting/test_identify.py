@@ -12,7 +12,7 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
 from bushfit.model import Model
-from bushfit.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.schema import FitSettings, ParameterSetting, SimulatedLoop, SimulatedSweep, SimulateSettings
 
 Rig = Callable[..., Campaign]
 BAND = tuple(float(f) for f in range(5, 156, 10))
@@ -39,7 +39,7 @@ LACKING = {
     "one frequency": (
         (loop(1e-3, 10.0),), (sweep(1e-4, 5e-4, band=(10.0,)),), "one frequency, 10 Hz", "at 10 Hz", "rate",
     ),
-    "one amplitude": ((), (sweep(2e-4),), "one amplitude; ", "", "tenth and all of the largest amplitude"),
+    "one amplitude": ((), (sweep(2e-4),), "one amplitude; there is no loop: ", "", "a loop at 0.1 Hz"),
 }  # fmt: skip
 
 
@@ -58,6 +58,37 @@ def test_what_is_lacking_is_said_with_what_is_known_and_what_would_help(
         if known:
             assert any(line.startswith("what is known all the same") and known in line for line in lines)
         assert any(line.startswith("the further test that would help most") and further in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("band", "amplitudes", "reason"),
+    [
+        ((40.0, 50.0, 60.0), (1e-4, 5e-4), "frequencies span only 40 to 60 Hz; there is no loop: "),
+        (BAND, (4e-4, 6e-4), "amplitudes span only "),
+        (BAND, (1e-4, 5e-4), "there is no loop: "),
+    ],
+)
+def test_a_span_is_a_reason_only_where_it_is_narrow(
+    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, band: tuple[float, ...], amplitudes: tuple[float, ...],
+    reason: str,
+) -> None:  # fmt: skip
+    plan = replace(paper_noise, repeats=1, noise=1e-2, loops=(), sweeps=(sweep(*amplitudes, band=band),))
+    lines = fit_joint(Data.of(rig(paper_model, plan, 1))).warnings
+    print(*lines, sep="\n")
+    said = [line for line in lines if "standard errors:" in line]
+    assert said
+    assert said[0].startswith(reason)
+
+
+def test_a_bound_of_the_user_is_named_as_the_user_s(
+    rig: Rig, paper_noise: SimulateSettings, paper_model: Model
+) -> None:
+    bounded = FitSettings({"mu": ParameterSetting(max=1e6)})
+    campaign = replace(rig(paper_model, paper_noise, 1), fit=bounded)
+    lines = fit_joint(Data.of(campaign)).warnings
+    print(*lines, sep="\n")
+    assert "mu rests on the max given in [fit]" in lines
+    assert not any("edge of what is possible" in line for line in lines)
 
 
 def test_complete_tests_leave_nothing_open(
