@@ -13,7 +13,7 @@ import json
 import os
 import shutil
 import uuid
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -88,6 +88,12 @@ def keep(output: Path, row: Row, files: Mapping[str, bytes], record: Record) -> 
 def to_line(record: Record) -> bytes:
     """A record on one line."""
     return json.dumps(record, allow_nan=False, ensure_ascii=False, separators=(",", ":")).encode() + b"\n"
+
+
+def strays(output: Path, rows: Iterable[Row]) -> list[Path]:
+    """Folders of rows of an earlier batch, in order, that are none of these."""
+    ours = {row.folder for row in rows}
+    return sorted(record.parent for record in (output / ROWS).glob(f"*/{RECORD}") if record.parent.name not in ours)
 
 
 @contextlib.contextmanager

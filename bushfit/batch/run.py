@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import shutil
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -67,7 +68,7 @@ class Summary:
         missed: names of bushings that miss a limit.
         errors: name and error of rows that failed.
         scatter: median and robust standard deviation of each quantity, in its unit.
-        notes: limits that could not be judged.
+        notes: limits that could not be judged, results of earlier batches beside these.
         seconds: of the work.
     """
 
@@ -104,10 +105,10 @@ def check_free(plan: Plan, *, force: bool) -> None:
     Raises:
         OutputError: the folder cannot be written or holds a batch, or the report cannot be written.
     """
-    output, replace = plan.orders.output, force or plan.orders.resume
+    output, over = plan.orders.output, force or plan.orders.resume
     check_writable(output, [TABLE, PICTURE], force=True)
     found = [name for name in (TABLE, PICTURE, ledger.ROWS) if (output / name).exists()]
-    if found and not replace:
+    if found and not over:
         raise OutputError(
             "results stand there already",
             file=output,
@@ -118,7 +119,7 @@ def check_free(plan: Plan, *, force: bool) -> None:
         with _blamed_on(plan.junit):
             if output / ledger.ROWS in plan.junit.absolute().parents:
                 raise OutputError("the report cannot stand among the results of the rows")
-            check_writable(plan.junit.parent, [plan.junit.name], force=replace)
+            check_writable(plan.junit.parent, [plan.junit.name], force=over)
 
 
 @contextmanager
@@ -147,15 +148,26 @@ def run(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Summary:
     begin, output = time.perf_counter(), plan.orders.output
     try:
         with ledger.held(output), Spool(output / ledger.ASIDE / "records", len(plan.rows)) as spool:
+            strays = ledger.strays(output, plan.rows)
+            if not plan.orders.resume:
+                for folder in strays:
+                    shutil.rmtree(folder)
             task = partial(work, orders=plan.orders)
             for number, (status, line) in pool.run(plan.rows, task, given_up, workers):
                 spool.put(number, line)
                 progress(status)
-            return _report(plan, spool, time.perf_counter() - begin)
+            summary = _report(plan, spool, time.perf_counter() - begin)
+            return replace(summary, notes=(*summary.notes, *_on_strays(len(strays), kept=plan.orders.resume)))
     except OSError as error:
         raise OutputError(
             "the results cannot be written", file=output, found=error.strerror or str(error), hint="free some space"
         ) from error
+
+
+def _on_strays(count: int, *, kept: bool) -> Iterator[str]:
+    if count:
+        fate = "are still in bushings/ (--force removes them)" if kept else "were removed from bushings/"
+        yield f"results of {count} bushings of an earlier batch, no rows of this one, {fate}"
 
 
 def _report(plan: Plan, spool: Spool, seconds: float) -> Summary:

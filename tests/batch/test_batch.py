@@ -160,6 +160,22 @@ def test_results_that_stand_are_refused_resumed_or_replaced(typed: Callable[...,
     assert tree(shop / "all") == files
 
 
+def test_results_of_rows_that_are_gone_do_not_stay_unsaid(typed: Callable[..., Any], shop: Path) -> None:
+    assert typed("batch", PATTERN, "-o", "all", "-q").returncode == 0
+    (shop / "all/bushings/notes").mkdir()
+    (shop / "all/bushings/notes/mine.txt").write_text("keep")
+    names = sorted(path.name for path in (shop / "all/bushings").iterdir())
+    resumed = typed("batch", "bushings/b[0-2]/bushing.toml", "-o", "all", "--resume", "--json")
+    assert resumed.returncode == 0, resumed.stderr
+    (said,) = json.loads(resumed.stdout)["warnings"]
+    assert "results of 2 bushings of an earlier batch" in said
+    assert "--force removes them" in said
+    assert sorted(path.name for path in (shop / "all/bushings").iterdir()) == names
+    forced = typed("batch", "bushings/b[0-2]/bushing.toml", "-o", "all", "--force")
+    assert "were removed" in forced.stderr
+    assert sorted(path.name for path in (shop / "all/bushings").iterdir()) == ["b0", "b1", "b2", "notes"]
+
+
 def test_only_what_changed_or_is_torn_is_done_again(typed: Callable[..., Any], shop: Path) -> None:
     typed("batch", PATTERN, "-o", "all", "-q")
     files, before = tree(shop / "all"), stamps(shop / "all/bushings")
