@@ -395,3 +395,18 @@ def test_a_sweep_in_another_dialect(sweep: Sweep, tmp_path: Path) -> None:
     assert seen.written["columns parted by"] == "semicolon"
     assert seen.written["decimal mark"] == "comma"
     assert seen.columns[3].low == pytest.approx(pd.to_numeric(table["Steifigkeit [N/mm]"]).min(), rel=1e-5)
+
+
+def test_rows_of_a_sine_do_not_pass_for_a_triangle(root: Path, tmp_path: Path) -> None:
+    """A sine's file without time, of which a rate was stated."""
+    from bushfit.geometry import Direction
+    from bushfit.inspection.loops import look_at_loop
+    from bushfit.reading import read_loop
+
+    lines = (root / "data/arm_bushing/loop_axial_1.csv").read_text(encoding="utf-8").splitlines()
+    file = tmp_path / "loop.csv"
+    file.write_text("\n".join(line.partition(",")[2] for line in lines), encoding="utf-8")
+    wrong = look_at_loop(read_loop(file, Direction.AXIAL, rate=1.2e-4), file)
+    right = look_at_loop(read_loop(file, Direction.AXIAL, frequency=0.1, waveform="sine"), file)
+    assert any("as those of a sine" in line for line in wrong.odd)
+    assert not any("as those of" in line for line in right.odd)

@@ -24,6 +24,8 @@ _SURE, _SHARE = 6.0, 2e-3
 _OFF_ZERO = 0.02
 #: Harmonics that swing beyond the range of the rows by this factor do so where there are no rows.
 _BEYOND = 1.1
+#: Of rows evenly spaced in time a triangle has a tenth beyond this share of its amplitude, a sine 29 %.
+_OUTER, _CROWDED = 0.9, 0.2
 #: At most so many cycles are looked at from either end, with so many harmonics.
 _ENDS, _HARMONICS = 6, 7
 
@@ -58,6 +60,7 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
         *odd_channels(loop),
         *([drive.note.removeprefix(f"{loop.name}: ")] if drive.note else []),
         *_changing(drive, names),
+        *_crowding(drive, names[0]),
     ]
     if swings:
         odd.append(
@@ -74,6 +77,19 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
 
 def _mean(drive: Drive) -> float:
     return float(np.average(drive.force, weights=np.ones_like(drive.weight)))
+
+
+def _crowding(drive: Drive, motion: str) -> Iterator[str]:
+    """A time column, or what stands in for it, that does not go with how the rows lie."""
+    from_middle = np.abs(drive.loop.displacement - drive.loop.displacement.min() - np.ptp(drive.loop.displacement) / 2)
+    outer = float(np.mean(from_middle > _OUTER * np.ptp(drive.loop.displacement) / 2))
+    if (_waveform(drive) == "a triangle" and outer > _CROWDED) or (_waveform(drive) == "a sine" and outer < _CROWDED):
+        like = "a sine" if outer > _CROWDED else "a triangle"
+        yield (
+            f"{100 * outer:.2g} % of the rows lie beyond {_OUTER:g} of the amplitude, as those of {like} recorded evenly "
+            f"in time, but the {motion} over time is {_waveform(drive)}: where a file has no time, rate means a "
+            'triangle, and frequency with waveform = "sine" a sine'
+        )
 
 
 def _waveform(drive: Drive) -> str:
