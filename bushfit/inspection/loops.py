@@ -86,8 +86,8 @@ def _crowding(drive: Drive, motion: str) -> Iterator[str]:
     if (_waveform(drive) == "a triangle" and outer > _CROWDED) or (_waveform(drive) == "a sine" and outer < _CROWDED):
         like = "a sine" if outer > _CROWDED else "a triangle"
         yield (
-            f"{100 * outer:.2g} % of the rows lie beyond {_OUTER:g} of the amplitude, as those of {like} recorded evenly "
-            f"in time, but the {motion} over time is {_waveform(drive)}: where a file has no time, rate means a "
+            f"{100 * outer:.2g} % of the rows lie beyond {_OUTER:g} of the amplitude, as those of {like} recorded "
+            f"evenly in time, but the {motion} over time is {_waveform(drive)}: where a file has no time, rate means a "
             'triangle, and frequency with waveform = "sine" a sine'
         )
 
