@@ -49,6 +49,8 @@ SWEEP_COLUMNS = {
         *("stiffness", "dynamic stiffness", "stiffness magnitude", "complex stiffness", "kdyn", "cdyn", "|k|", "K*"),
         *("Steifigkeit", "dynamische Steifigkeit", "Federsteifigkeit", "Drehsteifigkeit", "dyn Steifigkeit"),
         *("Federrate", "dynamische Federrate", "dyn Federrate", "dyn. Federrate", "Federkonstante", "|K*|", "c*"),
+        *("Steifigkeit dyn", "Steifigkeit dynamisch", "dyn Federsteifigkeit", "dynamische Federsteifigkeit"),
+        *("dyn stiffness", "stiffness dyn"),
         *("raideur", "rigidité", "raideur dynamique", "rigidité dynamique"),
         *("rigidez", "rigidez dinámica", "刚度", "动刚度"),
     ),
@@ -80,6 +82,8 @@ SWEEP_COLUMNS = {
 }  # fmt: skip
 #: Words that say where or how a channel was recorded, and not what it is.
 _ASIDES = re.compile(r"\b(?:axial|radial|torsional|measured|actual|gemessen|mesure|medido|ist)\b")
+#: Units by which the symbol f is not the role it could stand for.
+_NOT_F = {"force": ("Hz",), "frequency": ("N", "N m")}
 #: Names of an amplitude that say peak-to-peak by themselves.
 _DOUBLE = {
     *("doppelamplitude", "schwingbreite", "schwingungsbreite", "doubleamplitude", "amplitudedouble", "amplituddoble"),
@@ -166,8 +170,9 @@ class Vocabulary:
                 bare, convention = "amplitude", "peak-to-peak"
             with_aside = plain(_ASIDES.sub("", _folded(name)))
             for candidate in (bare, with_aside, *([bare + "amplitude"] if convention else [])):
-                if candidate in self._roles:
-                    return Heading(self._roles[candidate], unit, convention)
+                role = self._roles.get(candidate)
+                if role and not (candidate == "f" and unit and any(units.agrees(unit, si) for si in _NOT_F[role])):
+                    return Heading(role, unit, convention)
         return None
 
 

@@ -71,7 +71,11 @@ def read_loop(
     if "time" in table.roles:
         wanted["time"] = table.column("time", "s")
     elif rate is None and frequency is None:
-        raise table.missing("time", "s", hint='or state rate = "10 mm/min", or frequency and waveform, in the campaign')
+        raise table.missing(
+            "time",
+            "s",
+            hint='or state rate = "10 mm/min", or frequency = "0.1 Hz" and waveform = "sine", in the campaign',
+        )
     values = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
 
     for role in ("displacement", "force"):

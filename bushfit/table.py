@@ -290,7 +290,7 @@ class Table:
                 column=self._column_at(index),
                 found=f'"{text}"',
                 expected=f"numbers with a decimal {mark}",
-                hint="write all numbers in one way; decimal and thousands in the campaign state it",
+                hint='write all numbers in one way, or state decimal = "..." and thousands = "..." in the campaign',
             )
         if evidence.unclear:
             (line, index), text = evidence.unclear

@@ -30,6 +30,7 @@ _SAME_NAME = {
     "sheet": "Sheet of a workbook.",
 }
 _NUMBERS = ("force_sign", "header_line")
+_TABLE = re.compile(r"\{[^}]*\}")
 _PAIRED = re.compile(r'(column|unit)s = \{ (\w+) = "([^"]*)"')
 
 
@@ -73,9 +74,8 @@ def options_named() -> Iterator[None]:
     except BushfitError as error:
         hint = error.hint or ""
         named = [f'--{kind} "{role}={text}"' for kind, role, text in _PAIRED.findall(hint)]
-        named += [
-            "--" + key.replace("_", "-") for key in _SAME_NAME if re.search(rf"\b{key}\b", hint) and "campaign" in hint
-        ]
+        keys = _TABLE.sub("", hint)  # in a table, amplitude is a role
+        named += ["--" + key.replace("_", "-") for key in _SAME_NAME if re.search(rf"\b{key} = ", keys)]
         if named:
             error.hint = f"{hint}; for this command: {', '.join(dict.fromkeys(named))}"
         raise

@@ -14,7 +14,7 @@ from bushfit.campaign import reader_keywords
 from bushfit.directions import direction_of_file, named_direction
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.geometry import Direction
-from bushfit.headers import LOOP_COLUMNS, SWEEP_COLUMNS
+from bushfit.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary
 from bushfit.inspection.channels import clock, odd_channels
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.loops import look_at_loop
@@ -115,30 +115,39 @@ def _direction(file: Path, table: Table, stated: Mapping[str, Any]) -> Direction
 
 def _recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
     """The table of a file and whether it is a sweep's."""
-    opened: list[Table] = []
-    failed: list[BushfitError] = []
+    opened: list[tuple[Table, bool]] = []
+    failed: list[tuple[Mapping[str, Any], BushfitError]] = []
     for names, is_sweep in ((LOOP_COLUMNS, False), (SWEEP_COLUMNS, True)):
         try:
             table = _open(file, names, stated)
         except BushfitError as error:
-            failed.append(error)
+            failed.append((names, error))
             continue
-        opened.append(table)
-        roles = set(table.roles)
-        pair = any(set(pair) <= roles for pair in STIFFNESS_PAIRS)
-        if {"frequency", "amplitude"} <= roles and pair if is_sweep else {"displacement", "force"} <= roles:
+        opened.append((table, is_sweep))
+        if _missing(table, is_sweep=is_sweep) is None:
             return table, is_sweep
-    best = max(opened, key=lambda one: len(one.roles), default=None)
-    if best is None or (failed and len(best.roles) < 2):
-        raise failed[0]
+    if not opened:
+        raise failed[0][1]
+    best, is_sweep = max(opened, key=lambda one: len(one[0].roles))
+    for usual, failure in failed:
+        if len(best.roles) <= max(1, len(Vocabulary(usual, {}).roles(best.headers))):
+            raise failure
     known = ", ".join(role.replace("_", " ") for role in best.roles)
     raise best.error(
         "the columns do not make a test",
         line=best.layout.header_line,
         found=", ".join(best.headers) + (f" (understood: {known})" if known else ""),
         expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
-        hint='correct the header, or name a column: --column force=... (columns = { force = "..." } in a campaign)',
+        hint=f"correct the header, or name the column: --column {_missing(best, is_sweep=is_sweep)}=...",
     )
+
+
+def _missing(table: Table, *, is_sweep: bool) -> str | None:
+    """The first role that a table lacks to be a test; None where it is one."""
+    roles = set(table.roles)
+    nearest = max(STIFFNESS_PAIRS, key=lambda pair: len(roles & set(pair)))
+    needed = ("frequency", "amplitude", *nearest) if is_sweep else ("displacement", "force")
+    return next((role for role in needed if role not in roles), None)
 
 
 def _open(file: Path, names: Mapping[str, Any], stated: Mapping[str, Any]) -> Table:

@@ -91,3 +91,36 @@ def test_an_error_names_the_option_that_settles_it(
     again = typed("inspect", "axial.csv", "--no-plots", "--unit" if "unit" in said else "--column", option)
     assert again.returncode == 0, again.stderr
     assert option.partition("=")[2] in again.stdout
+
+
+@pytest.mark.parametrize(
+    ("header", "said", "unsaid"),
+    [
+        ("frequency [Hz],amplitude [mm],K7 [N/mm],loss factor [-]", "--column stiffness=...", "force="),
+        ("x [Hz],amplitude [mm],stiffness [N/mm],loss factor [-]", "--column frequency=...", "force="),
+        ("frequency [Hz],amplitude,stiffness [N/mm],loss factor [-]", '--unit "amplitude=', "--amplitude"),
+        ("frequency [Hz],amplitude [mm],stiffness [N/mm],K* [N/mm]", "could be the stiffness", "force"),
+    ],
+)
+def test_a_hint_leads_to_what_a_sweep_lacks(
+    typed: Callable, tmp_path: Path, header: str, said: str, unsaid: str
+) -> None:
+    rows = "\n".join(f"{f},0.1,{600 + f},0.1" for f in range(5, 50, 5))
+    (tmp_path / "axial.csv").write_text(f"{header}\n{rows}\n", encoding="utf-8")
+    done = typed("inspect", "axial.csv", "--no-plots")
+    print(done.stderr)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert unsaid not in done.stderr.partition("try:")[2]
+
+
+@pytest.mark.parametrize(
+    "header",
+    ["f [Hz],F [N],amplitude [mm],Steifigkeit dyn. [N/mm],delta [deg]", "f Hz,F in N,ampl mm,dyn. Steifigkeit,eta"],
+)
+def test_the_unit_tells_frequency_from_force(typed: Callable, tmp_path: Path, header: str) -> None:
+    rows = "\n".join(f"{f},60,0.1,{600 + f},0.2" for f in range(5, 50, 5))
+    (tmp_path / "axial.csv").write_text(f"{header}\n{rows}\n", encoding="utf-8")
+    done = typed("inspect", "axial.csv", "--no-plots", *(("--unit", "stiffness=N/mm") if "eta" in header else ()))
+    assert done.returncode == 0, done.stderr
+    assert "from 5 to 45 Hz" in done.stderr
