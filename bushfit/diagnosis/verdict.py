@@ -17,6 +17,8 @@ from bushfit.diagnosis.next_test import confirming_test, deciding_test
 from bushfit.diagnosis.record import Diagnosis, Judged, Named, Verdict, Where
 from bushfit.errors import FitError
 from bushfit.fitting.assess import Stage, covariance, measured_range, quality
+from bushfit.fitting.procedures import cautions
+from bushfit.fitting.solve import Bounds
 from bushfit.results import Covariance, Result
 
 #: Probability with which noise alone stays below the thresholds of a remainder and of a fault.
@@ -161,7 +163,7 @@ def _finish(
         tuple(_candidates(search, {named.name for named in effects})),
         base,
         after,
-        _result(after),
+        _result(after, search.bounds),
         _notes(search, after),
     )
 
@@ -201,7 +203,7 @@ def _candidates(search: Search, kept: set[str]) -> list[Judged]:
     return judged
 
 
-def _result(evidence: Evidence) -> Result:
+def _result(evidence: Evidence, bounds: Bounds) -> Result:
     """The model with its uncertainty; a parameter at rest on a bound counts as held there."""
     model, names = evidence.model, evidence.solution.coordinates.names
     moving = tuple(name for name in names if name not in evidence.solution.at_bound)
@@ -210,14 +212,13 @@ def _result(evidence: Evidence) -> Result:
     except FitError:
         cov = Covariance()
     sources = tuple(term.source for term in evidence.terms if term.source is not None)
-    warnings = [f"{name} rests on the edge of what is possible" for name in evidence.solution.at_bound]
     return Result(
         model,
         moving,
         cov,
         quality(model, evidence.terms, len(moving)),
         measured_range(model, evidence.terms),
-        tuple(warnings),
+        tuple(cautions(model, evidence.solution, evidence.terms, bounds)),
         sources,
     )
 

@@ -11,7 +11,7 @@ from bushfit.diagnosis.verdict import judge
 from bushfit.effects import BASE, effect_named
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
-from bushfit.fitting.robust import estimate, told
+from bushfit.fitting.robust import estimate, outliers_at, told
 from bushfit.fitting.starts import start_values
 from bushfit.fitting.terms import SweepTerm, Term
 from bushfit.model import Model
@@ -55,7 +55,9 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     search = Search.begin(fit(model, terms, held, data.bounds), settings, start, held, data.bounds)
     grown, added = search.grow()
     found = judge(search, *search.reconsider(grown, added))
-    notes = (*found.notes, *told(outliers, robust=True))
+    if not data.robust:
+        outliers = outliers_at(found.after.model, found.after.terms)
+    notes = (*found.notes, *told(outliers, robust=data.robust))
     return replace(found, notes=notes, result=replace(found.result, outliers=outliers))
 
 

@@ -129,13 +129,13 @@ def measured_range(model: Model, terms: Sequence[Term]) -> Range:
     return Range((float(f.min()), float(f.max())), (float(e.min()), float(e.max())))
 
 
-def misfit(model: Model, terms: Sequence[Term], parameters: int) -> list[str]:
-    """A sentence where the model misses the data by more than their noise."""
+def misfit(model: Model, terms: Sequence[Term], parameters: int, advice: str = "") -> list[str]:
+    """A sentence where the model misses the data by more than their noise, with advice."""
     reduced, freedom = _reduced(model, terms, parameters)
     if _inflation(reduced, freedom) == 1.0:
         return []
     return [
         "the model misses the data by more than their noise "
         f"(reduced chi-square {reduced:.2g}): "
-        "standard errors are scaled up; bushfit diagnose looks for what is missing"
+        f"standard errors are scaled up{advice}"
     ]

@@ -32,6 +32,8 @@ _MOST_PASSES = 50
 _LONGEST_STRIDE = 5.0
 #: A filled natural rubber, to say what leaving the springpot out may do: m/mu [s^alpha] and alpha.
 _TYPICAL_SPRINGPOT = (0.18, 0.24)
+#: What to do about a model that does not fit.
+_NEXT = "; bushfit diagnose looks for what is missing"
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,15 +220,19 @@ def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = Non
 
 
 def _cautions(steps: Sequence[Estimate], bounds: Bounds) -> list[str]:
-    """What the data of each step cannot tell: bounds met, what stays open, and a model that does not fit."""
-    lines = []
-    for step in steps:
-        solution = step.solution
-        names, model = solution.coordinates.names, steps[-1].solution.model
-        lines += [_at_edge(name, model, bounds) for name in solution.at_bound]
-        lines += left_open(model, step.terms, [name for name in names if name not in solution.at_bound])
-        lines += misfit(model, step.terms, len(names))
-    return lines
+    """What the data of each step cannot tell of the last one's model."""
+    model = steps[-1].solution.model
+    return [line for step in steps for line in cautions(model, step.solution, step.terms, bounds, _NEXT)]
+
+
+def cautions(model: Model, solution: Solution, terms: Sequence[Term], bounds: Bounds, advice: str = "") -> list[str]:
+    """What the data of a fit cannot tell: bounds met, what stays open, and a model that does not fit."""
+    names, at_bound = solution.coordinates.names, solution.at_bound
+    return [
+        *(_at_edge(name, model, bounds) for name in at_bound),
+        *left_open(model, terms, [name for name in names if name not in at_bound]),
+        *misfit(model, terms, len(names), advice),
+    ]
 
 
 def _at_edge(name: str, model: Model, bounds: Bounds) -> str:

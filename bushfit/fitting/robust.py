@@ -58,6 +58,11 @@ class Estimate:
         return tuple(entry for term, rows in zip(terms, self.wild, strict=True) for entry in _listed(term, rows, model))
 
 
+def outliers_at(model: Model, terms: Sequence[Term]) -> tuple[Outlier, ...]:
+    """The wild points of some terms as a model sees them, by file and row."""
+    return tuple(entry for term in terms for entry in _listed(term, wild_points(term, model), model))
+
+
 def estimate(
     model: Model, terms: Sequence[Term], names: Sequence[str], bounds: Bounds | None = None, *, robust: bool = False
 ) -> Estimate:
@@ -190,17 +195,30 @@ def _listed(term: Term, rows: Array, model: Model) -> Iterator[Outlier]:
 
 
 def told(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
-    """A sentence on the outliers, the first of each test by row; none where there are none."""
-    if not outliers:
-        return []
+    """A sentence on the outliers that the fit follows and one on those left out, the first of each test by row.
+
+    A wild displacement is never followed, see `drive`.
+    """
+    left = [entry for entry in outliers if robust or entry.column == "displacement"]
+    followed = [entry for entry in outliers if not robust and entry.column != "displacement"]
+    lines = []
+    if followed:
+        places = _places(followed)
+        lines.append(f"{_count(followed)} and the fit follows them: {places}; --loss soft_l1 leaves them out")
+    if left:
+        lines.append(f"{_count(left)}, left out of the fit: {_places(left)}")
+    return lines
+
+
+def _count(outliers: Sequence[Outlier]) -> str:
+    return f"{len(outliers)} point{'s lie' if len(outliers) > 1 else ' lies'} farther off than noise explains"
+
+
+def _places(outliers: Sequence[Outlier]) -> str:
     rows: Mapping[str, list[int]] = {entry.place: [] for entry in outliers}
     for entry in outliers:
         rows[entry.place].append(entry.row)
-    places = "; ".join(f"{place} {_first(numbers)}" for place, numbers in rows.items())
-    count = f"{len(outliers)} point{'s lie' if len(outliers) > 1 else ' lies'} farther off than noise explains"
-    if robust:
-        return [f"{count}, left out of the fit: {places}"]
-    return [f"{count} and the fit follows them: {places}; --loss soft_l1 leaves them out"]
+    return "; ".join(f"{place} {_first(numbers)}" for place, numbers in rows.items())
 
 
 def _first(rows: Sequence[int]) -> str:

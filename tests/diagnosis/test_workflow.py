@@ -22,7 +22,7 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction
 from bushfit.model import Model
-from bushfit.schema import FitSettings, ParameterSetting, SimulateSettings
+from bushfit.schema import FitSettings, Loss, ParameterSetting, SimulateSettings
 from bushfit.simulation import measure, undisturbed
 
 INERTIA = {"inertia": {"mass": 0.06}}
@@ -249,6 +249,26 @@ def test_what_the_tests_cannot_show_is_said(measured: Measured) -> None:
     assert {"viscous", "maxwell", "force_gain"} <= set(note.partition(": ")[2].split(", "))
     assert any("nothing was repeated" in note and "assumed" in note for note in asked(no_repeats(campaign)).notes)
     assert asked(campaign).notes == ()
+
+
+@pytest.mark.parametrize("loss", ["linear", "soft_l1"])
+def test_a_wild_point_is_listed_whatever_the_loss(measured: Measured, loss: Loss) -> None:
+    campaign = measured({}, SHARED)
+    stiffness = campaign.sweeps[0].stiffness.copy()
+    stiffness[11] *= 1.1
+    sweeps = (replace(campaign.sweeps[0], stiffness=stiffness), *campaign.sweeps[1:])
+    diagnosis = asked(replace(campaign, sweeps=sweeps, fit=replace(campaign.fit, loss=loss)))
+    assert [(entry.test, entry.row) for entry in diagnosis.result.outliers] == [(campaign.sweeps[0].name, 12)]
+    (note,) = [note for note in diagnosis.notes if "row 12" in note]
+    assert ("the fit follows them" if loss == "linear" else "left out of the fit") in note
+
+
+def test_what_stays_open_of_the_final_model_goes_with_it(measured: Measured) -> None:
+    campaign = measured({}, SHARED)
+    result = asked(no_sweeps(campaign)).result
+    print(*result.warnings, sep="\n")
+    assert any("cannot be told from one another" in line for line in result.to_document()["warnings"])
+    assert asked(campaign).result.warnings == ()
 
 
 #: 3 % of give in the axial direction, 17 % in the radial, measured at a few frequencies.

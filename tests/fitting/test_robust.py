@@ -14,10 +14,11 @@ from bushfit.fitting.drive import drive_of
 from bushfit.fitting.harmonics import MOST_ROWS
 from bushfit.fitting.outliers import limit
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, fit_two_step
+from bushfit.fitting.robust import told
 from bushfit.geometry import Direction
 from bushfit.measurement import Loop, Sweep
 from bushfit.model import FIVE, Model
-from bushfit.results import Result
+from bushfit.results import Outlier, Result
 from bushfit.schema import FitSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
 
 Rig = Callable[..., Campaign]
@@ -181,6 +182,17 @@ def test_without_repeats_a_wild_point_is_found(rig: Rig, paper_noise: SimulateSe
     shift = moved(robust(dirty), fit_joint(Data.of(campaign)))
     assert [entry.row for entry in robust(dirty).outliers] == [6, 41]
     assert np.max(np.abs(shift)) < 1.0
+
+
+def test_a_wild_displacement_is_said_to_be_left_out_whatever_the_loss() -> None:
+    wild = [Outlier("loop", None, row, column, 9.0) for row, column in ((7, "force"), (9, "displacement"))]
+    followed, left = told(wild, robust=False)
+    assert followed.startswith("1 point lies")
+    assert "follows them: loop, force row 7; --loss soft_l1" in followed
+    assert left.endswith("left out of the fit: loop, displacement row 9")
+    (both,) = told(wild, robust=True)
+    assert "2 points lie" in both
+    assert "follows" not in both
 
 
 @pytest.mark.parametrize(("factor", "missed"), [(0.7, 0), (1.1, 2)])
