@@ -122,11 +122,13 @@ max_nrmse_option = click.option(
 )
 
 
-loss_option = click.option(
-    "--loss",
-    type=click.Choice(["linear", "soft_l1"]),
-    help="linear: least squares [the campaign's, else this]. soft_l1: points far off pull less, wild ones not at all.",
-)
+def _loss_option(soft_l1: str) -> Callable[[Any], Any]:
+    words = f"linear: least squares [the campaign's, else this]. soft_l1: {soft_l1}."
+    return click.option("--loss", type=click.Choice(["linear", "soft_l1"]), help=words)
+
+
+loss_option = _loss_option("points far off pull less, wild ones not at all")
+diagnose_loss_option = _loss_option("the same with wild points left out")
 
 
 def open_campaign(file: Path, loss: str | None) -> Campaign:

@@ -10,7 +10,7 @@ import click
 from bushfit.cli.common import (
     Options,
     campaign_argument,
-    loss_option,
+    diagnose_loss_option,
     max_nrmse_option,
     new_table,
     number,
@@ -39,7 +39,7 @@ _COLOURS = {"consistent": "green", "named": "green", "ambiguous": "yellow", "par
 @click.option("--without", multiple=True, metavar="EFFECT", help="Do not consider this effect; may be given again.")
 @click.option("--max-effects", type=click.IntRange(0, 5), default=3, show_default=True, help="Effects to add at most.")
 @click.option("--tolerance", default="1 %", show_default=True, help="Gaps below this share of |K| do not count.")
-@loss_option
+@diagnose_loss_option
 @max_nrmse_option
 @shared_options
 def command(

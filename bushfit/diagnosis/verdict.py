@@ -231,5 +231,8 @@ def _notes(search: Search, after: Evidence) -> tuple[str, ...]:
         notes.append(f"not identifiable from these tests: {', '.join(blind)}")
     noise = next((term.noise for term in after.terms if hasattr(term, "noise")), None)
     if noise is not None and noise.origin == "assumed":
-        notes.append("nothing was repeated: errors shared by a block are assumed, 0.5 % gain and 0.25 deg phase")
+        notes.append(
+            "nothing was repeated at three frequencies or more: "
+            "errors shared by a block are assumed, 0.5 % gain and 0.25 deg phase"
+        )
     return tuple(notes)

@@ -37,7 +37,7 @@ LevelKey = tuple[str, float]
 _ORIGINS = {
     "repeats": "from repeats",
     "stated": "stated in the campaign",
-    "assumed": "no repeats: points against a smooth curve, shared part assumed",
+    "assumed": "no repeats of three frequencies or more: points against a smooth curve, shared part assumed",
 }
 
 

@@ -77,7 +77,9 @@ def test_repeats_without_a_common_frequency() -> None:
     frequency = np.array([5.0, 15.0, 25.0, 35.0, 45.0, 55.0, 65.0, 75.0])
     stiffness = 6e5 * frequency**0.05 * np.exp(0.1j)
     sweep = Sweep("x", Direction.AXIAL, frequency, np.full(8, 1e-4), stiffness, np.array([1, 2] * 4))
-    assert sweep_noise([sweep]).origin == "assumed"
+    noise = sweep_noise([sweep])
+    assert noise.origin == "assumed"
+    assert "no repeats of three frequencies or more" in noise.describe()
 
 
 def test_missing_points_do_not_matter(noisy_sweep: Callable[..., Sweep]) -> None:
