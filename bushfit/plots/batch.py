@@ -57,6 +57,7 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str] = ())
     for place, axes in enumerate(grid.flat[: len(panels)]):
         lowest = place + _COLUMNS >= len(panels)
         axes.tick_params(labelbottom=lowest)
+        axes.xaxis.set_in_layout(place // _COLUMNS == lines - 1)  # else its labels hang into the empty cell below
         if names:
             axes.set_xticks(
                 range(1, count + 1), names, rotation=90, fontsize=SMALL - 1, family=fonts(), parse_math=False

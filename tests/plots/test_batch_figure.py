@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -42,3 +44,16 @@ def test_medians_limits_and_names(count: int) -> None:
 def test_a_panel_of_which_all_are_out() -> None:
     values = np.array([3.0, 4.0, 5.0])
     to_png(batch_figure([Panel("mu [Pa]", values, (1.0, 2.0), {0: "a", 1: "b", 2: "c"})], "x"))
+
+
+def test_an_odd_panel_leaves_no_gap_between_the_rows() -> None:
+    names = [f"a bushing of a long name {n}" for n in range(10)]
+    figure = batch_figure([panel(10)] * 5, "x", names)
+    to_png(figure)
+    places = [axes.get_position() for axes in figure.axes[:5:2]]
+    gaps = [above.y0 - below.y1 for above, below in pairwise(places)]
+    print("gaps between the rows, shares of the height:", gaps)
+    assert gaps[1] == pytest.approx(gaps[0], abs=0.003)
+    right, last = figure.axes[3], figure.axes[4]
+    lowest = min(label.get_window_extent().y0 for label in right.get_xticklabels())
+    assert lowest > min(label.get_window_extent().y0 for label in last.get_xticklabels())
