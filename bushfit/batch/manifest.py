@@ -116,18 +116,26 @@ class Manifest:
     points: tuple[Point, ...] = ()
 
 
-def read_manifest(source: str, given: Settings) -> Manifest:
-    """The rows of a manifest or a pattern.
+def read_manifest(source: str, given: Settings, *more: str) -> Manifest:
+    """The rows of a manifest or a pattern, or of campaigns listed one by one.
 
     Args:
         source: a TOML or CSV file, or a pattern such as "bushings/*/campaign.toml".
         given: settings for rows that have none of their own; they win over those at the manifest's top.
+        more: where a shell has put matches for a pattern, the other campaign files.
 
     Raises:
         CampaignError: no such file, no match, or keys and values that are not understood.
     """
     path, points = Path(source), tuple[Point, ...]()
-    if _WILD.search(source) and not path.exists():
+    if more:
+        listed = (source, *more)
+        if strange := [name for name in listed if Path(name).suffix.lower() != ".toml"]:
+            raise CampaignError(
+                "this is no campaign", file=strange[0], expected="one manifest, or campaign files alone"
+            )
+        stem, base, entries = "batch", Path(), iter([Entry(campaign=name) for name in listed])
+    elif _WILD.search(source) and not path.exists():
         stem, base, entries = "batch", Path(), _expanded([Entry(campaign=source)], Path(), source)
     elif path.suffix.lower() == ".toml":
         content = _toml(path)

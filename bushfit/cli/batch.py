@@ -26,7 +26,7 @@ _DIRECTIONS = click.Choice(["axial", "radial", "torsion"])
 
 
 @click.command("batch")
-@click.argument("manifest")
+@click.argument("manifest", metavar="MANIFEST", nargs=-1, required=True)
 @click.option(
     "--command",
     "commands",
@@ -51,7 +51,7 @@ _DIRECTIONS = click.Choice(["axial", "radial", "torsion"])
 @click.option("--plots", is_flag=True, help="Write each bushing's plots too.")
 @shared_options
 def command(
-    manifest: str,
+    manifest: tuple[str, ...],
     commands: tuple[str, ...],
     directions: tuple[str, ...],
     effects: tuple[str, ...],
@@ -65,7 +65,7 @@ def command(
     plots: bool,
     options: Options,
 ) -> None:
-    """Fit (diagnose, predict) every campaign of MANIFEST: a TOML or CSV list, or a pattern in quotes.
+    """Fit (diagnose, predict) every campaign of MANIFEST: a TOML or CSV list, a pattern in quotes, or campaign files.
 
     Work is kept as it finishes: after an interruption the same command with --resume does what is missing. A row that
     fails costs that row; its error stands in the table. Exit status 1 where a row failed or a limit is missed.
@@ -85,7 +85,7 @@ def command(
         directions=tuple(Direction(direction) for direction in directions) or None,
         effects=tuple(effect_named(name).name for name in effects) or None,
     )
-    read = read_manifest(manifest, given)
+    read = read_manifest(manifest[0], given, *manifest[1:])
     judged_by = read_limits(limits) if limits else None
     if limits and judged_by:
         check_judged(judged_by, limits, read.rows)

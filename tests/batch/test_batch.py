@@ -275,6 +275,13 @@ def test_a_report_that_cannot_be_written_is_refused_before_the_work(
     assert (shop / "old.xml").read_text() == "old"
 
 
+def test_a_pattern_that_the_shell_has_expanded_is_the_pattern(typed: Callable[..., Any], shop: Path) -> None:
+    assert typed("batch", PATTERN, "-o", "quoted", "-q").returncode == 0
+    expanded = sorted(str(path.relative_to(shop)) for path in shop.glob(PATTERN))
+    assert typed("batch", *expanded, "-o", "bare", "-q").returncode == 0
+    assert tree(shop / "bare") == tree(shop / "quoted")
+
+
 def test_plain_lines_where_standard_error_is_no_terminal(typed: Callable[..., Any], shop: Path) -> None:
     done = typed("batch", PATTERN, "-o", "all", "--jobs", "1", "--no-plots")
     assert done.returncode == 0
@@ -297,6 +304,8 @@ def test_plain_lines_where_standard_error_is_no_terminal(typed: Callable[..., An
         ((PATTERN, "--command", "diagnose", "--direction", "radial"), "directions: this setting does nothing here"),
         (("bushings/b0/bushing.toml",), "this is one campaign"),
         (("bushings",), "in quotes"),
+        (("bushings/b0/bushing.toml", "many.csv"), "many.csv: this is no campaign"),
+        ((), "MANIFEST"),
     ],
 )
 def test_wrong_usage(typed: Callable[..., Any], shop: Path, arguments: tuple[str, ...], words: str) -> None:
