@@ -343,6 +343,31 @@ def test_a_history_points_to_reduce(root: Path) -> None:
     assert seen.looked.facts["frequencies"] == "5, from 10 to 155 Hz"
 
 
+@pytest.mark.parametrize(
+    ("frequency", "amplitudes", "said"),
+    [
+        (1.0, (1.0,), None),
+        (5.0, (1.0,), "a motion at 5 Hz is taken for a loop"),
+        (0.1, (0.2, 0.6, 1.0), "a motion of several amplitudes is taken for a loop"),
+    ],
+)
+def test_one_sine_is_a_loop_however_fast(
+    tmp_path: Path, frequency: float, amplitudes: tuple[float, ...], said: str | None
+) -> None:
+    time = np.arange(0.0, 5.0 * len(amplitudes), 0.005) / frequency
+    size = np.asarray(amplitudes)[np.minimum(time * frequency // 5, len(amplitudes) - 1).astype(int)]
+    phase = 2.0 * np.pi * frequency * time
+    noise = np.random.default_rng(3).standard_normal((2, time.size))
+    motion = 1e-3 * (size * np.sin(phase) + 1e-4 * noise[0])
+    force = 500.0 * (size * np.sin(phase + 0.1) + 1e-3 * noise[1])
+    seen = look(tmp_path, Loop("x", Direction.AXIAL, time, motion, force))
+    print(seen.kind, seen.looked.facts, seen.looked.odd)
+    assert seen.kind == "loop"
+    told = [sentence for sentence in seen.looked.odd if "taken for a loop" in sentence]
+    assert [sentence.startswith(said or "") for sentence in told] == [True] * bool(said)
+    assert all("bushfit reduce" in sentence for sentence in told)
+
+
 def damaged(values: np.ndarray, kind: int, random: np.random.Generator) -> np.ndarray:
     """Rows of a file cut out, thinned, mixed up, or with a column that is constant, noisy, coarse or scaled."""
     column = random.integers(values.shape[1])

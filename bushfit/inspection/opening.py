@@ -29,8 +29,9 @@ from bushfit.sheets import display_units
 from bushfit.table import Table
 from bushfit.toml import check_tables
 
-#: Slower than this, one sine is a quasi-static loop; faster, it is a step of a stepped sine [Hz].
-_QUASI_STATIC = 1.0
+#: Steps are of a stepped sine where one is faster than this [Hz], or one is by this factor faster than another; one
+#: sine is a loop.
+_QUASI_STATIC, _SEVERAL = 1.0, 1.2
 _MINUS = {"force_sign": -1}
 
 
@@ -207,10 +208,17 @@ def _look(measured: Loop, file: Path) -> tuple[Kind, Looked]:
     """Kind of a recorded test, and what is to be seen of it."""
     found = sines(measured)
     points = {(round(np.log(frequency), 2), round(np.log(amplitude), 1)) for frequency, amplitude, _ in found}
-    if len(points) > 1 or any(frequency > _QUASI_STATIC for frequency, *_ in found):
+    frequencies = [frequency for frequency, *_ in found] or [0.0]
+    fast = max(frequencies) > _QUASI_STATIC
+    if len(points) > 1 and (fast or max(frequencies) > _SEVERAL * min(frequencies)):
         with suppress(MeasurementError):  # no steady sine after all
             return "history", _look_at_history(measured, file)
-    return "loop", look_at_loop(measured, file)
+    looked = look_at_loop(measured, file)
+    if fast or len(points) > 1:
+        what = f"at {max(frequencies):.3g} Hz" if fast else "of several amplitudes"
+        either = f"a motion {what} is taken for a loop; should it be a stepped sine, bushfit reduce makes points of it"
+        looked = Looked(looked.facts, (*looked.odd, either))
+    return "loop", looked
 
 
 def _look_at_history(history: Loop, file: Path) -> Looked:
