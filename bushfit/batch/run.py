@@ -68,7 +68,7 @@ class Summary:
         missed: names of bushings that miss a limit.
         errors: name and error of rows that failed.
         scatter: median and robust standard deviation of each quantity, in its unit.
-        notes: limits that could not be judged, results of earlier batches beside these.
+        notes: limits that could not be judged, bushings with warnings, results of earlier batches beside these.
         seconds: of the work.
     """
 
@@ -178,7 +178,7 @@ def _report(plan: Plan, spool: Spool, seconds: float) -> Summary:
     quantities = {quantity.name: quantity for quantity in (*parameters, NRMSE, CHI_SQUARE, *points)}
     judge = Judge(plan.limits, columns, quantities) if plan.limits else None
     report = Report(plan.title) if plan.junit else None
-    status, limits, kept = Counter[str](), Counter[str](), 0
+    status, limits, kept, warned = Counter[str](), Counter[str](), 0, 0
     missed: dict[int, tuple[str, ...]] = {}
     errors = []
     aside = output / ledger.ASIDE / TABLE
@@ -193,6 +193,7 @@ def _report(plan: Plan, spool: Spool, seconds: float) -> Summary:
                 report.add(row, record, judged)
             status[record["status"]] += 1
             kept += bool(record.get("kept"))
+            warned += bool(record.get("warnings"))
             if not done:
                 errors.append((row.name, record["error"]))
             if judged:
@@ -214,9 +215,14 @@ def _report(plan: Plan, spool: Spool, seconds: float) -> Summary:
         tuple(plan.rows[number].name for number in missed),
         tuple(errors),
         {q: _scatter(columns[q.name], q.factor) for q in quantities.values() if q.name in columns},
-        tuple(judge.notes) if judge else (),
+        (*(judge.notes if judge else ()), *_on_warnings(warned)),
         seconds,
     )
+
+
+def _on_warnings(count: int) -> Iterator[str]:
+    if count:
+        yield f"{count} bushing{'s' * (count > 1)} with warnings of their own: see the column warnings of batch.csv"
 
 
 def _scatter(values: Array, factor: float) -> tuple[float, float]:

@@ -167,7 +167,7 @@ def test_results_of_rows_that_are_gone_do_not_stay_unsaid(typed: Callable[..., A
     names = sorted(path.name for path in (shop / "all/bushings").iterdir())
     resumed = typed("batch", "bushings/b[0-2]/bushing.toml", "-o", "all", "--resume", "--json")
     assert resumed.returncode == 0, resumed.stderr
-    (said,) = json.loads(resumed.stdout)["warnings"]
+    (said,) = [line for line in json.loads(resumed.stdout)["warnings"] if "column warnings" not in line]
     assert "results of 2 bushings of an earlier batch" in said
     assert "--force removes them" in said
     assert sorted(path.name for path in (shop / "all/bushings").iterdir()) == names
