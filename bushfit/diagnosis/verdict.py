@@ -218,7 +218,7 @@ def _result(evidence: Evidence, bounds: Bounds) -> Result:
         cov,
         quality(model, evidence.terms, len(moving)),
         measured_range(model, evidence.terms),
-        tuple(cautions(model, evidence.solution, evidence.terms, bounds)),
+        tuple(cautions(model, evidence.solution, evidence.terms, bounds, cov)),
         sources,
     )
 

@@ -15,10 +15,11 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.fitting.assess import measured_range
 from bushfit.fitting.drive import Drive
-from bushfit.fitting.solve import jacobian
+from bushfit.fitting.solve import Coordinates, jacobian
 from bushfit.fitting.terms import LoopTerm, SweepTerm, Term
 from bushfit.measurement import Loop, Sweep
 from bushfit.model import Model
+from bushfit.results import Z95, Covariance
 
 #: Relative standard error beyond which a direction counts as open, and a parameter as not determined.
 _OPEN = 0.15
@@ -74,32 +75,67 @@ def _sizes(model: Model, names: Sequence[str]) -> Array:
     return np.array(sizes)
 
 
-def left_open(model: Model, terms: Sequence[Term], names: Sequence[str]) -> list[str]:
-    """Sentences on what the tests leave open of a fitted model; none where everything is determined."""
+def left_open(model: Model, terms: Sequence[Term], names: Sequence[str], covariance: Covariance) -> list[str]:
+    """Sentences on what the tests leave open of a fitted model; none where everything is determined.
+
+    Each group of parameters that share open directions has a sentence, with the standard errors of the covariance.
+    """
     if not names:
         return []
     known = _Information.of(model, terms, names)
-    errors, vectors = known.directions()
-    weak = errors > _OPEN
-    if not weak.any():
-        return []
-    each, by_weak = known.errors(), np.linalg.norm((vectors * errors)[:, weak], axis=1)
-    least = min(_OPEN, _PARTNER * float(by_weak.max()))
-    involved = [name for name, error in zip(names, by_weak, strict=True) if error > least]
-    told = ", ".join(f"{name} {_percent(float(each[known.names.index(name)]))}" for name in involved)
-    reasons = "; ".join(_reasons(model, terms, involved)) or "these tests do not tell"
-    if set(involved) == set(_FRICTION) and known.error(dict(zip(_FRICTION, (1.0, -1.0), strict=True))) < _KNOWN:
-        meaning = "sigma_fmax and eps_half are known only as a ratio"
-    elif len(involved) > 1:
-        meaning = f"{', '.join(involved[:-1])} and {involved[-1]} cannot be told from one another"
-    else:
-        meaning = f"{involved[0]} is not determined"
-    lines = [f"{reasons}: {meaning} (standard errors: {told})"]
-    combinations = [*_combinations(model, terms, known, involved)]
+    slopes = Coordinates.of(model, names).slopes(model.values) * _sizes(model, names)
+    stderr = np.array([covariance.stderr(name) or 0.0 for name in names])
+    each = dict(zip(names, stderr / np.abs(slopes), strict=True))
+    groups = _groups(known)
+    zero = [name for group in groups for name in group if _is_zero(model, name, covariance)]
+    lines = [f"{name} is no different from zero: these tests do not show {name.partition('.')[0]}" for name in zero]
+    if zero:
+        idle = {name.partition(".")[0] for name in zero}
+        rest = [name for name in names if name.partition(".")[0] not in idle]
+        if not rest:
+            return lines
+        known = _Information.of(model, terms, rest)
+        groups = _groups(known)
+    combinations: list[str] = []
+    for group in groups:
+        told = ", ".join(f"{name} {_percent(float(each[name]))}" for name in group)
+        reasons = "; ".join(_reasons(model, terms, group)) or "these tests do not tell"
+        lines.append(f"{reasons}: {_meaning(known, group)} (standard errors: {told})")
+        combinations += [x for x in _combinations(model, terms, known, group) if x not in combinations]
     if combinations:
         lines.append("what is known all the same: " + "; ".join(combinations))
-    lines += _next(model, terms, known)
-    return lines
+    return [*lines, *_next(model, terms, known)] if groups else []
+
+
+def _groups(known: _Information) -> list[list[str]]:
+    """Parameters of each open direction; directions that share one are one group."""
+    errors, vectors = known.directions()
+    groups: list[set[str]] = []
+    for j in np.flatnonzero(errors > _OPEN):
+        parts = np.abs(vectors[:, j]) * errors[j]
+        least = min(_OPEN, _PARTNER * float(parts.max()))
+        group = {name for name, part in zip(known.names, parts, strict=True) if part > least}
+        for other in [other for other in groups if other & group]:
+            groups.remove(other)
+            group |= other
+        groups.append(group)
+    return [[name for name in known.names if name in group] for group in groups]
+
+
+def _is_zero(model: Model, name: str, covariance: Covariance) -> bool:
+    """Whether noise alone explains that the size of an added effect is not its neutral value."""
+    neutral = model.parameters[name].neutral
+    if "." not in name or neutral is None:
+        return False
+    return abs(model.values[name] - neutral) < Z95 * (covariance.stderr(name) or 0.0)
+
+
+def _meaning(known: _Information, group: Sequence[str]) -> str:
+    if set(group) == set(_FRICTION) and known.error(dict(zip(_FRICTION, (1.0, -1.0), strict=True))) < _KNOWN:
+        return "sigma_fmax and eps_half are known only as a ratio"
+    if len(group) > 1:
+        return f"{', '.join(group[:-1])} and {group[-1]} cannot be told from one another"
+    return f"{group[0]} is not determined"
 
 
 def _percent(error: float) -> str:
@@ -139,6 +175,13 @@ def _combinations(model: Model, terms: Sequence[Term], known: _Information, invo
         error = known.error({"sigma_fmax": 1.0, "eps_half": -1.0})
         if error < min(_KNOWN, _BETTER * least):
             yield f"sigma_fmax/eps_half = {values['sigma_fmax'] / values['eps_half']:.4g} Pa to {_percent(error)}"
+    if {"mu", *_FRICTION} <= set(known.names) and {"mu", *_FRICTION} & set(involved):
+        ratio = values["sigma_fmax"] / values["eps_half"]
+        total = values["mu"] + ratio
+        weights = {"mu": values["mu"] / total, "sigma_fmax": ratio / total, "eps_half": -ratio / total}
+        error = known.error(weights)
+        if error < min(_KNOWN, _BETTER * least):
+            yield f"mu + sigma_fmax/eps_half = {total:.4g} Pa to {_percent(error)} (the friction of small amplitudes)"
     if not {"m", "alpha"} & set(involved) or "alpha" not in values:
         return
     omega = 2.0 * np.pi * slow
@@ -147,6 +190,11 @@ def _combinations(model: Model, terms: Sequence[Term], known: _Information, invo
         error = known.error({"m": 1.0, "alpha": values["alpha"] * float(np.log(omega))})
         if error < min(_KNOWN, _BETTER * least):
             yield f"m omega^alpha at {slow:.3g} Hz = {values['m'] * power:.4g} Pa to {_percent(error)}"
+        loss = 0.5 * values["m"] * power * np.sin(turn)
+        slope = values["alpha"] * (np.log(omega) + np.pi / 2.0 / np.tan(turn))
+        error = known.error({"m": 1.0, "alpha": float(slope)})
+        if error < min(_KNOWN, _BETTER * least):
+            yield f"m/2 omega^alpha sin(pi alpha/2) at {slow:.3g} Hz = {loss:.4g} Pa to {_percent(error)}"
     if {"mu", "m", "alpha"} <= set(known.names):
         storage = values["mu"] + 0.5 * values["m"] * power * np.cos(turn)
         share = 0.5 * values["m"] * power / storage

@@ -213,24 +213,26 @@ def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = Non
         cov,
         quality(solution.model, terms, len(fitted)),
         measured_range(solution.model, terms),
-        (*notes, *_assumptions(terms), *told(outliers, robust=data.robust), *_cautions(steps, data.bounds)),
+        (*notes, *_assumptions(terms), *told(outliers, robust=data.robust), *_cautions(steps, data.bounds, cov)),
         tuple(term.source for term in terms if term.source is not None),
         outliers,
     )
 
 
-def _cautions(steps: Sequence[Estimate], bounds: Bounds) -> list[str]:
+def _cautions(steps: Sequence[Estimate], bounds: Bounds, covariance: Covariance) -> list[str]:
     """What the data of each step cannot tell of the last one's model."""
     model = steps[-1].solution.model
-    return [line for step in steps for line in cautions(model, step.solution, step.terms, bounds, _NEXT)]
+    return [line for step in steps for line in cautions(model, step.solution, step.terms, bounds, covariance, _NEXT)]
 
 
-def cautions(model: Model, solution: Solution, terms: Sequence[Term], bounds: Bounds, advice: str = "") -> list[str]:
+def cautions(
+    model: Model, solution: Solution, terms: Sequence[Term], bounds: Bounds, covariance: Covariance, advice: str = ""
+) -> list[str]:
     """What the data of a fit cannot tell: bounds met, what stays open, and a model that does not fit."""
     names, at_bound = solution.coordinates.names, solution.at_bound
     return [
         *(_at_edge(name, model, bounds) for name in at_bound),
-        *left_open(model, terms, [name for name in names if name not in at_bound]),
+        *left_open(model, terms, [name for name in names if name not in at_bound], covariance),
         *misfit(model, terms, len(names), advice),
     ]
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from bushfit.campaign import Campaign
+from bushfit.effects import BASE
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
@@ -30,9 +31,9 @@ def sweep(*amplitudes: float, band: tuple[float, ...] = BAND) -> SimulatedSweep:
 LACKING = {
     "small amplitudes": (
         (loop(3e-5, 0.1),), (sweep(1e-5, 3e-5),),
-        "of eps_half: sigma_fmax and eps_half", "", "times the largest amplitude",
+        "of eps_half: sigma_fmax and eps_half", "mu + sigma_fmax/eps_half", "times the largest amplitude",
     ),
-    "one loop": ((loop(1e-3, 0.1),), (), "one loop rate, 0.1 Hz", "mu + m/2 omega^alpha", "the rate"),
+    "one loop": ((loop(1e-3, 0.1),), (), "one loop rate, 0.1 Hz", "sin(pi alpha/2) at 0.1 Hz", "the rate"),
     "loops of one rate": (
         (loop(1e-3, 0.1), loop(3e-4, 0.1)), (), "mu, m and alpha cannot be told", "mu + m/2 omega^alpha", "the rate",
     ),
@@ -89,6 +90,31 @@ def test_a_bound_of_the_user_is_named_as_the_user_s(
     print(*lines, sep="\n")
     assert "mu rests on the max given in [fit]" in lines
     assert not any("edge of what is possible" in line for line in lines)
+
+
+def test_an_effect_that_is_not_there_is_said_to_be_no_different_from_zero(
+    rig: Rig, paper_noise: SimulateSettings, paper_model: Model
+) -> None:
+    plan = replace(paper_noise, repeats=1, noise=1e-2, loops=(), sweeps=(sweep(1e-4, 5e-4),))
+    lines = fit_joint(Data.of(rig(paper_model, plan, 1)), effects=(*BASE, "viscous")).warnings
+    print(*lines, sep="\n")
+    assert "viscous.eta is no different from zero: these tests do not show viscous" in lines
+    assert not any("standard errors:" in line and "viscous" in line for line in lines)
+
+
+def test_directions_that_share_no_parameter_have_sentences_of_their_own(
+    rig: Rig, paper_noise: SimulateSettings, paper_model: Model
+) -> None:
+    plan = replace(paper_noise, repeats=1, noise=1e-2, loops=(), sweeps=(sweep(1e-4, 5e-4),))
+    result = fit_joint(Data.of(rig(paper_model, plan, 1)))
+    said = [line for line in result.warnings if "standard errors:" in line]
+    print(*result.warnings, sep="\n")
+    assert len(said) == 2
+    assert "sigma_fmax and eps_half are known only as a ratio" in said[0]
+    assert "m and alpha cannot be told from one another" in said[1]
+    stderr, value = result.covariance.stderr("sigma_fmax"), result.model.values["sigma_fmax"]
+    assert stderr is not None
+    assert f"sigma_fmax {100 * stderr / value:.2g} %" in said[0]
 
 
 def test_complete_tests_leave_nothing_open(
