@@ -15,11 +15,10 @@ from bushfit.diagnosis.holdout import hold_out
 from bushfit.diagnosis.locate import contrasts, largest_smooth_misfit, locate
 from bushfit.diagnosis.next_test import confirming_test, deciding_test
 from bushfit.diagnosis.record import Diagnosis, Judged, Named, Verdict, Where
-from bushfit.errors import FitError
 from bushfit.fitting.assess import Stage, covariance, measured_range, quality
 from bushfit.fitting.procedures import cautions
 from bushfit.fitting.solve import Bounds
-from bushfit.results import Covariance, Result
+from bushfit.results import Result
 
 #: Probability with which noise alone stays below the thresholds of a remainder and of a fault.
 _LEVEL = 0.998
@@ -207,10 +206,7 @@ def _result(evidence: Evidence, bounds: Bounds) -> Result:
     """The model with its uncertainty; a parameter at rest on a bound counts as held there."""
     model, names = evidence.model, evidence.solution.coordinates.names
     moving = tuple(name for name in names if name not in evidence.solution.at_bound)
-    try:
-        cov = covariance(model, [Stage(moving, evidence.terms)])
-    except FitError:
-        cov = Covariance()
+    cov = covariance(model, [Stage(moving, evidence.terms)])
     sources = tuple(term.source for term in evidence.terms if term.source is not None)
     return Result(
         model,
