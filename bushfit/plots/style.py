@@ -114,7 +114,7 @@ def mark_wild(axes: Axes, x: Array, y: Array) -> None:
     """Crosses at points that lie far off, drawn at the edge where they lie beyond it."""
     low, high = axes.get_ylim()
     if x.size:
-        axes.plot(x, np.clip(y, low, high), "x", color=WILD, ms=4.5, mew=1.2, zorder=5)
+        axes.plot(x, np.clip(y, low, high), "x", color=WILD, ms=4.5, mew=1.2, zorder=5, clip_on=False)
     axes.set_ylim(low, high)
 
 
