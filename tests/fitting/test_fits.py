@@ -273,7 +273,7 @@ def test_held_and_bounded_parameters(measured: Data) -> None:
     assert "alpha" not in result.fitted
     assert result.covariance.stderr("alpha") is None
     assert result.model.values["mu"] <= 1.05e6
-    assert any(line.startswith("mu ended at the edge") for line in result.warnings)
+    assert any(line.startswith("mu rests on the max given in [fit]") for line in result.warnings)
 
 
 def test_dynamic_amplitudes_choose_the_levels(measured: Data) -> None:
