@@ -16,8 +16,6 @@ from bushfit.effects.history import History
 from bushfit.geometry import Direction
 from bushfit.model import Kind, Model
 
-WAVEFORMS = ("sine", "triangle")
-
 
 @dataclass(frozen=True)
 class Record:

@@ -7,17 +7,13 @@ import os
 # Small matrices, and a worker a core: threads of the linear algebra would only stand in each other's way.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import contextlib
-import io
-import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from unittest import mock
 
 import pytest
+from commandline import Done, call
 
-from bushfit.cli import main
 from bushfit.effects import BASE
 from bushfit.geometry import Bushing
 from bushfit.model import Model
@@ -73,29 +69,7 @@ def other_models() -> dict[str, Model]:
     }
 
 
-@dataclass(frozen=True)
-class Typed:
-    """What a command left behind."""
-
-    returncode: int
-    stdout: str
-    stderr: str
-
-
 @pytest.fixture
-def typed(tmp_path: Path) -> Callable[..., Typed]:
-    """Run a command line in `tmp_path`, in this process: what it would do in its own, less the time to start."""
-
-    def call(*arguments: object) -> Typed:
-        out, err = io.StringIO(), io.StringIO()
-        with (
-            contextlib.chdir(tmp_path),
-            contextlib.redirect_stdout(out),
-            contextlib.redirect_stderr(err),
-            mock.patch.object(sys, "argv", ["bushfit", *map(str, arguments)]),
-            pytest.raises(SystemExit) as left,
-        ):
-            main()
-        return Typed(int(left.value.code or 0), out.getvalue(), err.getvalue())
-
-    return call
+def typed(tmp_path: Path) -> Callable[..., Done]:
+    """Run a command line in `tmp_path`."""
+    return partial(call, tmp_path)

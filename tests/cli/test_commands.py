@@ -2,29 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
 import shutil
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from unittest import mock
 
 import pandas as pd
 import pytest
-
-from bushfit.cli import main
-
-
-@dataclass(frozen=True)
-class Done:
-    returncode: int
-    stdout: str
-    stderr: str
-
+from commandline import Done, call
 
 Run = Callable[..., Done]
 CAMPAIGN_FILES = {
@@ -44,20 +31,6 @@ def work(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     done = call(folder, "fit", "configs/cmp_15961.toml", "-o", "model", "--no-plots")
     assert done.returncode == 0, done.stderr
     return folder
-
-
-def call(folder: Path, *arguments: str) -> Done:
-    """The entry point in this process; what it would do in its own, less the time to start."""
-    out, err = io.StringIO(), io.StringIO()
-    with (
-        contextlib.chdir(folder),
-        contextlib.redirect_stdout(out),
-        contextlib.redirect_stderr(err),
-        mock.patch.object(sys, "argv", ["bushfit", *arguments]),
-        pytest.raises(SystemExit) as left,
-    ):
-        main()
-    return Done(int(left.value.code or 0), out.getvalue(), err.getvalue())
 
 
 @pytest.fixture

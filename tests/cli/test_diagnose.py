@@ -2,30 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
 import shutil
-import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from unittest import mock
 
 import numpy as np
 import pandas as pd
 import pytest
+from commandline import Done, call
 
-from bushfit.cli import main
 from bushfit.effects import BASE, LIBRARY
-
-
-@dataclass(frozen=True)
-class Done:
-    returncode: int
-    stdout: str
-    stderr: str
-
 
 Run = Callable[..., Done]
 #: An inertia is hidden here.
@@ -44,19 +32,7 @@ def work(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def bushfit(work: Path) -> Run:
-    def call(*arguments: str) -> Done:
-        out, err = io.StringIO(), io.StringIO()
-        with (
-            contextlib.chdir(work),
-            contextlib.redirect_stdout(out),
-            contextlib.redirect_stderr(err),
-            mock.patch.object(sys, "argv", ["bushfit", *arguments]),
-            pytest.raises(SystemExit) as left,
-        ):
-            main()
-        return Done(int(left.value.code or 0), out.getvalue(), err.getvalue())
-
-    return call
+    return partial(call, work)
 
 
 @pytest.fixture(scope="module")
