@@ -10,49 +10,17 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from looking import NOISE, SEEDS, look, plan, without
 
 from bushfit.errors import BushfitError, FitError
 from bushfit.geometry import Direction
 from bushfit.inspection.draft import file_text
-from bushfit.inspection.labels import labelled
 from bushfit.inspection.opening import inspect
-from bushfit.inspection.record import Inspected
 from bushfit.measurement import Loop, Sweep
 from bushfit.model import Model
-from bushfit.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
-from bushfit.sheets import raw_loop_table, raw_sweep_table, to_csv
+from bushfit.schema import SimulatedLoop, SimulateSettings
+from bushfit.sheets import raw_sweep_table
 from bushfit.simulation import Undisturbed, measure, undisturbed
-
-#: As good a rig as any, and as bad a one as most.
-NOISE = {
-    "good": {"noise": 1e-3, "force_noise": 5e-4, "displacement_noise": 1e-4},
-    "bad": {
-        **{"noise": 0.01, "force_noise": 0.01, "displacement_noise": 2e-3},
-        **{"gain_error": 5e-3, "phase_error": 5e-3},
-    },
-}
-SEEDS = 25
-
-
-def plan(**settings: float) -> SimulateSettings:
-    loops = (
-        SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=3),
-        SimulatedLoop(Direction.AXIAL, 3e-4, 0.2, cycles=2, waveform="triangle"),
-    )
-    sweep = SimulatedSweep(Direction.AXIAL, (1e-4, 2e-4, 5e-4), tuple(float(f) for f in range(5, 156, 10)))
-    return SimulateSettings(repeats=3, loops=loops, sweeps=(sweep,), **settings)
-
-
-@pytest.fixture(scope="module")
-def clean(paper_model: Model) -> Undisturbed:
-    return undisturbed(paper_model, plan(), steps_per_cycle=256)
-
-
-def look(folder: Path, test: Loop | Sweep, name: str = "axial.csv", **stated: object) -> Inspected:
-    """A test written as a file and looked at."""
-    table = raw_sweep_table(test) if isinstance(test, Sweep) else raw_loop_table(test)
-    (folder / name).write_bytes(to_csv(table))
-    return inspect(folder / name, stated)
 
 
 @pytest.mark.parametrize("rig", NOISE)
@@ -78,16 +46,6 @@ def test_practice_campaigns_raise_only_what_is_there(root: Path) -> None:
     said = {file: odd for file in files if (odd := inspect(file, {}).looked.odd)}
     assert all("loss factor below zero" in sentence for odd in said.values() for sentence in odd)
     assert len(said) <= 2
-
-
-@pytest.fixture
-def loop(clean: Undisturbed) -> Loop:
-    return measure(clean, plan(seed=1, force_noise=3e-3, displacement_noise=2e-4)).loops[0]
-
-
-@pytest.fixture
-def sweep(clean: Undisturbed) -> Sweep:
-    return measure(clean, plan(seed=1, noise=5e-3, gain_error=2e-3, phase_error=2e-3)).sweeps[0]
 
 
 def test_a_loop_is_described(loop: Loop, tmp_path: Path) -> None:
@@ -201,12 +159,6 @@ def spoiled(sweep: Sweep, rows: np.ndarray, factor: complex) -> Sweep:
     return replace(sweep, stiffness=np.where(rows, factor, 1.0) * sweep.stiffness)
 
 
-def without(sweep: Sweep, rows: np.ndarray) -> Sweep:
-    kept = ~rows
-    names = ("frequency", "amplitude", "stiffness", "repeat")
-    return replace(sweep, **{name: getattr(sweep, name)[kept] for name in names})
-
-
 def copied(sweep: Sweep) -> Sweep:
     """The second repeat of the smallest level is the first one once more."""
     first, second = ((sweep.amplitude == 1e-4) & (sweep.repeat == number) for number in (1, 2))
@@ -246,93 +198,6 @@ def test_each_fault_of_a_sweep_is_told(sweep: Sweep, tmp_path: Path, fault: str)
     odd = look(tmp_path, spoil(sweep)).looked.odd
     print("; ".join(odd))
     assert any(said in sentence for sentence in odd)
-
-
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("loop_axial_1mm_0.1Hz.csv", ()),
-        ("loop axial 1,0 mm 10mm_min.csv", ()),
-        ("axial_18mm_bushing_1mm.csv", ()),
-        ("loop_axial_2mm.csv", ("the name says 2 mm, the amplitude is 1 mm zero-to-peak: the name may count p",)),
-        ("loop_axial_0p5mm_0.2Hz.csv", ("the name says 0.5 mm, the amplitude", "the name says 0.2 Hz, the frequency")),
-    ],
-)
-def test_labels_are_held_against_the_content(loop: Loop, tmp_path: Path, name: str, said: tuple[str, ...]) -> None:
-    odd = look(tmp_path, loop, name).looked.odd
-    assert len(odd) == len(said)
-    assert all(sentence.startswith(start) for sentence, start in zip(odd, said, strict=True))
-
-
-def test_label_of_a_sweep(sweep: Sweep, tmp_path: Path) -> None:
-    one = without(sweep, sweep.amplitude != 2e-4)
-    assert look(tmp_path, one, "sweep_axial_0.2mm.csv").looked.odd == ()
-    (said,) = look(tmp_path, one, "sweep_axial_0.4mm.csv").looked.odd
-    assert "the amplitude is 0.2 mm zero-to-peak: the name may count peak-to-peak" in said
-
-
-def test_labels_are_read_with_their_units() -> None:
-    assert labelled(Path("a_0,25mm_300um_2deg.csv"), "m") == [("0.25 mm", 2.5e-4), ("300 µm", pytest.approx(3e-4))]
-    assert labelled(Path("x_50mHz.csv"), "Hz") == [("50 mHz", pytest.approx(0.05))]
-
-
-@pytest.mark.parametrize(
-    ("name", "direction"),
-    [
-        ("Schleife_radial_1.csv", Direction.RADIAL),
-        ("bague_axiale.csv", Direction.AXIAL),
-        ("essai_AXIAUX.csv", Direction.AXIAL),
-        ("ensayo torsión.csv", Direction.TORSION),
-        ("Verdrehung_3.csv", Direction.TORSION),
-        ("axial_and_radial.csv", None),
-        ("coaxial_mount.csv", None),
-        ("test_7.csv", None),
-    ],
-)
-def test_direction_from_the_name(loop: Loop, tmp_path: Path, name: str, direction: Direction | None) -> None:
-    if direction is Direction.TORSION:
-        table = raw_loop_table(loop).set_axis(["time [s]", "rotation [deg]", "moment [N m]"], axis=1)
-        (tmp_path / name).write_bytes(to_csv(table))
-        assert inspect(tmp_path / name, {}).direction is direction
-    else:
-        assert look(tmp_path, loop, name).direction is direction
-
-
-def test_the_direction_stated_goes_before_the_name_and_that_is_said(loop: Loop, tmp_path: Path) -> None:
-    seen = look(tmp_path, loop, "loop_axial_1.csv", direction="radial")
-    assert seen.direction is Direction.RADIAL
-    assert seen.looked.odd == ("the name says axial, it is taken for radial as stated",)
-    assert look(tmp_path, loop, "loop_axial_1.csv", direction="axial").looked.odd == ()
-    with pytest.raises(BushfitError, match="does not fit"):
-        look(tmp_path, loop, "loop_axial_1.csv", direction="torsion")
-    table = raw_loop_table(loop).set_axis(["time [s]", "rotation [deg]", "moment [N m]"], axis=1)
-    (tmp_path / "x.csv").write_bytes(to_csv(table))
-    with pytest.raises(BushfitError, match="the units say torsion"):
-        inspect(tmp_path / "x.csv", {"direction": "axial"})
-
-
-def test_what_the_user_states_goes_into_the_text(loop: Loop, tmp_path: Path) -> None:
-    table = raw_loop_table(loop).drop(columns="time [s]").set_axis(["Weg X", "Zelle 2"], axis=1)
-    (tmp_path / "loop.csv").write_bytes(to_csv(table))
-    stated = {
-        "direction": "radial",
-        "columns": {"displacement": "Weg X", "force": "Zelle 2", "stiffness": "k"},
-        "units": {"displacement": "mm", "force": "N"},
-        "frequency": "0.1 Hz",
-        "waveform": "sine",
-        "amplitude": "peak-to-peak",
-    }
-    seen = inspect(tmp_path / "loop.csv", stated)
-    (written,) = tomllib.loads(file_text(seen, tmp_path))["loops"]
-    assert written == {
-        "file": "loop.csv",
-        "direction": "radial",
-        "columns": {"displacement": "Weg X", "force": "Zelle 2"},
-        "units": {"displacement": "mm", "force": "N"},
-        "frequency": "0.1 Hz",
-        "waveform": "sine",
-    }
-    assert seen.looked.facts["frequency"].startswith("0.1")
 
 
 def test_a_history_points_to_reduce(root: Path) -> None:

@@ -1,0 +1,46 @@
+"""What the tests of this folder share: simulated tests of good and bad rigs, written as files and looked at."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bushfit.geometry import Direction
+from bushfit.inspection.opening import inspect
+from bushfit.inspection.record import Inspected
+from bushfit.measurement import Loop, Sweep
+from bushfit.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.sheets import raw_loop_table, raw_sweep_table, to_csv
+
+NOISE = {
+    "good": {"noise": 1e-3, "force_noise": 5e-4, "displacement_noise": 1e-4},
+    "bad": {
+        **{"noise": 0.01, "force_noise": 0.01, "displacement_noise": 2e-3},
+        **{"gain_error": 5e-3, "phase_error": 5e-3},
+    },
+}
+SEEDS = 25
+
+
+def plan(**settings: float) -> SimulateSettings:
+    loops = (
+        SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=3),
+        SimulatedLoop(Direction.AXIAL, 3e-4, 0.2, cycles=2, waveform="triangle"),
+    )
+    sweep = SimulatedSweep(Direction.AXIAL, (1e-4, 2e-4, 5e-4), tuple(float(f) for f in range(5, 156, 10)))
+    return SimulateSettings(repeats=3, loops=loops, sweeps=(sweep,), **settings)
+
+
+def look(folder: Path, test: Loop | Sweep, name: str = "axial.csv", **stated: object) -> Inspected:
+    """A test written as a file and looked at."""
+    table = raw_sweep_table(test) if isinstance(test, Sweep) else raw_loop_table(test)
+    (folder / name).write_bytes(to_csv(table))
+    return inspect(folder / name, stated)
+
+
+def without(sweep: Sweep, rows: np.ndarray) -> Sweep:
+    kept = ~rows
+    names = ("frequency", "amplitude", "stiffness", "repeat")
+    return replace(sweep, **{name: getattr(sweep, name)[kept] for name in names})

@@ -1,0 +1,104 @@
+"""What a file's name says is held against what it holds, and what the user states goes into the campaign."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from looking import look, without
+
+from bushfit.errors import BushfitError
+from bushfit.geometry import Direction
+from bushfit.inspection.draft import file_text
+from bushfit.inspection.labels import labelled
+from bushfit.inspection.opening import inspect
+from bushfit.measurement import Loop, Sweep
+from bushfit.sheets import raw_loop_table, to_csv
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("loop_axial_1mm_0.1Hz.csv", ()),
+        ("loop axial 1,0 mm 10mm_min.csv", ()),
+        ("axial_18mm_bushing_1mm.csv", ()),
+        ("loop_axial_2mm.csv", ("the name says 2 mm, the amplitude is 1 mm zero-to-peak: the name may count p",)),
+        ("loop_axial_0p5mm_0.2Hz.csv", ("the name says 0.5 mm, the amplitude", "the name says 0.2 Hz, the frequency")),
+    ],
+)
+def test_labels_are_held_against_the_content(loop: Loop, tmp_path: Path, name: str, said: tuple[str, ...]) -> None:
+    odd = look(tmp_path, loop, name).looked.odd
+    assert len(odd) == len(said)
+    assert all(sentence.startswith(start) for sentence, start in zip(odd, said, strict=True))
+
+
+def test_label_of_a_sweep(sweep: Sweep, tmp_path: Path) -> None:
+    one = without(sweep, sweep.amplitude != 2e-4)
+    assert look(tmp_path, one, "sweep_axial_0.2mm.csv").looked.odd == ()
+    (said,) = look(tmp_path, one, "sweep_axial_0.4mm.csv").looked.odd
+    assert "the amplitude is 0.2 mm zero-to-peak: the name may count peak-to-peak" in said
+
+
+def test_labels_are_read_with_their_units() -> None:
+    assert labelled(Path("a_0,25mm_300um_2deg.csv"), "m") == [("0.25 mm", 2.5e-4), ("300 µm", pytest.approx(3e-4))]
+    assert labelled(Path("x_50mHz.csv"), "Hz") == [("50 mHz", pytest.approx(0.05))]
+
+
+@pytest.mark.parametrize(
+    ("name", "direction"),
+    [
+        ("Schleife_radial_1.csv", Direction.RADIAL),
+        ("bague_axiale.csv", Direction.AXIAL),
+        ("essai_AXIAUX.csv", Direction.AXIAL),
+        ("ensayo torsión.csv", Direction.TORSION),
+        ("Verdrehung_3.csv", Direction.TORSION),
+        ("axial_and_radial.csv", None),
+        ("coaxial_mount.csv", None),
+        ("test_7.csv", None),
+    ],
+)
+def test_direction_from_the_name(loop: Loop, tmp_path: Path, name: str, direction: Direction | None) -> None:
+    if direction is Direction.TORSION:
+        table = raw_loop_table(loop).set_axis(["time [s]", "rotation [deg]", "moment [N m]"], axis=1)
+        (tmp_path / name).write_bytes(to_csv(table))
+        assert inspect(tmp_path / name, {}).direction is direction
+    else:
+        assert look(tmp_path, loop, name).direction is direction
+
+
+def test_the_direction_stated_goes_before_the_name_and_that_is_said(loop: Loop, tmp_path: Path) -> None:
+    seen = look(tmp_path, loop, "loop_axial_1.csv", direction="radial")
+    assert seen.direction is Direction.RADIAL
+    assert seen.looked.odd == ("the name says axial, it is taken for radial as stated",)
+    assert look(tmp_path, loop, "loop_axial_1.csv", direction="axial").looked.odd == ()
+    with pytest.raises(BushfitError, match="does not fit"):
+        look(tmp_path, loop, "loop_axial_1.csv", direction="torsion")
+    table = raw_loop_table(loop).set_axis(["time [s]", "rotation [deg]", "moment [N m]"], axis=1)
+    (tmp_path / "x.csv").write_bytes(to_csv(table))
+    with pytest.raises(BushfitError, match="the units say torsion"):
+        inspect(tmp_path / "x.csv", {"direction": "axial"})
+
+
+def test_what_the_user_states_goes_into_the_text(loop: Loop, tmp_path: Path) -> None:
+    table = raw_loop_table(loop).drop(columns="time [s]").set_axis(["Weg X", "Zelle 2"], axis=1)
+    (tmp_path / "loop.csv").write_bytes(to_csv(table))
+    stated = {
+        "direction": "radial",
+        "columns": {"displacement": "Weg X", "force": "Zelle 2", "stiffness": "k"},
+        "units": {"displacement": "mm", "force": "N"},
+        "frequency": "0.1 Hz",
+        "waveform": "sine",
+        "amplitude": "peak-to-peak",
+    }
+    seen = inspect(tmp_path / "loop.csv", stated)
+    (written,) = tomllib.loads(file_text(seen, tmp_path))["loops"]
+    assert written == {
+        "file": "loop.csv",
+        "direction": "radial",
+        "columns": {"displacement": "Weg X", "force": "Zelle 2"},
+        "units": {"displacement": "mm", "force": "N"},
+        "frequency": "0.1 Hz",
+        "waveform": "sine",
+    }
+    assert seen.looked.facts["frequency"].startswith("0.1")
