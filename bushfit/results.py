@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from scipy.special import stdtrit
@@ -25,6 +25,9 @@ Z95 = 1.959963984540054
 #: Beyond the one, degrees of freedom make no difference; below the other, an estimated variance says next to nothing.
 _MOST_FREEDOM, _LEAST_FREEDOM = 1e6, 2.0
 _PACKAGES = ("numpy", "scipy", "lmfit")
+
+#: An end of a parameter's range.
+End = Literal["min", "max"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +163,7 @@ class Result:
         inputs: the files behind it.
         outliers: points that lie farther off than noise explains.
         profile: 95 % intervals by profile likelihood, where they were asked for; None is an open end.
+        at_bound: parameters that came to rest on the least or largest value they may have, and on which.
     """
 
     model: Model
@@ -171,6 +175,7 @@ class Result:
     inputs: tuple[Source, ...] = ()
     outliers: tuple[Outlier, ...] = ()
     profile: Mapping[str, tuple[float | None, float | None]] = field(default_factory=dict)
+    at_bound: Mapping[str, End] = field(default_factory=dict)
 
     def interval(self, name: str) -> tuple[float, float] | None:
         """95 % interval of a parameter, within its bounds: symmetric in the logarithm for strictly positive ones."""
@@ -195,6 +200,8 @@ class Result:
             entry["ci95"] = None if interval is None else list(interval)
             if name in self.profile:
                 entry["profile95"] = list(self.profile[name])
+            if name in self.at_bound:
+                entry["at_bound"] = self.at_bound[name]
             entry["vary"] = name in self.fitted
         document["covariance"] = {
             "names": list(self.covariance.names),
@@ -256,6 +263,11 @@ class Result:
                     for name, entry in document["parameters"].items()
                     if entry.get("profile95") is not None
                 },
+                {
+                    name: _end(entry["at_bound"])
+                    for name, entry in document["parameters"].items()
+                    if "at_bound" in entry
+                },
             )
         except KeyError as missing:
             raise ModelError("a key is missing", place=str(missing.args[0])) from None
@@ -283,6 +295,12 @@ def _outlier(entry: Mapping[str, Any]) -> Outlier:
 def _ends(values: Sequence[float | None]) -> tuple[float | None, float | None]:
     low, high = (None if value is None else float(value) for value in values)
     return low, high
+
+
+def _end(word: object) -> End:
+    if word not in get_args(End):
+        raise ValueError(f"at_bound = {word!r}")
+    return cast("End", word)
 
 
 def _pair(values: Sequence[float]) -> tuple[float, float]:

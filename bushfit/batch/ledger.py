@@ -23,7 +23,7 @@ from bushfit.batch.manifest import Row
 from bushfit.batch.points import Point
 from bushfit.errors import OutputError
 
-SCHEMA = "bushfit/row/1"
+SCHEMA = "bushfit/row/2"
 RECORD, ROWS, ASIDE = "row.json", "bushings", ".aside"
 
 Record = dict[str, Any]

@@ -4,7 +4,8 @@ A value with its 95 % interval meets a limit in one of four ways (the words are 
 statements of conformity): pass, the whole interval is within; conditional pass, the value is within but the interval
 reaches over the limit; conditional fail, the value is outside but the interval reaches back; fail, the whole interval
 is outside. A bushing is as good as the worst of its quantities; what is not known of it cannot be said to be within,
-and fails.
+and fails. A parameter that came to rest on a bound of its fit is a value that the tests do not settle: within its
+limits, or without any, it passes on condition.
 """
 
 from __future__ import annotations
@@ -277,30 +278,35 @@ class Judge:
 
     def __call__(self, record: Record) -> Judgement:
         worst, missed, edge = Verdict.PASS, dict[str, str](), dict[str, str]()
-        known = dict(figures(record))
-        for name in self.allowed:
+        known, at_bound = dict(figures(record)), record.get("at_bound", {})
+        for name in dict.fromkeys((*self.allowed, *at_bound)):
             if (found := known.get(name)) is None:
                 worst, missed[name] = Verdict.FAIL, f"{name} is not known: fail"
                 continue
-            verdict = judge(found, *self.allowed[name])
+            verdict = judge(found, *self._allowed(name))
+            if name in at_bound:
+                verdict = max(verdict, Verdict.CONDITIONAL_PASS)
             worst = max(worst, verdict)
-            if verdict >= self._limits.missed_from:
-                missed[name] = self._words(name, found, verdict)
-            elif verdict is not Verdict.PASS:
-                edge[name] = self._words(name, found, verdict)
+            if verdict is not Verdict.PASS:
+                chosen = missed if verdict >= self._limits.missed_from else edge
+                chosen[name] = self._words(name, found, verdict, at_bound.get(name))
         said = record.get("verdict", "is not known")
         if self._limits.verdicts and said not in self._limits.verdicts:
             worst = Verdict.FAIL
             missed["verdict"] = f"verdict {said}, allowed {', '.join(self._limits.verdicts)}"
         return Judgement(worst, missed, edge)
 
-    def _words(self, name: str, found: Figures, verdict: Verdict) -> str:
-        quantity, (low, high) = self._quantities[name], self.allowed[name]
+    def _allowed(self, name: str) -> tuple[float, float]:
+        return self.allowed.get(name, (-math.inf, math.inf))
+
+    def _words(self, name: str, found: Figures, verdict: Verdict, bound: str | None) -> str:
+        quantity, (low, high) = self._quantities[name], self._allowed(name)
         value, least, most, _ = found
         unit = "" if quantity.unit == "-" else f" {quantity.unit}"
         span = "" if least is None or most is None else f" ({' to '.join(quantity.shown(x) for x in (least, most))})"
         ends = [f"{word} {quantity.shown(x)}" for word, x in (("min", low), ("max", high)) if math.isfinite(x)]
-        return f"{name} = {quantity.shown(value)}{span}{unit}, {' '.join(ends)}: {verdict}"
+        said = [" ".join(ends)] * bool(ends) + [f"at the {bound} of its fit"] * bool(bound)
+        return f"{name} = {quantity.shown(value)}{span}{unit}, {', '.join(said)}: {verdict}"
 
 
 def judge(figures: Figures, low: float, high: float) -> Verdict:

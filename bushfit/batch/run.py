@@ -6,7 +6,7 @@ import os
 import shutil
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -41,8 +41,6 @@ SCHEMA = "bushfit/batch/1"
 TABLE, PICTURE = "batch.csv", "batch.png"
 #: A quantity that fewer bushings have shows no scatter.
 _LEAST_DRAWN = 3
-#: More names do not fit along a panel.
-_MOST_LABELLED = 40
 
 
 @dataclass(frozen=True)
@@ -65,7 +63,8 @@ class Summary:
         status: rows by done, failed.
         kept: rows taken over from an earlier run.
         limits: bushings by verdict.
-        missed: names of bushings that miss a limit.
+        missed: name of each bushing that misses a limit, and what it misses, in words.
+        edge: the same of those that pass on condition.
         errors: name and error of rows that failed.
         scatter: median and robust standard deviation of each quantity, in its unit.
         notes: limits that could not be judged, bushings with warnings, results of earlier batches beside these.
@@ -75,7 +74,8 @@ class Summary:
     status: Counter[str]
     kept: int
     limits: Counter[str]
-    missed: tuple[str, ...]
+    missed: tuple[tuple[str, str], ...]
+    edge: tuple[tuple[str, str], ...]
     errors: tuple[tuple[str, str], ...]
     scatter: dict[Quantity, tuple[float, float]]
     notes: tuple[str, ...]
@@ -89,7 +89,8 @@ class Summary:
             "failed": [{"name": name, "error": error} for name, error in self.errors],
             "kept": self.kept,
             "limits": dict(self.limits),
-            "missed": list(self.missed),
+            "missed": [name for name, _ in self.missed],
+            "conditional": [name for name, _ in self.edge],
             "scatter": {
                 quantity.name: {"median": middle, "sigma": spread, "unit": quantity.unit}
                 for quantity, (middle, spread) in self.scatter.items()
@@ -117,8 +118,9 @@ def check_free(plan: Plan, *, force: bool) -> None:
         )
     if plan.junit:
         with _blamed_on(plan.junit):
-            if output / ledger.ROWS in plan.junit.absolute().parents:
-                raise OutputError("the report cannot stand among the results of the rows")
+            place, own = plan.junit.resolve(), output.resolve()
+            if place in (own / TABLE, own / PICTURE) or own / ledger.ROWS in (place, *place.parents):
+                raise OutputError("the report cannot stand among the results of the rows, nor in place of the table")
             check_writable(plan.junit.parent, [plan.junit.name], force=over)
 
 
@@ -148,6 +150,8 @@ def run(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Summary:
     begin, output = time.perf_counter(), plan.orders.output
     try:
         with ledger.held(output), Spool(output / ledger.ASIDE / "records", len(plan.rows)) as spool:
+            for name in (TABLE, PICTURE):  # from here on they tell of results that are replaced
+                (output / name).unlink(missing_ok=True)
             strays = ledger.strays(output, plan.rows)
             if not plan.orders.resume:
                 for folder in strays:
@@ -178,9 +182,9 @@ def _report(plan: Plan, spool: Spool, seconds: float) -> Summary:
     quantities = {quantity.name: quantity for quantity in (*parameters, NRMSE, CHI_SQUARE, *points)}
     judge = Judge(plan.limits, columns, quantities) if plan.limits else None
     report = Report(plan.title) if plan.junit else None
-    status, limits, kept, warned = Counter[str](), Counter[str](), 0, 0
-    missed: dict[int, tuple[str, ...]] = {}
-    errors = []
+    status, limits, bounds, kept, warned, bounded = Counter[str](), Counter[str](), Counter[str](), 0, 0, 0
+    missed: dict[int, Mapping[str, str]] = {}
+    errors, edge = [], []
     aside = output / ledger.ASIDE / TABLE
     with aside.open("w", encoding="utf-8", newline="") as stream:
         diagnosed = any("diagnose" in (row.settings.commands or ()) for row in plan.rows)
@@ -194,12 +198,16 @@ def _report(plan: Plan, spool: Spool, seconds: float) -> Summary:
             status[record["status"]] += 1
             kept += bool(record.get("kept"))
             warned += bool(record.get("warnings"))
+            bounded += bool(record.get("at_bound"))
+            bounds.update(list(record.get("at_bound", ())))
             if not done:
                 errors.append((row.name, record["error"]))
             if judged:
                 limits[str(judged.verdict)] += 1
                 if judged.missed:
-                    missed[number] = tuple(judged.missed)
+                    missed[number] = judged.missed
+                elif judged.edge:
+                    edge.append((row.name, "; ".join(judged.edge.values())))
         stream.flush()
         os.fsync(stream.fileno())
     aside.replace(output / TABLE)
@@ -212,12 +220,22 @@ def _report(plan: Plan, spool: Spool, seconds: float) -> Summary:
         status,
         kept,
         limits,
-        tuple(plan.rows[number].name for number in missed),
+        tuple((plan.rows[number].name, "; ".join(words.values())) for number, words in missed.items()),
+        tuple(edge),
         tuple(errors),
         {q: _scatter(columns[q.name], q.factor) for q in quantities.values() if q.name in columns},
-        (*(judge.notes if judge else ()), *_on_warnings(warned)),
+        (*(judge.notes if judge else ()), *_on_bounds(bounded, bounds), *_on_warnings(warned)),
         seconds,
     )
+
+
+def _on_bounds(count: int, by_name: Counter[str]) -> Iterator[str]:
+    if count:
+        names = ", ".join(f"{name} of {times}" for name, times in by_name.most_common())
+        yield (
+            f"{count} bushing{'s' * (count > 1)} with a parameter at rest on a bound of its fit, which the tests do "
+            f"not settle: {names}; see the column on a bound of batch.csv"
+        )
 
 
 def _on_warnings(count: int) -> Iterator[str]:
@@ -235,7 +253,7 @@ def _draw(
     columns: dict[str, Array],
     quantities: dict[str, Quantity],
     judge: Judge | None,
-    missed: dict[int, tuple[str, ...]],
+    missed: Mapping[int, Mapping[str, str]],
 ) -> None:
     from bushfit.plots import to_png
     from bushfit.plots.batch import Panel, batch_figure
@@ -245,15 +263,11 @@ def _draw(
             quantity.header,
             columns[name] * quantity.factor,
             tuple(limit * quantity.factor for limit in (judge.allowed.get(name, ()) if judge else ())),
-            {
-                number: plan.rows[number].name
-                for number, names in missed.items()
-                if name in names and np.isfinite(columns[name][number])
-            },
+            {number for number, names in missed.items() if name in names and np.isfinite(columns[name][number])},
         )
         for name, quantity in quantities.items()
         if name in columns and (np.isfinite(columns[name]).sum() >= _LEAST_DRAWN or (judge and name in judge.allowed))
     ]
     if panels:
-        names = [row.name for row in plan.rows] if len(plan.rows) <= _MOST_LABELLED else []
+        names = [row.name for row in plan.rows]
         write_files(plan.orders.output, {PICTURE: to_png(batch_figure(panels, plan.title, names))}, force=True)

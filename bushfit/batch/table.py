@@ -15,7 +15,7 @@ from bushfit.sheets import defused
 _FIRST = ("name", "campaign", "folder", "status", "error")
 _FOUND = ("verdict", "named effects", "cannot be told from")
 _JUDGED = ("limits", "out of limits", "on the edge")
-_LAST = ("warnings",)
+_LAST = ("on a bound", "warnings")
 
 
 class Table:
@@ -61,6 +61,7 @@ class Table:
         cells += [_number(found.get(quantity.name, (None,))[0], quantity) for quantity in (NRMSE, CHI_SQUARE)]
         for quantity in self._points:
             cells += [_number(x, quantity) for x in found.get(quantity.name, (None,) * 4)[:3]]
+        cells.append(", ".join(f"{name} ({end})" for name, end in record.get("at_bound", {}).items()))
         cells.append("; ".join(record.get("warnings", ())))
         self._writer.writerow([_safe(cell) for cell in cells])
 

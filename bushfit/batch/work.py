@@ -15,6 +15,7 @@ from bushfit.batch import ledger
 from bushfit.batch.ledger import Record
 from bushfit.batch.points import Point
 from bushfit.campaign import Campaign, load_campaign
+from bushfit.effects.contract import Parameter
 from bushfit.errors import BatchError, BushfitError
 from bushfit.fitting.data import Data
 from bushfit.prediction import Band, predict
@@ -22,6 +23,9 @@ from bushfit.results import Result, load_result
 
 if TYPE_CHECKING:
     from bushfit.batch.manifest import Row, Settings
+
+#: As good as no effect, as a share of its parameter's usual size.
+_NOTHING = 1e-3
 
 
 @dataclass(frozen=True)
@@ -159,11 +163,13 @@ def _predict(result: Result, campaign: Campaign, formats: Collection[str]) -> di
 
 def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> Record:
     """Parameters, quality, and stiffness and loss factor at the points, each with what is known of its error."""
-    parameters = {}
+    parameters, at_bound = {}, {}
     for name, parameter in result.model.parameters.items():
         interval = result.interval(name)
         value, stderr = result.model.values[name], result.covariance.stderr(name)
         parameters[name] = [*map(_finite, (value, *(interval or (None, None)), stderr)), parameter.unit]
+        if name in result.at_bound and not _vanishes(parameter, value):
+            at_bound[name] = result.at_bound[name]
     warnings, at = [*notes, *result.warnings], {}
     for point in points:
         prediction = predict(result, point.direction, [point.frequency], [point.amplitude])
@@ -172,11 +178,17 @@ def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> R
     quality = result.quality
     return {
         "parameters": parameters,
+        "at_bound": at_bound,
         "nrmse": quality.nrmse if quality else None,
         "reduced_chi_square": quality.reduced_chi_square if quality else None,
         "points": at,
         "warnings": warnings,
     }
+
+
+def _vanishes(parameter: Parameter, value: float) -> bool:
+    """Whether a value on a bound is that of an effect that is not there, which is an answer like any other."""
+    return parameter.neutral is not None and abs(value - parameter.neutral) <= _NOTHING * parameter.typical
 
 
 def _band(band: Band) -> list[float | None]:

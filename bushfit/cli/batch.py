@@ -164,7 +164,9 @@ def _lines(options: Options, total: int) -> Callable[[str], None]:
 
 
 def _tell(options: Options, summary: Summary, folder: Path, plan: Plan) -> None:
-    """Counts, the batch's own scatter, what failed and what misses limits."""
+    """Counts, the batch's own scatter, what failed, what misses limits and what passes on condition."""
+    from bushfit.batch.run import PICTURE, TABLE
+
     console, status = options.console, summary.status
     if summary.scatter:
         table = new_table(f"{plan.title}: {status['done']} bushings", "quantity", "median", "robust std dev", "unit")
@@ -182,11 +184,12 @@ def _tell(options: Options, summary: Summary, folder: Path, plan: Plan) -> None:
     warn(options, summary.notes)
     for word, names in (
         ("failed", [f"{name}: {' '.join(error.split())}" for name, error in summary.errors]),
-        ("out of limits", list(summary.missed)),
+        ("out of limits", [f"{name}: {words}" for name, words in summary.missed]),
+        ("conditional pass", [f"{name}: {words}" for name, words in summary.edge]),
     ):
         for name in names[:_MOST_SHOWN]:
             console.print(f"{word}: {name}", markup=False)
         if len(names) > _MOST_SHOWN:
             console.print(f"... and {len(names) - _MOST_SHOWN} more {word}: see batch.csv", markup=False)
-    written = ["batch.csv", *(["batch.png"] if plan.picture else []), "bushings/"]
+    written = [*(name for name in (TABLE, PICTURE) if (folder / name).exists()), "bushings/"]
     console.print(f"wrote {', '.join(written)} to {folder}", markup=False)

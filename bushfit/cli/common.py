@@ -223,13 +223,19 @@ def parameter_table(title: str, result: Result) -> Table:
         interval = result.profile.get(name) or result.interval(name)
         digits = _digits(value, stderr)
         table.add_row(
-            name if name in result.fitted else f"{name} (held)",
+            _labelled(name, result),
             number(value, digits),
             "" if stderr is None else number(stderr, 2),
             "" if interval is None else " to ".join("open" if end is None else number(end, digits) for end in interval),
             "-" if parameter.unit == "1" else parameter.unit,
         )
     return table
+
+
+def _labelled(name: str, result: Result) -> str:
+    if name in result.at_bound:
+        return f"{name} (at {result.at_bound[name]})"
+    return name if name in result.fitted else f"{name} (held)"
 
 
 def number(value: float, digits: int) -> str:

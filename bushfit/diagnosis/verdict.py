@@ -216,6 +216,7 @@ def _result(evidence: Evidence, bounds: Bounds) -> Result:
         measured_range(model, evidence.terms),
         tuple(cautions(model, evidence.solution, evidence.terms, bounds, cov)),
         sources,
+        at_bound=evidence.solution.at_bound,
     )
 
 

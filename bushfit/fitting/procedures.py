@@ -20,7 +20,7 @@ from bushfit.fitting.starts import start_values
 from bushfit.fitting.terms import LoopTerm, SweepTerm, Term
 from bushfit.geometry import Direction
 from bushfit.model import Model
-from bushfit.results import Covariance, Result
+from bushfit.results import Covariance, End, Result
 
 STATIC = ("mu", "sigma_fmax", "eps_half")
 DYNAMIC = ("m", "alpha")
@@ -216,6 +216,7 @@ def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = Non
         (*notes, *_assumptions(terms), *told(outliers, robust=data.robust), *_cautions(steps, data.bounds, cov)),
         tuple(term.source for term in terms if term.source is not None),
         outliers,
+        at_bound={name: end for step in steps for name, end in step.solution.at_bound.items()},
     )
 
 
@@ -231,21 +232,15 @@ def cautions(
     """What the data of a fit cannot tell: bounds met, what stays open, and a model that does not fit."""
     names, at_bound = solution.coordinates.names, solution.at_bound
     return [
-        *(_at_edge(name, model, bounds) for name in at_bound),
+        *(_at_edge(name, end, bounds) for name, end in at_bound.items()),
         *left_open(model, terms, [name for name in names if name not in at_bound], covariance),
         *misfit(model, terms, len(names), advice),
     ]
 
 
-def _at_edge(name: str, model: Model, bounds: Bounds) -> str:
-    limits = model.parameters[name].bounds
-    distance = [
-        abs(model.values[name] - (least if own is None else own))
-        for least, own in zip(limits, bounds.get(name, (None, None)), strict=True)
-    ]
-    end = int(np.argmin(distance))
-    if bounds.get(name, (None, None))[end] is not None:
-        return f"{name} rests on the {('min', 'max')[end]} given in [fit]"
+def _at_edge(name: str, end: End, bounds: Bounds) -> str:
+    if bounds.get(name, (None, None))[end == "max"] is not None:
+        return f"{name} rests on the {end} given in [fit]"
     return f"{name} ended at the edge of what is possible: the data do not determine it"
 
 

@@ -19,6 +19,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.terms import Term
 from bushfit.model import Model
+from bushfit.results import End
 
 if TYPE_CHECKING:
     import lmfit
@@ -66,14 +67,14 @@ class Coordinates:
 @dataclass(frozen=True, eq=False)
 class Solution:
     """Where a fit ended: the model, whitened residuals (n,), their derivatives by coordinate (k, n),
-    model evaluations, and the names of parameters that ended at a bound."""
+    model evaluations, and the parameters that ended at a bound, with the end."""
 
     model: Model
     coordinates: Coordinates
     residual: Array
     jacobian: Array
     evaluations: int
-    at_bound: tuple[str, ...]
+    at_bound: Mapping[str, End]
 
     @property
     def chi_square(self) -> float:
@@ -183,7 +184,7 @@ def solve(
         residual(best, terms),
         jacobian(best, terms, coordinates.names),
         int(fit.nfev),
-        tuple(name for name, met in zip(coordinates.names, _at_bound(end, low, high), strict=True) if met),
+        _at_bound(coordinates.names, end, low, high),
     )
 
 
@@ -211,6 +212,7 @@ def _lmfit_parameters(start: Array, low: Array | None = None, high: Array | None
     return parameters
 
 
-def _at_bound(point: Array, low: Array, high: Array) -> Array:
+def _at_bound(names: Sequence[str], point: Array, low: Array, high: Array) -> dict[str, End]:
     near = _AT_BOUND * np.minimum(high - low, 1.0)
-    return (point - low < near) | (high - point < near)
+    ends: dict[str, End] = {name: "min" for name, met in zip(names, point - low < near, strict=True) if met}
+    return ends | {name: "max" for name, met in zip(names, high - point < near, strict=True) if met}

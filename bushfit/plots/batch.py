@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,9 +18,11 @@ _MISS, _LIMIT, _GOOD = "#c1272d", "#c1272d", "#31688e"
 #: Up to this many bushings are drawn as single points; beyond, as a cloud with its histogram.
 _CLOUD = 200
 _MOST_NAMED = 4
+#: More names do not fit along a panel.
+_MOST_ALONG = 40
 _MOST_LETTERS = 24
-#: Room of a name, as a share of the panel.
-_WIDE, _HIGH = 0.6, 0.07
+#: Room of a letter, as a share of the panel's width, and of a line [points].
+_LETTER, _LINE = 0.021, 8.5
 #: Values further out than this many robust standard deviations are drawn at the edge.
 _FURTHEST = 12.0
 _COLUMNS = 2
@@ -29,48 +31,48 @@ _COLUMNS = 2
 @dataclass(frozen=True, eq=False)
 class Panel:
     """One quantity: its header, values over the bushings (n,) with NaN where there is none, the lowest and highest
-    allowed value where there is a limit, and the names of bushings that miss it, by their place."""
+    allowed value where there is a limit, and the places of bushings that miss it."""
 
     title: str
     values: Array
     allowed: tuple[float, ...] = ()
-    missed: Mapping[int, str] = field(default_factory=dict)
+    missed: Collection[int] = ()
 
 
-def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str] = ()) -> Figure:
+def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> Figure:
     """Two columns of panels, the bushings along x in the manifest's order.
 
     Args:
         panels: the quantities.
         title: of the batch.
-        names: of all bushings, to stand along x; empty where they are too many.
+        names: of all bushings, (n,); they stand along x too where they are few.
     """
+    along = names if len(names) <= _MOST_ALONG else ()
     lines = math.ceil(len(panels) / _COLUMNS)
-    height = ROW * (0.9 + 0.1 * bool(names)) * lines + 0.35 * FRAME
-    figure = new_figure(f"{title}: {panels[0].values.size} bushings", height)
+    height = ROW * (0.9 + 0.1 * bool(along)) * lines + 0.35 * FRAME
+    figure = new_figure(f"{title}: {len(names)} bushings", height)
     grid = figure.subplots(lines, _COLUMNS, sharex=True, squeeze=False)
     for axes, panel in zip(grid.flat, panels, strict=False):
-        _draw(axes, panel)
+        _draw(axes, panel, names)
     for axes in grid.flat[len(panels) :]:
         axes.set_visible(False)
-    count = panels[0].values.size
     for place, axes in enumerate(grid.flat[: len(panels)]):
         lowest = place + _COLUMNS >= len(panels)
         axes.tick_params(labelbottom=lowest)
         axes.xaxis.set_in_layout(place // _COLUMNS == lines - 1)  # else its labels hang into the empty cell below
-        if names:
-            axes.set_xticks(
-                range(1, count + 1), names, rotation=90, fontsize=SMALL - 1, family=fonts(), parse_math=False
-            )
+        if along:
+            ticks = range(1, len(along) + 1)
+            axes.set_xticks(ticks, along, rotation=90, fontsize=SMALL - 1, family=fonts(), parse_math=False)
         elif lowest:
             axes.set_xlabel("bushing, in the manifest's order", fontsize=SMALL, color=INK)
-        axes.set_xlim(0.5, count + 0.5)
+        axes.set_xlim(0.5, len(names) + 0.5)
     limits = "Dashed: limits; red: out of them, the worst by name." if any(panel.allowed for panel in panels) else ""
-    explain(figure, "Grey line: median of the batch.", limits, "Triangles: further out than the panel reaches.")
+    beyond = "Triangles: further out than the panel reaches, the furthest by name and value."
+    explain(figure, "Grey line: median of the batch.", limits, beyond)
     return figure
 
 
-def _draw(axes: Axes, panel: Panel) -> None:
+def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     there = np.isfinite(panel.values)
     place, values = np.flatnonzero(there), panel.values[there]
     low, high = _reach(values, panel.allowed)
@@ -94,7 +96,7 @@ def _draw(axes: Axes, panel: Panel) -> None:
     axes.yaxis.get_offset_text().set_fontsize(SMALL)
     count = f": {len(panel.missed)} out" if panel.missed else ""
     axes.set_title(panel.title + count, fontsize=SMALL, loc="left", color=_MISS if count else INK, pad=3)
-    _name(axes, panel, (low, high))
+    _name(axes, panel, (low, high), names)
     if cloud:
         _histogram(axes, shown)
 
@@ -112,27 +114,42 @@ def _reach(values: Array, allowed: Sequence[float]) -> tuple[float, float]:
     return low, high
 
 
-def _name(axes: Axes, panel: Panel, reach: tuple[float, float]) -> None:
-    """The bushings that are furthest out, where their names do not cover each other."""
+def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[str]) -> None:
+    """The bushings that miss a limit or lie beyond the panel, furthest out first, where their names do not cover each
+    other; beyond the panel with the value that it does not show."""
     low, high = panel.allowed if panel.allowed else (-math.inf, math.inf)
-    places: list[tuple[float, float]] = []
-    for k in sorted(panel.missed, key=lambda k: min(high - panel.values[k], panel.values[k] - low)):
+    middle = float(np.nanmedian(panel.values))
+    beyond = set(np.flatnonzero((panel.values < reach[0]) | (panel.values > reach[1])).tolist())
+
+    def order(k: int) -> tuple[bool, float]:
+        value = panel.values[k]
+        return k not in panel.missed, min(high - value, value - low) if k in panel.missed else -abs(value - middle)
+
+    taken: list[tuple[float, float, int, bool]] = []
+    for k in sorted(beyond.union(panel.missed), key=order)[:_MOST_NAMED]:
         value = float(np.clip(panel.values[k], *reach))
-        x, y = k / panel.values.size, (value - reach[0]) / (reach[1] - reach[0])
-        if any(abs(x - other) < _WIDE and abs(y - above) < _HIGH for other, above in places):
-            continue
-        if len(places) == _MOST_NAMED:
-            break
-        places.append((x, y))
-        name = panel.missed[k]
+        text = names[k] if len(names[k]) <= _MOST_LETTERS else names[k][: _MOST_LETTERS - 1] + "…"
+        if k in beyond:
+            text = f"{text}: {panel.values[k]:.3g}"
+        place, above = (k + 0.5) / panel.values.size, value < (reach[0] + reach[1]) / 2.0
+        half, line = 0.5 * _LETTER * len(text), 1
+        center = min(max(place, half), 1.0 - half)
+        while any(
+            abs(center - other) < half + room and at == line and side == above for other, room, at, side in taken
+        ):
+            line += 1
+        taken.append((center, half, line, above))
         axes.annotate(
-            name if len(name) <= _MOST_LETTERS else name[: _MOST_LETTERS - 1] + "…",
-            (k + 1, value),
-            xytext=(4 if x < 0.5 else -4, 2),
+            text,
+            (center, value),
+            xycoords=("axes fraction", "data"),
+            xytext=(0, (1 if above else -1) * _LINE * line),
             textcoords="offset points",
-            ha="left" if x < 0.5 else "right",
+            ha="center",
+            va="center",
+            bbox={"facecolor": "white", "alpha": 0.7, "lw": 0, "pad": 0.3},
             fontsize=SMALL - 1,
-            color=_MISS,
+            color=_MISS if k in panel.missed else GREY,
             family=fonts(),
             parse_math=False,
             zorder=5,

@@ -125,6 +125,29 @@ def test_limits_decide_the_exit_status_and_are_named(typed: Callable[..., Any], 
     )
 
 
+def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(
+    typed: Callable[..., Any], shop: Path
+) -> None:
+    campaign = shop / "bushings/b1/bushing.toml"
+    campaign.write_text(campaign.read_text() + '\n[fit.mu]\nmax = "0.1 MPa"\n')
+    (shop / "limits.toml").write_text('[parameters.mu]\nmax = "1 GPa"\n')
+    done = typed("batch", "bushings/b[0-2]/bushing.toml", "-o", "all", "--limits", "limits.toml", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["conditional"] == ["b1"]
+    assert json.loads((shop / "all/bushings/b1/model.json").read_text())["parameters"]["mu"]["at_bound"] == "max"
+    good, held, other = rows(shop / "all")
+    assert (good["limits"], held["limits"], other["limits"]) == ("pass", "conditional pass", "pass")
+    assert good["on a bound"] == ""
+    assert held["on a bound"].startswith("mu (max)")
+    assert "at the max of its fit" in held["on the edge"]
+    assert "warning: 1 bushing with a parameter at rest on a bound of its fit" in done.stderr
+    assert "conditional pass: b1: mu = 1e+05" in done.stderr
+    none = typed("batch", "bushings/b[0-2]/bushing.toml", "-o", "none", "--effect", "inertia", "--json")
+    assert json.loads((shop / "none/bushings/b1/model.json").read_text())["parameters"]["mu"]["at_bound"] == "max"
+    assert not any("inertia" in row["on a bound"] for row in rows(shop / "none")), "no mass is an answer"
+    assert none.returncode == 0
+
+
 def test_limits_on_what_a_row_does_not_have(typed: Callable[..., Any], shop: Path) -> None:
     (shop / "limits.toml").write_text('verdicts = ["consistent"]\n')
     refused = typed("batch", PATTERN, "-o", "all", "--limits", "limits.toml")
@@ -141,6 +164,10 @@ def test_limits_on_what_a_row_does_not_have(typed: Callable[..., Any], shop: Pat
     assert (without["limits"], without["out of limits"]) == ("fail", "inertia.mass is not known: fail")
     assert float(with_["inertia.mass [kg]"]) < 1
     assert (shop / "all/batch.png").exists(), "the picture shows what is known"
+    again = typed("batch", "m.csv", "-o", "all", "--force", "--no-plots")
+    assert again.returncode == 0
+    assert not (shop / "all/batch.png").exists(), "a picture of another run"
+    assert "wrote batch.csv, bushings/ to" in again.stderr
 
 
 def test_results_that_stand_are_refused_resumed_or_replaced(typed: Callable[..., Any], shop: Path) -> None:
@@ -261,6 +288,8 @@ def test_two_batches_do_not_share_a_folder(typed: Callable[..., Any], shop: Path
         ("old.xml/r.xml", "not a folder"),
         ("bushings", "a folder stands where a file goes"),
         ("all/bushings/b0/r.xml", "among the results"),
+        ("all/bushings/../batch.csv", "in place of the table"),
+        ("all/batch.png", "in place of the table"),
     ],
 )
 def test_a_report_that_cannot_be_written_is_refused_before_the_work(

@@ -134,6 +134,27 @@ def test_a_bushing_is_as_good_as_its_worst_and_the_words_say_why(tmp_path: Path)
     assert set(guarded(record).missed) == {"mu", "alpha"}
 
 
+def test_a_value_at_rest_on_a_bound_of_its_fit_is_no_plain_pass(tmp_path: Path) -> None:
+    quantities = {q.name: q for q in parameter_quantities(["mu", "eps_half"])}
+    record = {
+        "parameters": {"mu": [1.1e6, None, None, None, "Pa"], "eps_half": [0.01, 0.009, 0.011, 1e-4, "1"]},
+        "at_bound": {"mu": "max", "eps_half": "min"},
+    }
+    text = "[parameters.mu]\nmin = '1 MPa'\nmax = '1.2 MPa'\n"
+    found = Judge(limits(tmp_path, text), {}, quantities)(record)
+    assert found.verdict is Verdict.CONDITIONAL_PASS
+    assert not found.missed
+    assert dict(found.edge) == {
+        "mu": "mu = 1.1e+06 Pa, min 1e+06 max 1.2e+06, at the max of its fit: conditional pass",
+        "eps_half": "eps_half = 0.01 (0.009 to 0.011), at the min of its fit: conditional pass",
+    }
+    guarded = Judge(limits(tmp_path, "guard = true\n" + text), {}, quantities)
+    assert set(guarded(record).missed) == {"mu", "eps_half"}
+    out = Judge(limits(tmp_path, "[parameters.mu]\nmax = '1 MPa'\n"), {}, quantities)(record)
+    assert out.verdict is Verdict.FAIL
+    assert out.missed["mu"] == "mu = 1.1e+06 Pa, max 1e+06, at the max of its fit: fail"
+
+
 def test_what_is_not_known_is_no_pass(tmp_path: Path) -> None:
     point, read = "axial 25 Hz 0.1 mm", limits(tmp_path, ALL + "[parameters.'inertia.mass']\nmax = '0.1 kg'\n")
     record = {

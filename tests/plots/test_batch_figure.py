@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
@@ -16,14 +16,13 @@ def panel(count: int) -> Panel:
     values[[1, 4]] = 1.5, np.nan
     if count > 100:
         values[50] = 40.0
-    missed = {int(k): f"$name {k}" for k in np.flatnonzero(values > 1.2)}
-    return Panel("mu [MPa]", values, (-np.inf, 1.2), missed)
+    return Panel("mu [MPa]", values, (-np.inf, 1.2), [int(k) for k in np.flatnonzero(values > 1.2)])
 
 
 @pytest.mark.parametrize("count", [10, 20_000])
 def test_medians_limits_and_names(count: int) -> None:
     one = panel(count)
-    names = [str(n) for n in range(count)] if count <= 10 else []
+    names = [f"$name {n}" for n in range(count)]
     panels = [one, Panel("alpha [-]", np.full(count, 0.24))]
     figure = batch_figure(panels, "x", names)
     assert to_png(figure) == to_png(batch_figure(panels, "x", names))
@@ -34,8 +33,8 @@ def test_medians_limits_and_names(count: int) -> None:
     assert low < 1.0 < 1.2 < high
     assert high < 2.0, "one far out must not squash the rest"
     assert f"{len(one.missed)} out" in axes.get_title(loc="left")
-    assert {text.get_text() for text in axes.texts} <= set(one.missed.values())
-    assert axes.texts
+    named = {text.get_text().partition(":")[0] for text in axes.texts}
+    assert named == {f"$name {k}" for k in one.missed}
     points = sum(len(line.get_xdata()) for line in axes.lines if line.get_linestyle() == "None")
     assert points == count - 1, "each bushing that has a value, once"
     assert other.get_ylim()[0] < 0.24 < other.get_ylim()[1]
@@ -43,7 +42,17 @@ def test_medians_limits_and_names(count: int) -> None:
 
 def test_a_panel_of_which_all_are_out() -> None:
     values = np.array([3.0, 4.0, 5.0])
-    to_png(batch_figure([Panel("mu [Pa]", values, (1.0, 2.0), {0: "a", 1: "b", 2: "c"})], "x"))
+    to_png(batch_figure([Panel("mu [Pa]", values, (1.0, 2.0), [0, 1, 2])], "x", ["a", "b", "c"]))
+
+
+def test_triangles_have_a_name_and_the_value_that_the_panel_does_not_show() -> None:
+    values = np.array([1.0, 1.01, 0.99, 1.02, 0.98, 40.0, 1.0, 30.0, 0.97, 20.0])
+    figure = batch_figure([Panel("mu [MPa]", values)], "x", [f"b{n}" for n in range(10)])
+    to_png(figure)
+    axes = figure.axes[0]
+    assert {text.get_text() for text in axes.texts} == {"b5: 40", "b7: 30", "b9: 20"}
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2)), "names must not cover each other"
 
 
 def test_an_odd_panel_leaves_no_gap_between_the_rows() -> None:
