@@ -27,6 +27,7 @@ from bushfit.effects.contract import Array, Condition, ForceBelow, StiffnessBelo
 from bushfit.effects.history import History
 from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Direction
+from bushfit.units import for_people
 
 Kind = Literal["sweep", "loop"]
 
@@ -158,8 +159,9 @@ class Model:
         branches = " + ".join(effect.equation for effect in self._structure.branches)
         lines = [f"K = k ({branches}), k the stiffness of this shape per modulus"]
         lines += [f"  {effect.name}: {effect.equation}" for effect in self.records if not isinstance(effect, Branch)]
-        units = {name: parameter.unit.removesuffix("1") for name, parameter in self.parameters.items()}
-        lines += [f"  {name} = {self.values[name]:.6g} {unit}".rstrip() for name, unit in units.items()]
+        for name, parameter in self.parameters.items():
+            unit, factor = for_people(parameter.unit, 1.0, self.values[name])
+            lines.append(f"  {name} = {self.values[name] * factor:.6g} {unit}".removesuffix(" -"))
         return "\n".join(lines)
 
     def to_document(self) -> dict[str, Any]:

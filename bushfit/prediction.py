@@ -163,16 +163,17 @@ def _extrapolations(result: Result, direction: Direction, frequency: Array, ampl
     if result.measured is None:
         return (*lines, "the model was not fitted here: no uncertainty, and no measured range to compare with")
     strain = amplitude * result.model.bushing.unit_strain(direction)
-    low, high = result.measured.frequency
-    if frequency.min() < low * (1 - _MARGIN) or frequency.max() > high * (1 + _MARGIN):
-        lines.append(
-            f"{direction}: frequencies {frequency.min():.3g} to {frequency.max():.3g} Hz leave the measured "
-            f"{low:.3g} to {high:.3g} Hz"
-        )
-    low, high = result.measured.strain
-    if strain.min() < low * (1 - _MARGIN) or strain.max() > high * (1 + _MARGIN):
-        lines.append(
-            f"{direction}: strains {100 * strain.min():.2g} to {100 * strain.max():.2g} % leave the measured "
-            f"{100 * low:.2g} to {100 * high:.2g} %"
-        )
+    axes = (
+        ("frequencies", "Hz", frequency, result.measured.frequency),
+        ("strains", "%", strain, result.measured.strain),
+    )
+    for what, unit, asked, (low, high) in axes:
+        if asked.min() < low * (1 - _MARGIN) or asked.max() > high * (1 + _MARGIN):
+            here, there = _span(asked.min(), asked.max(), unit), _span(low, high, unit)
+            lines.append(f"{direction}: predicted at {what} of {here}, but tested at {there} only: extrapolated beyond")
     return tuple(lines)
+
+
+def _span(low: float, high: float, unit: str) -> str:
+    ends = [f"{100 * end:.2g}" if unit == "%" else f"{end:.3g}" for end in (low, high)]
+    return f"{' to '.join(dict.fromkeys(ends))} {unit}"

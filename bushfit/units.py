@@ -32,6 +32,8 @@ _KINDS = {
     "Pa": ("a stress", "MPa"),
     "1": ("a ratio", "%"),
 }
+#: What people write for an SI unit, and the factor from SI to it.
+_WRITTEN = {"m": ("mm", 1e3), "m/N": ("mm/kN", 1e6), "N/m": ("N/mm", 1e-3), "1": ("-", 1.0)}
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _FACTOR = r"(?:[^\W\d_]+|%|°|1)(?:(?:\^|\*\*)-?[1-9]|⁻?[¹²³])?"
 #: The products and quotients of units that are handed on to pint, which would otherwise evaluate any arithmetic.
@@ -122,6 +124,25 @@ def quantity(value: object, *expected: str) -> float:
     number, unit = _split_quantity(value, expected[0])
     fitting = next((choice for choice in expected if agrees(unit, choice)), expected[0])
     return _si(number, factor(unit, fitting))
+
+
+def for_people(unit: str, factor: float, size: float) -> tuple[str, float]:
+    """Unit and factor from SI in which people read numbers of that size: MPa for 1.09e6 Pa, kPa for 1.46e4 Pa.
+
+    Args:
+        unit: SI, or another.
+        factor: from SI to it.
+        size: of the numbers, in SI.
+    """
+    unit, factor = _WRITTEN.get(unit, (unit, factor))
+    number = abs(size) * factor
+    if unit == "s":
+        return ("ms", 1e3) if number < 0.1 else (unit, factor)
+    least = 0.1 if unit.startswith("Pa") else 10.0  # 0.2 MPa, but 9000 N
+    for prefix, power in (("M", 1e6), ("k", 1e3)):
+        if unit[0] in "PN" and number >= least * power:
+            return prefix + unit, factor / power
+    return unit, factor
 
 
 def describe(expected: str) -> str:

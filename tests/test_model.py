@@ -119,7 +119,7 @@ def test_equation_is_text(paper_model: Model) -> None:
     assert text.isascii()
     assert "K = k (mu + m/2 (i omega)^alpha + (A + iB)/(2 e0)" in text
     assert "inertia: " in text
-    assert "mu = 1.09e+06 Pa" in text
+    assert "mu = 1.09 MPa" in text
     assert "inertia.mass = 0.1 kg" in text
 
 

@@ -137,10 +137,12 @@ def test_extrapolation_is_said(result: Result) -> None:
     inside = predict(result, Direction.AXIAL, [5.0, 155.0], [1e-4, 5e-4])
     assert inside.warnings == ()
     high = predict(result, Direction.AXIAL, [5.0, 400.0], [1e-4])
-    assert high.warnings == ("axial: frequencies 5 to 400 Hz leave the measured 0.1 to 155 Hz",)
+    assert high.warnings == (
+        "axial: predicted at frequencies of 5 to 400 Hz, but tested at 0.1 to 155 Hz only: extrapolated beyond",
+    )
     far = predict(result, Direction.AXIAL, [5.0], [5e-3])
     assert len(far.warnings) == 1
-    assert "strains 31 to 31 % leave the measured" in far.warnings[0]
+    assert "predicted at strains of 31 %, but tested at " in far.warnings[0]
     assert len(predict(result, Direction.AXIAL, [0.01], [1e-6]).warnings) == 2
 
 

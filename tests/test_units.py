@@ -14,6 +14,35 @@ from bushfit.errors import UnitError
 
 
 @pytest.mark.parametrize(
+    ("value", "unit", "shown"),
+    [
+        (1.09e6, "Pa", "1.09 MPa"),
+        (0.19e6, "Pa*s^alpha", "0.19 MPa*s^alpha"),
+        (1.46e4, "Pa", "14.6 kPa"),
+        (-1.46e4, "Pa", "-14.6 kPa"),
+        (12.0, "Pa", "12 Pa"),
+        (64.6, "Pa*s", "64.6 Pa*s"),
+        (5e-5, "m", "0.05 mm"),
+        (1.41e-8, "m/N", "0.0141 mm/kN"),
+        (1.2e-4, "s", "0.12 ms"),
+        (20.0, "s", "20 s"),
+        (3.1e6, "N/m", "3100 N/mm"),
+        (3.1e7, "N/m", "31 kN/mm"),
+        (9000.0, "N", "9000 N"),
+        (20e3, "N*m", "20 kN*m"),
+        (0.0, "Pa", "0 Pa"),
+        (0.1, "kg", "0.1 kg"),
+        (0.24, "1", "0.24 -"),
+    ],
+)
+def test_units_that_people_read(value: float, unit: str, shown: str) -> None:
+    name, factor = units.for_people(unit, 1.0, value)
+    assert f"{value * factor:.6g} {name}" == shown
+    plain = name.removesuffix("^alpha")
+    assert units.factor(plain, unit.removesuffix("^alpha")) * factor == pytest.approx(1.0), "the same quantity"
+
+
+@pytest.mark.parametrize(
     ("text", "expected", "value"),
     [
         ("10 mm", "m", 0.01),

@@ -300,13 +300,17 @@ class Judge:
         return self.allowed.get(name, (-math.inf, math.inf))
 
     def _words(self, name: str, found: Figures, verdict: Verdict, bound: str | None) -> str:
-        quantity, (low, high) = self._quantities[name], self._allowed(name)
-        value, least, most, _ = found
+        (low, high), (value, least, most, _) = self._allowed(name), found
+        quantity = self._quantities[name].for_people(value)
+
+        def shown(x: float) -> str:
+            return f"{x * quantity.factor:.4g}"
+
         unit = "" if quantity.unit == "-" else f" {quantity.unit}"
-        span = "" if least is None or most is None else f" ({' to '.join(quantity.shown(x) for x in (least, most))})"
-        ends = [f"{word} {quantity.shown(x)}" for word, x in (("min", low), ("max", high)) if math.isfinite(x)]
+        span = "" if least is None or most is None else f" ({shown(least)} to {shown(most)})"
+        ends = [f"{word} {shown(x)}" for word, x in (("min", low), ("max", high)) if math.isfinite(x)]
         said = [" ".join(ends)] * bool(ends) + [f"at the {bound} of its fit"] * bool(bound)
-        return f"{name} = {quantity.shown(value)}{span}{unit}, {', '.join(said)}: {verdict}"
+        return f"{name} = {shown(value)}{span}{unit}, {', '.join(said)}: {verdict}"
 
 
 def judge(figures: Figures, low: float, high: float) -> Verdict:

@@ -9,6 +9,7 @@ from typing import Any
 from bushfit.batch.points import Point
 from bushfit.effects import LIBRARY, qualified
 from bushfit.sheets import display_units
+from bushfit.units import for_people
 
 Record = Mapping[str, Any]
 #: Value, low and high of its 95 % interval, standard error, in SI; None where it is not known.
@@ -23,9 +24,9 @@ class Quantity:
     unit: str
     factor: float = 1.0
 
-    def shown(self, value: float) -> str:
-        """A value in this unit, four digits."""
-        return f"{value * self.factor:.4g}"
+    def for_people(self, size: float) -> Quantity:
+        """The same in the unit in which people read numbers of that size [SI]."""
+        return Quantity(self.name, *for_people(self.unit, self.factor, size))
 
     @property
     def header(self) -> str:

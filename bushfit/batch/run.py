@@ -258,16 +258,15 @@ def _draw(
     from bushfit.plots import to_png
     from bushfit.plots.batch import Panel, batch_figure
 
-    panels = [
-        Panel(
-            quantity.header,
-            columns[name] * quantity.factor,
-            tuple(limit * quantity.factor for limit in (judge.allowed.get(name, ()) if judge else ())),
-            {number for number, names in missed.items() if name in names and np.isfinite(columns[name][number])},
-        )
-        for name, quantity in quantities.items()
-        if name in columns and (np.isfinite(columns[name]).sum() >= _LEAST_DRAWN or (judge and name in judge.allowed))
-    ]
+    panels = []
+    for name, quantity in quantities.items():
+        allowed = judge.allowed.get(name, ()) if judge else ()
+        known = np.isfinite(columns.get(name, np.empty(0)))
+        if known.sum() >= (1 if allowed else _LEAST_DRAWN):
+            shown = quantity.for_people(float(np.median(columns[name][known])))
+            values, limits = columns[name] * shown.factor, tuple(limit * shown.factor for limit in allowed)
+            out = {number for number, names in missed.items() if name in names and known[number]}
+            panels.append(Panel(shown.header, values, limits, out))
     if panels:
         names = [row.name for row in plan.rows]
         write_files(plan.orders.output, {PICTURE: to_png(batch_figure(panels, plan.title, names))}, force=True)

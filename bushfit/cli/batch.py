@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bushfit.cli.common import Options, new_table, number, shared_options, warn
+from bushfit.units import for_people
 
 if TYPE_CHECKING:
     from bushfit.batch.points import Point
@@ -171,7 +172,8 @@ def _tell(options: Options, summary: Summary, folder: Path, plan: Plan) -> None:
     if summary.scatter:
         table = new_table(f"{plan.title}: {status['done']} bushings", "quantity", "median", "robust std dev", "unit")
         for quantity, (middle, spread) in summary.scatter.items():
-            table.add_row(quantity.name, number(middle, 4), number(spread, 2), quantity.unit)
+            unit, factor = for_people(quantity.unit, 1.0, middle)
+            table.add_row(quantity.name, number(middle * factor, 4), number(spread * factor, 2), unit)
         console.print(table)
     rate = status.total() / max(summary.seconds, 1e-9)
     kept = f", {summary.kept} of them from before" if summary.kept else ""

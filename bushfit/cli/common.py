@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import click
 
 from bushfit.output import check_free, to_json, write_files
+from bushfit.units import for_people
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -221,14 +222,10 @@ def parameter_table(title: str, result: Result) -> Table:
     for name, parameter in result.model.parameters.items():
         value, stderr = result.model.values[name], result.covariance.stderr(name)
         interval = result.profile.get(name) or result.interval(name)
-        digits = _digits(value, stderr)
-        table.add_row(
-            _labelled(name, result),
-            number(value, digits),
-            "" if stderr is None else number(stderr, 2),
-            "" if interval is None else " to ".join("open" if end is None else number(end, digits) for end in interval),
-            "-" if parameter.unit == "1" else parameter.unit,
-        )
+        digits, (unit, factor) = _digits(value, stderr), for_people(parameter.unit, 1.0, value)
+        ends = ["open" if end is None else number(end * factor, digits) for end in interval or ()]
+        error = "" if stderr is None else number(stderr * factor, 2)
+        table.add_row(_labelled(name, result), number(value * factor, digits), error, " to ".join(ends), unit)
     return table
 
 
@@ -239,8 +236,8 @@ def _labelled(name: str, result: Result) -> str:
 
 
 def number(value: float, digits: int) -> str:
-    """A number with that many digits, without the padding of exponents: 1.09e6."""
-    mantissa, exponent, power = f"{value:.{digits}g}".partition("e")
+    """A number with that many digits, an exponent only beyond six places, and without padding: 370, 1.09e6."""
+    mantissa, exponent, power = f"{float(f'{value:.{digits}g}'):g}".partition("e")
     return f"{mantissa}e{int(power)}" if exponent else mantissa
 
 

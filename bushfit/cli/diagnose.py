@@ -19,6 +19,7 @@ from bushfit.cli.common import (
     shared_options,
     warn,
 )
+from bushfit.units import for_people
 
 if TYPE_CHECKING:
     from bushfit.jobs.diagnose import Diagnosed
@@ -95,10 +96,10 @@ def tell_diagnosis(options: Options, name: str, outcome: Diagnosed) -> None:
     for effect in outcome.document["effects"]:
         console.print(f"  [bold]{effect['name']}[/bold] ({effect['level']}): {escape(effect['sentence'])}")
         for parameter, entry in effect["parameters"].items():
-            interval = entry["ci95"]
-            span = f", 95 % {number(interval[0], 3)} to {number(interval[1], 3)}" if interval else ""
-            unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
-            console.print(f"    {parameter} = {number(entry['value'], 4)}{unit}{span}")
+            unit, factor = for_people(entry["unit"], 1.0, entry["value"])
+            ends = [number(end * factor, 3) for end in entry["ci95"] or ()]
+            size = f"{number(entry['value'] * factor, 4)} {unit}".removesuffix(" -")
+            console.print(f"    {parameter} = {size}" + (f", 95 % {' to '.join(ends)}" if ends else ""))
         console.print(f"    {escape(effect['evidence'])}")
         if effect["alternatives"]:
             console.print(f"    cannot be told from: {escape(', '.join(effect['alternatives']))}")

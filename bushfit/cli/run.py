@@ -21,6 +21,7 @@ from bushfit.cli.common import (
     tell_fit,
     warn,
 )
+from bushfit.units import for_people
 
 if TYPE_CHECKING:
     from bushfit.fitting.data import Data
@@ -109,15 +110,18 @@ def _two_step(options: Options, data: Data) -> TwoStep | None:
 
 
 def _tell_passes(options: Options, two_step: TwoStep) -> None:
-    table = new_table("static and dynamic fit in turn, pass by pass", "pass", *two_step.passes[0])
+    parameters, last = two_step.result.model.parameters, two_step.passes[-1]
+    units = {name: for_people(parameters[name].unit, 1.0, value) for name, value in last.items()}
+    headers = (f"{name} [{unit}]" for name, (unit, _) in units.items())
+    table = new_table("static and dynamic fit in turn, pass by pass", "pass", *headers)
     for count, values in enumerate(two_step.passes, start=1):
-        table.add_row(str(count), *(number(value, 5) for value in values.values()))
+        table.add_row(str(count), *(number(values[name] * factor, 5) for name, (_, factor) in units.items()))
     options.console.print(table)
 
 
 def _tell_cost(options: Options, two_step: Result, joint: Result) -> None:
     """What the two-step procedure costs: its values and errors beside those of the joint fit."""
-    columns = ("two-step", "std error", "joint", "std error", "difference", "error ratio")
+    columns = ("two-step", "std error", "joint", "std error", "unit", "difference", "error ratio")
     table = new_table("what the two-step procedure costs", "parameter", *columns)
     for name in joint.fitted:
         if name not in two_step.model.values:
@@ -125,7 +129,8 @@ def _tell_cost(options: Options, two_step: Result, joint: Result) -> None:
         one, other = two_step.model.values[name], joint.model.values[name]
         errors = two_step.covariance.stderr(name), joint.covariance.stderr(name)
         ratio = f"{errors[0] / errors[1]:.1f}" if errors[0] and errors[1] else ""
-        shown = ["" if error is None else number(error, 2) for error in errors]
-        difference = f"{100 * (one / other - 1):+.1f} %"
-        table.add_row(name, number(one, 4), shown[0], number(other, 4), shown[1], difference, ratio)
+        unit, factor = for_people(joint.model.parameters[name].unit, 1.0, other)
+        shown = ["" if error is None else number(error * factor, 2) for error in errors]
+        pairs = (number(one * factor, 4), shown[0], number(other * factor, 4), shown[1])
+        table.add_row(name, *pairs, unit, f"{100 * (one / other - 1):+.1f} %", ratio)
     options.console.print(table)

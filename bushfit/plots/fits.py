@@ -26,12 +26,12 @@ from bushfit.plots.style import (
     mark_wild,
     new_figure,
     noise_band,
-    prefixed,
     readable,
     styles,
 )
 from bushfit.prediction import Band
 from bushfit.sheets import display_units
+from bushfit.units import for_people
 
 _STRIP = 2.6 / 2.54
 _MOST_ROWS = 1600
@@ -87,7 +87,7 @@ def loops_figure(model: Model, terms: Sequence[LoopTerm], title: str) -> Figure:
         mine = [term for term in terms if term.direction is direction]
         units, turns = display_units(direction), direction is Direction.TORSION
         unit, length = units["length"]
-        force_unit, force = prefixed(units["force"], max(float(np.abs(term.drive.force).max()) for term in mine))
+        force_unit, force = for_people(*units["force"], max(float(np.abs(term.drive.force).max()) for term in mine))
         motion_name, force_name = ("rotation", "moment") if turns else ("displacement", "force")
         dress(loop_panel, f"{motion_name} [{unit}]", f"{direction} {force_name} [{force_unit}]")
         dress(phase_panel, "phase after the upper turn [deg]", "residual / noise")

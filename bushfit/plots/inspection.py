@@ -13,8 +13,9 @@ from bushfit.effects.contract import Array
 from bushfit.geometry import Direction
 from bushfit.inspection.record import Inspected
 from bushfit.measurement import Floats, Loop, Sweep
-from bushfit.plots.style import GREY, POINT, ROW, dress, explain, legend, new_figure, prefixed, readable, styles
+from bushfit.plots.style import GREY, POINT, ROW, dress, explain, legend, new_figure, readable, styles
 from bushfit.sheets import display_units
+from bushfit.units import for_people
 
 _COLOR = "#3b528b"
 #: Rows of a loop drawn as they are; of more, the least and largest of so many bins of time.
@@ -45,7 +46,7 @@ def inspection_figure(files: Sequence[Inspected]) -> Figure:
 def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bool) -> Axes:
     units = display_units(history.direction)
     (length, to_length), unit_force = units["length"], units["force"]
-    force, to_force = prefixed(unit_force, float(np.abs(history.force).max()))
+    force, to_force = for_people(*unit_force, float(np.abs(history.force).max()))
     names = ("rotation", "moment") if history.direction is Direction.TORSION else ("displacement", "force")
     grid = place.subgridspec(2, 2 if loop else 1, width_ratios=[1.0, 1.2] if loop else None)
     over_time = [figure.add_subplot(grid[0, -1])]
@@ -79,7 +80,7 @@ def _draw_over_time(axes: Axes, time: Floats, values: Floats) -> None:
 def _draw_sweep(figure: Figure, place: SubplotSpec, sweep: Sweep) -> Axes:
     units = display_units(sweep.direction)
     unit, length = units["length"]
-    stiffness, factor = prefixed(units["stiffness"], float(np.abs(sweep.stiffness).max()))
+    stiffness, factor = for_people(*units["stiffness"], float(np.abs(sweep.stiffness).max()))
     grid = place.subgridspec(1, 2)
     pair = [figure.add_subplot(grid[0, column]) for column in range(2)]
     levels = np.unique(sweep.amplitude)

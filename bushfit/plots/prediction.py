@@ -12,9 +12,10 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.terms import SweepTerm
 from bushfit.geometry import Direction
 from bushfit.plots.points import Points, means
-from bushfit.plots.style import POINT, ROW, dress, explain, least_span, legend, new_figure, prefixed, readable, styles
+from bushfit.plots.style import POINT, ROW, dress, explain, least_span, legend, new_figure, readable, styles
 from bushfit.prediction import Band, Prediction
 from bushfit.sheets import display_units
+from bushfit.units import for_people
 
 #: Points of a model's line.
 FINE = 60
@@ -80,7 +81,7 @@ def draw(
     inside = (where >= x.min() * (1 - _SAME[0])) & (where <= x.max() * (1 + _SAME[0]))
     marked = [inside & np.isclose(getattr(points, other), level, *_SAME) for level in levels]
     drawn = styles(levels.size, other)
-    stiffness_unit, factor = prefixed(units["stiffness"], float(lines.stiffness.value.max()))
+    stiffness_unit, factor = for_people(*units["stiffness"], float(lines.stiffness.value.max()))
     kinds = (
         ("stiffness", factor, f"{direction} stiffness |K| [{stiffness_unit}]"),
         ("loss_factor", 1.0, f"{direction} loss factor [-]"),

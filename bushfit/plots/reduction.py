@@ -20,12 +20,12 @@ from bushfit.plots.style import (
     explain,
     legend,
     new_figure,
-    prefixed,
     readable,
     styles,
 )
 from bushfit.reduction import Reduction, Step
 from bushfit.sheets import display_units
+from bushfit.units import for_people
 
 _STRIP, _NOISE_ROW = 2.7 / 2.54, 4.2 / 2.54
 #: Bins of time in which a history is drawn, from its least to its largest value.
@@ -83,7 +83,7 @@ def _draw_points(pair: Sequence[Axes], reduction: Reduction, looks: dict[float, 
     units = display_units(reduction.direction)
     unit, length = units["length"]
     steps = reduction.steps
-    stiffness_unit, factor = prefixed(units["stiffness"], max(abs(step.stiffness) for step in steps))
+    stiffness_unit, factor = for_people(*units["stiffness"], max(abs(step.stiffness) for step in steps))
     names = f"{reduction.direction} stiffness |K| [{stiffness_unit}]", f"{reduction.direction} loss factor [-]"
     for axes, name in zip(pair, names, strict=True):
         for level, look in looks.items():

@@ -129,15 +129,6 @@ def explain(figure: Figure, *sentences: str) -> None:
     figure.supxlabel(text, x=0.01, ha="left", fontsize=SMALL, color=GREY, parse_math=False)
 
 
-def prefixed(unit_and_factor: tuple[str, float], largest: float) -> tuple[str, float]:
-    """With k or M for numbers of five digits and more."""
-    unit, factor = unit_and_factor
-    for prefix, power in (("M", 1e6), ("k", 1e3)):
-        if factor * largest >= 10.0 * power:
-            return prefix + unit, factor / power
-    return unit, factor
-
-
 def to_png(figure: Figure) -> bytes:
     """The figure as PNG, the same bytes for the same figure: no date, no version."""
     buffer = io.BytesIO()

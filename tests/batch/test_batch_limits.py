@@ -124,9 +124,7 @@ def test_a_bushing_is_as_good_as_its_worst_and_the_words_say_why(tmp_path: Path)
     found = judged(record)
     assert found.verdict is Verdict.CONDITIONAL_FAIL
     assert dict(found.missed) == {"alpha": "alpha = 0.26 (0.25 to 0.27), min 0.228 max 0.252: conditional fail"}
-    assert dict(found.edge) == {
-        "mu": "mu = 1.19e+06 (1.17e+06 to 1.21e+06) Pa, min 1e+06 max 1.2e+06: conditional pass"
-    }
+    assert dict(found.edge) == {"mu": "mu = 1.19 (1.17 to 1.21) MPa, min 1 max 1.2: conditional pass"}
     partly = judged({**record, "verdict": "partly"})
     assert partly.verdict is Verdict.FAIL
     assert partly.missed["verdict"] == "verdict partly, allowed consistent, named"
@@ -145,14 +143,14 @@ def test_a_value_at_rest_on_a_bound_of_its_fit_is_no_plain_pass(tmp_path: Path) 
     assert found.verdict is Verdict.CONDITIONAL_PASS
     assert not found.missed
     assert dict(found.edge) == {
-        "mu": "mu = 1.1e+06 Pa, min 1e+06 max 1.2e+06, at the max of its fit: conditional pass",
+        "mu": "mu = 1.1 MPa, min 1 max 1.2, at the max of its fit: conditional pass",
         "eps_half": "eps_half = 0.01 (0.009 to 0.011), at the min of its fit: conditional pass",
     }
     guarded = Judge(limits(tmp_path, "guard = true\n" + text), {}, quantities)
     assert set(guarded(record).missed) == {"mu", "eps_half"}
     out = Judge(limits(tmp_path, "[parameters.mu]\nmax = '1 MPa'\n"), {}, quantities)(record)
     assert out.verdict is Verdict.FAIL
-    assert out.missed["mu"] == "mu = 1.1e+06 Pa, max 1e+06, at the max of its fit: fail"
+    assert out.missed["mu"] == "mu = 1.1 MPa, max 1, at the max of its fit: fail"
 
 
 def test_what_is_not_known_is_no_pass(tmp_path: Path) -> None:
