@@ -56,7 +56,8 @@ def command(
     if options.plots:
         from bushfit.plots import reduction_figure, to_png
 
-        title = ", ".join(history.name for history in histories[:3]) + (", ..." if len(histories) > 3 else "")
+        names = histories[0].name if len(histories) == 1 else f"{len(histories)} histories"
+        title = f"{names}: {len(reduction.steps)} points, {direction}"
         output["reduce.png"] = to_png(reduction_figure(reduction, histories, title))
     options.write(folder, output)
     snippet = f'[[sweeps]]\nfile = "sweep.csv"\ndirection = "{direction}"\n'

@@ -44,7 +44,10 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
     levels = sorted({step.level for step in reduction.steps})
     looks = dict(zip(levels, styles(len(levels), "amplitude"), strict=True))
     for row, history in enumerate(shown):
-        _draw_history(figure.add_subplot(grid[row, :]), history, reduction, looks)
+        strip = figure.add_subplot(grid[row, :])
+        _draw_history(strip, history, reduction, looks)
+        if len(histories) > 1:  # the title names one
+            strip.set_title(history.name.replace("$", r"\$"), fontsize=7.5, loc="left", color=GREY, pad=2)
     points = [figure.add_subplot(grid[len(shown), column]) for column in range(2)]
     _draw_points(points, reduction, looks)
     quality = [figure.add_subplot(grid[len(shown) + 1, column], sharex=points[0]) for column in range(2)]
@@ -74,8 +77,7 @@ def _draw_history(axes: Axes, history: Loop, reduction: Reduction, looks: dict[f
                 inside |= (middle >= step.start) & (middle <= step.end)
         axes.fill_between(middle, low, high, where=inside, color=look.color, lw=0.4, step="post")
     motion = "rotation" if reduction.direction is Direction.TORSION else "displacement"
-    dress(axes, "time [s]", f"{motion} [{unit}]")
-    axes.set_title(history.name.replace("$", r"\$"), fontsize=7.5, loc="left", color=GREY, pad=2)
+    dress(axes, "time [s]", f"{motion}\n[{unit}]")
     axes.margins(x=0.01)
 
 
@@ -98,7 +100,7 @@ def _draw_points(pair: Sequence[Axes], reduction: Reduction, looks: dict[float, 
         axes.tick_params(labelbottom=False)
         readable(axes, np.array([step.frequency for step in steps]))
     handles = [look.handle(True) for look in looks.values()]
-    legend(pair[-1], handles, [f"{length * level:.3g} {unit}" for level in looks], "amplitude")
+    legend(pair[-1], handles, [f"{length * level:.4g} {unit}" for level in looks], "amplitude")
 
 
 def _draw_quality(pair: Sequence[Axes], reduction: Reduction, looks: dict[float, Style]) -> None:
