@@ -22,6 +22,8 @@ _NOISE, _CONVERTER, _RANGE = 10.0, 4.0, 1e-3
 #: (those with the least motion) that count.
 _ORDER, _BLOCK, _MOST_BLOCKS, _QUIET = 6, 256, 2000, 0.1
 _DIFFERENCE_GAIN = 924.0**0.5  # square root of the sum of squared binomials of that order
+#: Variance of a row less the cubic through its neighbours at even times, over that of a row.
+_EVEN_GAIN = 1.0 + (2.0 * 4.0**2 + 2.0) / 36.0
 #: Rows that are looked at in one go.
 _CHUNK = 1 << 18
 #: Neighbours in one run differ by less than this, in ln of period and of range.
@@ -139,7 +141,8 @@ def least_turn(values: Floats) -> float:
 
 def wild_rows(time: Floats, values: Floats) -> NDArray[np.bool_]:
     """Rows that lie alone far off the cubic through the two before and the two after them: further than those spread,
-    and than noise goes. No sine does that, however few rows it has, nor the kink of dry friction."""
+    and than noise goes, which a cubic through rows at uneven times magnifies. No sine does that, however few rows it
+    has, nor the kink of dry friction."""
     wild = np.zeros(values.size, dtype=bool)
     least = least_turn(values)
     for start in range(0, values.size - 4, _CHUNK):
@@ -148,14 +151,16 @@ def wild_rows(time: Floats, values: Floats) -> NDArray[np.bool_]:
         stop = own.size - 4
         near = [own[place : stop + place] for place in (0, 1, 3, 4)]
         apart = [clock[place : stop + place] - clock[2 : stop + 2] for place in (0, 1, 3, 4)]
-        middle = np.zeros(stop)
+        middle, gain = np.zeros(stop), np.ones(stop)
         for value, node in zip(near, apart, strict=True):
-            part = value.copy()
+            weight = np.ones(stop)
             for other in apart:
                 if other is not node:
-                    part *= other / (other - node)
-            middle += part
-        wild[start + 2 : start + 2 + stop] = np.abs(own[2:-2] - middle) > np.ptp(near, axis=0) + least
+                    weight *= other / (other - node)
+            middle += weight * value
+            gain += weight * weight
+        reach = least * np.sqrt(gain / _EVEN_GAIN)
+        wild[start + 2 : start + 2 + stop] = np.abs(own[2:-2] - middle) > np.ptp(near, axis=0) + reach
     return wild
 
 

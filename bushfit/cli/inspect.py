@@ -35,7 +35,11 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     frequencies, amplitudes, repeats; and what is odd, in sentences with figures. The text for the campaign goes to
     standard output, ready to paste.
 
-    Writes inspect.png (inspect_2.png and so on of more than five files).
+    A file that cannot be used does not keep the others from being told; then nothing is written, and the exit status
+    is 2.
+
+    Writes inspect.png (inspect_2.png and so on of more than five files), with -o there, else under results/ in a folder
+    of the first file's name.
     """
     from bushfit.inspection.draft import file_text
     from bushfit.inspection.opening import inspect
@@ -59,9 +63,9 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     if not options.as_json:
         click.echo(text, nl=False)
     if failed:
-        for other in failed[1:]:
-            options.console.print(f"cannot be used either: {other}", markup=False)
-        raise failed[0]
+        for other in failed[:-1]:
+            click.echo(f"cannot be used: {other}", err=True)
+        raise failed[-1]
     if options.plots:
         options.write(folder, _pictures(seen, pages))
     options.tell({"files": [one.to_document() for one in seen], "campaign": text})

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bushfit.cycles import wild_rows
+from bushfit.cycles import least_turn, wild_rows
 from bushfit.geometry import Direction
 from bushfit.measurement import Floats, Loop
 from bushfit.sheets import display_units
@@ -47,28 +47,44 @@ class Channel(NamedTuple):
         return f"{self.factor * self.values[row]:.4g}"
 
 
-def odd_channels(history: Loop) -> Iterator[str]:
-    """Sentences on the channels of a loop or a raw history."""
+def odd_channels(history: Loop, *, timed: bool = True) -> Iterator[str]:
+    """Sentences on the channels of a loop or a raw history; one that is not `timed` had no time in its file."""
     names = ("rotation", "moment") if history.direction is Direction.TORSION else ("displacement", "force")
     units = display_units(history.direction)
     motion = Channel(names[0], *units["length"], history.displacement)
     force = Channel(names[1], *units["force"], history.force)
-    steps = np.diff(history.time)
-    wide = steps > max(_GAP * np.median(steps), _UNEVEN * np.quantile(steps, 0.99))
     still = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
-    yield from _gaps(steps, wide)
+    yield from _gaps(history.time) if timed else _jumps(motion, history.time)
     yield from _stuck(motion, force, still)
     for channel in (motion, force):
         yield from _cut_off(channel)
         yield from _wild(channel, history.time)
 
 
-def _gaps(steps: Floats, wide: Flags) -> Iterator[str]:
+def _wide(steps: Floats) -> Flags:
+    return steps > max(_GAP * np.median(steps), _UNEVEN * np.quantile(steps, 0.99))
+
+
+def _gaps(time: Floats) -> Iterator[str]:
+    steps = np.diff(time)
+    wide = _wide(steps)
     if wide.any():
         first, count = int(np.argmax(wide)), int(wide.sum())
         yield (
             f"{count} gap{'s' * (count > 1)} in time, the first after data row {first + 1}: {steps[first]:.3g} s "
             f"without a row, else mostly {np.median(steps):.3g} s"
+        )
+
+
+def _jumps(motion: Channel, time: Floats) -> Iterator[str]:
+    """Gaps in a file without time, where only the motion tells of them."""
+    steps, wild = np.abs(np.diff(motion.values)), wild_rows(time, motion.values)
+    wide = _wide(steps) & (steps > least_turn(motion.values)) & ~(wild[1:] | wild[:-1])
+    if wide.any():
+        first, count = int(np.argmax(wide)), int(wide.sum())
+        yield (
+            f"{count} gap{'s' * (count > 1)} in the motion, the first after data row {first + 1}: the {motion.name} "
+            f"goes from {motion.shown(first)} to {motion.shown(first + 1)} {motion.unit} at once"
         )
 
 

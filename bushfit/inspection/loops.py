@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bushfit.cycles import least_turn
 from bushfit.effects.contract import Array
 from bushfit.fitting.drive import Drive, drive_of
 from bushfit.geometry import Direction
@@ -30,8 +31,8 @@ _OUTER, _CROWDED = 0.9, 0.2
 _ENDS, _HARMONICS = 6, 7
 
 
-def look_at_loop(loop: Loop, file: Path) -> Looked:
-    """Facts and oddities of a loop.
+def look_at_loop(loop: Loop, file: Path, *, timed: bool = True) -> Looked:
+    """Facts and oddities of a loop; of one that is not `timed` the time was made from its motion.
 
     Raises:
         FitError: no whole cycle, or a loop that runs the wrong way round.
@@ -49,7 +50,7 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
     facts = {
         "cycles": f"{drive.cycles:.4g}, {'from rest' if drive.from_rest else 'settled or run in'}",
         "frequency": f"{drive.frequency:.4g} Hz, {_waveform(drive)}",
-        "sampling": f"{clock(loop)}, {rows:.4g} rows a cycle",
+        "sampling": f"{clock(loop) if timed else 'no time in the file'}, {rows:.4g} rows a cycle",
         "amplitude": f"{to_length * amplitude:.4g} {length} zero-to-peak",
         f"mean {names[0]}": f"{to_length * mean_motion:.3g} {length}",
         f"mean {names[1]}": f"{to_force * mean_force:.3g} {force}",
@@ -57,9 +58,9 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
     }
     odd = [
         *wrong_labels(file, loop.direction, [amplitude, half_motion], [drive.frequency]),
-        *odd_channels(loop),
+        *odd_channels(loop, timed=timed),
         *([drive.note.removeprefix(f"{loop.name}: ")] if drive.note else []),
-        *_changing(drive, names),
+        *_changing(drive, names, timed=timed),
         *_crowding(drive, names[0]),
     ]
     if swings:
@@ -100,7 +101,7 @@ def _waveform(drive: Drive) -> str:
     return "a sine" if share < _LIKE else f"neither sine nor triangle (third harmonic {100 * share:.2g} %)"
 
 
-def _changing(drive: Drive, names: tuple[str, str]) -> Iterator[str]:
+def _changing(drive: Drive, names: tuple[str, str], *, timed: bool) -> Iterator[str]:
     """Whether force amplitude, mean force or mean motion change from cycle to cycle."""
     loop = drive.loop
     count = int(drive.cycles + 0.01)
@@ -132,7 +133,8 @@ def _changing(drive: Drive, names: tuple[str, str]) -> Iterator[str]:
         )
     for name, kind, mean, least in (
         (names[1], "force", means[:, 0], max(_SURE * 1.5 * error, _SHARE * half)),
-        (names[0], "length", means[:, 1], 2.0 * _SHARE * drive.amplitude),
+        # a time that was made from the motion turns its noise into drift
+        (names[0], "length", means[:, 1], 2.0 * _SHARE * drive.amplitude if timed else least_turn(loop.displacement)),
     ):
         drift = mean[-1] - mean[0]
         if abs(drift) > least:

@@ -53,10 +53,11 @@ def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bo
     over_time.append(figure.add_subplot(grid[1, -1], sharex=over_time[0]))
     motion, load = to_length * history.displacement, to_force * history.force
     for axes, values, label in zip(
-        over_time, (motion, load), (f"{names[0]} [{length}]", f"{names[1]} [{force}]"), strict=True
+        over_time, (motion, load), (f"{names[0]}\n[{length}]", f"{names[1]}\n[{force}]"), strict=True
     ):
         _draw_over_time(axes, history.time, values)
         dress(axes, "time [s]", label)
+    figure.align_ylabels(over_time)
     over_time[0].tick_params(labelbottom=False)
     over_time[0].set_xlabel("")
     if not loop:

@@ -49,6 +49,18 @@ def test_a_bad_file_is_one_error_after_the_good_ones(typed: Callable, root: Path
     assert not (tmp_path / "x").exists()
 
 
+def test_bad_files_are_told_in_the_order_given_the_last_as_the_error(
+    typed: Callable, root: Path, tmp_path: Path
+) -> None:
+    for name in ("one", "two", "three"):
+        (tmp_path / f"{name}.csv").write_text("length [mm],colour\n1,2\n2,3\n", encoding="utf-8")
+    done = typed("inspect", "one.csv", root / CLEAN[0], "two.csv", "three.csv", "-q")
+    assert done.returncode == 2
+    places = [done.stderr.index(said) for said in ("used: one.csv", "used: two.csv", "bushfit: error: three.csv")]
+    assert places == sorted(places)
+    assert not (tmp_path / "results").exists()
+
+
 def test_results_are_not_replaced_unasked(typed: Callable, root: Path) -> None:
     assert typed("inspect", root / CLEAN[0], "-o", "x", "-q").returncode == 0
     assert "results stand there already" in typed("inspect", root / CLEAN[0], "-o", "x").stderr

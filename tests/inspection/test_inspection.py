@@ -19,7 +19,7 @@ from bushfit.inspection.opening import inspect
 from bushfit.measurement import Loop, Sweep
 from bushfit.model import Model
 from bushfit.schema import SimulatedLoop, SimulateSettings
-from bushfit.sheets import raw_sweep_table
+from bushfit.sheets import raw_loop_table, raw_sweep_table
 from bushfit.simulation import Undisturbed, measure, undisturbed
 
 
@@ -32,6 +32,27 @@ def test_clean_tests_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str)
             raised += [f"seed {seed}, {test.name}: {sentence}" for sentence in look(tmp_path, test).looked.odd]
     print(f"{rig} rig: {len(raised)} sentences over {SEEDS} clean campaigns")
     assert raised == []
+
+
+@pytest.mark.parametrize("rig", NOISE)
+def test_clean_loops_without_time_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str) -> None:
+    """Time rebuilt from a noisy motion is uneven at its turning points; rows there are no wilder for it."""
+    raised, file = [], tmp_path / "axial.csv"
+    for seed in range(SEEDS):
+        loops = measure(clean, plan(seed=seed, **NOISE[rig])).loops
+        for loop, waveform, frequency in zip(loops, ("sine", "triangle"), ("0.1 Hz", "0.2 Hz"), strict=True):
+            raw_loop_table(loop).iloc[:, 1:].to_csv(file, index=False)
+            seen = inspect(file, {"frequency": frequency, "waveform": waveform})
+            raised += [f"seed {seed}, {waveform}: {sentence}" for sentence in seen.looked.odd]
+    print(f"{rig} rig: {len(raised)} sentences over {2 * SEEDS} clean loops without time")
+    assert raised == []
+
+
+def test_a_gap_in_a_loop_without_time_is_told_by_its_motion(loop: Loop, tmp_path: Path) -> None:
+    table = raw_loop_table(loop).iloc[:, 1:].drop(index=range(500, 530))
+    table.to_csv(tmp_path / "axial.csv", index=False)
+    odd = inspect(tmp_path / "axial.csv", {"frequency": "0.1 Hz", "waveform": "sine"}).looked.odd
+    assert any("1 gap in the motion, the first after data row 500: the displacement goes from " in line for line in odd)
 
 
 def test_the_data_of_the_repository_raise_nothing(root: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -17,7 +19,17 @@ from bushfit.reduction import reduce
 
 
 def labels(figure: Figure) -> set[str]:
-    return {label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label}
+    return {
+        " ".join(label.split()) for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label
+    }
+
+
+def colliding(figure: Figure) -> list[tuple[str, str]]:
+    """Labels of y axes that run into each other or into a panel's title."""
+    figure.draw_without_rendering()
+    texts = [axes.yaxis.label for axes in figure.axes] + [axes._left_title for axes in figure.axes]
+    boxes = [(text.get_text(), text.get_window_extent()) for text in texts if text.get_text()]
+    return [(name, other) for (name, box), (other, beside) in combinations(boxes, 2) if box.overlaps(beside)]
 
 
 def outside(figure: Figure) -> list[str]:
@@ -41,7 +53,14 @@ def test_reduction(paper_model: Model, direction: Direction) -> None:
     reduction = reduce([history])
     figure = reduction_figure(reduction, [history], "$ raw $.csv")
     assert outside(figure) == []
+    assert colliding(figure) == []
     shown = labels(figure)
+    legend = figure.axes[2].get_legend()
+    assert legend is not None
+    unit, length = ("deg", 180.0 / np.pi) if turns else ("mm", 1e3)
+    levels = sorted({step.level for step in reduction.steps})
+    assert [text.get_text() for text in legend.get_texts()] == [f"{length * level:.4g} {unit}" for level in levels]
+    assert all(axes.get_title(loc="left") == "" for axes in figure.axes), "the title names one history"
     assert {"time [s]", "frequency [Hz]", "noise [%]", "distortion [%]"} <= shown
     assert f"{direction} stiffness |K| [{'N m/rad' if turns else 'N/mm'}]" in shown
     assert ("rotation [deg]" if turns else "displacement [mm]") in shown
@@ -72,6 +91,7 @@ def seen(root: object) -> list[Inspected]:
 def test_inspection(seen: list[Inspected]) -> None:
     figure = inspection_figure(seen)
     assert outside(figure) == []
+    assert colliding(figure) == []
     assert {"time [s]", "displacement [mm]", "force [N]", "frequency [Hz]", "|K| [N/mm]", "loss factor [-]"} <= labels(
         figure
     )
