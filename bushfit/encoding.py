@@ -10,9 +10,11 @@ from __future__ import annotations
 
 import codecs
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
+from bushfit.blocks import by_blocks
 from bushfit.errors import MeasurementError
 from bushfit.files import Bytes
 
@@ -22,7 +24,7 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
-_CHUNK = 1 << 20
+_CHUNK = 1 << 22
 _SAMPLE = 1 << 16
 _HIGH_RUN = re.compile(rb"[\x80-\xff]+")
 #: Two bytes of GB2312: its punctuation and its 3755 commonest characters. Western accents make few such pairs.
@@ -40,7 +42,7 @@ def to_utf8(data: Bytes, file: Path, stated: str | None = None) -> tuple[Bytes, 
     Raises:
         MeasurementError: no text, or not in the encoding stated.
     """
-    if stated is None and data.find(b"\0") < 0 and all(part.isascii() for part in _parts(data)):
+    if stated is None and _is_ascii(data):
         return data, "utf-8"
     data = data[:]
     encoding = stated or detect(data)
@@ -63,8 +65,10 @@ def to_utf8(data: Bytes, file: Path, stated: str | None = None) -> tuple[Bytes, 
     return text.removeprefix("\ufeff").encode(), encoding
 
 
-def _parts(data: Bytes) -> Iterator[bytes]:
-    return (data[start : start + _CHUNK] for start in range(0, len(data), _CHUNK))
+def _is_ascii(data: Bytes) -> bool:
+    """Whether all bytes are from 1 to 127."""
+    codes = np.frombuffer(data, dtype=np.int8)
+    return all(by_blocks(lambda part: bool(codes[part].min() > 0), codes.size, _CHUNK))
 
 
 def detect(data: bytes) -> str:
@@ -95,11 +99,11 @@ def _not_utf8(data: bytes) -> int | None:
     if (zero := data.find(0)) >= 0:
         return zero
     decoder = codecs.getincrementaldecoder("utf-8")()
-    for number, part in enumerate(_parts(data)):
+    for start in range(0, len(data), _CHUNK):
         try:
-            decoder.decode(part, final=(number + 1) * _CHUNK >= len(data))
+            decoder.decode(data[start : start + _CHUNK], final=start + _CHUNK >= len(data))
         except UnicodeDecodeError as error:
-            return min(number * _CHUNK + error.start, len(data) - 1)
+            return min(start + error.start, len(data) - 1)
     return None
 
 

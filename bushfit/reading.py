@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bushfit.blocks import by_blocks
 from bushfit.geometry import Direction
 from bushfit.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention, Column
 from bushfit.layout import FileFormat
@@ -81,8 +82,13 @@ def read_loop(
     for role in ("displacement", "force"):
         if np.ptp(values[role][:_FEWEST_LOOP_ROWS]) == 0.0 == np.ptp(values[role]):
             raise table.error(f"the {role} never changes", column=wanted[role], expected="a loop")
-    displacement = values["displacement"]
-    if np.dot(displacement, values["force"]) < displacement.sum() * values["force"].mean():
+    displacement, force = values["displacement"], values["force"]
+
+    def sums(rows: slice) -> tuple[float, float, float]:
+        return np.einsum("i,i", displacement[rows], force[rows]), displacement[rows].sum(), force[rows].sum()
+
+    product, *each = np.sum(by_blocks(sums, force.size), axis=0)
+    if product < each[0] * each[1] / force.size:
         raise table.error(
             "the force falls where the displacement rises",
             column=wanted["force"],
@@ -93,12 +99,14 @@ def read_loop(
         )
     if "time" in values:
         time = values["time"]
-        late = np.append(False, time[1:] <= time[:-1])
-        table.refuse(late, wanted["time"], "time does not increase", "a later time on every row")
+        after, before = time[1:], time[:-1]
+        if any(by_blocks(lambda rows: bool((after[rows] <= before[rows]).any()), after.size)):
+            late = np.append(False, after <= before)
+            table.refuse(late, wanted["time"], "time does not increase", "a later time on every row")
     else:
         time = rebuild_time(displacement, rate=rate, frequency=frequency, waveform=waveform)
     source = Source(listed_as or Path(file.name), table.sha256)
-    return Loop(name or file.stem, direction, time, displacement, values["force"], noise, source)
+    return Loop(name or file.stem, direction, time, displacement, force, noise, source)
 
 
 def read_sweep(

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from bushfit.blocks import by_blocks
 from bushfit.encoding import to_utf8
 from bushfit.files import Bytes
 from bushfit.layout import HEAD, MOST_LINES, Layout, Line, is_comment, split
@@ -127,7 +128,10 @@ class Text:
                     names=list(range(width)),
                     index_col=False,
                     decimal=numerals.decimal,
-                    dtype={index: np.float64 if index in scales else str for index in range(width)},
+                    # one type for all columns spares pandas a copy
+                    dtype=np.float64
+                    if len(scales) == width
+                    else {index: np.float64 if index in scales else str for index in range(width)},
                     na_filter=False,
                     compression=None,
                 )
@@ -135,14 +139,21 @@ class Text:
             return None
         if self._has('"', before) and len(frame) != sum(1 for _ in self.lines(layout.lines_before_data)):
             return None  # a quote left open took lines into its cell
-        columns = {}
-        for index, scale in scales.items():
-            column = frame[index].to_numpy()
-            columns[index] = column if scale == 1.0 else column * scale
-            low, high = column.min(initial=np.inf), column.max(initial=-np.inf)
-            if not (min(low * scale, high * scale) >= -LARGEST and max(low * scale, high * scale) <= LARGEST):
-                return None  # not a number fails this too
-        return columns
+        columns = {index: frame[index].to_numpy() for index in scales}
+
+        def scaled(rows: slice) -> bool:
+            """Multiply some rows by their scales; False where one holds no number, or one beyond LARGEST."""
+            for index, scale in scales.items():
+                part, largest = columns[index][rows], LARGEST / abs(scale)
+                if not (part.min() >= -largest and part.max() <= largest):
+                    return False
+                if scale != 1.0:
+                    part *= scale
+            return True
+
+        for column in columns.values():
+            column.flags.writeable = True  # the frame is nobody else's
+        return columns if all(by_blocks(scaled, len(frame))) else None
 
     def _has(self, sign: str, offset: int) -> bool:
         return self.data.find(sign.encode(), offset) >= 0

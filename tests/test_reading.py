@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from bushfit.blocks import BLOCK
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.geometry import Direction
 from bushfit.measurement import Loop, Sweep, rebuild_time
@@ -181,6 +182,14 @@ def test_a_large_file_reads_like_a_small_one(lead: str, tmp_path: Path) -> None:
     last = lead.count("\n") + 1 + count
     with pytest.raises(MeasurementError, match=rf'line {last}, column "force \[kN\]"[\s\S]*"abc"'):
         loop_from(text.rsplit(",", 1)[0] + ",abc\n", tmp_path)
+
+
+@pytest.mark.parametrize("row", [BLOCK - 1, BLOCK, BLOCK + 1])
+def test_time_that_stands_still_is_found_wherever_blocks_meet(row: int, tmp_path: Path) -> None:
+    rows = [f"{i - (i == row)},{i % 7}.5,{i % 7}.25" for i in range(BLOCK + 9)]
+    text = "\n".join(["time [s],displacement [mm],force [kN]", *rows])
+    with pytest.raises(MeasurementError, match=rf'line {row + 2}, column "time \[s\]"'):
+        loop_from(text, tmp_path)
 
 
 NEVER = [f"{i},{i},7" for i in range(20)]

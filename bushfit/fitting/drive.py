@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from bushfit.blocks import BLOCK, by_blocks
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History, reversals
 from bushfit.errors import FitError
@@ -158,7 +159,8 @@ def drive_of(loop: Loop, *, without_wild: bool = False) -> Drive:
     motion, force_mean, force_noise, wild = harmonics(loop, frequency, cycles)
     rows = wild["force"].rows
     sound = np.delete(loop.force, rows) if rows.size else loop.force
-    half_motion, half_force = np.ptp(series(motion, np.arange(GRID) / GRID)) / 2.0, float(np.ptp(sound)) / 2.0
+    ends = np.array(by_blocks(lambda part: (sound[part].min(), sound[part].max()), sound.size))
+    half_motion, half_force = np.ptp(series(motion, np.arange(GRID) / GRID)) / 2.0, float(np.ptp(ends)) / 2.0
     noise = loop.noise * half_force if loop.noise is not None else force_noise
     from_rest = first == 0 and _from_rest(loop, frequency, half_motion, half_force, noise)
     clock, force = (loop.time - loop.time[0] if loop.time[0] else loop.time), loop.force
@@ -282,19 +284,23 @@ def _binned(
         starts = np.union1d(np.arange(_APART), later.astype(np.intp))
     group = np.searchsorted(starts, number, side="right") - 1
     middle = np.round(np.bincount(group, weights=number) / np.bincount(group))
-    first_rows = np.searchsorted(clock, np.arange(int(cycles * GRID) + 1) / (frequency * GRID))
-    bins = np.flatnonzero(np.diff(first_rows, append=clock.size))  # the filled ones
-    edges = first_rows[bins]
-    count = np.diff(edges, append=clock.size).astype(float)
+    edges = np.append(np.arange(int(cycles * GRID) + 1) / (frequency * GRID), np.inf)
+
+    def sums(bins: slice) -> Array:
+        """Of some bins the filled ones, (k,), their rows, and sums of phase in bins and of force over these, (4, k)."""
+        start, stop = np.searchsorted(clock, edges[[bins.start, bins.stop]])
+        first = np.searchsorted(clock[start:stop], edges[bins])
+        filled = np.flatnonzero(np.diff(first, append=stop - start))
+        number, first = filled + bins.start, first[filled]
+        count = np.diff(first, append=stop - start)
+        in_bins = np.add.reduceat(clock[start:stop], first) * (frequency * GRID) - count * number
+        return np.stack((number, count, in_bins, np.add.reduceat(force[start:stop], first)))
+
+    blocks = by_blocks(sums, edges.size - 1, 1 + BLOCK * edges.size // clock.size)
+    bins, *parts = np.concatenate(blocks, axis=1)
+    bins = bins.astype(np.intp)
     place = GRID * group[bins // GRID] + bins % GRID
-    rows, inside, total = (
-        np.bincount(place, weights=sums)
-        for sums in (
-            count,
-            np.add.reduceat(clock, edges) * (frequency * GRID) - count * bins,
-            np.add.reduceat(force, edges),
-        )
-    )
+    rows, inside, total = (np.bincount(place, weights=part) for part in parts)
     filled = np.flatnonzero(rows)
     rows, inside, total = rows[filled], inside[filled], total[filled]
     phase = middle[filled // GRID] + (filled % GRID + inside / rows) / GRID
