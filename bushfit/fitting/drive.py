@@ -18,7 +18,6 @@ from bushfit.effects.contract import Array
 from bushfit.effects.history import History, reversals
 from bushfit.errors import FitError
 from bushfit.fitting.harmonics import (
-    ENOUGH_ROWS,
     GRID,
     MOST_ROWS,
     WildRows,
@@ -31,8 +30,7 @@ from bushfit.fitting.harmonics import (
     turned,
 )
 from bushfit.fitting.noise import FLOOR
-from bushfit.fitting.outliers import gross_rows
-from bushfit.fitting.runin import steady_part
+from bushfit.fitting.runin import steady_part, thinned
 from bushfit.measurement import Loop
 
 #: Cycles whose bins are kept apart, and how fast the groups of later ones grow.
@@ -152,10 +150,10 @@ def drive_of(loop: Loop, *, without_wild: bool = False) -> Drive:
     Raises:
         FitError: the displacement is not one whole cycle or more of a periodic motion, or the loop gives energy.
     """
-    whole = loop.time
-    loop, note = steady_part(loop)
-    first = int(np.searchsorted(whole, loop.time[0]))
-    frequency, cycles = _fundamental(loop)
+    whole, thin = loop, thinned(loop)
+    loop, note = steady_part(whole, *thin)
+    first = int(np.searchsorted(whole.time, loop.time[0]))
+    frequency, cycles = _fundamental(loop, *(thin if loop is whole else thinned(loop)))
     motion, force_mean, force_noise, wild = harmonics(loop, frequency, cycles)
     rows = wild["force"].rows
     sound = np.delete(loop.force, rows) if rows.size else loop.force
@@ -222,18 +220,17 @@ def _from_rest(loop: Loop, frequency: float, half_motion: float, half_force: flo
     """
     if abs(loop.displacement[0]) > _AT_REST * half_motion or abs(loop.force[0]) > _AT_REST * half_force + 3.0 * noise:
         return False
-    clock = loop.time - loop.time[0]
+    end = np.searchsorted(loop.time, loop.time[0] + 2.0 / frequency)
+    clock, force = loop.time[:end] - loop.time[0], loop.force[:end]
     first = clock[: np.searchsorted(clock, _FIRST / frequency)]
-    change = np.interp(first + 1.0 / frequency, clock, loop.force) - loop.force[: first.size]
+    change = np.interp(first + 1.0 / frequency, clock, force) - force[: first.size]
     chance = 5.0 * noise * np.sqrt(2.0 / first.size)
     return bool(abs(np.median(change)) > max(1.25 * chance, _OTHER * half_force))
 
 
-def _fundamental(loop: Loop) -> tuple[float, float]:
-    """Frequency [Hz] and number of cycles: from crossings in one sense, refined by Gauss-Newton on the motion."""
-    rows = np.arange(0, loop.time.size, -(-loop.time.size // ENOUGH_ROWS))
-    rows = np.delete(rows, gross_rows(loop.displacement[rows]))
-    clock, x = loop.time[rows], loop.displacement[rows]
+def _fundamental(loop: Loop, clock: Array, x: Array) -> tuple[float, float]:
+    """Frequency [Hz] and number of cycles, from time and displacement of the loop `thinned`: by crossings in one sense,
+    refined by Gauss-Newton on the motion."""
     x = x - (x.max() + x.min()) / 2.0
     band = 0.1 * np.ptp(x)
     state = np.where(x > band, 1, np.where(x < -band, -1, 0))

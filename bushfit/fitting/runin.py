@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.fitting.harmonics import ENOUGH_ROWS
 from bushfit.fitting.outliers import gross_rows
 from bushfit.measurement import Loop
 
@@ -24,18 +25,26 @@ _WITHIN, _LEAST, _EDGE = 8.0, 5e-4, 0.5
 _THREE = 2.95
 #: Share of the range by which the motion passes its middle, before that counts as a crossing.
 _BAND = 0.1
-#: Rows that are enough to find the stretch.
-_MOST_ROWS = 200_000
 
 
-def steady_part(loop: Loop) -> tuple[Loop, str | None]:
+def thinned(loop: Loop) -> tuple[Array, Array]:
+    """Time and displacement of rows that are enough to find the cycles, gross ones left out."""
+    every = slice(None, None, -(-loop.time.size // ENOUGH_ROWS))
+    time, motion = loop.time[every], loop.displacement[every]
+    rows = gross_rows(motion)
+    return np.delete(time, rows), np.delete(motion, rows)
+
+
+def steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | None]:
     """A loop without what comes before and after its steady cycles, and a sentence on what was left out, if anything.
 
     After a run-in the first cycle still remembers it, and goes too where two more are left.
+
+    Args:
+        loop: the whole record.
+        time: and
+        motion: of the loop `thinned`.
     """
-    rows = np.arange(0, loop.time.size, -(-loop.time.size // _MOST_ROWS))
-    rows = np.delete(rows, gross_rows(loop.displacement[rows]))
-    time, motion = loop.time[rows], loop.displacement[rows]
     period = _period(time, motion)
     if period is None or time[-1] - time[0] <= period:
         return loop, None

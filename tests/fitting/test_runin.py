@@ -12,7 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.effects.history import History
 from bushfit.errors import FitError
 from bushfit.fitting.drive import drive_of
-from bushfit.fitting.runin import steady_part
+from bushfit.fitting.runin import steady_part, thinned
 from bushfit.fitting.terms import LoopTerm
 from bushfit.geometry import Direction
 from bushfit.measurement import Loop
@@ -84,7 +84,7 @@ def test_a_steady_record_is_left_alone(paper_model: Model, case: str) -> None:
     noisy = replace(loop, displacement=loop.displacement + 5e-3 * AMPLITUDE * rng.standard_normal(loop.time.size))
     spiked = replace(loop, displacement=np.where(rng.random(loop.time.size) < 0.003, 0.0, loop.displacement))
     for one in (loop, noisy, spiked):
-        same, note = steady_part(one)
+        same, note = steady_part(one, *thinned(one))
         assert same is one
         assert note is None
 
