@@ -37,7 +37,8 @@ def parse_point(text: str) -> Point:
     expected = 'direction, frequency and amplitude, such as "axial 25 Hz 0.1 mm" or "torsion 10 Hz 1 deg"'
     match = _WORDS.fullmatch(text)
     if not match or match[1] not in set(Direction):
-        raise UnitError("this is no operating point", found=repr(text), expected=expected)
+        hint = "write numbers with a decimal point" if re.search(r"\d,\d", text) else None
+        raise UnitError("this is no operating point", found=repr(text), expected=expected, hint=hint)
     direction = Direction(match[1])
     frequency, amplitude = quantity(match[2], "Hz"), quantity(match[3], direction.displacement_unit)
     if not (frequency > 0.0 and amplitude > 0.0):

@@ -44,6 +44,8 @@ class _Folder(click.Path):
 class _Share(click.FloatRange):
     """A share above zero; nan is none."""
 
+    name = "share, such as 0.02"
+
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         share = super().convert(value, param, ctx)
         return share if math.isfinite(share) else self.fail(f"{value} is no share such as 0.02", param, ctx)

@@ -19,6 +19,14 @@ def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | 
     if text is None:
         return None
     expected = 'such as "5:155:10 Hz" (start:stop:step) or "0.1, 0.2, 0.5 mm", with one unit at the end'
+    if re.search(r"\d,\d", text):
+        raise UnitError(
+            "a comma between two digits may part numbers or be a decimal comma",
+            place=option,
+            found=repr(text),
+            expected=expected,
+            hint='write decimals with a point, "0.5", and numbers of a list apart, "1, 5"',
+        )
     parts = re.fullmatch(r"\s*([-+0-9.eE,:\s]*[0-9.])\s*([^-+\d\s:,.].*)", text)
     if not parts:
         raise UnitError("these are no values with a unit", place=option, found=repr(text), expected=expected)

@@ -11,24 +11,29 @@ import click
 from bushfit.cli.common import Options, shared_options, warn
 from bushfit.cli.inspect import KEYS
 from bushfit.cli.raw import direction_error, file_options, options_named
-from bushfit.errors import CampaignError, MeasurementError
+from bushfit.errors import BushfitError, CampaignError, MeasurementError
 
 if TYPE_CHECKING:
+    from bushfit.geometry import Bushing
     from bushfit.inspection.record import Inspected
 
 
 @click.command("init")
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--inner-radius", required=True, help='Of the rubber, such as "10 mm".')
-@click.option("--outer-radius", required=True, help='Of the rubber, such as "18 mm".')
+@click.option("--inner-radius", help='Of the rubber, such as "10 mm"; or else')
+@click.option("--inner-diameter", help='such as "20 mm".')
+@click.option("--outer-radius", help='Of the rubber, such as "18 mm"; or else')
+@click.option("--outer-diameter", help='such as "36 mm".')
 @click.option("--length", required=True, help='Mean length of the rubber, such as "34 mm".')
 @click.option("--name", help="Of the bushing [the folder of the first file].")
 @file_options(*KEYS)
 @shared_options
 def command(
     files: tuple[Path, ...],
-    inner_radius: str,
-    outer_radius: str,
+    inner_radius: str | None,
+    inner_diameter: str | None,
+    outer_radius: str | None,
+    outer_diameter: str | None,
     length: str,
     name: str | None,
     stated: Mapping[str, Any],
@@ -46,13 +51,24 @@ def command(
     from bushfit.inspection.opening import inspect
 
     name = name or files[0].resolve().parent.name
-    bushing = {"name": name, "inner_radius": inner_radius, "outer_radius": outer_radius, "length": length}
-    folder, target = _target(options, bushing)
+    radii = {
+        "inner": _radius("inner", inner_radius, inner_diameter),
+        "outer": _radius("outer", outer_radius, outer_diameter),
+    }
+    table = {"name": name, **{f"{side}_radius": radius for side, radius in radii.items()}, "length": length}
+    folder, target = _place(options, name)
+    bushing = _bushing(table, folder / target)
     options.require_free(folder, [target])
     with options_named():
         seen = [_usable(inspect(file, stated)) for file in files]
     _check_once(files)
-    text = campaign_text(bushing, seen, folder)
+    text = campaign_text(table, seen, folder)
+    inner, outer, long = (1e3 * size for size in (2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length))
+    options.console.print(
+        f"{name}: rubber from {inner:.6g} to {outer:.6g} mm in diameter, {(outer - inner) / 2:.6g} mm thick, "
+        f"{long:.6g} mm long",
+        markup=False,
+    )
     for one in seen:
         _tell(options, one)
     options.write(folder, {target: text.encode()})
@@ -60,25 +76,47 @@ def command(
     options.tell({"campaign": text, "files": [one.to_document() for one in seen]})
 
 
-def _target(options: Options, bushing: Mapping[str, str]) -> tuple[Path, str]:
-    """Folder and name of the campaign, its geometry checked."""
-    from bushfit.errors import BushfitError
-    from bushfit.geometry import Bushing
+def _radius(side: str, radius: str | None, diameter: str | None) -> str:
+    """A radius as the campaign has it, from the one of the two options that was given."""
+    from bushfit.units import quantity
+
+    options = f"--{side}-radius", f"--{side}-diameter"
+    if radius is not None and diameter is not None:
+        raise click.UsageError(f"'{options[0]}' and '{options[1]}' are one size; give one of them.")
+    if radius is not None:
+        return radius
+    if diameter is None:
+        raise click.UsageError(f"Missing option '{options[0]}' or '{options[1]}'.")
+    try:
+        return f"{1e3 * quantity(diameter, 'm') / 2.0:.12g} mm"
+    except BushfitError as error:
+        error.place = options[1]
+        raise
+
+
+def _place(options: Options, name: str) -> tuple[Path, str]:
+    """Folder and name of the campaign."""
     from bushfit.output import folder_name
+
+    file = options.output
+    if file and file.suffix == ".toml":
+        return file.parent, file.name
+    return options.folder(folder_name(name)), "campaign.toml"
+
+
+def _bushing(table: Mapping[str, str], file: Path) -> Bushing:
+    """The bushing of the campaign to be; errors name the options."""
+    from bushfit.geometry import Bushing
     from bushfit.schema import BushingTable
     from bushfit.toml import check_tables
 
-    file = options.output if options.output and options.output.suffix == ".toml" else None
-    folder = file.parent if file else options.folder(folder_name(bushing["name"]))
-    target = file.name if file else "campaign.toml"
     try:
-        Bushing(**vars(check_tables(bushing, folder / target, BushingTable)))
+        return Bushing(**vars(check_tables(table, file, BushingTable)))
     except BushfitError as error:
         error.file = None
         if error.place:
             error.place = ", ".join("--" + key.replace("_", "-") for key in error.place.split(", "))
         raise
-    return folder, target
 
 
 def _usable(seen: Inspected) -> Inspected:
@@ -110,7 +148,8 @@ def _check_once(files: Sequence[Path]) -> None:
 def _tell(options: Options, seen: Inspected) -> None:
     """One line of what a file is, what was assumed, and what is odd."""
     facts = seen.looked.facts
-    kept = [facts[key] for key in ("cycles", "frequency", "frequencies", "amplitude", "amplitudes") if key in facts]
+    wanted = ("cycles", "frequency", "frequencies", "amplitude", "amplitudes")
+    kept = [f"{key}: {facts[key]}" for key in wanted if key in facts]
     options.console.print(f"{seen.file}: {seen.kind}, {seen.direction}; {'; '.join(kept)}", markup=False)
     warn(options, [f"{seen.file.name}: {sentence}" for sentence in seen.looked.odd])
     if seen.kind == "sweep" and "amplitude" not in seen.entry and not seen.counted:

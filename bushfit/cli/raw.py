@@ -52,8 +52,20 @@ def file_options(*keys: str) -> Callable[[F], F]:
                 type=click.Choice(["axial", "radial", "torsion"]),
                 help="Of all files given [found from their names and columns].",
             ),
-            click.option("--column", "columns", multiple=True, metavar="ROLE=HEADER", help='Such as "force=Fz".'),
-            click.option("--unit", "units", multiple=True, metavar="ROLE=UNIT", help='Such as "force=kN".'),
+            click.option(
+                "--column",
+                "columns",
+                multiple=True,
+                metavar="ROLE=HEADER",
+                help='Such as "force=Fz", of all loops given; roles of a sweep, of all sweeps.',
+            ),
+            click.option(
+                "--unit",
+                "units",
+                multiple=True,
+                metavar="ROLE=UNIT",
+                help='Such as "force=kN", of all loops given; roles of a sweep, of all sweeps.',
+            ),
             *(
                 click.option(
                     "--" + key.replace("_", "-"), key, type=int if key in _NUMBERS else str, help=_SAME_NAME[key]

@@ -48,7 +48,7 @@ def look_at_loop(loop: Loop, file: Path, *, timed: bool = True) -> Looked:
     if swings:
         amplitude, mean_motion = half_motion, float(loop.displacement.min() + half_motion)
     facts = {
-        "cycles": f"{drive.cycles:.4g}, {'from rest' if drive.from_rest else 'settled or run in'}",
+        "cycles": f"{drive.cycles:.3g}, {'the first from rest' if drive.from_rest else 'taken as steady'}",
         "frequency": f"{drive.frequency:.4g} Hz, {_waveform(drive)}",
         "sampling": f"{clock(loop) if timed else 'no time in the file'}, {rows:.4g} rows a cycle",
         "amplitude": f"{to_length * amplitude:.4g} {length} zero-to-peak",

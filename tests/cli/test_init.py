@@ -40,6 +40,17 @@ def test_the_campaign_loads_and_fits(typed: Callable, tests: list[Path], tmp_pat
     assert values == pytest.approx(table_1, rel=0.02)
 
 
+def test_diameters_are_halved_and_the_geometry_is_echoed(typed: Callable, tests: list[Path], tmp_path: Path) -> None:
+    sizes = ("--inner-diameter", "20 mm", "--outer-diameter", "3.6 cm", "--length", "34 mm")
+    done = typed("init", *tests, *sizes, "-o", "x", "--name", "B")
+    assert done.returncode == 0, done.stderr
+    assert "B: rubber from 20 to 36 mm in diameter, 8 mm thick, 34 mm long" in done.stderr
+    assert "loop_axial_1.csv: loop, axial; cycles: 3, taken as steady; frequency: 0.1 Hz, a sine; " in done.stderr
+    assert "sweep_axial.csv: sweep, axial; frequencies: 16, from 5 to 155 Hz; amplitudes: " in done.stderr
+    bushing = load_campaign(tmp_path / "x/campaign.toml").bushing
+    assert (bushing.inner_radius, bushing.outer_radius) == (0.01, 0.018)
+
+
 def test_where_it_is_written(typed: Callable, tests: list[Path], tmp_path: Path) -> None:
     done = typed("init", *tests, *GEOMETRY, "-o", "lab/my.toml", "--json")
     assert done.returncode == 0, done.stderr
@@ -122,6 +133,13 @@ def test_a_force_that_counts_the_other_way_is_turned_and_said(
         (("data/cmp_15961_raw/stepped_sine_axial.csv",), GEOMETRY, "is a raw stepped-sine history"),
         (("data/cmp_15961/loop_axial_1.csv",) * 2, GEOMETRY, "a file is given twice"),
         (("data/cmp_15961/loop_axial_1.csv",), GEOMETRY[:4], "Missing option '--length'"),
+        (("data/cmp_15961/loop_axial_1.csv",), GEOMETRY[2:], "Missing option '--inner-radius' or '--inner-diameter'"),
+        (("data/cmp_15961/loop_axial_1.csv",), (*GEOMETRY, "--outer-diameter", "36 mm"), "give one of them"),
+        (
+            ("data/cmp_15961/loop_axial_1.csv",),
+            ("--outer-diameter", "36,5 mm", *GEOMETRY[:2], *GEOMETRY[4:]),
+            "--outer-diameter: this is no quantity",
+        ),
         (("data/cmp_15961/loop_axial_1.csv",), (*GEOMETRY[:5], "34"), 'write "34 mm"'),
         (
             ("data/cmp_15961/loop_axial_1.csv",),
