@@ -52,14 +52,14 @@ class Covariance:
         i = self.names.index(name)
         return float(np.sqrt(self.matrix[i, i]))
 
+    @cached_property
     def root(self) -> Array:
         """B with B B^T the covariance, so that |B^T slope| is a standard error however ill-conditioned it is."""
-        return self._roots[0]
+        return _root(self.matrix)
 
     @cached_property
-    def _roots(self) -> list[Array]:
-        """Of the matrix, and of each spread."""
-        return [_root(part) for part in (self.matrix, *self.spread)]
+    def _spread_roots(self) -> list[Array]:
+        return [_root(part) for part in self.spread]
 
     def half_width(self, slopes: Array) -> Array:
         """Half width of the 95 % interval of quantities with these slopes by parameter, (k, n) -> (n,).
@@ -67,7 +67,8 @@ class Covariance:
         Student's t with the effective degrees of freedom of Satterthwaite (1946): 2 v^2 over the variance of v, which
         is the sum of squares of what each spread adds to the quantity's variance v.
         """
-        variance, *moved = (np.sum(np.square(root.T @ slopes), axis=0) for root in self._roots)
+        variance = np.sum(np.square(self.root.T @ slopes), axis=0)
+        moved = [np.sum(np.square(root.T @ slopes), axis=0) for root in self._spread_roots]
         unsure = np.sqrt(np.sum(np.square(moved), axis=0)) if moved else np.zeros_like(variance)
         least = np.sqrt(2.0 / _MOST_FREEDOM)
         share = np.divide(unsure, variance, out=np.zeros_like(variance), where=variance > 0.0)

@@ -97,12 +97,12 @@ def test_intervals_stay_within_what_is_possible(paper_model: Model) -> None:
 
 
 def test_covariance_root(result: Result) -> None:
-    root = result.covariance.root()
+    root = result.covariance.root
     np.testing.assert_allclose(root @ root.T, result.covariance.matrix, rtol=1e-7)
     singular = Covariance(("mu", "m"), np.array([[4.0, 6.0], [6.0, 9.0]]))
-    np.testing.assert_allclose(singular.root() @ singular.root().T, singular.matrix, atol=1e-12)
+    np.testing.assert_allclose(singular.root @ singular.root.T, singular.matrix, atol=1e-12)
     held = Covariance(("mu", "m"), np.array([[4.0, 0.0], [0.0, 0.0]]))
-    np.testing.assert_allclose(held.root() @ held.root().T, held.matrix, atol=1e-12)
+    np.testing.assert_allclose(held.root @ held.root.T, held.matrix, atol=1e-12)
     assert held.correlations() == []
 
 

@@ -44,7 +44,7 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
     slopes = Coordinates.of(model, names).slopes(model.values)
     system, root = np.eye(len(names)), np.zeros((len(names), len(names)))
     begin = len(held.names)
-    root[:begin, :begin] = held.root() / slopes[:begin, None]
+    root[:begin, :begin] = held.root / slopes[:begin, None]
     bases = []
     for stage in stages:
         own = slice(begin, begin + len(stage.names))

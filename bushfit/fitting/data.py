@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -101,6 +102,7 @@ class Data:
             )
         return [*(axial or self.loops)]
 
+    @cached_property
     def smallest_sweep(self) -> SweepTerm:
         """The sweep levels `fit-dynamic` uses: those the campaign names, else the smallest axial one.
 

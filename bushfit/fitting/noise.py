@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import bartlett
+from scipy.special import chdtrc
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.outliers import MEDIAN_TO_SIGMA
@@ -207,14 +207,21 @@ def _parts(values: Array) -> Array:
 def _alike(levels: Sequence[_Level]) -> list[_Level]:
     """Levels of equal noise, those that a single wild point sets apart without it; none where they are unequal."""
     alike = sorted(levels, key=lambda level: -float(level.variance.sum()))
+    variance = np.array([level.variance.mean() for level in alike])
+    freedom = np.array([level.freedom for level in alike], dtype=float)
     for place, level in enumerate(alike):
-        if _unequal(alike) and level.calmer is not None and level.calmer.size:
-            alike[place] = replace(level, scatter=level.calmer, freedom=level.calmer.shape[0])
-    return [] if _unequal(alike) else alike
+        if level.calmer is not None and level.calmer.size and _unequal(variance, freedom):
+            alike[place] = calm = replace(level, scatter=level.calmer, freedom=level.calmer.shape[0])
+            variance[place], freedom[place] = calm.variance.mean(), calm.freedom
+    return [] if _unequal(variance, freedom) else alike
 
 
-def _unequal(levels: Sequence[_Level]) -> bool:
-    samples = [level.scatter.ravel() for level in levels]
-    if len(samples) < 2 or any(np.ptp(sample) == 0.0 for sample in samples):
+def _unequal(variance: Array, freedom: Array) -> bool:
+    """Bartlett's test (1937) of variances (n,), each with as many degrees of freedom in gain as in phase."""
+    if variance.size < 2 or not variance.all():
         return False
-    return bool(bartlett(*samples).pvalue < _EQUAL_NOISE_P)
+    freedom = 2.0 * freedom
+    pooled = np.average(variance, weights=freedom)
+    few = (np.sum(1.0 / freedom) - 1.0 / freedom.sum()) / (3.0 * (variance.size - 1))
+    statistic = float(freedom @ np.log(pooled / variance)) / (1.0 + few)
+    return bool(chdtrc(variance.size - 1, statistic) < _EQUAL_NOISE_P)

@@ -94,7 +94,7 @@ def fit_dynamic(data: Data, static: Result) -> Result:
 
     The static parameters' own errors are carried into those of m and alpha.
     """
-    terms: list[Term] = [data.smallest_sweep()]
+    terms: list[Term] = [data.smallest_sweep]
     held = {name: static.model.values[name] for name in STATIC}
     return _result(data, [_solve(data, terms, BASE, held)], static.covariance.restricted(STATIC))
 
@@ -113,7 +113,7 @@ def fit_two_step(data: Data) -> TwoStep:
     Raises:
         FitError: a test is missing, or the passes do not settle.
     """
-    loops, sweep = data.static_terms(), data.smallest_sweep()
+    loops, sweep = data.static_terms(), data.smallest_sweep
     springpot: dict[str, float] = {}
     passes: list[Mapping[str, float]] = []
     asked: list[Array] = []

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -203,12 +203,24 @@ def walls(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, Array]:
 
 
 def _lmfit_parameters(start: Array, low: Array | None = None, high: Array | None = None) -> Any:
+    parameters = _blank_parameters(start.size)
+    lows, highs = (
+        np.full(start.shape, end) if wall is None else wall for wall, end in ((low, -np.inf), (high, np.inf))
+    )
+    for parameter, value, least, most in zip(parameters.values(), start, lows, highs, strict=True):
+        parameter.set(value=float(value), min=float(least), max=float(most))
+    return parameters
+
+
+@cache
+def _blank_parameters(count: int) -> Any:
+    """Parameters for one fit after the other: lmfit copies what it is given, and to make them takes as long as to
+    evaluate a model."""
     import lmfit
 
-    lows, highs = (np.full(start.shape, None) if wall is None else wall for wall in (low, high))
     parameters = lmfit.Parameters()
-    for i, (value, least, most) in enumerate(zip(start, lows, highs, strict=True)):
-        parameters.add(f"u{i}", value=value, min=least, max=most)
+    for i in range(count):
+        parameters.add(f"u{i}")
     return parameters
 
 

@@ -150,9 +150,9 @@ class SweepTerm:
     @cached_property
     def _distinct(self) -> tuple[Array, Array, Array]:
         """Frequency and reached amplitude of the distinct operating points, and the place of each point among them."""
-        points = np.stack((self.frequency, self.sweep.amplitude_reached[self.order]))
-        distinct, place = np.unique(points, axis=1, return_inverse=True)
-        return distinct[0], distinct[1], place.ravel()
+        points = self.frequency + 1j * self.sweep.amplitude_reached[self.order]
+        distinct, place = np.unique(points, return_inverse=True)
+        return distinct.real, distinct.imag, place
 
     def relative(self, model: Model) -> Array:
         """|K - K_meas| / |K_meas| of the points that carry weight, for NRMSE."""
@@ -171,20 +171,17 @@ class SweepTerm:
         """Length of deviations, (n,), in units of the random noise, less the likeliest error that a block shares."""
         return np.hypot(*self._own(deviation, shared=shared))
 
-    def _own(self, deviation: Array, *, shared: bool = True) -> list[Array]:
-        parts = []
-        for which, part in enumerate((deviation.real, deviation.imag)):
-            scale, share, weight = self._block_scales[which]
-            if shared:
-                mean = np.add.reduceat(part * scale**2, self.block_starts) / weight
-                part = part - np.repeat((1.0 - (1.0 - share) ** 2) * mean, self._block_sizes)
-            parts.append(part / self._random[which])
-        return parts
+    def _own(self, deviation: Array, *, shared: bool = True) -> Array:
+        parts = _parts(deviation)
+        if shared:
+            mean = np.add.reduceat(parts * self._scale**2, self.block_starts, axis=-1) / self._block_weight
+            parts = parts - ((1.0 - (1.0 - self._share) ** 2) * mean)[:, self._block]
+        return parts / self._random
 
     def shown(self, model: Model) -> Array:
         """As `residual`, and of points without weight how far they lie off, in units of noise, (2 n,)."""
         deviation = self.deviation(model)
-        return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), np.concatenate(self._own(deviation)))
+        return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), self._own(deviation).ravel())
 
     def deviation(self, model: Model, values: Values | None = None) -> Array:
         """Residual before whitening: gain in the real, phase (or loss factor) in the imaginary part, (..., n)."""
@@ -228,17 +225,12 @@ class SweepTerm:
 
     def whiten(self, deviation: Array) -> Array:
         """Residuals in units of noise, shared block errors taken out: (..., n) complex -> (..., 2 n)."""
-        parts = (deviation.real, deviation.imag)
-        return np.concatenate([self._whiten(part, which) for which, part in enumerate(parts)], axis=-1)
+        return _flat(self._less_shared(_parts(deviation) * self._scale))
 
-    def _whiten(self, part: Array, which: int) -> Array:
-        return self._less_shared(part * self._block_scales[which][0], which)
-
-    def _less_shared(self, part: Array, which: int) -> Array:
-        """Residuals over their noise, less the share of what lies along it in each block."""
-        scale, share, weight = self._block_scales[which]
-        along = np.add.reduceat(part * scale, self.block_starts, axis=-1) / weight
-        return part - np.repeat(along * share, self._block_sizes, axis=-1) * scale
+    def _less_shared(self, parts: Array) -> Array:
+        """Residuals over their noise, (..., 2, n), less the share of what lies along it in each block."""
+        along = np.add.reduceat(parts * self._scale, self.block_starts, axis=-1) / self._block_weight
+        return parts - (along * self._share)[..., self._block] * self._scale
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
         """Per estimated variance of the noise, what reacts to the whitened residuals by `influence`, (k, 2 n), times
@@ -247,27 +239,27 @@ class SweepTerm:
         Within a block V = s^2 I + t^2 1 1^T has the derivatives I and 1 1^T, whitened W^2 and (W 1)(W 1)^T. The
         estimate of t^2 is a mean of `freedom` squares that expect t^2 + s^2/n, and scatters no further down than to 0.
         """
-        zero = np.zeros_like(influence[:, : self.frequency.size])
-        parts: dict[Hashable, Array] = {}
-        for which, part in enumerate(np.split(influence, 2, axis=1)):
-            scale, share, _ = self._block_scales[which]
-            reactions = {}
-            if self.noise.scatter_freedom:
-                twice = self._less_shared(self._less_shared(part, which), which)
-                reactions["scatter"] = twice * np.sqrt(2.0 / self.noise.scatter_freedom)
-            if self.noise.freedom:
-                variance = self.noise.shared[which] ** 2
-                expected = variance + self._random[which][self.block_starts] ** 2 / self._block_sizes
-                error = np.minimum(expected * np.sqrt(2.0 / self.noise.freedom), variance) * (1.0 - share) ** 2
-                block = np.add.reduceat(part * scale, self.block_starts, axis=-1) * error
-                reactions["shared"] = np.repeat(block, self._block_sizes, axis=-1) * scale
-            for kind, reaction in reactions.items():
-                parts[kind, which] = np.concatenate((zero, reaction) if which else (reaction, zero), axis=1)
-        return parts
+        parts = influence.reshape(-1, 2, self.frequency.size)
+        reactions = {}
+        if self.noise.scatter_freedom:
+            twice = self._less_shared(self._less_shared(parts))
+            reactions["scatter"] = twice * np.sqrt(2.0 / self.noise.scatter_freedom)
+        if self.noise.freedom:
+            variance = np.square(self.noise.shared)[:, None]
+            expected = variance + self._random[:, self.block_starts] ** 2 / np.bincount(self._block)
+            error = np.minimum(expected * np.sqrt(2.0 / self.noise.freedom), variance) * (1.0 - self._share) ** 2
+            along = np.add.reduceat(parts * self._scale, self.block_starts, axis=-1)
+            reactions["shared"] = (along * error)[..., self._block] * self._scale
+        return {
+            (kind, which): _flat(reaction * only)
+            for kind, reaction in reactions.items()
+            for which, only in enumerate(np.eye(2)[..., None])
+        }
 
     @cached_property
-    def _block_sizes(self) -> Array:
-        return np.diff(np.append(self.block_starts, self.frequency.size))
+    def _block(self) -> Array:
+        """Number of the block that each point belongs to, (n,)."""
+        return np.repeat(np.arange(self.block_starts.size), np.diff(self.block_starts, append=self.frequency.size))
 
     @cached_property
     def weights(self) -> Array:
@@ -275,21 +267,35 @@ class SweepTerm:
         return np.ones(self.frequency.size) if self.weight is None else self.weight
 
     @cached_property
-    def _random(self) -> list[Array]:
-        """Standard deviation of each point's gain and phase, as if it had all its weight, (n,) each."""
+    def _random(self) -> Array:
+        """Standard deviation of each point's gain and phase, as if it had all its weight, (2, n)."""
         levels = [self.noise.random[self.sweep.name, float(x)] for x in self.amplitude[self.block_starts]]
-        return [np.repeat(part, self._block_sizes) for part in np.array(levels).T]
+        return np.array(levels).T[:, self._block]
 
     @cached_property
-    def _block_scales(self) -> list[tuple[Array, Array, Array]]:
-        """For gain and phase: one over each point's noise, (n,), the share of what lies along it in a block that is
-        taken out, and the sum of its squares there."""
-        scales = []
-        for random, shared in zip(self._random, self.noise.shared, strict=True):
-            scale = np.sqrt(self.weights) / random
-            weight = np.maximum(np.add.reduceat(scale**2, self.block_starts), np.finfo(float).tiny)
-            scales.append((scale, 1.0 - 1.0 / np.sqrt(1.0 + shared**2 * weight), weight))
-        return scales
+    def _scale(self) -> Array:
+        """One over the noise of each point's gain and phase, (2, n)."""
+        return np.sqrt(self.weights) / self._random
+
+    @cached_property
+    def _block_weight(self) -> Array:
+        """Sum of the squares of one over the noise in each block, (2, blocks)."""
+        return np.maximum(np.add.reduceat(self._scale**2, self.block_starts, axis=-1), np.finfo(float).tiny)
+
+    @cached_property
+    def _share(self) -> Array:
+        """Share of what lies along the noise in a block that is taken out, (2, blocks)."""
+        return 1.0 - 1.0 / np.sqrt(1.0 + np.square(self.noise.shared)[:, None] * self._block_weight)
+
+
+def _parts(deviation: Array) -> Array:
+    """Gain and phase, complex (..., n) -> (..., 2, n)."""
+    return np.stack((deviation.real, deviation.imag), axis=-2)
+
+
+def _flat(parts: Array) -> Array:
+    """All gains, then all phases, (..., 2, n) -> (..., 2 n)."""
+    return parts.reshape(*parts.shape[:-2], -1)
 
 
 Term = LoopTerm | SweepTerm

@@ -168,7 +168,7 @@ def by_time_stepping(term: SweepTerm, static: Result, start: dict[str, float]) -
 def test_fit_dynamic_against_time_stepping(
     benchmark: BenchmarkFixture, data: Data, static: Result, table: Rows
 ) -> None:
-    term = data.smallest_sweep()
+    term = data.smallest_sweep
     start = {"m": 0.5 * static.model.values["m"], "alpha": 0.3}
     slow_answer = by_time_stepping(term, static, start)
     found = benchmark(fit_dynamic, data, static)

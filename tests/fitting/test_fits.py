@@ -277,12 +277,12 @@ def test_held_and_bounded_parameters(measured: Data) -> None:
 
 
 def test_dynamic_amplitudes_choose_the_levels(measured: Data) -> None:
-    assert set(measured.smallest_sweep().amplitude) == {1e-4}
+    assert set(measured.smallest_sweep.amplitude) == {1e-4}
     other = replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(2e-4, 5e-4)))
-    assert set(Data.of(other).smallest_sweep().amplitude) == {2e-4, 5e-4}
+    assert set(Data.of(other).smallest_sweep.amplitude) == {2e-4, 5e-4}
     absent = Data.of(replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(3e-4,))))
     with pytest.raises(FitError, match="no sweep at these amplitudes"):
-        absent.smallest_sweep()
+        _ = absent.smallest_sweep
 
 
 def test_missing_tests_are_said(measured: Data) -> None:

@@ -18,7 +18,7 @@ from bushfit.model import FIVE, Model
 from bushfit.results import Result
 from bushfit.schema import FitSettings, ParameterSetting, SimulatedLoop, SimulatedSweep, SimulateSettings
 
-SEEDS = 60
+SEEDS = 100
 FREQUENCIES = (5.0, 15.0, 45.0, 100.0, 155.0)
 
 
