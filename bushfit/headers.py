@@ -164,15 +164,17 @@ class Vocabulary:
         text, convention = split_convention(header.translate(_SPELLINGS))
         if plain(header) in self._roles:  # a campaign may name a header with its unit
             return Heading(self._roles[plain(header)], units.split_header(text)[1], convention)
-        for name, unit in _splits(text):
-            bare = plain(name)
+        for name, unit, bracketed in _splits(text):
+            bare, counted = plain(name), convention
             if bare in _DOUBLE:
-                bare, convention = "amplitude", "peak-to-peak"
+                bare, counted = "amplitude", "peak-to-peak"
             with_aside = plain(_ASIDES.sub("", _folded(name)))
-            for candidate in (bare, with_aside, *([bare + "amplitude"] if convention else [])):
+            for candidate in (bare, with_aside, *([bare + "amplitude"] if counted else [])):
                 role = self._roles.get(candidate)
-                if role and not (candidate == "f" and unit and any(units.agrees(unit, si) for si in _NOT_F[role])):
-                    return Heading(role, unit, convention)
+                if role is None or not (bracketed or units.is_unit(unit or "")):
+                    continue
+                if not (candidate == "f" and unit and any(units.agrees(unit, si) for si in _NOT_F[role])):
+                    return Heading(role, unit, counted)
         return None
 
 
@@ -194,15 +196,13 @@ def plain(name: str) -> str:
     return letters.replace("ae", "a").replace("oe", "o").replace("ue", "u")
 
 
-def _splits(text: str) -> Iterator[tuple[str, str | None]]:
-    """All ways to take a header apart into name and unit."""
+def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
+    """All ways to take a header apart into name and unit, and whether brackets say that it is one."""
     name, unit = units.split_header(text)
-    yield name, unit
+    yield name, unit, True
     if unit is None:
         for cut in _CUT.finditer(name):
-            suffix = name[cut.end() :].replace("_", " ")
-            if units.is_unit(suffix):
-                yield name[: cut.start()], suffix
+            yield name[: cut.start()], name[cut.end() :].replace("_", " "), False
 
 
 def _folded(text: str) -> str:

@@ -54,6 +54,24 @@ _SPELLINGS = {
     }.items()
     for word in words.split()
 }
+#: Everyday units by SI base, as pint has them: a run that meets no other is spared pint, which takes longer to load
+#: than a fit takes.
+_EVERYDAY = {
+    unit: (scale, base)
+    for base, scales in {
+        "dimensionless": {"1": 1.0, "%": 0.01},
+        "meter": {"m": 1.0, "mm": 1e-3, "µm": 1e-6},
+        "radian": {"rad": 1.0, "deg": math.pi / 180.0},
+        "second": {"s": 1.0, "ms": 1e-3, "min": 60.0},
+        "1 / second": {"Hz": 1.0},
+        "kilogram * meter / second ** 2": {"N": 1.0, "kN": 1e3},
+        "kilogram * meter ** 2 / second ** 2": {"N*m": 1.0, "N m": 1.0, "Nm": 1.0},
+        "kilogram / second ** 2": {"N/m": 1.0, "N/mm": 1e3, "kN/mm": 1e6},
+        "kilogram * meter ** 2 / radian / second ** 2": {"N*m/rad": 1.0, "N m/deg": 180.0 / math.pi},
+        "kilogram / meter / second ** 2": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6},
+    }.items()
+    for unit, scale in scales.items()
+}
 #: Words that only some spellings of are known, and capitals that pint takes for other units.
 _EXACT = {"Grad": "deg", "GRAD": "deg", "DEG": "deg", "Deg": "deg", "MM": "mm", "KN": "kN", "SEC": "s", "Sec": "s"}
 _EXACT |= {"RPM": "rpm", "Inch": "inch", "INCH": "inch", "Mpa": "MPa", "MPA": "MPa", "LBF": "lbf", "Lbf": "lbf"}
@@ -191,6 +209,12 @@ def _resolve(text: str) -> tuple[float, str]:
     text = text.strip().rstrip(".")
     if text in ("", "-"):
         text = "1"
+    if text in _EVERYDAY:
+        return _EVERYDAY[text]
+    return _by_pint(text)
+
+
+def _by_pint(text: str) -> tuple[float, str]:
     unknown = UnitError(
         "unknown unit", found=f'"{text[:_LONGEST]}"', expected="a unit such as mm, N, kN/mm, deg, Hz or %"
     )

@@ -171,3 +171,8 @@ def test_units_of_two_readings_are_refused(unit: str, said: str) -> None:
 def test_pounds_of_mass_are_told_from_pounds_of_force(unit: str) -> None:
     with pytest.raises(UnitError, match='a pound of force is "lbf"'):
         units.factor(unit, "N")
+
+
+@pytest.mark.parametrize("unit", units._EVERYDAY)
+def test_everyday_units_are_what_pint_says(unit: str) -> None:
+    assert units._EVERYDAY[unit] == units._by_pint(unit)

@@ -215,6 +215,17 @@ def test_help_is_instant(arguments: tuple[str, ...]) -> None:
     assert done.stdout
 
 
+def test_everyday_units_need_no_pint(work: Path, tmp_path: Path) -> None:
+    arguments = ["bushfit", "fit", CAMPAIGN, "--no-plots", "-q", "-o", str(tmp_path / "fit")]
+    code = (
+        f"import sys\nfrom bushfit.cli import main\nsys.argv = {arguments!r}\n"
+        "try:\n    main()\nfinally:\n    assert not {'pint', 'matplotlib.pyplot', 'distributed'} & set(sys.modules)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=work, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "fit" / "model.json").exists()
+
+
 @pytest.mark.parametrize("command", ["run", "fit-static", "fit-dynamic", "fit", "predict", "simulate"])
 def test_every_command_has_help_that_names_its_files(bushfit: Run, command: str) -> None:
     done = bushfit(command, "--help")
