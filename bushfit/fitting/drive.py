@@ -35,7 +35,7 @@ from bushfit.measurement import Loop
 
 #: Cycles whose bins are kept apart, and how fast the groups of later ones grow.
 _APART, _GROWTH = 4, 1.5
-_CLOCK_HARMONICS, _CLOCK_ROUNDS = 15, 6
+_CLOCK_HARMONICS, _CLOCK_ROUNDS, _CLOCK_SETTLED = 15, 10, 1e-12
 #: Steps of the grid about a turning point in which rows carry no weight.
 _JUMP = 1.5
 #: Share of the half range below which both first displacement and first force count as a start from rest.
@@ -257,15 +257,18 @@ def _fundamental(loop: Loop, clock: Array, x: Array) -> tuple[float, float]:
     number = order(loop.time.size / (closed * frequency), _CLOCK_HARMONICS)
     sample = slice(None, None, max(1, x.size // 2000))
     time, motion = clock[sample] - loop.time[0], x[sample]
-    sound = np.ones(time.size, dtype=bool)
+    columns = basis(time * frequency, number)
+    shape = solve(columns, motion)
     for _ in range(_CLOCK_ROUNDS):
-        columns = basis(time * frequency, number)
-        shape = solve(columns, motion, sound)
         left = motion - columns @ shape
         sound = np.abs(left) <= reach(shape, left, left.size)
         angle_slope = 2.0 * np.pi * time * (columns @ turned(shape))
         solution = solve(np.column_stack((columns, angle_slope)), motion, sound)
-        frequency += float(np.clip(solution[-1], -0.05 * frequency, 0.05 * frequency))
+        step = float(np.clip(solution[-1], -0.05 * frequency, 0.05 * frequency))
+        frequency += step
+        if abs(step) < _CLOCK_SETTLED * frequency:
+            break
+        columns, shape = basis(time * frequency, number), solution[:-1]
     return frequency, closed * frequency
 
 

@@ -125,7 +125,7 @@ def basis(phase: Array, order: int) -> Array:
 
 def solve(columns: Array, values: Array, weight: Array | None = None) -> Array:
     """Least squares by normal equations; harmonics over whole cycles are nearly orthogonal."""
-    weighed = columns.T if weight is None else columns.T * weight
+    weighed = columns.T if weight is None or np.all(weight == 1.0) else columns.T * weight
     return np.linalg.solve(weighed @ columns, weighed @ values)
 
 
