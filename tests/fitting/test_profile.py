@@ -161,4 +161,5 @@ def test_profiles_hold_the_truth_as_often_as_they_say(
             inside.append((low is None or low <= truth) and (high is None or truth <= high))
     share, each = np.mean(inside), np.mean(np.reshape(inside, (SEEDS, -1)), axis=0)
     print(f"profile intervals, block errors {shared}, {SEEDS} seeds: {share:.3f}, {dict(zip(FIVE, each, strict=True))}")
-    assert 0.93 <= share <= 0.97
+    chance = np.sqrt(0.95 * 0.05 / len(inside))
+    assert 0.93 - chance <= share <= 0.97 + chance
