@@ -29,7 +29,7 @@ _CHUNK = 1 << 18
 #: Neighbours in one run differ by less than this, in ln of period and of range.
 _SAME_PERIOD, _SAME_RANGE = 0.1, 0.25
 #: A cycle has no hole longer than this share of it.
-_HOLE = 0.34
+HOLE = 0.34
 #: A split takes this much off chi-square, and parts frequencies or amplitudes by these shares at least.
 _SPLIT_GAIN, _OTHER_FREQUENCY, _OTHER_AMPLITUDE = 40.0, 1e-3, 0.02
 #: No crossing is known better than this share of a period, no amplitude better than this share of itself.
@@ -88,7 +88,7 @@ class Cycles:
         period = np.diff(self.edges)
         before = self.first_rows - 1
         gap = np.maximum.reduceat(np.diff(self.time[: before[-1] + 2]), before[:-1])
-        hole = gap > _HOLE * period
+        hole = gap > HOLE * period
         other = (np.abs(np.diff(np.log(period))) > _SAME_PERIOD) | (np.abs(np.diff(np.log(self.range))) > _SAME_RANGE)
         border = np.concatenate(([0], 1 + np.flatnonzero(other | hole[1:] | hole[:-1]), [period.size]))
         return [slice(int(a), int(b)) for a, b in pairwise(border) if not hole[a]]

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.blocks import BLOCK, by_blocks
+from bushfit.cycles import HOLE
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History, reversals
 from bushfit.errors import FitError
@@ -36,6 +37,10 @@ from bushfit.measurement import Loop
 #: Cycles whose bins are kept apart, and how fast the groups of later ones grow.
 _APART, _GROWTH = 4, 1.5
 _CLOCK_HARMONICS, _CLOCK_ROUNDS, _CLOCK_SETTLED = 15, 10, 1e-12
+#: A closed cycle ends where it began within this share of its amplitude; beyond the other it began at an extreme.
+_CLOSED, _EXTREME = 0.04, 0.98
+#: Cycles, counted by one stroke, from which on a record is no single closed one.
+_MORE_THAN_ONE = 1.03
 #: Steps of the grid about a turning point in which rows carry no weight.
 _JUMP = 1.5
 #: Share of the half range below which both first displacement and first force count as a start from rest.
@@ -148,12 +153,15 @@ def drive_of(loop: Loop, *, without_wild: bool = False) -> Drive:
         without_wild: whether rows whose force is wild carry no weight; else they count like any other.
 
     Raises:
-        FitError: the displacement is not one whole cycle or more of a periodic motion, or the loop gives energy.
+        FitError: the displacement is not one whole cycle or more of a periodic motion, rows are missing, or the loop
+            gives energy.
     """
     whole, thin = loop, thinned(loop)
     loop, note = steady_part(whole, *thin)
     first = int(np.searchsorted(whole.time, loop.time[0]))
-    frequency, cycles = _fundamental(loop, *(thin if loop is whole else thinned(loop)))
+    thin = thin if loop is whole else thinned(loop)
+    frequency, cycles = _fundamental(loop, *thin)
+    _check_no_hole(loop, thin[0], frequency)
     motion, force_mean, force_noise, wild = harmonics(loop, frequency, cycles)
     rows = wild["force"].rows
     sound = np.delete(loop.force, rows) if rows.size else loop.force
@@ -178,6 +186,21 @@ def drive_of(loop: Loop, *, without_wild: bool = False) -> Drive:
     drive = replace(drive, weight=np.where(_at_reversal(drive), 0.0, weight))
     _check_loses_energy(drive)
     return drive
+
+
+def _check_no_hole(loop: Loop, clock: Array, frequency: float) -> None:
+    """Across rows that are missing nothing tells how many turns the motion made, nor so its frequency."""
+    steps = np.diff(clock)
+    widest = int(np.argmax(steps))
+    if steps[widest] > HOLE / frequency:
+        raise FitError(
+            "rows are missing inside the loop",
+            file=loop.source.file if loop.source else None,
+            found=f"none from {clock[widest]:.4g} to {clock[widest + 1]:.4g} s; how many cycles went by, and so the "
+            "frequency, cannot be told",
+            expected="no gap longer than a third of a cycle",
+            hint="keep the whole cycles before the gap, or those after it",
+        )
 
 
 def _check_loses_energy(drive: Drive) -> None:
@@ -239,7 +262,8 @@ def _fundamental(loop: Loop, clock: Array, x: Array) -> tuple[float, float]:
     crossings = max((turns[state[turns] == sense] for sense in (1, -1)), key=len)
     duration = float(loop.time[-1] - loop.time[0])
     closed = duration * loop.time.size / (loop.time.size - 1)
-    if crossings.size < 2:
+    stroke = float(clock[turns[1]] - clock[turns[0]]) if turns.size == 2 else np.inf
+    if crossings.size < 2 and (_closes(x) or closed < _MORE_THAN_ONE * 2.0 * stroke):
         apart = abs(loop.displacement[-1] - loop.displacement[0])
         if apart > band:
             unit = loop.direction.displacement_unit
@@ -253,7 +277,9 @@ def _fundamental(loop: Loop, clock: Array, x: Array) -> tuple[float, float]:
         stride = np.abs(np.diff(loop.displacement[[0, 1, -2, -1]]))[[0, 2]].mean()
         period = duration if apart < 0.5 * stride else closed
         return 1.0 / period, closed / period
-    frequency = (crossings.size - 1) / float(clock[crossings[-1]] - clock[crossings[0]])
+    frequency = 0.5 / stroke
+    if crossings.size > 1:
+        frequency = (crossings.size - 1) / float(clock[crossings[-1]] - clock[crossings[0]])
     number = order(loop.time.size / (closed * frequency), _CLOCK_HARMONICS)
     sample = slice(None, None, max(1, x.size // 2000))
     time, motion = clock[sample] - loop.time[0], x[sample]
@@ -270,6 +296,13 @@ def _fundamental(loop: Loop, clock: Array, x: Array) -> tuple[float, float]:
             break
         columns, shape = basis(time * frequency, number), solution[:-1]
     return frequency, closed * frequency
+
+
+def _closes(x: Array) -> bool:
+    """Whether a motion about zero ends where it began and goes on the same way, but for a start at its very end."""
+    few, half = max(1, x.size // 50), np.ptp(x) / 2.0
+    onward = (x[few] - x[0]) * (x[-1] - x[-1 - few]) > 0.0 or abs(x[0]) > _EXTREME * half
+    return bool(onward and abs(x[-1] - x[0]) < _CLOSED * half)
 
 
 def _binned(

@@ -1,4 +1,5 @@
-"""The steady cycles of a loop: what comes before them (a ramp, a hold, smaller cycles) and after them is left out.
+"""The steady cycles of a loop: what comes before them (a ramp, a hold, smaller cycles) and after them is left out, and
+what lies beyond a hole in the record, because nobody knows how many cycles went by there.
 
 A motion is steady where it comes again a period later. The longest stretch that does so is kept; without a stretch that
 does not, nothing is touched, so a record may start and end anywhere in its cycle.
@@ -10,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bushfit.cycles import HOLE
 from bushfit.effects.contract import Array
 from bushfit.fitting.harmonics import ENOUGH_ROWS
 from bushfit.fitting.outliers import gross_rows
@@ -48,6 +50,12 @@ def steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | Non
     period = _period(time, motion)
     if period is None or time[-1] - time[0] <= period:
         return loop, None
+    holes = np.flatnonzero(np.diff(time) > HOLE * period)
+    if holes.size:
+        whole, first, last = _between(loop, time, holes)
+        part, note = steady_part(whole, *thinned(whole))
+        said = f"{loop.name}: rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
+        return part, said if note is None else f"{said}, and of these {note.removeprefix(f'{loop.name}: ')}"
     again = np.interp(time + period, time, motion)
     comparable = time + period <= time[-1]
     off, clock = np.abs(again - motion)[comparable], time[comparable]
@@ -63,18 +71,34 @@ def steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | Non
     first, last = float(time[start]), float(time[end - 1]) + period
     if before and last - first > _THREE * period:
         first += period
-    kept = slice(np.searchsorted(loop.time, first), np.searchsorted(loop.time, last, side="right") if after else None)
     left_out = [
         f"{duration:.3g} s {where} its steady cycles"
         for duration, where in ((first - time[0], "before"), (time[-1] - last, "after"))
         if duration > _BRIEF * period
     ]
     note = f"{loop.name}: {' and '.join(left_out)} are left out; {(last - first) / period:.3g} cycles are used"
-    return replace(loop, **{name: getattr(loop, name)[kept] for name in ("time", "displacement", "force")}), note
+    return _cut(loop, first, last if after else None), note
+
+
+def _between(loop: Loop, time: Array, holes: Array) -> tuple[Loop, float, float]:
+    """The longest part of a loop without a hole, and its first and last time; `holes` are the steps of `time` that
+    are one."""
+    starts, ends = time[np.append(0, holes + 1)], time[np.append(holes, time.size - 1)]
+    longest = int(np.argmax(ends - starts))
+    first, last = float(starts[longest]), float(ends[longest])
+    return _cut(loop, first, last), first, last
+
+
+def _cut(loop: Loop, first: float, last: float | None) -> Loop:
+    """The rows between two times, both counted in; to the end where there is no last."""
+    end = None if last is None else np.searchsorted(loop.time, last, side="right")
+    kept = slice(np.searchsorted(loop.time, first), end)
+    return replace(loop, **{name: getattr(loop, name)[kept] for name in ("time", "displacement", "force")})
 
 
 def _period(time: Array, motion: Array) -> float | None:
-    """Usual time between upward crossings of the middle in the later half; twice a stroke where there is one cycle."""
+    """Usual time between crossings in one sense of the middle in the later half; twice a stroke where there is one
+    cycle. What holds a hole does not count."""
     centred = motion - (motion.max() + motion.min()) / 2.0
     band = _BAND * np.ptp(motion)
     marks = np.flatnonzero(np.abs(centred) > band)
@@ -82,9 +106,14 @@ def _period(time: Array, motion: Array) -> float | None:
     crossings = marks[1:][upper[1:] != upper[:-1]]
     if crossings.size < 2:
         return None
-    if crossings.size == 2:
-        return float(2.0 * (time[crossings[1]] - time[crossings[0]]))
-    intervals = time[crossings[2:]] - time[crossings[:-2]]
+    strokes, steps = np.diff(time[crossings]), np.diff(time)
+    widest = np.maximum(np.maximum.reduceat(steps, crossings - 1)[:-1], steps[crossings[1:] - 1])
+    intervals = strokes[1:] + strokes[:-1]
+    intervals = intervals[np.maximum(widest[1:], widest[:-1]) < HOLE * intervals]
+    if not intervals.size:
+        intervals = 2.0 * strokes[widest < HOLE * strokes]
+    if not intervals.size:
+        return None
     return float(np.median(intervals[intervals.size // 2 :]))
 
 

@@ -23,8 +23,6 @@ _TRIANGLE, _LIKE = 1.0 / 9.0, 0.03
 _SURE, _SHARE = 6.0, 2e-3
 #: A loop's zero is off by this share of half the range.
 _OFF_ZERO = 0.02
-#: Harmonics that swing beyond the range of the rows by this factor do so where there are no rows.
-_BEYOND = 1.1
 #: Of rows evenly spaced in time a triangle has a tenth beyond this share of its amplitude, a sine 29 %.
 _OUTER, _CROWDED = 0.9, 0.2
 #: At most so many cycles are looked at from either end, with so many harmonics.
@@ -44,9 +42,6 @@ def look_at_loop(loop: Loop, file: Path, *, timed: bool = True) -> Looked:
     rows = loop.time.size / drive.cycles
     half_motion, half_force = np.ptp(loop.displacement) / 2.0, np.ptp(loop.force) / 2.0
     amplitude, mean_motion, mean_force = drive.amplitude, drive.coefficients[0].real, _mean(drive)
-    swings = amplitude > _BEYOND * half_motion
-    if swings:
-        amplitude, mean_motion = half_motion, float(loop.displacement.min() + half_motion)
     facts = {
         "cycles": f"{drive.cycles:.3g}, {'the first from rest' if drive.from_rest else 'taken as steady'}",
         "frequency": f"{drive.frequency:.4g} Hz, {_waveform(drive)}",
@@ -63,11 +58,6 @@ def look_at_loop(loop: Loop, file: Path, *, timed: bool = True) -> Looked:
         *_changing(drive, names, timed=timed),
         *_crowding(drive, names[0]),
     ]
-    if swings:
-        odd.append(
-            f"no harmonics follow the {names[0]} without swinging far beyond its rows, as across a gap: its frequency "
-            "and waveform are not to be relied on, nor is a fit; keep the whole cycles before the gap or after it"
-        )
     if abs(mean_motion) > _OFF_ZERO * half_motion and not drive.from_rest:
         odd.append(
             f"the motion is off zero by {to_length * mean_motion:.3g} {length}, {100 * mean_motion / half_motion:.2g} "

@@ -154,3 +154,40 @@ def test_half_a_cycle_is_refused(paper_model: Model) -> None:
     with pytest.raises(FitError, match="does not hold a whole cycle") as caught:
         drive_of(loop)
     assert "at least one closed cycle" in str(caught.value)
+
+
+def with_hole(loop: Loop, begin: float, end: float) -> Loop:
+    """A loop without the rows from one cycle count to another."""
+    kept = (loop.time * FREQUENCY < begin) | (loop.time * FREQUENCY >= end)
+    return replace(loop, **{name: getattr(loop, name)[kept] for name in ("time", "displacement", "force")})
+
+
+@pytest.mark.parametrize("waveform", ["sine", "triangle"])
+@pytest.mark.parametrize("hole", [(1.0, 2.0), (1.3, 2.3), (1.3, 1.8), (1.3, 1.55), (0.5, 1.5), (1.3, 2.9)])
+@pytest.mark.parametrize("cycles", [3.0, 5.0])
+def test_rows_that_are_missing_do_not_change_the_frequency(
+    paper_model: Model, waveform: str, hole: tuple[float, float], cycles: float
+) -> None:
+    drive = drive_of(with_hole(measured(paper_model, waveform=waveform, cycles=cycles), *hole))
+    print(f"{drive.frequency:.6f} Hz, {drive.note}")
+    assert drive.frequency == pytest.approx(FREQUENCY, rel=1e-3)
+    assert drive.amplitude == pytest.approx(AMPLITUDE, rel=5e-3)
+    if hole[1] - hole[0] > 0.4:
+        assert drive.note is not None
+        assert "rows are missing" in drive.note
+
+
+def test_where_no_stroke_is_whole_the_hole_is_named(paper_model: Model) -> None:
+    loop = with_hole(measured(paper_model, cycles=2.0, start=0.1), 0.3, 1.6)
+    with pytest.raises(FitError, match=r"rows are missing inside the loop\n.*none from 2\.99 to 16 s"):
+        drive_of(loop)
+
+
+@pytest.mark.parametrize("waveform", ["sine", "triangle"])
+@pytest.mark.parametrize("cycles", [1.12, 1.2, 1.3, 1.5, 1.7])
+def test_a_record_of_one_cycle_and_a_part_is_not_one_longer_cycle(
+    paper_model: Model, waveform: str, cycles: float
+) -> None:
+    starts = np.arange(0.0, 1.0, 0.05)
+    found = [drive_of(measured(paper_model, waveform=waveform, cycles=cycles, start=a)).frequency for a in starts]
+    assert found == pytest.approx([FREQUENCY] * starts.size, rel=2e-3)
