@@ -32,6 +32,11 @@ _MOST_PASSES = 50
 _LONGEST_STRIDE = 5.0
 #: A filled natural rubber, to say what leaving the springpot out may do: m/mu [s^alpha] and alpha.
 _TYPICAL_SPRINGPOT = (0.18, 0.24)
+#: What is said of a fit that crept along a flat stretch until it was stopped.
+_STOPPED = (
+    "the fit was stopped after {} evaluations of the model, where chi-square is flat: parameters that stay open could "
+    "move on, for less than noise"
+)
 #: What to do about a model that does not fit.
 _NEXT = "; bushfit diagnose looks for what is missing"
 
@@ -232,6 +237,7 @@ def cautions(
     """What the data of a fit cannot tell: bounds met, what stays open, and a model that does not fit."""
     names, at_bound = solution.coordinates.names, solution.at_bound
     return [
+        *([_STOPPED.format(solution.evaluations)] if solution.stopped else []),
         *(_at_edge(name, end, bounds) for name, end in at_bound.items()),
         *left_open(model, terms, [name for name in names if name not in at_bound], covariance),
         *misfit(model, terms, len(names), advice),

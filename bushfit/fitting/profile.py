@@ -85,11 +85,7 @@ class _Profile:
     def _walled(self, end: float) -> float:
         """How far chi-square would fall there if others could leave the bounds that they met on the way."""
         found = self.fitted(end)
-        free = [i for i, name in enumerate(found.coordinates.names) if name not in self.best.at_bound]
-        if set(found.at_bound) <= set(self.best.at_bound):
-            return 0.0
-        basis = np.linalg.qr(found.jacobian[free].T)[0]
-        return float(np.sum(np.square(basis.T @ found.residual)))
+        return 0.0 if set(found.at_bound) <= set(self.best.at_bound) else found.gain(self.best.at_bound)
 
 
 def profile95(
