@@ -66,7 +66,7 @@ def seconds(bushings: Path, count: int, jobs: int, folder: Path) -> float:
 
 
 def test_campaigns_a_second(benchmark: BenchmarkFixture, bushings: Path, tmp_path: Path) -> None:
-    """Wall time of batches on one core and on two, and of a shell loop over `bushfit fit`, with its plots and without."""
+    """Wall time of batches on one core and on two, and of a shell loop over `bushfit fit`, with plots and without."""
     count = 400 if benchmark.enabled else 8
     seconds(bushings, 8, 2, tmp_path / "warm")
     two = benchmark.pedantic(seconds, (bushings, count, 2, tmp_path / "two"), rounds=1)
