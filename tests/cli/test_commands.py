@@ -59,6 +59,7 @@ def test_run_does_the_whole_chain_and_says_what_two_steps_cost(bushfit: Run, tmp
     assert {"static.json", "dynamic.json", "model.json"} | tables <= named
     assert "pass by pass" in done.stderr
     assert "what the two-step procedure costs" in done.stderr
+    assert f"the model to use: {tmp_path / 'x/model.json'}, the joint fit" in done.stderr
     assert "springpot was left out" in done.stderr
     radial = pd.read_csv(tmp_path / "x" / "radial.csv")
     assert list(radial.columns[:2]) == ["frequency [Hz]", "amplitude [mm]"]

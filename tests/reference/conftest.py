@@ -1,4 +1,4 @@
-"""Agreement with numbers of others, held against what the README says of it."""
+"""Agreement with numbers of others, held against what the README of this folder says of it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _MODESTY, _ROUNDING = 0.5, 12.0
 
 @pytest.fixture(scope="session")
 def agree(root: Path) -> Agree:
-    text = (root / "README.md").read_text(encoding="utf-8")
+    text = (root / "tests/reference/README.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| ([^|]+?) \| [^|]+ \| ([\d./ ]+) \|$", text, re.MULTILINE)
     said = {what: [float(part) for part in figures.split("/")] for what, figures in rows}
 
