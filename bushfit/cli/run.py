@@ -89,8 +89,8 @@ def command(campaign: Path, loss: str | None, max_nrmse: float | None, options: 
         **predicted.files(options.formats),
     }
     options.write(folder, files)
-    names = ", ".join(effect.name for effect in diagnosed.diagnosis.effects)
-    which = f"with {names}; joint.json is without" if added else "the joint fit"
+    found = ", ".join(effect.name for effect in diagnosed.diagnosis.effects)
+    which = f"with {found}; joint.json is without" if added else "the joint fit"
     options.console.print(f"the model to use: {folder / 'model.json'}, {which}", markup=False)
     options.tell(documents)
     enforce_nrmse(final, max_nrmse)
