@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
@@ -20,10 +19,8 @@ from bushfit.fitting.terms import Term
 from bushfit.model import Model
 from bushfit.results import Z95, Covariance
 
-#: Longest first step, in coordinates, which are of order one; each further step is longer by the growth.
-_STEP, _GROWTH = 0.3, 1.5
-#: An end is known well enough when it is known to this share of the first step.
-_PRECISION = 2e-3
+#: Longest step of the search, in coordinates, which are of order one.
+_STEP = 0.5
 #: Most evaluations for the fit of the others at one point, and the relative change at which it stops.
 _EVALUATIONS, _TOLERANCE = 100, 1e-7
 #: Noise that was itself estimated widens an interval by no more than this (Student's t of two degrees of freedom).
@@ -48,14 +45,17 @@ class _Profile:
     bounds: Bounds
     known: dict[float, Model]
 
+    def value(self, at: float) -> float:
+        """Of the parameter."""
+        least, most = self.best.model.parameters[self.name].bounds  # exp(log(bound)) may lie beyond it
+        return float(np.clip(Coordinates.of(self.best.model, [self.name]).values([at])[self.name], least, most))
+
     def fitted(self, at: float) -> Solution:
         """The fit of the others, with the parameter held there."""
         near = self.known[min(self.known, key=lambda known: abs(known - at))]
-        least, most = near.parameters[self.name].bounds  # exp(log(bound)) may lie beyond it
-        value = float(np.clip(Coordinates.of(near, [self.name]).values([at])[self.name], least, most))
         others = [name for name in self.best.coordinates.names if name != self.name]
         found = solve(
-            near.with_values({self.name: value}),
+            near.with_values({self.name: self.value(at)}),
             self.terms,
             others,
             self.bounds,
@@ -70,17 +70,23 @@ class _Profile:
         """Root of the rise over the least chi-square."""
         return float(np.sqrt(max(self.fitted(at).chi_square - self.best.chi_square, 0.0)))
 
-    def end(self, start: float, wall: float, step: float, allowed: float) -> float | None:
-        """Where the root of the rise reaches what is allowed, from the best value on towards a bound."""
-        inner, stride = start, float(np.copysign(step, wall - start))
-        while inner != wall:
-            outer = inner + stride if abs(inner + stride - start) < abs(wall - start) else wall
-            if self.root_rise(outer) > allowed:
-                end = brentq(lambda at: self.root_rise(at) - allowed, inner, outer, xtol=_PRECISION * step)
-                far = abs(end - start) > _FAR
-                return None if far and self._walled(end) > _OTHERS * allowed**2 else float(end)
-            inner, stride = outer, stride * _GROWTH
-        return None
+    def interval(self, start: float, walls: Array, step: float, allowed: float) -> Interval:
+        """Where the root of the rise reaches what is allowed, to either side of the best value; lmfit searches, in
+        steps that suit the parameter."""
+        from bushfit.fitting.interval import ends
+
+        def at(steps: float) -> float:
+            return float(np.clip(start + step * steps, *walls))
+
+        found = ends(lambda steps: self.root_rise(at(steps)) / allowed, *(walls - start) / step)
+        low, high = (
+            None if end is None or self._held_far(start, at(end), allowed) else self.value(at(end)) for end in found
+        )
+        return low, high
+
+    def _held_far(self, start: float, end: float, allowed: float) -> bool:
+        """Whether it is the bounds of others that hold an end, and that far away."""
+        return abs(end - start) > _FAR and self._walled(end) > _OTHERS * allowed**2
 
     def _walled(self, end: float) -> float:
         """How far chi-square would fall there if others could leave the bounds that they met on the way."""
@@ -130,9 +136,7 @@ def profile95(
     for i, name in enumerate(names):
         profile = _Profile(name, best, terms, bounds, {start[i]: best.model})
         step = min(1.1 * allowed[i] * linear[i], _STEP)
-        ends = (profile.end(start[i], wall, step, allowed[i]) for wall in walled[i])
-        low, high = (None if end is None else profile.known[end].values[name] for end in ends)
-        found[name] = low, high
+        found[name] = profile.interval(start[i], walled[i], step, allowed[i])
         advance(name, len(names) - len(found))
     return found
 
