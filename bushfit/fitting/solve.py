@@ -212,26 +212,23 @@ def walls(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, Array]:
     return low, high
 
 
-def _lmfit_parameters(start: Array, low: Array | None = None, high: Array | None = None) -> Any:
+def _lmfit_parameters(start: Array, low: Array | None = None, high: Array | None = None) -> list[Any]:
     parameters = _blank_parameters(start.size)
     lows, highs = (
         np.full(start.shape, end) if wall is None else wall for wall, end in ((low, -np.inf), (high, np.inf))
     )
-    for parameter, value, least, most in zip(parameters.values(), start, lows, highs, strict=True):
+    for parameter, value, least, most in zip(parameters, start, lows, highs, strict=True):
         parameter.set(value=float(value), min=float(least), max=float(most))
     return parameters
 
 
 @cache
-def _blank_parameters(count: int) -> Any:
-    """Parameters for one fit after the other: lmfit copies what it is given, and to make them takes as long as to
-    evaluate a model."""
+def _blank_parameters(count: int) -> list[Any]:
+    """Parameters for one fit after the other: lmfit takes a list as it is, and to make or copy them takes as long as
+    to evaluate a model."""
     import lmfit
 
-    parameters = lmfit.Parameters()
-    for i in range(count):
-        parameters.add(f"u{i}")
-    return parameters
+    return [lmfit.Parameter(f"u{i}") for i in range(count)]
 
 
 def _at_bound(names: Sequence[str], point: Array, low: Array, high: Array) -> dict[str, End]:
