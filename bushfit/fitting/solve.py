@@ -166,7 +166,7 @@ def solve(
         with np.errstate(invalid="ignore", divide="ignore"):  # lmfit takes roots of a covariance nobody asked for
             if set(model.effects) <= set(BASE):
                 with suppress(_WallMetError, ValueError):
-                    free = _lmfit_parameters(start)
+                    free = list(_lmfit_parameters(start).values())  # which lmfit takes as they are, without a copy
                     fit = lmfit.minimize(within, free, "leastsq", Dfun=slopes, col_deriv=True, gtol=0.0, **common)
             if fit is None or fit.aborted:
                 walled = _lmfit_parameters(start, low, high)
@@ -212,23 +212,25 @@ def walls(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, Array]:
     return low, high
 
 
-def _lmfit_parameters(start: Array, low: Array | None = None, high: Array | None = None) -> list[Any]:
+def _lmfit_parameters(start: Array, low: Array | None = None, high: Array | None = None) -> Any:
     parameters = _blank_parameters(start.size)
     lows, highs = (
         np.full(start.shape, end) if wall is None else wall for wall, end in ((low, -np.inf), (high, np.inf))
     )
-    for parameter, value, least, most in zip(parameters, start, lows, highs, strict=True):
+    for parameter, value, least, most in zip(parameters.values(), start, lows, highs, strict=True):
         parameter.set(value=float(value), min=float(least), max=float(most))
     return parameters
 
 
 @cache
-def _blank_parameters(count: int) -> list[Any]:
-    """Parameters for one fit after the other: lmfit takes a list as it is, and to make or copy them takes as long as
-    to evaluate a model."""
+def _blank_parameters(count: int) -> Any:
+    """Parameters for one fit after the other: to make them takes as long as to evaluate a model."""
     import lmfit
 
-    return [lmfit.Parameter(f"u{i}") for i in range(count)]
+    parameters = lmfit.Parameters()
+    for i in range(count):
+        parameters.add(f"u{i}")
+    return parameters
 
 
 def _at_bound(names: Sequence[str], point: Array, low: Array, high: Array) -> dict[str, End]:
