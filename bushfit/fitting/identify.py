@@ -32,6 +32,10 @@ _ONE, _NARROW_RATE, _NARROW_STRAIN = 1.05, 5.0, 2.0
 _KNOWN, _BETTER = 0.1, 0.34
 #: A loop that is proposed where there is none: its rate [Hz], rows, and noise over half its force range.
 _NEW_RATE, _ROWS, _FORCE_NOISE = 0.1, 400, 5e-3
+#: Strain that a bushing can be asked to bear in a test.
+_BEARABLE = 0.5
+#: Relative standard error that is as good as none: a test that leaves so much is not worth its time.
+_HOPELESS = 10.0
 _FRICTION, _RATE = ("sigma_fmax", "eps_half"), ("mu", "m", "alpha")
 
 
@@ -215,9 +219,14 @@ def _next(model: Model, terms: Sequence[Term], known: _Information) -> list[str]
     """The further test that shrinks the worst error most, and to what."""
     before = known.errors()
     worst = int(np.argmax(before))
-    after = {words: known.with_more(model, more).errors() for words, more in _further(model, terms)}
-    best = min(after, key=lambda words: float(after[words].max()), default=None)
-    if best is None or after[best].max() > 0.8 * before[worst]:
+    bearable = max(_BEARABLE, measured_range(model, terms).strain[1])
+    after = {
+        words: known.with_more(model, more).errors()
+        for words, more in _further(model, terms)
+        if measured_range(model, more).strain[1] <= bearable
+    }
+    best = min(after, key=lambda words: float(after[words].max()))
+    if after[best].max() > min(0.8 * before[worst], _HOPELESS):
         return []
     return [
         f"the further test that would help most: {best}; the standard error of {known.names[worst]} would fall from "
@@ -237,7 +246,7 @@ def _further(model: Model, terms: Sequence[Term]) -> Iterator[tuple[str, list[Te
         for words, factor in (("a tenth of", 0.1), ("ten times", 10.0)):
             yield f"a loop at {words} the rate", [_loop(largest, model, rate=factor)]
     else:
-        for times, words in ((1.0, ""), (3.0, "three times ")):
+        for times, words in ((1.0, ""), (3.0, "three times "), (10.0, "ten times ")):
             yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", [_new_loop(model, terms, times)]
     reach = measured_range(model, terms)
     direction = terms[0].direction

@@ -133,3 +133,16 @@ def test_complete_tests_leave_nothing_open(
     sweeps_only = replace(paper_noise, sweeps=(sweep(1e-4, 2e-4, 5e-4),))
     assert fit_joint(Data.of(rig(paper_model, sweeps_only, 1))).warnings == ()
     print(f"{count + 1} campaigns that lack nothing: none warned of")
+
+
+@pytest.mark.parametrize(("largest", "proposed"), [(1e-4, True), (3e-3, False)])
+def test_no_test_is_proposed_that_would_tear_the_rubber(
+    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, largest: float, proposed: bool
+) -> None:
+    """Friction that gives way at strains beyond all reach: what would help is more amplitude, as far as rubber goes."""
+    model = paper_model.with_values({"sigma_fmax": 2e6, "eps_half": 2.0})
+    plan = replace(paper_noise, loops=(loop(largest, 0.1),), sweeps=(sweep(0.3 * largest, largest),))
+    lines = fit_joint(Data.of(rig(model, plan, 1))).warnings
+    print(*lines, sep="\n")
+    assert any("of eps_half: " in line for line in lines)
+    assert any("times the largest amplitude" in line for line in lines) is proposed
