@@ -129,7 +129,7 @@ def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(
     typed: Callable[..., Any], shop: Path
 ) -> None:
     campaign = shop / "bushings/b1/bushing.toml"
-    campaign.write_text(campaign.read_text() + '\n[fit.mu]\nmax = "0.1 MPa"\n')
+    campaign.write_text(campaign.read_text() + '\n[fit.mu]\nmax = "0.2 MPa"\n')
     (shop / "limits.toml").write_text('[parameters.mu]\nmax = "1 GPa"\n')
     done = typed("batch", "bushings/b[0-2]/bushing.toml", "-o", "all", "--limits", "limits.toml", "--json")
     assert done.returncode == 0, done.stderr
@@ -141,7 +141,7 @@ def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(
     assert held["on a bound"].startswith("mu (max)")
     assert "at the max of its fit" in held["on the edge"]
     assert "warning: 1 bushing with a parameter at rest on a bound of its fit" in done.stderr
-    assert "conditional pass: b1: mu = 0.1" in done.stderr
+    assert "conditional pass: b1: mu = 0.2" in done.stderr
     none = typed("batch", "bushings/b[0-2]/bushing.toml", "-o", "none", "--effect", "inertia", "--json")
     assert json.loads((shop / "none/bushings/b1/model.json").read_text())["parameters"]["mu"]["at_bound"] == "max"
     assert not any("inertia" in row["on a bound"] for row in rows(shop / "none")), "no mass is an answer"
