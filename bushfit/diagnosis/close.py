@@ -7,29 +7,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from bushfit.diagnosis.calibrate import SENSITIVITY_LEFT, Questions
-from bushfit.diagnosis.evidence import Evidence, fit
-from bushfit.diagnosis.name import REFITTED, Candidate, Proposal, finished, proposals, refit
+from bushfit.diagnosis.evidence import Evidence, begun, fit
+from bushfit.diagnosis.name import Proposal, proposals
+from bushfit.diagnosis.race import PLAIN, Candidate, hopeful, race
 from bushfit.diagnosis.record import Settings
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.solve import Bounds
+from bushfit.fitting.terms import Term
 
 #: Probability with which noise alone stays below the threshold of the best candidate.
 _LEVEL = 0.995
 #: Candidates within this of the best by BIC are one set; a rival must stay this far by chi-square to be excluded.
 SAME, APART = 6.0, 10.0
-#: Rivals farther than this from the data than the best are excluded without asking what the test could tell.
-_PLAIN = 60.0
 #: A richer rival that meets a simpler model's prediction this closely contains it.
 _CONTAINS = 1.0
 _MOST_SWAPS = 4
-#: Candidates with less than this share of the best score are not refitted.
-_PROMISING = 0.1
-#: And those that gained less than this share of the best gain in their first steps are not fitted to their end.
-_CLOSE = 0.5
+#: Reduced chi-square beyond which the values of the model as it came are no place to start from.
+_BENT = 1.5
+#: Candidates that are refitted in each round at most, the best scores first, and the share of the best that they need.
+_REFITTED, _PROMISING = 6, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,83 +53,101 @@ class Step:
 
 
 @dataclass(frozen=True, eq=False)
+class Round:
+    """A refitted model, every effect's claim on it, and the best claims refitted, best by BIC first."""
+
+    evidence: Evidence
+    proposed: tuple[Proposal, ...]
+    tried: tuple[Candidate, ...]
+
+    @cached_property
+    def critical(self) -> float:
+        """The gain that noise alone exceeds with probability 1 - _LEVEL."""
+        return critical_gain(self.evidence, self.proposed)
+
+    @property
+    def best(self) -> Candidate | None:
+        return self.tried[0] if self.tried else None
+
+    @property
+    def real(self) -> Candidate | None:
+        """The best candidate, where it is more than chance and more than its price."""
+        best = self.best
+        worth = best is not None and self.evidence.bic - best.evidence.bic > SAME and best.gain > self.critical
+        return best if worth else None
+
+
+@dataclass(frozen=True, eq=False)
 class Search:
     """The search for effects on one campaign.
 
     Args:
-        base: the model as it came, refitted.
         settings: of the user.
         start: values of the paper's parameters read off the data.
         held: parameters the campaign holds.
         bounds: limits the campaign sets.
-        proposed: every effect's claim on the base model.
-        rounds: per set of added effects the refitted model and the best refit of each candidate beside it.
-        critical: gain on the base model that noise alone exceeds with probability 1 - _LEVEL.
+        rounds: per set of added effects the refitted model and what every effect says of it.
     """
 
-    base: Evidence
     settings: Settings
     start: Mapping[str, float]
     held: tuple[str, ...]
     bounds: Bounds
-    proposed: tuple[Proposal, ...] = ()
-    rounds: dict[frozenset[str], tuple[Evidence, list[Candidate]]] = field(default_factory=dict)
-    critical: float = 0.0
+    rounds: dict[frozenset[str], Round] = field(default_factory=dict)
 
     @classmethod
     def begin(
         cls, base: Evidence, settings: Settings, start: Mapping[str, float], held: Sequence[str], bounds: Bounds
     ) -> Search:
         """Ask every effect of the library, and refit the best."""
-        proposed = tuple(proposals(base, settings.without))
-        search = cls(base, settings, start, tuple(held), bounds, proposed, {}, critical_gain(base, proposed))
-        search.rounds[frozenset()] = base, search.refitted(base, proposed)
+        search = cls(settings, start, tuple(held), bounds)
+        search._round(base, ())
         return search
 
     @property
-    def judged(self) -> dict[str, Candidate]:
-        """Best refit of every candidate on the base model, by name."""
-        return {candidate.name: candidate for candidate in self.rounds[frozenset()][1]}
+    def first(self) -> Round:
+        """What every effect says of the model as it came, refitted."""
+        return self.rounds[frozenset()]
 
-    def refitted(self, evidence: Evidence, proposed: Sequence[Proposal]) -> list[Candidate]:
-        """The best scores refitted, best by BIC first."""
-        least = max(evidence.penalty / 2.0, _PROMISING * max((proposal.score for proposal in proposed), default=0.0))
-        promising = [proposal for proposal in proposed if proposal.score > least][:REFITTED]
-        begun = [refit(evidence, proposal, self.start, self.held, self.bounds) for proposal in promising]
-        fits = [candidate for candidate in begun if candidate is not None]
-        reach = _CLOSE * max((candidate.gain for candidate in fits), default=0.0)
-        fits = [
-            finished(evidence, candidate, self.held, self.bounds) if candidate.gain > reach else candidate
-            for candidate in fits
-        ]
-        return sorted(fits, key=lambda candidate: candidate.evidence.bic)
+    @property
+    def base(self) -> Evidence:
+        """The model as it came, refitted."""
+        return self.first.evidence
+
+    def _round(self, evidence: Evidence, added: Sequence[str], known: Sequence[Candidate] = ()) -> Round:
+        """Ask every effect that is not there, and refit the best but those known already.
+
+        A model that lacks something large has bent its own parameters to make up for it; the way back is long, and
+        shorter from the start values read off the data.
+        """
+        key = frozenset(added)
+        if key not in self.rounds:
+            proposed = tuple(proposals(evidence, (*self.settings.without, *added)))
+            least = max(evidence.penalty / 2.0, _PROMISING * max((claim.score for claim in proposed), default=0.0))
+            fitted = {candidate.name for candidate in known}
+            best = [claim for claim in proposed[:_REFITTED] if claim.score > least and claim.name not in fitted]
+            start = self.start if not added and evidence.reduced > _BENT else {}
+            tried = race(evidence, best, known, start, self.held, self.bounds)
+            self.rounds[key] = Round(evidence, proposed, tuple(tried))
+        return self.rounds[key]
 
     def grow(self) -> tuple[Evidence, list[str]]:
         """Add the best effect, look again, and stop when what is left is chance or too small to matter."""
         current, added = self.base, list[str]()
-        tried, critical = self.rounds[frozenset()][1], self.critical
         while len(added) < self.settings.max_effects:
-            best = min(tried, key=lambda candidate: candidate.evidence.bic, default=None)
-            if best is None or not self.convincing(current, best, critical):
+            best = self._round(current, added).real
+            if best is None or not self._large(current, best):
                 break
             current, added = best.evidence, [*added, best.name]
-            proposed = tuple(proposals(current, self.settings.without))
-            tried = self.refitted(current, proposed)
-            self.rounds[frozenset(added)] = current, tried
-            critical = critical_gain(current, proposed)
         return current, added
 
-    def convincing(self, current: Evidence, best: Candidate, critical: float) -> bool:
-        """Real, and large enough to matter."""
-        large = footprint(current, best.evidence) > self.settings.tolerance
-        return large and _real(current, best, critical)
+    def _large(self, current: Evidence, best: Candidate) -> bool:
+        return footprint(current, best.evidence) > self.settings.tolerance
 
     def trace(self) -> Candidate | None:
         """The best candidate on the base model where it is real but too small to matter."""
-        best = min(self.judged.values(), key=lambda candidate: candidate.evidence.bic, default=None)
-        if best is None or not _real(self.base, best, self.critical):
-            return None
-        return None if self.convincing(self.base, best, self.critical) else best
+        best = self.first.real
+        return None if best is None or self._large(self.base, best) else best
 
     def reconsider(self, current: Evidence, added: Sequence[str]) -> tuple[Evidence, list[Step]]:
         """Try every added effect's rivals in its place, and dropping it; swap where that is better."""
@@ -138,8 +157,8 @@ class Search:
             steps, swapped = [], False
             for name in names:
                 others = [other for other in names if other != name]
-                reduced, tried = self._place(current, others)
-                best = tried[0] if tried else None
+                place = self._place(current, name, others)
+                best, reduced = place.best, place.evidence
                 if swaps_left and best and best.name != name and best.evidence.bic < current.bic - 1e-6:
                     names[names.index(name)] = best.name
                     current, swapped = best.evidence, True
@@ -148,55 +167,52 @@ class Search:
                     names.remove(name)
                     current, swapped = reduced, True
                     break
-                steps.append(self._step(name, current, reduced, tried))
+                steps.append(self._step(name, current, place))
             if not swapped:
                 break
         return current, steps
 
-    def _step(self, name: str, current: Evidence, reduced: Evidence, tried: Sequence[Candidate]) -> Step:
+    def _step(self, name: str, current: Evidence, place: Round) -> Step:
         """Sort an effect's rivals: those these tests cannot tell from it, and those that contain it.
 
         A rival is the same within SAME by BIC, or nearer than APART to the model's own noise-free prediction. A richer
         one that meets this prediction contains the model: then the simpler name stands.
         """
         rivals, richer = [], []
-        for rival in tried:
-            if rival.name == name or rival.evidence.chi_square - current.chi_square > _PLAIN:
+        clean = [term.noise_free(current.model) for term in current.terms]
+        for rival in place.tried:
+            if rival.name == name or rival.evidence.chi_square - current.chi_square > PLAIN:
                 continue
-            distance = self._distance(current, rival)
+            distance = self._distance(clean, rival)
             if distance < _CONTAINS and rival.evidence.parameters > current.parameters:
                 richer.append(rival)
             elif rival.evidence.bic - current.bic < SAME or distance < APART:
                 rivals.append(rival)
-        gain = reduced.chi_square - current.chi_square
-        return Step(name, gain, tuple(rivals), tuple(richer), tuple(tried))
+        gain = place.evidence.chi_square - current.chi_square
+        return Step(name, gain, tuple(rivals), tuple(richer), place.tried)
 
-    def _place(self, current: Evidence, others: Sequence[str]) -> tuple[Evidence, list[Candidate]]:
-        """The model with no more than some of the added effects, refitted, and its candidates; each set once."""
-        key = frozenset(others)
-        if key not in self.rounds:
-            model = self.base.model
-            for other in others:
-                own = {name: value for name, value in current.model.values.items() if name.startswith(f"{other}.")}
-                model = model.with_effect(other, own)
-            start = {name: value for name, value in current.model.values.items() if name in model.values}
-            reduced = fit(model.with_values(start), current.terms, self.held, self.bounds)
-            proposed = proposals(reduced, (*self.settings.without, *others))
-            self.rounds[key] = reduced, self.refitted(reduced, proposed)
-        return self.rounds[key]
+    def _place(self, current: Evidence, name: str, others: Sequence[str]) -> Round:
+        """The model without an added effect, refitted, and its candidates, of which that effect is one; each once."""
+        if frozenset(others) in self.rounds:
+            return self.rounds[frozenset(others)]
+        model = self.base.model
+        for other in others:
+            model = model.with_effect(other)
+        start = {parameter: value for parameter, value in current.model.values.items() if parameter in model.values}
+        reduced = fit(model.with_values(start), current.terms, self.held, self.bounds)
+        known = Candidate(name, current, reduced.chi_square - current.chi_square)
+        return self._round(reduced, others, [known])
 
-    def _distance(self, current: Evidence, rival: Candidate) -> float:
-        """Chi-square of the rival, fitted to what the model itself would have measured without noise."""
-        terms = [term.noise_free(current.model) for term in current.terms]
+    def _distance(self, clean: Sequence[Term], rival: Candidate) -> float:
+        """Chi-square of the rival, fitted to what the model itself would have measured without noise; no further than
+        it takes to see whether that is far or next to nothing."""
         try:
-            return fit(rival.evidence.model, terms, self.held, self.bounds).chi_square
+            descent = begun(rival.evidence.model, clean, self.held, self.bounds)
         except (FitError, ModelError):
             return float("inf")
-
-
-def _real(current: Evidence, best: Candidate, critical: float) -> bool:
-    """More than chance, and more than its price."""
-    return best.gain > critical and current.bic - best.evidence.bic > SAME
+        while descent.chi_square > _CONTAINS and hopeful(descent, APART):
+            descent = descent.stepped()
+        return descent.chi_square
 
 
 def critical_gain(evidence: Evidence, proposed: Sequence[Proposal]) -> float:

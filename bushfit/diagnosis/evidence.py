@@ -10,12 +10,13 @@ from itertools import pairwise
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.solve import Bounds, Solution, solve
+from bushfit.fitting.descent import Descent
+from bushfit.fitting.solve import Bounds, Solution
 from bushfit.fitting.terms import SweepTerm, Term
 from bushfit.model import Model
 
-#: Evaluations after which a candidate that fits badly is taken as it is, and where a better one may stop.
-EVALUATIONS, _TOLERANCE = 40, 1e-7
+#: Evaluations after which a model that fits badly is taken as it is.
+EVALUATIONS = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,10 +99,17 @@ class Evidence:
         return sweeps[0].noise.freedom if sweeps else 0
 
 
-def fit(
-    model: Model, terms: Sequence[Term], held: Sequence[str], bounds: Bounds, evaluations: int = EVALUATIONS
-) -> Evidence:
-    """Fit every parameter of a model but the held ones, from its own values."""
-    names = [name for name in model.parameters if name not in held]
-    solution = solve(model, terms, names, bounds, evaluations=evaluations, tolerance=_TOLERANCE, strict=False)
-    return Evidence(solution, tuple(terms))
+def fit(model: Model, terms: Sequence[Term], held: Sequence[str], bounds: Bounds) -> Evidence:
+    """Fit every parameter of a model but the held ones, from its own values.
+
+    Raises:
+        FitError: fewer data than parameters, or no finite response.
+        ModelError: no response.
+    """
+    descent = begun(model, terms, held, bounds).finished(EVALUATIONS)
+    return Evidence(descent.solution, tuple(terms))
+
+
+def begun(model: Model, terms: Sequence[Term], held: Sequence[str], bounds: Bounds) -> Descent:
+    """The same fit at its start."""
+    return Descent.start(model, terms, [name for name in model.parameters if name not in held], bounds)

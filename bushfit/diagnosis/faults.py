@@ -19,8 +19,8 @@ from bushfit.sheets import display_units
 
 #: A disturbance covers at most this many neighbouring frequencies.
 _WIDEST = 3
-#: A single point is a suspect beyond this many standard deviations.
-_FAR = 4.0
+#: A single point is a suspect beyond this many standard deviations, and where many are, the farthest of each test.
+_FAR, _FARTHEST = 4.0, 8
 
 
 #: Points that deviate together: per sweep term its place among the residuals and the points touched.
@@ -166,8 +166,9 @@ def _rows(evidence: Evidence) -> Iterator[Place]:
     for term, place in _sweeps(evidence):
         residual = evidence.residual[place]
         count = term.frequency.size
-        far = np.flatnonzero(np.maximum(np.abs(residual[:count]), np.abs(residual[count:])) > _FAR)
-        for row in far:
+        distance = np.maximum(np.abs(residual[:count]), np.abs(residual[count:]))
+        farthest = np.argsort(-distance, kind="stable")[:_FARTHEST]
+        for row in farthest[distance[farthest] > _FAR]:
             together = [(term, place, np.arange(count) == row)]
             words = (
                 f"the point at {term.frequency[row]:.4g} Hz, {_amplitude(term, term.amplitude[row])}, "

@@ -125,10 +125,14 @@ def _named(step: Step) -> Named:
 
 
 def _evidence(step: Step) -> str:
-    second = step.tried[1] if len(step.tried) > 1 else None
+    others = [rival for rival in step.tried[1:] if not rival.left]
     behind = ""
-    if second is not None and step.tried[0].name == step.name:
-        behind = f"; next best {second.name}, {second.evidence.bic - step.tried[0].evidence.bic:.0f} behind by BIC"
+    if step.tried and step.tried[0].name == step.name:
+        behind = "; no other comes near"
+        if others:
+            behind = (
+                f"; next best {others[0].name}, {others[0].evidence.bic - step.tried[0].evidence.bic:.0f} behind by BIC"
+            )
     return f"takes {step.gain:.0f} off chi-square{behind}"
 
 
@@ -179,11 +183,13 @@ def _fault_where(fault: Fault) -> Where:
 def _candidates(search: Search, kept: set[str]) -> list[Judged]:
     """Every effect of the library on the base model: score, refit, and why it won or lost."""
     base, judged = search.base, []
-    leader = min((c.evidence.bic for c in search.judged.values()), default=base.bic)
-    for proposal in search.proposed:
-        candidate = search.judged.get(proposal.name)
-        if candidate is None:
+    tried = {candidate.name: candidate for candidate in search.first.tried}
+    leader = min((c.evidence.bic for c in search.first.tried), default=base.bic)
+    for proposal in search.first.proposed:
+        candidate = tried.get(proposal.name)
+        if candidate is None or candidate.left:
             why = "not visible in these tests" if not proposal.visible else "score too small to refit"
+            why = "left on its way, far behind the best" if candidate else why
             judged.append(Judged(proposal.name, proposal.score, None, None, None, {}, why))
             continue
         bic = candidate.evidence.bic
@@ -191,8 +197,8 @@ def _candidates(search: Search, kept: set[str]) -> list[Judged]:
         own = {name: value for name, value in model.values.items() if name not in base.model.values}
         if proposal.name in kept:
             why = "kept"
-        elif candidate.gain < search.critical:
-            why = f"gain below {search.critical:.3g}, which chance alone can make"
+        elif candidate.gain < search.first.critical:
+            why = f"gain below {search.first.critical:.3g}, which chance alone can make"
         elif base.bic - bic < SAME:
             why = "gain below its price in parameters"
         else:
@@ -222,7 +228,7 @@ def _result(evidence: Evidence, bounds: Bounds) -> Result:
 
 def _notes(search: Search, after: Evidence) -> tuple[str, ...]:
     """What these tests could not show at all."""
-    blind = [proposal.name for proposal in search.proposed if not proposal.visible]
+    blind = [proposal.name for proposal in search.first.proposed if not proposal.visible]
     notes = []
     if blind:
         notes.append(f"not identifiable from these tests: {', '.join(blind)}")

@@ -131,14 +131,9 @@ def solve(
     """
     import lmfit
 
-    points = sum(term.size for term in terms)
-    if points <= len(names):
-        raise FitError("too few points for the fit", found=f"{points} points for {len(names)} parameters")
-    coordinates = Coordinates.of(model, names)
-    low, high = walls(coordinates, bounds or {})
+    coordinates, start, low, high = opening(model, terms, names, bounds or {})
     inside = 1e-6 * (high - low)
-    lifted = {name: value or model.parameters[name].bounds[0] for name, value in model.values.items()}
-    start = np.clip(coordinates.point(lifted), low + inside, high - inside)
+    start = np.clip(start, low + inside, high - inside)
 
     @lru_cache(maxsize=2)  # terms know again the model they answered last: the best so far, and the one tried
     def model_at(point: tuple[float, ...]) -> Model:
@@ -173,11 +168,7 @@ def solve(
                 by_point = {"jac": lambda parameters: slopes(parameters).T, "x_scale": "jac", "gtol": None}
                 fit = lmfit.minimize(misfit, walled, "least_squares", **by_point, **common)
     except ValueError as error:  # lmfit's word for a residual that is not finite
-        raise FitError(
-            "the model has no finite response to these tests",
-            found=", ".join(f"{name} = {value:.4g}" for name, value in model.values.items()),
-            hint="give start values or bounds in [fit] of the campaign",
-        ) from error
+        raise no_finite_response(model) from error
     end = np.array([parameter.value for parameter in fit.params.values()])
     best = model_at(tuple(end))
     found = Solution(
@@ -186,7 +177,7 @@ def solve(
         residual(best, terms),
         jacobian(best, terms, coordinates.names),
         int(fit.nfev),
-        _at_bound(coordinates.names, end, low, high),
+        at_bound(coordinates.names, end, low, high),
         bool(fit.aborted),
     )
     if found.stopped and strict and found.gain(found.at_bound) > Z95**2:
@@ -200,6 +191,32 @@ def solve(
 
 class _WallMetError(Exception):
     """A step leaves the bounds."""
+
+
+def opening(
+    model: Model, terms: Sequence[Term], names: Sequence[str], bounds: Bounds
+) -> tuple[Coordinates, Array, Array, Array]:
+    """The coordinates of a fit, where in them the model's own values lie, and the walls, (k,) each.
+
+    Raises:
+        FitError: fewer data than parameters.
+    """
+    points = sum(term.size for term in terms)
+    if points <= len(names):
+        raise FitError("too few points for the fit", found=f"{points} points for {len(names)} parameters")
+    coordinates = Coordinates.of(model, names)
+    least = {name: parameter.bounds[0] for name, parameter in model.parameters.items() if parameter.log}
+    lifted = {name: value or least.get(name, 0.0) for name, value in model.values.items()}
+    return coordinates, coordinates.point(lifted), *walls(coordinates, bounds)
+
+
+def no_finite_response(model: Model) -> FitError:
+    """The error of a fit that cannot begin."""
+    return FitError(
+        "the model has no finite response to these tests",
+        found=", ".join(f"{name} = {value:.4g}" for name, value in model.values.items()),
+        hint="give start values or bounds in [fit] of the campaign",
+    )
 
 
 def walls(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, Array]:
@@ -233,7 +250,8 @@ def _blank_parameters(count: int) -> Any:
     return parameters
 
 
-def _at_bound(names: Sequence[str], point: Array, low: Array, high: Array) -> dict[str, End]:
+def at_bound(names: Sequence[str], point: Array, low: Array, high: Array) -> dict[str, End]:
+    """Coordinates that rest on a wall, and on which."""
     near = _AT_BOUND * np.minimum(high - low, 1.0)
     ends: dict[str, End] = {name: "min" for name, met in zip(names, point - low < near, strict=True) if met}
     return ends | {name: "max" for name, met in zip(names, high - point < near, strict=True) if met}

@@ -101,6 +101,26 @@ def test_what_is_there_is_named_and_its_model_is_then_consistent(
         assert again.result.model.values[name] == pytest.approx(value, rel=2e-3)
 
 
+def test_a_branch_of_the_paper_that_a_model_lacks_is_named(measured: Measured) -> None:
+    """What has no neutral logarithm to begin at begins at the amount that its score suggests."""
+    campaign = measured({}, SHARED)
+    lacking = Model.started(campaign.bushing, ("elastic", "friction"), {"eps_half": 0.01})
+    diagnosis = asked(campaign, lacking)
+    assert said(diagnosis) == "named springpot"
+    whole = asked(campaign)
+    for name, value in whole.result.model.values.items():
+        assert diagnosis.result.model.values[name] == pytest.approx(value, rel=1e-2)
+
+
+def test_what_was_left_on_its_way_has_no_gain(diagnosed: Diagnosed) -> None:
+    judged = {candidate.name: candidate for candidate in diagnosed(INERTIA, SHARED).candidates}
+    left = [candidate for candidate in judged.values() if "left on its way" in candidate.why]
+    assert left
+    for candidate in left:
+        assert candidate.gain is candidate.bic is candidate.heldout is None
+        assert candidate.score > 0.0
+
+
 def test_every_candidate_is_judged(diagnosed: Diagnosed) -> None:
     candidates = diagnosed(INERTIA, SHARED).candidates
     assert len({judged.name for judged in candidates}) == len(candidates) == len(LIBRARY) - len(BASE)
