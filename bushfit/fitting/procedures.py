@@ -32,11 +32,9 @@ _MOST_PASSES = 50
 _LONGEST_STRIDE = 5.0
 #: A filled natural rubber, to say what leaving the springpot out may do: m/mu [s^alpha] and alpha.
 _TYPICAL_SPRINGPOT = (0.18, 0.24)
-#: What is said of a fit that crept along a flat stretch until it was stopped.
-_STOPPED = (
-    "the fit was stopped after {} evaluations of the model, where chi-square is flat: parameters that stay open could "
-    "move on, for less than noise"
-)
+#: What is said of a fit that was stopped where chi-square is flat, and of one that was stopped on a slope.
+_FLAT = "chi-square is flat: parameters that stay open could move on, for next to nothing"
+_SLOPE = "it had not come to its end: the parameters are not the best ones"
 #: What to do about a model that does not fit.
 _NEXT = "; bushfit diagnose looks for what is missing"
 
@@ -237,11 +235,16 @@ def cautions(
     """What the data of a fit cannot tell: bounds met, what stays open, and a model that does not fit."""
     names, at_bound = solution.coordinates.names, solution.at_bound
     return [
-        *([_STOPPED.format(solution.evaluations)] if solution.stopped else []),
+        *(_stopped(solution) if solution.stopped else []),
         *(_at_edge(name, end, bounds) for name, end in at_bound.items()),
         *left_open(model, terms, [name for name in names if name not in at_bound], covariance),
         *misfit(model, terms, len(names), advice),
     ]
+
+
+def _stopped(solution: Solution) -> list[str]:
+    where = _FLAT if solution.flat else _SLOPE
+    return [f"the fit was stopped after {solution.evaluations} evaluations of the model, where {where}"]
 
 
 def _at_edge(name: str, end: End, bounds: Bounds) -> str:

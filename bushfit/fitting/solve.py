@@ -87,6 +87,11 @@ class Solution:
         basis = np.linalg.qr(self.jacobian[free].T)[0]
         return float(np.sum(np.square(basis.T @ self.residual)))
 
+    @property
+    def flat(self) -> bool:
+        """Whether no step takes chi-square, in units of the misfit's variance, further down than chance does."""
+        return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
+
 
 def residual(model: Model, terms: Sequence[Term]) -> Array:
     """Whitened residuals of all terms, (n,)."""
@@ -123,8 +128,8 @@ def solve(
         bounds: limits inside the parameters' own.
         evaluations: most evaluations of the model.
         tolerance: relative change of chi-square and of the point at which the fit stops.
-        strict: False takes the best point reached as it is when those are used up. Else it has to be a flat stretch,
-            on which no step takes chi-square below its 95 % interval.
+        strict: False takes the best point reached as it is when those are used up. Else chi-square has to be
+            flat there.
 
     Raises:
         FitError: fewer data than parameters, or no convergence.
@@ -180,7 +185,7 @@ def solve(
         at_bound(coordinates.names, end, low, high),
         bool(fit.aborted),
     )
-    if found.stopped and strict and found.gain(found.at_bound) > Z95**2:
+    if found.stopped and strict and not found.flat:
         raise FitError(
             "the fit did not converge",
             found=f"no end after {fit.nfev} evaluations of the model",
