@@ -84,15 +84,21 @@ SWEEP_COLUMNS = {
 _ASIDES = re.compile(r"\b(?:axial|radial|torsional|measured|actual|gemessen|mesure|medido|ist)\b")
 #: Units by which the symbol f is not the role it could stand for.
 _NOT_F = {"force": ("Hz",), "frequency": ("N", "N m")}
-#: Names of an amplitude that say peak-to-peak by themselves.
+#: Names of an amplitude that say peak-to-peak by themselves; "range" alone and "Schwingungsweite" do not, which some
+#: take for the amplitude.
 _DOUBLE = {
-    *("doppelamplitude", "schwingbreite", "schwingungsbreite", "doubleamplitude", "amplitudedouble", "amplituddoble"),
-    *("doublestroke", "doppelhub", "峰峰值"),
+    *("doppelamplitude", "schwingbreite", "schwingungsbreite", "schwingweite", "doppelhub", "2a", "2amplitude"),
+    *("doubleamplitude", "totalamplitude", "fullamplitude", "doublestroke", "displacementrange", "rotationrange"),
+    *("amplitudedouble", "amplitudetotale", "amplituddoble", "dobleamplitud", "amplitudtotal"),
+    *("2xamplitude", "2xa", "峰峰值"),
 }
 _PEAK = r"(?:peak|pk|spitze|crete|cresta|pico|pic)"
 _BEFORE, _AFTER = r"(?<![^\W_])", r"(?![^\W_])"
+#: A unit that the word is glued to: "mmpp".
+_UNIT_BEFORE = r"(?:(?<=mm)|(?<=[u\u03bc]m)|(?<=deg)|(?<=rad))"
 _PEAK_TO_PEAK = re.compile(
-    rf"{_BEFORE}(?:{_PEAK}[\s_/-]*(?:(?:to|zu|a|2)[\s_-]*)?{_PEAK}|p[\s_./-]?(?:t[\s_./-]?|2[\s_./-]?)?p|c[\s-]a[\s-]c)\.?{_AFTER}"
+    rf"{_BEFORE}(?:{_PEAK}[\s_/-]*(?:(?:to|zu|a|2)[\s_-]*)?{_PEAK}|p[\s_./-]?(?:t[\s_./-]?|2[\s_./-]?)?p|c[\s-]a[\s-]c"
+    rf"|s[.-]?s)\.?{_AFTER}|{_UNIT_BEFORE}(?:pk?-?pk?|s-?s){_AFTER}"
 )
 _ZERO_TO_PEAK = re.compile(
     rf"{_BEFORE}(?:(?:zero|null|cero|0)[\s_/-]*(?:(?:to|bis|zu|a|2)[\s_-]*)?(?:{_PEAK}|p))\.?{_AFTER}"
@@ -161,15 +167,17 @@ class Vocabulary:
         return {heading.role for cell in cells if (heading := self.heading(cell))}
 
     def _read(self, header: str) -> Heading | None:
-        text, convention = split_convention(header.translate(_SPELLINGS))
+        whole = header.translate(_SPELLINGS)
+        text, convention = split_convention(whole)
         if plain(header) in self._roles:  # a campaign may name a header with its unit
-            return Heading(self._roles[plain(header)], units.split_header(text)[1], convention)
-        for name, unit, bracketed in _splits(text):
-            bare, counted = plain(name), convention
-            if bare in _DOUBLE:
-                bare, counted = "amplitude", "peak-to-peak"
+            name, unit = units.split_header(text)
+            return Heading(self._roles[plain(header)], unit, "peak-to-peak" if plain(name) in _DOUBLE else convention)
+        # and a header with what it says of counting
+        for name, unit, bracketed in (split for way in dict.fromkeys((text, whole)) for split in _splits(way)):
+            bare, double = plain(name), plain(name) in _DOUBLE
+            counted = "peak-to-peak" if double else convention
             with_aside = plain(_ASIDES.sub("", _folded(name)))
-            for candidate in (bare, with_aside, *([bare + "amplitude"] if counted else [])):
+            for candidate in (bare, with_aside, *([bare + "amplitude"] if counted else []), *["amplitude"] * double):
                 role = self._roles.get(candidate)
                 if role is None or not (bracketed or units.is_unit(unit or "")):
                     continue

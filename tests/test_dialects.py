@@ -134,6 +134,20 @@ AMPLITUDES = {
     "Amplitude crete-a-crete [mm]": 0.5,
     "Amplitud pico a pico [mm]": 0.5,
     "Amplitude [mm p-p]": 0.5,
+    "Amplitude SS [mm]": 0.5,
+    "Amplitude s-s (mm)": 0.5,
+    "Amplitude Spitze zu Spitze / mm": 0.5,
+    "Amplitude [mm SS]": 0.5,
+    "Amplitude [mmpp]": 0.5,
+    "Weg [mmp-p]": 0.5,
+    "Weg SS in mm": 0.5,
+    "Schwingweite [mm]": 0.5,
+    "2A [mm]": 0.5,
+    "total amplitude [mm]": 0.5,
+    "displacement range [mm]": 0.5,
+    "amplitude totale [mm]": 0.5,
+    "Amplitude c-à-c [mm]": 0.5,
+    "Amplitud pico-pico (mm)": 0.5,
     "Amplitude [mm]": 1.0,
     "Amplitude 0-p [mm]": 1.0,
     "Amplitude zero-to-peak (mm)": 1.0,
@@ -150,6 +164,28 @@ def test_a_header_says_how_amplitudes_count(header: str, tmp_path: Path) -> None
     if header != "Amplitude [mm]":
         with pytest.raises(MeasurementError, match="header and campaign count amplitudes differently"):
             read_sweep(file, Direction.AXIAL, amplitude=contrary)  # type: ignore[arg-type]
+
+
+NAMED = {
+    "Amplitude SS [mm]": ("Amplitude SS", 0.5),
+    "Level SS [mm]": ("Level SS", 0.5),
+    "Pegel p-p [mm]": ("Pegel p-p [mm]", 0.5),
+    "Pegel [mm pp]": ("Pegel", 0.5),
+    "Schwingbreite [mm]": ("Schwingbreite", 0.5),
+    "Doppelamplitude [mm] ": ("Doppelamplitude [mm]", 0.5),
+    "Pegel 0-p [mm]": ("Pegel 0-p", 1.0),
+    "range [mm]": ("range", 1.0),
+    "Stress level [mm]": ("Stress level", 1.0),
+}
+
+
+@pytest.mark.parametrize("header", NAMED)
+def test_a_header_that_is_named_says_it_too(header: str, tmp_path: Path) -> None:
+    named, counted = NAMED[header]
+    file = tmp_path / "sweep.csv"
+    file.write_text(DIALECTS["plain sweep"].text().replace("amplitude [mm]", header), encoding="utf-8")
+    found = read_sweep(file, Direction.AXIAL, columns={"amplitude": named}).amplitude
+    assert np.array_equal(found, expected("sweep")[1] * 1e-3 * counted)
 
 
 Rows = Iterable[Sequence[object]]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bushfit.cli.common import Options, shared_options, warn
-from bushfit.cli.inspect import KEYS
+from bushfit.cli.inspect import KEYS, tell_assumed
 from bushfit.cli.raw import direction_error, file_options, options_named
 from bushfit.errors import BushfitError, CampaignError, MeasurementError
 
@@ -152,8 +152,4 @@ def _tell(options: Options, seen: Inspected) -> None:
     kept = [f"{key}: {facts[key]}" for key in wanted if key in facts]
     options.console.print(f"{seen.file}: {seen.kind}, {seen.direction}; {'; '.join(kept)}", markup=False)
     warn(options, [f"{seen.file.name}: {sentence}" for sentence in seen.looked.odd])
-    if seen.kind == "sweep" and "amplitude" not in seen.entry and not seen.counted:
-        options.console.print(
-            "  its header does not say how amplitudes are counted: taken zero-to-peak, else --amplitude peak-to-peak",
-            markup=False,
-        )
+    tell_assumed(options, seen)

@@ -88,10 +88,17 @@ def tell(options: Options, seen: Inspected) -> None:
     facts = {"written with": written, **seen.looked.facts}
     for label, value in facts.items():
         console.print(f"  {label}: {value}", markup=False)
+    tell_assumed(options, seen)
     for sentence in seen.looked.odd:
         console.print(f"  [yellow]odd:[/yellow] {escape(sentence)}")
     if not seen.looked.odd:
         console.print("  nothing odd")
+
+
+def tell_assumed(options: Options, seen: Inspected) -> None:
+    """What a file leaves open and was assumed."""
+    if seen.assumed:
+        options.console.print(f"  {seen.assumed}", markup=False)
 
 
 def _pictures(seen: Sequence[Inspected], pages: Sequence[str]) -> dict[str, bytes]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -70,6 +70,9 @@ def inspect(file: Path, stated: Mapping[str, Any]) -> Inspected:
         odd.append(f"the name says {named}, it is taken for {direction} as stated")
     looked = Looked(looked.facts, (*odd, *looked.odd))
     counted = is_sweep and table.roles["amplitude"].convention is not None
+    if is_sweep and "peak-to-peak" in (table.roles["amplitude"].convention, entry.get("amplitude")):
+        half = f', half of "{table.roles["amplitude"].header}", which counts peak-to-peak'
+        looked = replace(looked, facts={**looked.facts, "amplitudes": looked.facts["amplitudes"] + half})
     return Inspected(file, kind, direction, _written(table), columns, looked, entry, measured, counted)
 
 

@@ -60,6 +60,13 @@ class Inspected:
     measured: Loop | Sweep | None = None
     counted: bool = False
 
+    @property
+    def assumed(self) -> str | None:
+        """What was taken for granted, as a sentence with the option that says otherwise; None where nothing was."""
+        if self.kind != "sweep" or self.counted or "amplitude" in self.entry:
+            return None
+        return "its header does not say how amplitudes are counted: taken zero-to-peak, else --amplitude peak-to-peak"
+
     def to_document(self) -> dict[str, Any]:
         """As JSON."""
         return {
@@ -69,5 +76,6 @@ class Inspected:
             "written": dict(self.written),
             "columns": [vars(column) for column in self.columns],
             "facts": dict(self.looked.facts),
+            "assumed": self.assumed,
             "odd": list(self.looked.odd),
         }

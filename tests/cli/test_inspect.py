@@ -136,3 +136,25 @@ def test_the_unit_tells_frequency_from_force(typed: Callable, tmp_path: Path, he
     done = typed("inspect", "axial.csv", "--no-plots", *(("--unit", "stiffness=N/mm") if "eta" in header else ()))
     assert done.returncode == 0, done.stderr
     assert "from 5 to 45 Hz" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("header", "options", "said", "unsaid"),
+    [
+        ("amplitude [mm]", (), "taken zero-to-peak, else --amplitude peak-to-peak", "half of"),
+        ("Pegel [mm]", ("--column", "amplitude=Pegel"), "taken zero-to-peak, else --amplitude", "half of"),
+        ("Amplitude SS [mm]", (), '0.05 mm zero-to-peak, half of "Amplitude SS [mm]", which counts peak', "taken zero"),
+        ("Pegel", ("--column", "amplitude=Pegel", "--unit", "amplitude=mmpp"), 'half of "Pegel"', "taken zero"),
+        ("amplitude [mm]", ("--amplitude", "peak-to-peak"), 'half of "amplitude [mm]"', "taken zero"),
+        ("amplitude 0-p [mm]", (), "0.1 mm zero-to-peak", "taken zero"),
+    ],
+)
+def test_how_amplitudes_are_counted_is_said(
+    typed: Callable, tmp_path: Path, header: str, options: tuple[str, ...], said: str, unsaid: str
+) -> None:
+    rows = "\n".join(f"{f},0.1,{600 + f},0.1" for f in range(5, 50, 5))
+    (tmp_path / "axial.csv").write_text(f"f [Hz],{header},stiffness [N/mm],eta\n{rows}\n", encoding="utf-8")
+    done = typed("inspect", "axial.csv", "--no-plots", *options)
+    assert done.returncode == 0, done.stderr
+    assert said in done.stderr
+    assert unsaid not in done.stderr
