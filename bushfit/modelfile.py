@@ -12,6 +12,7 @@ from pydantic import Field
 
 from bushfit.errors import ModelError
 from bushfit.files import read_utf8
+from bushfit.geometry import Direction
 from bushfit.schema import Name
 from bushfit.toml import check_tables
 
@@ -62,6 +63,7 @@ class FitEntry:
     noise: Number
     frequency_Hz: Interval | None = None  # noqa: N815
     strain: Interval | None = None
+    directions: tuple[Direction, ...] = ()
 
 
 @dataclass(frozen=True)

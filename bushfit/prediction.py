@@ -5,7 +5,7 @@ Material and component effects are kept, instrument effects are left out: the ca
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +22,7 @@ from bushfit.sensitivity import stiffness_jacobian
 PAPER_FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
 PAPER_AMPLITUDES = (1e-4, 2e-4, 5e-4)
 _TORSION_AMPLITUDES = tuple(float(np.radians(x)) for x in (0.5, 1.0, 2.0))
-#: Beyond the measured range by more than this share, a prediction is an extrapolation.
+#: Beyond the fitted range by more than this share, a prediction is an extrapolation.
 _MARGIN = 0.01
 
 
@@ -47,7 +47,7 @@ class Prediction:
         loss_factor: K''/K'.
         storage_stiffness: K'.
         loss_stiffness: K''.
-        warnings: what leaves the measured range.
+        warnings: what leaves what was fitted: its directions, frequencies and strains.
     """
 
     direction: Direction
@@ -144,24 +144,44 @@ def predict(
         loss_factor=band(loss_factor, (1.0 + loss_factor**2) * relative.imag),
         storage_stiffness=band(stiffness.real, slopes.real),
         loss_stiffness=band(stiffness.imag, slopes.imag),
-        warnings=_extrapolations(result, direction, frequency, amplitude),
+        warnings=(*_unfitted(result, direction), *_extrapolations(result, direction, frequency, amplitude)),
     )
 
 
-def left_out(result: Result) -> str | None:
-    """A sentence on the instrument effects that prediction leaves out, or None where there are none."""
-    names = [name for name in result.model.effects if effect_named(name).level is Level.INSTRUMENT]
-    if not names:
-        return None
-    return f"left out of the prediction, because they belong to the rig and not to the bushing: {', '.join(names)}"
-
-
-def _extrapolations(result: Result, direction: Direction, frequency: Array, amplitude: Array) -> tuple[str, ...]:
+def caveats(result: Result) -> list[str]:
+    """Sentences on what holds of a model's prediction in every direction."""
     lines = []
     if "springpot" not in result.model.effects:
         lines.append("the model has no springpot: its stiffness does not depend on frequency")
     if result.measured is None:
-        return (*lines, "the model was not fitted here: no uncertainty, and no measured range to compare with")
+        lines.append("the model was not fitted here: no uncertainty, and no fitted range to compare with")
+    rig = [name for name in result.model.effects if effect_named(name).level is Level.INSTRUMENT]
+    if rig:
+        belong = "because they belong to the rig and not to the bushing"
+        lines.append(f"left out of the prediction, {belong}: {', '.join(rig)}")
+    return lines
+
+
+def _unfitted(result: Result, direction: Direction) -> Iterator[str]:
+    """What the band of a direction does not hold where only others were fitted: the formula that leads there."""
+    fitted = result.measured.directions if result.measured else ()
+    if not fitted or direction in fitted:
+        return
+    radially = direction is Direction.RADIAL or (Direction.AXIAL not in fitted and Direction.RADIAL in fitted)
+    if radially and "radial_factor" in result.model.effects:
+        return
+    formula, compared = (
+        ("radial", "-0.7 to +9.7 % against finite elements")
+        if radially
+        else ("torsion", "which was not compared with finite elements")
+    )
+    scatter = f"its band holds the scatter of the {' and '.join(fitted)} tests"
+    yield f"{direction}: not fitted; {scatter}, not the error of the {formula} formula, {compared}"
+
+
+def _extrapolations(result: Result, direction: Direction, frequency: Array, amplitude: Array) -> Iterator[str]:
+    if result.measured is None:
+        return
     strain = amplitude * result.model.bushing.unit_strain(direction)
     axes = (
         ("frequencies", "Hz", frequency, result.measured.frequency),
@@ -170,8 +190,7 @@ def _extrapolations(result: Result, direction: Direction, frequency: Array, ampl
     for what, unit, asked, (low, high) in axes:
         if asked.min() < low * (1 - _MARGIN) or asked.max() > high * (1 + _MARGIN):
             here, there = _span(asked.min(), asked.max(), unit), _span(low, high, unit)
-            lines.append(f"{direction}: predicted at {what} of {here}, but tested at {there} only: extrapolated beyond")
-    return tuple(lines)
+            yield f"{direction}: predicted at {what} of {here}, but fitted at {there} only: extrapolated beyond"
 
 
 def _span(low: float, high: float, unit: str) -> str:

@@ -15,6 +15,7 @@ from scipy.special import stdtrit
 from bushfit import __version__
 from bushfit.effects.contract import Array
 from bushfit.errors import BushfitError, ModelError
+from bushfit.geometry import Direction
 from bushfit.measurement import Source
 from bushfit.model import Model
 from bushfit.modelfile import read_model_file
@@ -120,10 +121,12 @@ class Quality:
 
 @dataclass(frozen=True)
 class Range:
-    """What was measured: frequencies [Hz] and equivalent strain amplitudes, least and largest."""
+    """What was fitted: frequencies [Hz] and equivalent strain amplitudes, least and largest, and directions; of these
+    none where an older file does not say which."""
 
     frequency: tuple[float, float]
     strain: tuple[float, float]
+    directions: tuple[Direction, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -159,7 +162,7 @@ class Result:
         fitted: names of the parameters the fit moved.
         covariance: of the fitted parameters, and of held ones whose error is known.
         quality: None where the model was not fitted.
-        measured: None where the model was not fitted.
+        measured: reach of the tests that were fitted; None where the model was not fitted.
         warnings: what a user must know before using the numbers.
         inputs: the files behind it.
         outliers: points that lie farther off than noise explains.
@@ -218,6 +221,7 @@ class Result:
                 "noise": self.quality.noise,
                 "frequency_Hz": list(self.measured.frequency),
                 "strain": list(self.measured.strain),
+                "directions": [str(direction) for direction in self.measured.directions],
             }
         document["warnings"] = list(self.warnings)
         document["outliers"] = [asdict(outlier) for outlier in self.outliers]
@@ -252,7 +256,7 @@ class Result:
                 Quality(float(fit["nrmse"]), float(fit["reduced_chi_square"]), int(fit["points"]), float(fit["noise"]))
                 if fit
                 else None,
-                Range(_pair(fit["frequency_Hz"]), _pair(fit["strain"])) if fit and "strain" in fit else None,
+                _range(fit) if fit and "strain" in fit else None,
                 tuple(str(line) for line in document.get("warnings", ())),
                 tuple(
                     Source(Path(entry["file"]), str(entry["sha256"]))
@@ -302,6 +306,11 @@ def _end(word: object) -> End:
     if word not in get_args(End):
         raise ValueError(f"at_bound = {word!r}")
     return cast("End", word)
+
+
+def _range(fit: Mapping[str, Any]) -> Range:
+    directions = tuple(Direction(name) for name in fit.get("directions", ()))
+    return Range(_pair(fit["frequency_Hz"]), _pair(fit["strain"]), directions)
 
 
 def _pair(values: Sequence[float]) -> tuple[float, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +66,15 @@ def test_there_and_back(result: Result, document: dict[str, Any]) -> None:
     np.testing.assert_array_equal(back.covariance.spread, result.covariance.spread)
     again = back.to_document()
     assert {**again, "provenance": None} == {**document, "provenance": None}
+
+
+def test_a_file_that_does_not_say_which_directions_were_fitted_is_read(
+    result: Result, document: dict[str, Any]
+) -> None:
+    del document["fit"]["directions"]
+    back = Result.from_document(document)
+    assert result.measured is not None
+    assert back.measured == replace(result.measured, directions=())
 
 
 def test_a_model_alone_is_a_result(paper_model: Model, tmp_path: Path) -> None:
@@ -150,6 +160,7 @@ DAMAGES: dict[str, Change] = {
     "covariance is text": lambda d: d.update(covariance="none"),
     "fit is a list": lambda d: d.update(fit=[1, 2]),
     "fit lacks a number": lambda d: d["fit"].pop("nrmse"),
+    "unknown direction": lambda d: d["fit"].update(directions=["sideways"]),
     "range of three": lambda d: d["fit"].update(strain=[1, 2, 3]),
     "provenance is text": lambda d: d.update(provenance="here"),
     "warnings is a number": lambda d: d.update(warnings=3),

@@ -44,7 +44,7 @@ def command(
 
     Writes axial.csv and radial.csv (torsion.csv on request) with 95 % bands, and a plot of each. Effects of the rig
     are left out. Without a grid in the options or the campaign it is that of the campaign's sweeps in each direction,
-    or the paper's as far as it was measured. A warning names what leaves the measured range of strain or frequency.
+    or the paper's as far as it was measured. A warning names what leaves the fitted directions, strains or frequencies.
     """
     from bushfit.campaign import load_campaign
     from bushfit.cli.grids import parse_grid
@@ -75,18 +75,13 @@ def command(
 
 def tell_predictions(options: Options, outcome: Predicted) -> None:
     """The corners of each table, and what a user must know before using it."""
-    from bushfit.prediction import left_out
     from bushfit.sheets import prediction_table
 
-    result = outcome.result
     for prediction in outcome.predictions:
         table = prediction_table(prediction)
-        shown = new_table(f"{result.model.bushing.name}: {prediction.direction}, corners", *table.columns[:4])
+        shown = new_table(f"{outcome.result.model.bushing.name}: {prediction.direction}, corners", *table.columns[:4])
         low, high = table.iloc[:, 0].min(), table.iloc[:, 0].max()
         for row in table[table.iloc[:, 0].isin([low, high])].itertuples(index=False):
             shown.add_row(*(f"{value:.4g}" for value in row[:4]))
         options.console.print(shown)
-        warn(options, prediction.warnings)
-    rig_only = left_out(result)
-    if rig_only:
-        warn(options, [rig_only])
+    warn(options, outcome.warnings)

@@ -10,6 +10,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.fitting.solve import Coordinates, jacobian, residual
 from bushfit.fitting.terms import Term
+from bushfit.geometry import Direction
 from bushfit.model import Model
 from bushfit.results import Covariance, Quality, Range
 
@@ -123,10 +124,11 @@ def quality(model: Model, terms: Sequence[Term], parameters: int) -> Quality:
 
 
 def measured_range(model: Model, terms: Sequence[Term]) -> Range:
-    """Frequencies and equivalent strains that the terms reach."""
+    """Frequencies, equivalent strains and directions that the terms reach."""
     f = np.concatenate([term.frequency for term in terms])
     e = np.concatenate([term.amplitude * model.bushing.unit_strain(term.direction) for term in terms])
-    return Range((float(f.min()), float(f.max())), (float(e.min()), float(e.max())))
+    directions = tuple(direction for direction in Direction if any(term.direction is direction for term in terms))
+    return Range((float(f.min()), float(f.max())), (float(e.min()), float(e.max())), directions)
 
 
 def misfit(model: Model, terms: Sequence[Term], parameters: int, advice: str = "") -> list[str]:

@@ -51,13 +51,12 @@ def prediction_files(
     if "png" not in formats:
         return files
     from bushfit.plots import fine_grid, prediction_figure, to_png
-    from bushfit.prediction import left_out, predict
+    from bushfit.prediction import caveats, predict
 
     for prediction in predictions:
         over = [term for term in measured if term.direction is prediction.direction]
         curves = predict(result, prediction.direction, *fine_grid(prediction))
-        notes = filter(None, (left_out(result), *prediction.warnings))
-        note = ". ".join(text[0].upper() + text[1:] for text in notes)
+        note = ". ".join(text[0].upper() + text[1:] for text in (*caveats(result), *prediction.warnings))
         title = result.model.bushing.name
         files[f"{prediction.direction}.png"] = to_png(
             prediction_figure(prediction, over, title, curves=curves, note=note)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from bushfit.fitting.terms import SweepTerm, sweep_terms
 from bushfit.geometry import Direction
 from bushfit.jobs.artifacts import artifact_names, prediction_files
-from bushfit.prediction import Prediction, default_grid, predict
+from bushfit.prediction import Prediction, caveats, default_grid, predict
 from bushfit.schema import PredictSettings
 from bushfit.sheets import prediction_table
 
@@ -30,7 +30,13 @@ class Predicted:
 
     @property
     def document(self) -> Mapping[str, Any]:
-        return {str(p.direction): prediction_table(p).to_dict(orient="list") for p in self.predictions}
+        tables = {str(p.direction): prediction_table(p).to_dict(orient="list") for p in self.predictions}
+        return {**tables, "warnings": self.warnings}
+
+    @property
+    def warnings(self) -> list[str]:
+        """Of each direction, then of all."""
+        return [*(line for p in self.predictions for line in p.warnings), *caveats(self.result)]
 
     def files(self, formats: Collection[str]) -> dict[str, bytes]:
         return prediction_files(self.result, self.predictions, self.measured, formats)

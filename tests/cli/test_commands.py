@@ -94,6 +94,18 @@ def test_predict_lays_measurements_over_and_takes_grids(bushfit: Run, tmp_path: 
     assert table["amplitude [mm]"].tolist() == [0.1] * 3 + [0.3] * 3
 
 
+def test_predict_says_each_warning_once_and_in_its_document(bushfit: Run, root: Path, tmp_path: Path) -> None:
+    at = (*("-o", str(tmp_path / "x")), "--no-plots", "--force", "--json")
+    truth = str(root / "data/mystery_mount/open_last/truth.json")
+    for model, said in ((truth, "left out of the prediction"), ("model/model.json", "radial: not fitted")):
+        done = bushfit("predict", model, *at)
+        told = [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
+        assert len(set(told)) == len(told) > 0
+        warnings = json.loads(done.stdout)["warnings"]
+        assert [f"warning: {line}" for line in warnings] == [line for line in told if ": of the fit: " not in line]
+        assert any(line.startswith(said) for line in warnings)
+
+
 def test_simulate_writes_a_campaign_that_run_takes(bushfit: Run, tmp_path: Path) -> None:
     at = str(tmp_path / "sim")
     one = bushfit("simulate", "model/model.json", "--seed", "7", "--noise", "0.5 %", "-o", at)
