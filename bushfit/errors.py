@@ -75,6 +75,10 @@ class MeasurementError(BushfitError):
     """A measured table that cannot be used."""
 
 
+class NoColumnError(MeasurementError):
+    """A table without the header that a column was named by."""
+
+
 class ModelError(BushfitError):
     """A model file, or a set of effects and values, that cannot be used."""
 

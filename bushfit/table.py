@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit import units
-from bushfit.errors import MeasurementError, UnitError
+from bushfit.errors import MeasurementError, NoColumnError, UnitError
 from bushfit.files import sha256, view_bytes
 from bushfit.headers import Column, Vocabulary, split_convention
 from bushfit.layout import DELIMITERS, FileFormat, Layout, find_layout, fits
@@ -194,11 +194,12 @@ class Table:
         found: str | None = None,
         expected: str | None = None,
         hint: str | None = None,
+        kind: type[MeasurementError] = MeasurementError,
     ) -> MeasurementError:
         """An error in this table, at a line (from 1) and column where they are known."""
         found = found if found is None or len(found) <= _LONGEST_FOUND else found[:_LONGEST_FOUND] + "..."
         place = self._place(line, column)
-        return MeasurementError(problem, file=self.file, place=place, found=found, expected=expected, hint=hint)
+        return kind(problem, file=self.file, place=place, found=found, expected=expected, hint=hint)
 
     def _place(self, line: int | None, column: Column | None) -> str | None:
         sheet = self.source.sheet
@@ -259,12 +260,15 @@ class Table:
         for role in columns:
             if role not in roles:
                 near = get_close_matches(columns[role], self.headers, n=1, cutoff=0.4)
+                header = near[0] if near else "..."
                 raise self.error(
                     f'there is no column "{columns[role]}"',
+                    kind=NoColumnError,
                     line=self.layout.header_line,
                     found=", ".join(self.headers),
-                    expected=f"the column that the campaign names for the {_label(role)}",
-                    hint=f'did you mean "{near[0]}"?' if near else None,
+                    expected=f"the header that was named for the {_label(role)}",
+                    hint=(f'did you mean "{near[0]}"? ' if near else "name one of this file: ")
+                    + f'columns = {{ {role} = "{header}" }} in the campaign',
                 )
         return roles
 

@@ -48,7 +48,7 @@ def command(
     Writes campaign.toml; -o may also name the file itself, such as -o my_bushing.toml.
     """
     from bushfit.inspection.draft import campaign_text
-    from bushfit.inspection.opening import inspect
+    from bushfit.inspection.opening import inspect, stated_of_each
 
     name = name or files[0].resolve().parent.name
     radii = {
@@ -60,7 +60,7 @@ def command(
     bushing = _bushing(table, folder / target)
     options.require_free(folder, [target])
     with options_named():
-        seen = [_usable(inspect(file, stated)) for file in files]
+        seen = [_usable(inspect(file, own)) for file, own in zip(files, stated_of_each(files, stated), strict=True)]
     _check_once(files)
     text = campaign_text(table, seen, folder)
     inner, outer, long = (1e3 * size for size in (2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length))

@@ -33,7 +33,7 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
 
     For each FILE: how every column was understood, in which unit, and its range; cycles, sampling, waveform, noise,
     frequencies, amplitudes, repeats; and what is odd, in sentences with figures. The text for the campaign goes to
-    standard output, ready to paste.
+    standard output, ready to paste into a campaign in any folder.
 
     A file that cannot be used does not keep the others from being told; then nothing is written, and the exit status
     is 2.
@@ -41,8 +41,8 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     Writes inspect.png (inspect_2.png and so on of more than five files), with -o there, else under results/ in a folder
     of the first file's name.
     """
-    from bushfit.inspection.draft import file_text
-    from bushfit.inspection.opening import inspect
+    from bushfit.inspection.draft import pasted_text
+    from bushfit.inspection.opening import inspect, stated_of_each
     from bushfit.output import folder_name
 
     folder = options.folder(folder_name(files[0].stem))
@@ -51,15 +51,15 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
         options.require_free(folder, pages)
     seen: list[Inspected] = []
     failed: list[BushfitError] = []
-    for file in files:
+    for file, own in zip(files, stated_of_each(files, stated), strict=True):
         try:
             with options_named():
-                seen.append(inspect(file, stated))
+                seen.append(inspect(file, own))
         except BushfitError as error:
             failed.append(error)
         else:
             tell(options, seen[-1])
-    text = "\n".join(file_text(one) for one in seen)
+    text = pasted_text(seen)
     if not options.as_json:
         click.echo(text, nl=False)
     if failed:

@@ -61,19 +61,19 @@ def command(
         output["reduce.png"] = to_png(reduction_figure(reduction, histories, title))
     options.write(folder, output)
     snippet = f'[[sweeps]]\nfile = "sweep.csv"\ndirection = "{direction}"\n'
-    options.console.print(f"for the campaign:\n\n{snippet}", markup=False)
+    options.console.print(f"for a campaign in {folder} (elsewhere, with the way there):\n\n{snippet}", markup=False)
     options.tell(_document(reduction, snippet))
 
 
 def _read(files: Sequence[Path], stated: Mapping[str, Any]) -> list[Loop]:
     """The histories, of one direction, named by their stems, or by their paths where stems agree."""
-    from bushfit.inspection.opening import read_history
+    from bushfit.inspection.opening import read_history, stated_of_each
 
     stems = [file.stem for file in files]
     histories: list[Loop] = []
-    for file, stem in zip(files, stems, strict=True):
+    for file, stem, own in zip(files, stems, stated_of_each(files, stated), strict=True):
         with options_named():
-            history, direction = read_history(file, stated)
+            history, direction = read_history(file, own)
         if direction is None:
             raise direction_error(file)
         if histories and direction is not histories[0].direction:

@@ -26,14 +26,20 @@ def campaign_text(bushing: Mapping[str, str], files: Sequence[Inspected], folder
     return "\n".join([*head, "", *(file_text(seen, folder) for seen in order)])
 
 
+def pasted_text(files: Sequence[Inspected]) -> str:
+    """Tables to paste into a campaign in whatever folder: files are named from the root."""
+    head = "# files by their full path, which holds in any folder; bushfit init writes them as seen from the campaign\n"
+    return head * any(seen.kind in _PLURAL for seen in files) + "\n".join(file_text(seen) for seen in files)
+
+
 def file_text(seen: Inspected, folder: Path | None = None) -> str:
-    """The table of one file in a campaign, to paste; of a raw history, what to do first.
+    """The table of one file in a campaign; of a raw history, what to do first.
 
     Args:
         seen: the file.
-        folder: where the campaign lies; without it the file keeps the name that it was given by.
+        folder: where the campaign lies; without it the file is named by its full path.
     """
-    name = _relative(seen.file, folder)
+    name = _named(seen.file, folder)
     direction = f'"{seen.direction}"' if seen.direction else '"..."  # axial or radial: the file does not say'
     if seen.kind == "history":
         stated = f" --direction {seen.direction}" if seen.direction else " --direction ..."
@@ -43,12 +49,12 @@ def file_text(seen: Inspected, folder: Path | None = None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _relative(file: Path, folder: Path | None) -> str:
-    """The file as seen from a folder, with forward slashes; as given where there is no way between them."""
+def _named(file: Path, folder: Path | None) -> str:
+    """The file as seen from a folder, with forward slashes; its full path where there is no way between them."""
     if folder is not None:
         with suppress(ValueError):  # another drive
             return Path(os.path.relpath(file, folder)).as_posix()
-    return file.as_posix()
+    return file.resolve().as_posix()
 
 
 def _quoted(name: str) -> str:

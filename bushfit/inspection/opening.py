@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields, replace
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 
 from bushfit.campaign import reader_keywords
 from bushfit.directions import direction_of_file, named_direction
-from bushfit.errors import BushfitError, MeasurementError
+from bushfit.errors import BushfitError, MeasurementError, NoColumnError
 from bushfit.geometry import Direction
 from bushfit.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary
 from bushfit.inspection.channels import clock, odd_channels
@@ -33,6 +33,34 @@ from bushfit.toml import check_tables
 #: sine is a loop.
 _QUASI_STATIC, _SEVERAL = 1.0, 1.2
 _MINUS = {"force_sign": -1}
+
+
+def stated_of_each(files: Sequence[Path], stated: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """What the user states of each of several files: a column that some of them have is not asked of the others."""
+    columns: Mapping[str, str] = stated.get("columns", {})
+    has = {role: [_has(file, role, stated) for file in files] for role in columns}
+    return [
+        {
+            **stated,
+            "columns": {
+                role: header
+                for role, header in columns.items()
+                if has[role][number] is not False or True not in has[role]
+            },
+        }
+        for number in range(len(files))
+    ]
+
+
+def _has(file: Path, role: str, stated: Mapping[str, Any]) -> bool | None:
+    """Whether a file has the column that is stated for a role; None where it cannot be told."""
+    names = LOOP_COLUMNS if role in LOOP_COLUMNS else SWEEP_COLUMNS
+    try:
+        return role in _open(file, names, {**stated, "columns": {role: stated["columns"][role]}}).roles
+    except NoColumnError:
+        return False
+    except BushfitError:  # which the look at the file will tell
+        return None
 
 
 def inspect(file: Path, stated: Mapping[str, Any]) -> Inspected:

@@ -54,7 +54,7 @@ IN_CAMPAIGN = [
     ('"loop.csv"', '"loop.csv"\nfrequency = "0.1 Hz"', "campaign.toml, loops #1: these keys do not settle the time of a loop", 'rate, or frequency and waveform ("sine" or "triangle") together'),
     ('"loop.csv"', '"loop.csv"\nwaveform = "square"', "campaign.toml, loops #1.waveform: this value is not understood", "'sine' or 'triangle'"),
     ('"loop.csv"', '"loop.csv"\nnoise = "200 %"', "campaign.toml, loops #1.noise: this value is not understood", "less than 1"),
-    ('"loop.csv"', '"loop.csv"\ncolumns = {force = "Kraft" }', 'loop.csv, line 1: there is no column "Kraft"', "the column that the campaign names for the force"),
+    ('"loop.csv"', '"loop.csv"\ncolumns = {force = "Kraft" }', 'loop.csv, line 1: there is no column "Kraft"', "the header that was named for the force"),
     ('"loop.csv"', '"loop.csv"\ncolumns = {kraft = "force" }', "campaign.toml, loops #1.columns: unknown key", "one of time, displacement, force"),
     ('"loop.csv"', '"loop.csv"\ncolumns = "force"', "campaign.toml, loops #1.columns: this value is not understood", "a table"),
     ('"loop.csv"', '"loop.csv"\nunits = {force = "mm" }', 'loop.csv, line 1, column "force [N]": two units for the force', "one unit, from the header, the units row or the campaign"),

@@ -10,6 +10,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from bushfit.campaign import load_campaign
+
 CLEAN = ("data/arm_bushing/loop_axial_1.csv", "data/arm_bushing/sweep_radial.csv")
 RECORD = "data/cmp_15961_raw/stepped_sine_axial.csv"
 
@@ -158,3 +160,54 @@ def test_how_amplitudes_are_counted_is_said(
     assert done.returncode == 0, done.stderr
     assert said in done.stderr
     assert unsaid not in done.stderr
+
+
+def test_the_text_holds_in_a_campaign_in_any_folder(typed: Callable, root: Path, tmp_path: Path) -> None:
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "lab/axial.csv").write_bytes((root / CLEAN[0]).read_bytes())
+    done = typed("inspect", "lab/axial.csv", "--no-plots", "-q")
+    assert done.stdout.startswith("# files by their full path")
+    bushing = '[bushing]\nname = "B"\ninner_radius = "14 mm"\nouter_radius = "20 mm"\nlength = "45 mm"\n'
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere/campaign.toml").write_text(bushing + done.stdout, encoding="utf-8")
+    (loop,) = load_campaign(tmp_path / "elsewhere/campaign.toml").loops
+    assert loop.time.size == 2001
+
+
+def two_sweeps(folder: Path, *headers: str) -> list[str]:
+    rows = "\n".join(f"{f},0.1,{600 + f},0.1" for f in range(5, 50, 5))
+    for number, header in enumerate(headers):
+        (folder / f"axial_{number}.csv").write_text(f"f [Hz],{header},stiffness [N/mm],eta\n{rows}\n", encoding="utf-8")
+    return [f"axial_{number}.csv" for number in range(len(headers))]
+
+
+def test_a_column_is_named_where_it_stands(typed: Callable, tmp_path: Path) -> None:
+    files = two_sweeps(tmp_path, "Pegel SS [mm]", "amplitude [mm]")
+    done = typed("inspect", *files, "--no-plots", "--column", "amplitude=Pegel SS [mm]")
+    assert done.returncode == 0, done.stderr
+    one, other = tomllib.loads(done.stdout)["sweeps"]
+    assert one["columns"] == {"amplitude": "Pegel SS [mm]"}
+    assert "columns" not in other
+    assert "amplitudes: 0.05 mm" in done.stderr
+    assert "amplitudes: 0.1 mm" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("headers", "said"),
+    [
+        (
+            ("amplitude [mm]", "amplitude [mm]"),
+            ('axial_0.csv, line 1: there is no column "Pegel SS"', "the header that"),
+        ),
+        (("Pegel SS [mm]", "Niveau [mm]"), ("axial_1.csv, line 1", "--column amplitude=...")),
+    ],
+)
+def test_a_column_that_no_file_has_is_refused(
+    typed: Callable, tmp_path: Path, headers: tuple[str, ...], said: tuple[str, ...]
+) -> None:
+    size = ("--inner-radius", "10 mm", "--outer-radius", "18 mm", "--length", "34 mm")
+    done = typed("init", *two_sweeps(tmp_path, *headers), *size, "--column", "amplitude=Pegel SS", "-o", "x")
+    assert done.returncode == 2
+    for words in (*said, "try: "):
+        assert words in done.stderr
+    assert not (tmp_path / "x").exists()

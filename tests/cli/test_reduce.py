@@ -44,7 +44,7 @@ def test_a_raw_record_becomes_a_sweep_that_fits(
     assert len(set(sweep.amplitude)) == 3
 
     shutil.copy(root / "data/cmp_15961/loop_axial_1.csv", tmp_path / "x")
-    snippet = done.stderr.partition("for the campaign:")[2]
+    snippet = done.stderr.partition("the way there):")[2]
     (tmp_path / "x/campaign.toml").write_text(CAMPAIGN + snippet, encoding="utf-8")
     fitted = typed("fit", "x/campaign.toml", "-o", "fit", "--no-plots", "--json", "-q")
     assert fitted.returncode == 0, fitted.stderr
