@@ -33,7 +33,8 @@ class Source:
 class Loop:
     """A quasi-static hysteresis loop: time [s], displacement [m or rad], force [N or N m], each (n,).
 
-    noise is the standard deviation of the force relative to its half range, where the campaign states it.
+    noise is the standard deviation of the force relative to its half range, where the campaign states it; of a loop
+    that is not `timed` the time was made from its motion.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Loop:
     force: Floats
     noise: float | None = None
     source: Source | None = None
+    timed: bool = True
 
     def __post_init__(self) -> None:
         _check_lengths(self.name, self.time, self.displacement, self.force)

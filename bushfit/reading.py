@@ -106,7 +106,7 @@ def read_loop(
     else:
         time = rebuild_time(displacement, rate=rate, frequency=frequency, waveform=waveform)
     source = Source(listed_as or Path(file.name), table.sha256)
-    return Loop(name or file.stem, direction, time, displacement, force, noise, source)
+    return Loop(name or file.stem, direction, time, displacement, force, noise, source, "time" in values)
 
 
 def read_sweep(

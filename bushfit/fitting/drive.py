@@ -32,6 +32,7 @@ from bushfit.fitting.harmonics import (
 )
 from bushfit.fitting.noise import FLOOR
 from bushfit.fitting.runin import steady_part, thinned
+from bushfit.fitting.waveform import wrong_clock
 from bushfit.measurement import Loop
 
 #: Cycles whose bins are kept apart, and how fast the groups of later ones grow.
@@ -70,7 +71,7 @@ class Drive:
         half_range: half of the range of the measured force, wild rows aside [N or N m].
         datum: mean of the measured force where the motion lies off zero, else None. Whether a sensor's zero or
             a preload put it there is not known, so such a loop counts from its own middle.
-        note: what of the record was left out, in words; None where nothing was.
+        notes: sentences on what of the record was left out, and on a time that does not go with its rows.
         wild: by column, rows of the loop that are faults of the record, and how far they lie off [noise].
         first_row: row of the whole record that the loop begins with.
     """
@@ -86,7 +87,7 @@ class Drive:
     coefficients: Array
     half_range: float
     datum: float | None = None
-    note: str | None = None
+    notes: tuple[str, ...] = ()
     wild: Mapping[str, WildRows] = field(default_factory=dict)
     first_row: int = 0
 
@@ -157,7 +158,7 @@ def drive_of(loop: Loop, *, without_wild: bool = False) -> Drive:
             gives energy.
     """
     whole, thin = loop, thinned(loop)
-    loop, note = steady_part(whole, *thin)
+    loop, cut = steady_part(whole, *thin)
     first = int(np.searchsorted(whole.time, loop.time[0]))
     thin = thin if loop is whole else thinned(loop)
     frequency, cycles = _fundamental(loop, *thin)
@@ -180,8 +181,9 @@ def drive_of(loop: Loop, *, without_wild: bool = False) -> Drive:
     noise = max(noise, FLOOR * half_force)
     off_zero = not from_rest and abs(motion[0]) > _CENTRED * half_motion
     datum = force_mean if off_zero else None
+    notes = tuple(filter(None, (cut, wrong_clock(loop, motion))))
     drive = Drive(
-        loop, frequency, cycles, from_rest, phase, force, weight, noise, motion, half_force, datum, note, wild, first
+        loop, frequency, cycles, from_rest, phase, force, weight, noise, motion, half_force, datum, notes, wild, first
     )
     drive = replace(drive, weight=np.where(_at_reversal(drive), 0.0, weight))
     _check_loses_energy(drive)

@@ -216,7 +216,7 @@ def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = Non
         cov,
         quality(solution.model, terms, len(fitted)),
         measured_range(solution.model, terms),
-        (*notes, *_assumptions(terms), *told(outliers, robust=data.robust), *_cautions(steps, data.bounds, cov)),
+        (*notes, *_assumed(terms), *told(outliers, robust=data.robust), *_cautions(steps, data.bounds, cov)),
         tuple(term.source for term in terms if term.source is not None),
         outliers,
         at_bound={name: end for step in steps for name, end in step.solution.at_bound.items()},
@@ -232,9 +232,11 @@ def _cautions(steps: Sequence[Estimate], bounds: Bounds, covariance: Covariance)
 def cautions(
     model: Model, solution: Solution, terms: Sequence[Term], bounds: Bounds, covariance: Covariance, advice: str = ""
 ) -> list[str]:
-    """What the data of a fit cannot tell: bounds met, what stays open, and a model that does not fit."""
+    """What is odd about the loops of a fit, and what its data cannot tell: bounds met, what stays open, and a model
+    that does not fit."""
     names, at_bound = solution.coordinates.names, solution.at_bound
     return [
+        *(f"{term.name}: {note}" for term in terms if isinstance(term, LoopTerm) for note in term.drive.notes),
         *(_stopped(solution) if solution.stopped else []),
         *(_at_edge(name, end, bounds) for name, end in at_bound.items()),
         *left_open(model, terms, [name for name in names if name not in at_bound], covariance),
@@ -253,8 +255,7 @@ def _at_edge(name: str, end: End, bounds: Bounds) -> str:
     return f"{name} ended at the edge of what is possible: the data do not determine it"
 
 
-def _assumptions(terms: Sequence[Term]) -> list[str]:
-    """What was left out of the loops, and what was assumed of the noise because nothing was repeated."""
+def _assumed(terms: Sequence[Term]) -> list[str]:
+    """What was assumed of the noise because nothing was repeated."""
     noises = {id(term.noise): term.noise for term in terms if isinstance(term, SweepTerm)}
-    assumed = [f"noise of the sweeps: {noise.describe()}" for noise in noises.values() if noise.origin == "assumed"]
-    return [*(term.drive.note for term in terms if isinstance(term, LoopTerm) and term.drive.note), *assumed]
+    return [f"noise of the sweeps: {noise.describe()}" for noise in noises.values() if noise.origin == "assumed"]

@@ -54,8 +54,8 @@ def steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | Non
     if holes.size:
         whole, first, last = _between(loop, time, holes)
         part, note = steady_part(whole, *thinned(whole))
-        said = f"{loop.name}: rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
-        return part, said if note is None else f"{said}, and of these {note.removeprefix(f'{loop.name}: ')}"
+        said = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
+        return part, said if note is None else f"{said}, and of these {note}"
     again = np.interp(time + period, time, motion)
     comparable = time + period <= time[-1]
     off, clock = np.abs(again - motion)[comparable], time[comparable]
@@ -76,7 +76,7 @@ def steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | Non
         for duration, where in ((first - time[0], "before"), (time[-1] - last, "after"))
         if duration > _BRIEF * period
     ]
-    note = f"{loop.name}: {' and '.join(left_out)} are left out; {(last - first) / period:.3g} cycles are used"
+    note = f"{' and '.join(left_out)} are left out; {(last - first) / period:.3g} cycles are used"
     return _cut(loop, first, last if after else None), note
 
 

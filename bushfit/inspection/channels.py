@@ -47,14 +47,14 @@ class Channel(NamedTuple):
         return f"{self.factor * self.values[row]:.4g}"
 
 
-def odd_channels(history: Loop, *, timed: bool = True) -> Iterator[str]:
-    """Sentences on the channels of a loop or a raw history; one that is not `timed` had no time in its file."""
+def odd_channels(history: Loop) -> Iterator[str]:
+    """Sentences on the channels of a loop or a raw history."""
     names = ("rotation", "moment") if history.direction is Direction.TORSION else ("displacement", "force")
     units = display_units(history.direction)
     motion = Channel(names[0], *units["length"], history.displacement)
     force = Channel(names[1], *units["force"], history.force)
     still = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
-    yield from _gaps(history.time) if timed else _jumps(motion, history.time)
+    yield from _gaps(history.time) if history.timed else _jumps(motion, history.time)
     yield from _stuck(motion, force, still)
     for channel in (motion, force):
         yield from _cut_off(channel)

@@ -10,6 +10,7 @@ import numpy as np
 from bushfit.cycles import least_turn
 from bushfit.effects.contract import Array
 from bushfit.fitting.drive import Drive, drive_of
+from bushfit.fitting.waveform import waveform
 from bushfit.geometry import Direction
 from bushfit.inspection.channels import clock, odd_channels
 from bushfit.inspection.labels import wrong_labels
@@ -17,20 +18,16 @@ from bushfit.inspection.record import Looked
 from bushfit.measurement import Loop
 from bushfit.sheets import display_units
 
-#: Third harmonic of a triangle over its first, and how near to it, or to none, a motion is called by its name.
-_TRIANGLE, _LIKE = 1.0 / 9.0, 0.03
 #: Cycles differ beyond so many standard errors and this share of half the force's range.
 _SURE, _SHARE = 6.0, 2e-3
 #: A loop's zero is off by this share of half the range.
 _OFF_ZERO = 0.02
-#: Of rows evenly spaced in time a triangle has a tenth beyond this share of its amplitude, a sine 29 %.
-_OUTER, _CROWDED = 0.9, 0.2
 #: At most so many cycles are looked at from either end, with so many harmonics.
 _ENDS, _HARMONICS = 6, 7
 
 
-def look_at_loop(loop: Loop, file: Path, *, timed: bool = True) -> Looked:
-    """Facts and oddities of a loop; of one that is not `timed` the time was made from its motion.
+def look_at_loop(loop: Loop, file: Path) -> Looked:
+    """Facts and oddities of a loop.
 
     Raises:
         FitError: no whole cycle, or a loop that runs the wrong way round.
@@ -44,8 +41,8 @@ def look_at_loop(loop: Loop, file: Path, *, timed: bool = True) -> Looked:
     amplitude, mean_motion, mean_force = drive.amplitude, drive.coefficients[0].real, _mean(drive)
     facts = {
         "cycles": f"{drive.cycles:.3g}, {'the first from rest' if drive.from_rest else 'taken as steady'}",
-        "frequency": f"{drive.frequency:.4g} Hz, {_waveform(drive)}",
-        "sampling": f"{clock(loop) if timed else 'no time in the file'}, {rows:.4g} rows a cycle",
+        "frequency": f"{drive.frequency:.4g} Hz, {waveform(drive.coefficients)}",
+        "sampling": f"{clock(loop) if loop.timed else 'no time in the file'}, {rows:.4g} rows a cycle",
         "amplitude": f"{to_length * amplitude:.4g} {length} zero-to-peak",
         f"mean {names[0]}": f"{to_length * mean_motion:.3g} {length}",
         f"mean {names[1]}": f"{to_force * mean_force:.3g} {force}",
@@ -53,10 +50,9 @@ def look_at_loop(loop: Loop, file: Path, *, timed: bool = True) -> Looked:
     }
     odd = [
         *wrong_labels(file, loop.direction, [amplitude, half_motion], [drive.frequency]),
-        *odd_channels(loop, timed=timed),
-        *([drive.note.removeprefix(f"{loop.name}: ")] if drive.note else []),
-        *_changing(drive, names, timed=timed),
-        *_crowding(drive, names[0]),
+        *odd_channels(loop),
+        *drive.notes,
+        *_changing(drive, names),
     ]
     if abs(mean_motion) > _OFF_ZERO * half_motion and not drive.from_rest:
         odd.append(
@@ -70,28 +66,7 @@ def _mean(drive: Drive) -> float:
     return float(np.average(drive.force, weights=np.ones_like(drive.weight)))
 
 
-def _crowding(drive: Drive, motion: str) -> Iterator[str]:
-    """A time column, or what stands in for it, that does not go with how the rows lie."""
-    from_middle = np.abs(drive.loop.displacement - drive.loop.displacement.min() - np.ptp(drive.loop.displacement) / 2)
-    outer = float(np.mean(from_middle > _OUTER * np.ptp(drive.loop.displacement) / 2))
-    if (_waveform(drive) == "a triangle" and outer > _CROWDED) or (_waveform(drive) == "a sine" and outer < _CROWDED):
-        like = "a sine" if outer > _CROWDED else "a triangle"
-        yield (
-            f"{100 * outer:.2g} % of the rows lie beyond {_OUTER:g} of the amplitude, as those of {like} recorded "
-            f"evenly in time, but the {motion} over time is {_waveform(drive)}: where a file has no time, rate means a "
-            'triangle, and frequency with waveform = "sine" a sine'
-        )
-
-
-def _waveform(drive: Drive) -> str:
-    third = abs(drive.coefficients[3]) if drive.coefficients.size > 3 else 0.0
-    share = third / abs(drive.coefficients[1])
-    if abs(share - _TRIANGLE) < _LIKE:
-        return "a triangle"
-    return "a sine" if share < _LIKE else f"neither sine nor triangle (third harmonic {100 * share:.2g} %)"
-
-
-def _changing(drive: Drive, names: tuple[str, str], *, timed: bool) -> Iterator[str]:
+def _changing(drive: Drive, names: tuple[str, str]) -> Iterator[str]:
     """Whether force amplitude, mean force or mean motion change from cycle to cycle."""
     loop = drive.loop
     count = int(drive.cycles + 0.01)
@@ -124,12 +99,16 @@ def _changing(drive: Drive, names: tuple[str, str], *, timed: bool) -> Iterator[
     for name, kind, mean, least in (
         (names[1], "force", means[:, 0], max(_SURE * 1.5 * error, _SHARE * half)),
         # a time that was made from the motion turns its noise into drift
-        (names[0], "length", means[:, 1], 2.0 * _SHARE * drive.amplitude if timed else least_turn(loop.displacement)),
+        (names[0], "length", means[:, 1], _least_drift(drive)),
     ):
         drift = mean[-1] - mean[0]
         if abs(drift) > least:
             unit, factor = units[kind]
             yield f"the {name} drifts: its mean goes from {factor * mean[0]:.3g} to {factor * mean[-1]:.3g} {unit}"
+
+
+def _least_drift(drive: Drive) -> float:
+    return 2.0 * _SHARE * drive.amplitude if drive.loop.timed else least_turn(drive.loop.displacement)
 
 
 def _cycle(phase: Array, values: Array, order: int) -> tuple[Array, Array, float]:

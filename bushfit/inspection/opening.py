@@ -87,7 +87,7 @@ def inspect(file: Path, stated: Mapping[str, Any]) -> Inspected:
         kind, looked = "sweep", look_at_sweep(measured, file)
     else:
         measured, entry, odd = _read_loop(file, read_as, entry, table)
-        kind, looked = _look(measured, file, timed="time" in table.roles)
+        kind, looked = _look(measured, file)
     ranges = _ranges(table, is_sweep=is_sweep)
     columns = tuple(
         _column(header, next((c for c in table.roles.values() if c.index == index), None), ranges)
@@ -235,7 +235,7 @@ def _read_loop(
     return turned, {**entry, **_MINUS}, [odd]
 
 
-def _look(measured: Loop, file: Path, *, timed: bool) -> tuple[Kind, Looked]:
+def _look(measured: Loop, file: Path) -> tuple[Kind, Looked]:
     """Kind of a recorded test, and what is to be seen of it."""
     found = sines(measured)
     points = {(round(np.log(frequency), 2), round(np.log(amplitude), 1)) for frequency, amplitude, _ in found}
@@ -244,7 +244,7 @@ def _look(measured: Loop, file: Path, *, timed: bool) -> tuple[Kind, Looked]:
     if len(points) > 1 and (fast or max(frequencies) > _SEVERAL * min(frequencies)):
         with suppress(MeasurementError):  # no steady sine after all
             return "history", _look_at_history(measured, file)
-    looked = look_at_loop(measured, file, timed=timed)
+    looked = look_at_loop(measured, file)
     if fast or len(points) > 1:
         what = f"at {max(frequencies):.3g} Hz" if fast else "of several amplitudes"
         either = f"a motion {what} is taken for a loop; should it be a stepped sine, bushfit reduce makes points of it"

@@ -160,6 +160,25 @@ def test_what_cannot_be_a_campaign(
     assert not (tmp_path / "x").exists()
 
 
+def test_a_time_that_does_not_go_with_the_rows_is_told_by_every_fit(
+    typed: Callable, tests: list[Path], tmp_path: Path
+) -> None:
+    """A sine recorded without time, of which a rate was stated; silence where the time is as the rows lie."""
+    loop = pd.read_csv(tests[0])
+    loop.drop(columns="time [s]").to_csv(tests[0], index=False)
+    for stated, said in (("--rate=0.4 mm/s", 1), ("--frequency=0.1 Hz", 0)):
+        waveform = () if said else ("--waveform", "sine")
+        started = typed("init", *tests, *GEOMETRY, stated, *waveform, "-o", "campaign", "--force")
+        assert started.stderr.count("as those of a sine recorded evenly") == said
+        for command in ("fit-static", "fit", "diagnose"):
+            done = typed(command, "campaign/campaign.toml", "-o", "out", "--no-plots", "--force")
+            words = "warning: loop_axial_1: 29 % of the rows lie beyond 0.9 of the amplitude, as those of a sine"
+            assert done.stderr.count(words) == said
+            written = tmp_path / "out" / ("static.json" if command == "fit-static" else "model.json")
+            warnings = json.loads(written.read_text(encoding="utf-8"))["warnings"]
+            assert sum("rate means a triangle" in line for line in warnings) == said
+
+
 @given(st.text(st.characters(exclude_categories=["Cs"])))
 def test_any_text_is_written_as_toml(text: str) -> None:
     assert tomllib.loads(f"x = {toml_value(text)}") == {"x": text}

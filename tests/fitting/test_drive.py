@@ -169,12 +169,12 @@ def test_rows_that_are_missing_do_not_change_the_frequency(
     paper_model: Model, waveform: str, hole: tuple[float, float], cycles: float
 ) -> None:
     drive = drive_of(with_hole(measured(paper_model, waveform=waveform, cycles=cycles), *hole))
-    print(f"{drive.frequency:.6f} Hz, {drive.note}")
+    print(f"{drive.frequency:.6f} Hz, {drive.notes}")
     assert drive.frequency == pytest.approx(FREQUENCY, rel=1e-3)
     assert drive.amplitude == pytest.approx(AMPLITUDE, rel=5e-3)
     if hole[1] - hole[0] > 0.4:
-        assert drive.note is not None
-        assert "rows are missing" in drive.note
+        (note,) = drive.notes
+        assert "rows are missing" in note
 
 
 def test_where_no_stroke_is_whole_the_hole_is_named(paper_model: Model) -> None:

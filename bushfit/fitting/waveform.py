@@ -1,0 +1,41 @@
+"""The course of a loop's motion over time, and whether it goes with how the rows lie."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.geometry import Direction
+from bushfit.measurement import Loop
+
+#: Third harmonic of a triangle over its first, and how near to it, or to none, a motion is called by its name.
+_TRIANGLE, _LIKE = 1.0 / 9.0, 0.03
+#: Of rows evenly spaced in time a triangle has a tenth beyond this share of its amplitude, a sine 29 %.
+_OUTER, _CROWDED = 0.9, 0.2
+
+
+def waveform(coefficients: Array) -> str:
+    """The name of a motion, in words, from its complex harmonics, mean first."""
+    third = abs(coefficients[3]) if coefficients.size > 3 else 0.0
+    share = third / abs(coefficients[1])
+    if abs(share - _TRIANGLE) < _LIKE:
+        return "a triangle"
+    return "a sine" if share < _LIKE else f"neither sine nor triangle (third harmonic {100 * share:.2g} %)"
+
+
+def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
+    """A sentence where the time of a loop was made from its motion, but not as its rows lie; else None."""
+    if loop.timed:
+        return None
+    motion = loop.displacement
+    half = np.ptp(motion) / 2.0
+    outer = float(np.mean(np.abs(motion - motion.min() - half) > _OUTER * half))
+    like, other = ("a sine", "a triangle") if outer > _CROWDED else ("a triangle", "a sine")
+    if waveform(coefficients) != other:
+        return None
+    name = "rotation" if loop.direction is Direction.TORSION else "displacement"
+    return (
+        f"{100 * outer:.2g} % of the rows lie beyond {_OUTER:g} of the amplitude, as those of {like} recorded evenly "
+        f"in time, but the {name} over time is {other}: where a file has no time, rate means a triangle, and frequency "
+        'with waveform = "sine" a sine'
+    )
