@@ -168,7 +168,7 @@ def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> R
         interval = result.interval(name)
         value, stderr = result.model.values[name], result.covariance.stderr(name)
         parameters[name] = [*map(_finite, (value, *(interval or (None, None)), stderr)), parameter.unit]
-        if name in result.at_bound and not _vanishes(parameter, value):
+        if name in result.at_bound and not _vanishes(name, parameter, value):
             at_bound[name] = result.at_bound[name]
     warnings, at = [*notes, *result.warnings], {}
     for point in points:
@@ -186,9 +186,11 @@ def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> R
     }
 
 
-def _vanishes(parameter: Parameter, value: float) -> bool:
-    """Whether a value on a bound is that of an effect that is not there, which is an answer like any other."""
-    return parameter.neutral is not None and abs(value - parameter.neutral) <= _NOTHING * parameter.typical
+def _vanishes(name: str, parameter: Parameter, value: float) -> bool:
+    """Whether a value on a bound is that of an added effect that is not there, which is an answer like any other."""
+    return (
+        "." in name and parameter.neutral is not None and abs(value - parameter.neutral) <= _NOTHING * parameter.typical
+    )
 
 
 def _band(band: Band) -> list[float | None]:

@@ -131,10 +131,16 @@ def measured_range(model: Model, terms: Sequence[Term]) -> Range:
     return Range((float(f.min()), float(f.max())), (float(e.min()), float(e.max())), directions)
 
 
+def lack_of_fit(model: Model, terms: Sequence[Term], parameters: int) -> float | None:
+    """Reduced chi-square where the model misses the data by more than their noise, else None."""
+    reduced, freedom = _reduced(model, terms, parameters)
+    return None if _inflation(reduced, freedom) == 1.0 else reduced
+
+
 def misfit(model: Model, terms: Sequence[Term], parameters: int, advice: str = "") -> list[str]:
     """A sentence where the model misses the data by more than their noise, with advice."""
-    reduced, freedom = _reduced(model, terms, parameters)
-    if _inflation(reduced, freedom) == 1.0:
+    reduced = lack_of_fit(model, terms, parameters)
+    if reduced is None:
         return []
     return [
         "the model misses the data by more than their noise "

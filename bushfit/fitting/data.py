@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from bushfit.fitting.solve import Bounds
 from bushfit.fitting.terms import LoopTerm, SweepTerm, Term, loop_terms, sweep_terms
 from bushfit.geometry import Direction
 from bushfit.results import Outlier
+
+_Term = TypeVar("_Term", LoopTerm, SweepTerm)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +63,8 @@ class Data:
         return tuple(name for name in names if name not in settings or settings[name].vary)
 
     def chosen(self, directions: Sequence[Direction] | None) -> list[Term]:
-        """Terms of the given directions; by default the axial ones, as in the paper, or all where none is.
+        """Terms of the given directions; by default the axial loops and sweeps, as in the paper, and where a kind has
+        none that is axial all of it.
 
         Raises:
             FitError: there is none.
@@ -74,8 +78,7 @@ class Data:
                 hint="add measured tests, or make some with bushfit simulate",
             )
         if directions is None:
-            axial = [term for term in terms if term.direction is Direction.AXIAL]
-            return axial or terms
+            return [*_axial(self.loops), *_axial(self.sweeps)]
         chosen = [term for term in terms if term.direction in directions]
         if not chosen:
             raise FitError(
@@ -92,7 +95,6 @@ class Data:
         Raises:
             FitError: there is no loop.
         """
-        axial = [term for term in self.loops if term.direction is Direction.AXIAL]
         if not self.loops:
             raise FitError(
                 "fit-static needs a loop",
@@ -100,7 +102,7 @@ class Data:
                 found="no [[loops]]",
                 hint="add a quasi-static loop, or run bushfit fit for the sweeps alone",
             )
-        return [*(axial or self.loops)]
+        return [*_axial(self.loops)]
 
     @cached_property
     def smallest_sweep(self) -> SweepTerm:
@@ -109,7 +111,7 @@ class Data:
         Raises:
             FitError: no sweep, or none at the amplitudes named.
         """
-        sweeps = [sweep for sweep in self.sweeps if sweep.direction is Direction.AXIAL] or list(self.sweeps)
+        sweeps = _axial(self.sweeps)
         if not sweeps:
             raise FitError(
                 "fit-dynamic needs a sweep",
@@ -133,3 +135,8 @@ class Data:
             found=", ".join(f"{x:.4g}" for x in wanted),
             expected="some of " + ", ".join(f"{x:.4g}" for x in levels),
         )
+
+
+def _axial(terms: Sequence[_Term]) -> Sequence[_Term]:
+    """The axial ones, or all where none is."""
+    return [term for term in terms if term.direction is Direction.AXIAL] or terms

@@ -13,6 +13,7 @@ from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import Stage, covariance, measured_range, misfit, quality
 from bushfit.fitting.data import Data
 from bushfit.fitting.identify import left_open
+from bushfit.fitting.plausible import implausible, unfitted
 from bushfit.fitting.profile import profile95
 from bushfit.fitting.robust import Estimate, estimate, told
 from bushfit.fitting.solve import Bounds, Coordinates, Solution
@@ -66,8 +67,10 @@ def fit_joint(
     Raises:
         FitError: no test in those directions, or data that cannot support the fit.
     """
-    found = _solve(data, data.chosen(directions), effects, {})
-    result = _result(data, [found])
+    terms = data.chosen(directions)
+    found = _solve(data, terms, effects, {})
+    left: list[Term] = [*(x for x in data.loops if x not in terms), *(x for x in data.sweeps if x not in terms)]
+    result = _result(data, [found], notes=unfitted(found.solution.model, left, _NEXT))
     if profile is None:
         return result
     intervals = profile95(found.solution, found.minimised, result.covariance, data.bounds, profile)
@@ -216,7 +219,13 @@ def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = Non
         cov,
         quality(solution.model, terms, len(fitted)),
         measured_range(solution.model, terms),
-        (*notes, *_assumed(terms), *told(outliers, robust=data.robust), *_cautions(steps, data.bounds, cov)),
+        (
+            *notes,
+            *implausible(data.campaign.bushing, terms),
+            *_assumed(terms),
+            *told(outliers, robust=data.robust),
+            *_cautions(steps, data.bounds, cov),
+        ),
         tuple(term.source for term in terms if term.source is not None),
         outliers,
         at_bound={name: end for step in steps for name, end in step.solution.at_bound.items()},

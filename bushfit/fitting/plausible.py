@@ -1,0 +1,49 @@
+"""What a fit says of tests that no rubber could have given, and of tests that it left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bushfit.fitting.assess import lack_of_fit
+from bushfit.fitting.terms import Term
+from bushfit.geometry import Bushing
+from bushfit.model import Model
+from bushfit.units import for_people
+
+#: Shear modulus of a rubber [Pa]: the softest gel of a mount, the hardest compound at small strain, with room.
+_SOFTEST, _HARDEST = 5e4, 1e8
+#: Rubber stiffens less than this from the slowest and largest test to the fastest and smallest.
+_MOST_STIFFENING = 20.0
+_CHECK = "check the units of displacement and force, and the dimensions of the bushing"
+
+
+def implausible(bushing: Bushing, terms: Sequence[Term]) -> list[str]:
+    """Sentences on moduli that no rubber has, and on tests too far apart to be of one bushing: most often a unit."""
+    moduli = {
+        term.name: float(np.median(np.abs(term.measured))) / bushing.stiffness_per_modulus(term.direction)
+        for term in terms
+    }
+    softest, hardest = (pick(moduli, key=moduli.__getitem__) for pick in (min, max))
+    ratio = moduli[hardest] / moduli[softest]
+    if ratio > _MOST_STIFFENING:
+        return [f"{hardest} shows {ratio:.2g} times the modulus of {softest}, which no rubber does: {_CHECK}"]
+    modulus = moduli[hardest]
+    if _SOFTEST < modulus < _HARDEST:
+        return []
+    unit, factor = for_people("Pa", 1.0, modulus)
+    return [f"a shear modulus of {modulus * factor:.3g} {unit} is that of no rubber: {_CHECK}"]
+
+
+def unfitted(model: Model, terms: Sequence[Term], advice: str) -> list[str]:
+    """Sentences on tests that a model was not fitted to and misses by more than their noise."""
+    lines = []
+    for term in terms:
+        if (misfit := lack_of_fit(model, [term], 0)) is not None:
+            nrmse = np.sqrt(np.mean(np.square(np.abs(term.relative(model)))))
+            lines.append(
+                f"{term.name}, {term.direction}, was not fitted, and the model misses it by {100 * nrmse:.2g} % "
+                f"(NRMSE), {np.sqrt(misfit):.2g} times its noise{advice}"
+            )
+    return lines

@@ -1,0 +1,75 @@
+"""What a fit says of the tests it left out, and of tests that no rubber could have given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from bushfit.campaign import Campaign
+from bushfit.fitting.data import Data
+from bushfit.fitting.procedures import fit_joint
+from bushfit.geometry import Direction
+from bushfit.measurement import Loop, Sweep
+from bushfit.model import Model
+from bushfit.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+
+BAND = (5.0, 15.0, 45.0, 100.0, 155.0)
+
+
+@pytest.fixture
+def campaign(rig: Callable[..., Campaign], paper_model: Model, paper_noise: SimulateSettings) -> Campaign:
+    """An axial loop, an axial and a radial sweep."""
+    sweeps = tuple(SimulatedSweep(direction, (1e-4, 5e-4), BAND) for direction in (Direction.AXIAL, Direction.RADIAL))
+    loops = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1),)
+    return rig(paper_model, replace(paper_noise, loops=loops, sweeps=sweeps), 1)
+
+
+def stiffer(test: Sweep, factor: float) -> Sweep:
+    return replace(test, stiffness=factor * test.stiffness)
+
+
+def without(campaign: Campaign, direction: Direction) -> tuple[Sweep, ...]:
+    return tuple(sweep for sweep in campaign.sweeps if sweep.direction is not direction)
+
+
+def test_a_sweep_that_is_needed_is_fitted_whatever_its_direction(campaign: Campaign, paper_model: Model) -> None:
+    result = fit_joint(Data.of(replace(campaign, sweeps=without(campaign, Direction.AXIAL))))
+    assert result.model.values["m"] == pytest.approx(paper_model.values["m"], rel=0.1)
+    assert result.model.values["alpha"] == pytest.approx(paper_model.values["alpha"], rel=0.1)
+    assert not any("not fitted" in line for line in result.warnings)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.05])
+def test_a_test_that_was_left_out_is_told_where_the_model_misses_it(campaign: Campaign, factor: float) -> None:
+    radial = [stiffer(sweep, factor) for sweep in without(campaign, Direction.AXIAL)]
+    data = Data.of(replace(campaign, sweeps=(*without(campaign, Direction.RADIAL), *radial)))
+    told = [line for line in fit_joint(data).warnings if "was not fitted" in line]
+    print(told)
+    assert len(told) == (factor != 1.0)
+    if told:
+        assert f"{radial[0].name}, radial, was not fitted, and the model misses it by 4." in told[0]
+        assert "bushfit diagnose" in told[0]
+    both = fit_joint(data, directions=(Direction.AXIAL, Direction.RADIAL))
+    assert not any("was not fitted" in line for line in both.warnings)
+
+
+def test_kilonewtons_taken_for_newtons_are_told(campaign: Campaign) -> None:
+    axial = without(campaign, Direction.RADIAL)
+    slip = replace(campaign, sweeps=tuple(stiffer(sweep, 1e-3) for sweep in axial))
+    (told,) = [line for line in fit_joint(Data.of(slip)).warnings if "units" in line]
+    print(told)
+    assert told.startswith(f"{campaign.loops[0].name} shows ")
+    assert f"times the modulus of {axial[0].name}, which no rubber does: check the units" in told
+
+
+def test_a_modulus_of_no_rubber_is_told(campaign: Campaign) -> None:
+    def slipped(loop: Loop) -> Loop:
+        return replace(loop, force=1e-3 * loop.force)
+
+    axial = tuple(stiffer(sweep, 1e-3) for sweep in without(campaign, Direction.RADIAL))
+    soft = replace(campaign, loops=tuple(slipped(loop) for loop in campaign.loops), sweeps=axial)
+    (told,) = [line for line in fit_joint(Data.of(soft)).warnings if "units" in line]
+    print(told)
+    assert "kPa is that of no rubber" in told
