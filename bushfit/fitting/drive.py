@@ -18,17 +18,15 @@ from bushfit.cycles import HOLE
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History, reversals
 from bushfit.errors import FitError
+from bushfit.fitting.clock import fundamental
 from bushfit.fitting.harmonics import (
     GRID,
     MOST_ROWS,
     WildRows,
     basis,
     harmonics,
-    order,
-    reach,
     series,
     solve,
-    turned,
 )
 from bushfit.fitting.noise import FLOOR
 from bushfit.fitting.runin import steady_part, thinned
@@ -37,11 +35,6 @@ from bushfit.measurement import Loop
 
 #: Cycles whose bins are kept apart, and how fast the groups of later ones grow.
 _APART, _GROWTH = 4, 1.5
-_CLOCK_HARMONICS, _CLOCK_ROUNDS, _CLOCK_SETTLED = 15, 10, 1e-12
-#: A closed cycle ends where it began within this share of its amplitude; beyond the other it began at an extreme.
-_CLOSED, _EXTREME = 0.04, 0.98
-#: Cycles, counted by one stroke, from which on a record is no single closed one.
-_MORE_THAN_ONE = 1.03
 #: Steps of the grid about a turning point in which rows carry no weight.
 _JUMP = 1.5
 #: Share of the half range below which both first displacement and first force count as a start from rest.
@@ -161,7 +154,7 @@ def drive_of(loop: Loop, *, without_wild: bool = False) -> Drive:
     loop, cut = steady_part(whole, *thin)
     first = int(np.searchsorted(whole.time, loop.time[0]))
     thin = thin if loop is whole else thinned(loop)
-    frequency, cycles = _fundamental(loop, *thin)
+    frequency, cycles = fundamental(loop, *thin)
     _check_no_hole(loop, thin[0], frequency)
     motion, force_mean, force_noise, wild = harmonics(loop, frequency, cycles)
     rows = wild["force"].rows
@@ -251,60 +244,6 @@ def _from_rest(loop: Loop, frequency: float, half_motion: float, half_force: flo
     change = np.interp(first + 1.0 / frequency, clock, force) - force[: first.size]
     chance = 5.0 * noise * np.sqrt(2.0 / first.size)
     return bool(abs(np.median(change)) > max(1.25 * chance, _OTHER * half_force))
-
-
-def _fundamental(loop: Loop, clock: Array, x: Array) -> tuple[float, float]:
-    """Frequency [Hz] and number of cycles, from time and displacement of the loop `thinned`: by crossings in one sense,
-    refined by Gauss-Newton on the motion."""
-    x = x - (x.max() + x.min()) / 2.0
-    band = 0.1 * np.ptp(x)
-    state = np.where(x > band, 1, np.where(x < -band, -1, 0))
-    marks = np.flatnonzero(state)
-    turns = marks[1:][state[marks[1:]] != state[marks[:-1]]]
-    crossings = max((turns[state[turns] == sense] for sense in (1, -1)), key=len)
-    duration = float(loop.time[-1] - loop.time[0])
-    closed = duration * loop.time.size / (loop.time.size - 1)
-    stroke = float(clock[turns[1]] - clock[turns[0]]) if turns.size == 2 else np.inf
-    if crossings.size < 2 and (_closes(x) or closed < _MORE_THAN_ONE * 2.0 * stroke):
-        apart = abs(loop.displacement[-1] - loop.displacement[0])
-        if apart > band:
-            unit = loop.direction.displacement_unit
-            raise FitError(
-                "the loop does not hold a whole cycle",
-                file=loop.source.file if loop.source else None,
-                found=f"displacement from {loop.displacement[0]:.4g} to {loop.displacement[-1]:.4g} {unit}",
-                expected="at least one closed cycle",
-                hint="export the whole cycle, or several",
-            )
-        stride = np.abs(np.diff(loop.displacement[[0, 1, -2, -1]]))[[0, 2]].mean()
-        period = duration if apart < 0.5 * stride else closed
-        return 1.0 / period, closed / period
-    frequency = 0.5 / stroke
-    if crossings.size > 1:
-        frequency = (crossings.size - 1) / float(clock[crossings[-1]] - clock[crossings[0]])
-    number = order(loop.time.size / (closed * frequency), _CLOCK_HARMONICS)
-    sample = slice(None, None, max(1, x.size // 2000))
-    time, motion = clock[sample] - loop.time[0], x[sample]
-    columns = basis(time * frequency, number)
-    shape = solve(columns, motion)
-    for _ in range(_CLOCK_ROUNDS):
-        left = motion - columns @ shape
-        sound = np.abs(left) <= reach(shape, left, left.size)
-        angle_slope = 2.0 * np.pi * time * (columns @ turned(shape))
-        solution = solve(np.column_stack((columns, angle_slope)), motion, sound)
-        step = float(np.clip(solution[-1], -0.05 * frequency, 0.05 * frequency))
-        frequency += step
-        if abs(step) < _CLOCK_SETTLED * frequency:
-            break
-        columns, shape = basis(time * frequency, number), solution[:-1]
-    return frequency, closed * frequency
-
-
-def _closes(x: Array) -> bool:
-    """Whether a motion about zero ends where it began and goes on the same way, but for a start at its very end."""
-    few, half = max(1, x.size // 50), np.ptp(x) / 2.0
-    onward = (x[few] - x[0]) * (x[-1] - x[-1 - few]) > 0.0 or abs(x[0]) > _EXTREME * half
-    return bool(onward and abs(x[-1] - x[0]) < _CLOSED * half)
 
 
 def _binned(

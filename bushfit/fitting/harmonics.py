@@ -74,9 +74,9 @@ def harmonics(loop: Loop, frequency: float, cycles: float) -> Harmonics:
         cycles: in the loop.
     """
     columns = {"displacement": loop.displacement, "force": loop.force}
-    sample = _sample(loop.time.size)
-    phase = (loop.time[sample] - loop.time[0]) * frequency
-    values = np.column_stack([column[sample] for column in columns.values()])
+    chosen = sample(loop.time.size, MOST_ROWS)
+    phase = (loop.time[chosen] - loop.time[0]) * frequency
+    values = np.column_stack([column[chosen] for column in columns.values()])
     number = order(loop.time.size / max(cycles, 1.0), _HARMONICS)
     columns_of = basis(phase, number)
     solution = solve(columns_of, values)
@@ -214,9 +214,9 @@ def _triangle(mean: complex, fundamental: complex) -> Array:
     return coefficients
 
 
-def _sample(rows: int) -> NDArray[np.intp]:
+def sample(rows: int, most: int) -> NDArray[np.intp]:
     """Rows that stand for all: every one of few, else spread evenly, but in no step that could keep time with the
     cycles."""
-    count = min(rows, MOST_ROWS)
+    count = min(rows, most)
     number = np.arange(count)
     return (number if count == rows else (number + number * _GOLDEN % 1.0) * (rows / count)).astype(np.intp)
