@@ -104,6 +104,8 @@ def predict(
     direction: Direction,
     frequencies: Sequence[float] | Array,
     amplitudes: Sequence[float] | Array,
+    *,
+    rig: bool = False,
 ) -> Prediction:
     """Dynamic stiffness on a grid, with 95 % bands from the covariance of the fit (delta method).
 
@@ -112,6 +114,7 @@ def predict(
         direction: axial, radial or torsion.
         frequencies: [Hz].
         amplitudes: zero-to-peak [m or rad].
+        rig: whether the rig's effects are kept, as in the tests.
 
     Raises:
         ModelError: a frequency or amplitude that is not positive.
@@ -119,7 +122,7 @@ def predict(
     for name, given in (("frequency", frequencies), ("amplitude", amplitudes)):
         if not (np.size(given) and np.all(np.isfinite(given)) and np.min(given) > 0):
             raise ModelError(f"impossible {name} to predict at", found=str(np.asarray(given)), expected="above zero")
-    model = result.model.without(Level.INSTRUMENT)
+    model = result.model if rig else result.model.without(Level.INSTRUMENT)
     amplitude, frequency = (
         axis.ravel() for axis in np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
     )
@@ -155,11 +158,15 @@ def caveats(result: Result) -> list[str]:
         lines.append("the model has no springpot: its stiffness does not depend on frequency")
     if result.measured is None:
         lines.append("the model was not fitted here: no uncertainty, and no fitted range to compare with")
-    rig = [name for name in result.model.effects if effect_named(name).level is Level.INSTRUMENT]
-    if rig:
+    if rig := rig_effects(result):
         belong = "because they belong to the rig and not to the bushing"
         lines.append(f"left out of the prediction, {belong}: {', '.join(rig)}")
     return lines
+
+
+def rig_effects(result: Result) -> list[str]:
+    """Effects of a model that belong to the rig."""
+    return [name for name in result.model.effects if effect_named(name).level is Level.INSTRUMENT]
 
 
 def _unfitted(result: Result, direction: Direction) -> Iterator[str]:

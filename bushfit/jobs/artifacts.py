@@ -51,15 +51,16 @@ def prediction_files(
     if "png" not in formats:
         return files
     from bushfit.plots import fine_grid, prediction_figure, to_png
-    from bushfit.prediction import caveats, predict
+    from bushfit.prediction import caveats, predict, rig_effects
 
     for prediction in predictions:
         over = [term for term in measured if term.direction is prediction.direction]
         curves = predict(result, prediction.direction, *fine_grid(prediction))
+        rig = predict(result, prediction.direction, *fine_grid(prediction), rig=True) if rig_effects(result) else None
         note = ". ".join(text[0].upper() + text[1:] for text in (*caveats(result), *prediction.warnings))
         title = result.model.bushing.name
         files[f"{prediction.direction}.png"] = to_png(
-            prediction_figure(prediction, over, title, curves=curves, note=note)
+            prediction_figure(prediction, over, title, curves=curves, rig=rig, note=note)
         )
     return files
 

@@ -7,18 +7,21 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.terms import SweepTerm
 from bushfit.geometry import Direction
 from bushfit.plots.points import Points, means
-from bushfit.plots.style import POINT, ROW, dress, explain, least_span, legend, new_figure, readable, styles
+from bushfit.plots.style import INK, POINT, ROW, dress, explain, least_span, legend, new_figure, readable, styles
 from bushfit.prediction import Band, Prediction
 from bushfit.sheets import display_units
 from bushfit.units import for_people
 
 #: Points of a model's line.
 FINE = 60
+#: Width of a line with the rig's effects.
+_THIN = 0.6
 #: A measured point belongs to a predicted level that is as near as this, relative and absolute.
 _SAME = (0.01, 0.0)
 
@@ -39,6 +42,7 @@ def prediction_figure(
     title: str,
     *,
     curves: Prediction | None = None,
+    rig: Prediction | None = None,
     note: str = "",
 ) -> Figure:
     """Magnitude and loss factor over frequency per amplitude, and over amplitude per frequency (Figs. 7 to 9).
@@ -48,6 +52,7 @@ def prediction_figure(
         measured: sweeps to lay over; other directions and levels are left out.
         title: names the bushing.
         curves: the prediction on `fine_grid`, for smooth lines; without it they run straight from point to point.
+        rig: the same as these lines, with the rig's effects: drawn thin where points are laid over, which it meets.
         note: what else a reader must know, such as what the prediction leaves out.
     """
     lines = prediction if curves is None else curves
@@ -62,17 +67,26 @@ def prediction_figure(
         rows.append(("amplitude", _spread(known if known.size > 1 else frequencies, 4)))
     figure = new_figure(title, len(rows) * ROW)
     pairs = zip(figure.subplots(len(rows), 2, squeeze=False), rows, strict=True)
-    laid = [draw(pair, prediction.direction, lines, points, *row) for pair, row in pairs]
+    drawn = [draw(pair, prediction.direction, lines, points, *row, rig) for pair, row in pairs]
+    laid = any(drawn)
     banded = np.any(lines.stiffness.high > lines.stiffness.low)
     shade = "; shaded: its 95 % band, where that is wider than the line" if banded else ""
-    explain(figure, f"Lines: model{shade}.", points_note(mine) if any(laid) else "", note)
+    through = " Thin lines: the same with what belongs to the rig, as the points were measured." if laid and rig else ""
+    explain(figure, f"Lines: model{shade}.{through}", points_note(mine) if laid else "", note)
     return figure
 
 
 def draw(
-    pair: Sequence[Axes], direction: Direction, lines: Prediction | Points, points: Points, along: str, levels: Array
+    pair: Sequence[Axes],
+    direction: Direction,
+    lines: Prediction | Points,
+    points: Points,
+    along: str,
+    levels: Array,
+    rig: Prediction | None = None,
 ) -> bool:
-    """Stiffness left, loss factor right, a line and its points per level; returns whether there were points."""
+    """Stiffness left, loss factor right, a line and its points per level, through these a thin line of the `rig`;
+    returns whether there were points."""
     other = "amplitude" if along == "frequency" else "frequency"
     units = display_units(direction)
     scales = {"frequency": ("Hz", 1.0), "amplitude": units["length"]}
@@ -97,6 +111,8 @@ def draw(
             )
             axes.fill_between(x[at], low, high, color=style.color, alpha=0.22, lw=0)
             if spots.any():
+                if rig is not None:
+                    axes.plot(x[at], factor * getattr(rig, kind).value[at], color=style.color, lw=_THIN)
                 mean, low, high = point[:, spots]
                 axes.vlines(where[spots], low, high, color=style.color, lw=0.7, alpha=0.7)
                 axes.plot(where[spots], mean, style.marker, color=style.color, **POINT)
@@ -107,8 +123,12 @@ def draw(
     handles = [style.handle(bool(spots.any())) for style, spots in zip(drawn, marked, strict=True)]
     labels = [f"{scale * level:.3g} {unit}" for level in levels]
     order = slice(None, None, 1 if other == "amplitude" else -1)  # as the lines lie, the stiffest on top
-    legend(pair[-1], handles[order], labels[order], other)
-    return any(spots.any() for spots in marked)
+    handles, labels, laid = handles[order], labels[order], any(spots.any() for spots in marked)
+    if laid and rig is not None:
+        handles += [Line2D([], [], color=INK, lw=1.3), Line2D([], [], color=INK, lw=_THIN, marker="o", **POINT)]
+        labels += ["bushing", "with the rig"]
+    legend(pair[-1], handles, labels, other)
+    return laid
 
 
 def points_note(terms: Sequence[SweepTerm]) -> str:

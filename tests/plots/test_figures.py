@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import matplotlib
@@ -15,10 +16,11 @@ from matplotlib.transforms import Bbox
 from bushfit.effects.contract import Array
 from bushfit.fitting.terms import LoopTerm, SweepTerm
 from bushfit.geometry import Direction
+from bushfit.jobs.artifacts import prediction_files
 from bushfit.model import Model
 from bushfit.plots import fine_grid, loops_figure, prediction_figure, sweeps_figure, to_png
 from bushfit.prediction import Prediction, predict
-from bushfit.results import Covariance, Result
+from bushfit.results import Covariance, Range, Result
 
 Swept = Callable[..., SweepTerm]
 Looped = Callable[..., LoopTerm]
@@ -94,6 +96,34 @@ def test_points_are_means_of_repeats_of_the_same_level_and_direction(paper_model
     assert drawn.get_ydata()[FREQUENCIES == 55.0][0] == pytest.approx(middle, rel=1e-12)
     radial = predicted(paper_model, Direction.TORSION, amplitudes=TORSION)[0]
     assert "measured" not in prediction_figure(radial, sweeps, "").get_supxlabel()
+
+
+def test_points_lie_on_lines_with_the_rig_and_the_bushing_stands_apart(
+    paper_model: Model, swept: Swept, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As `run` draws them: a rig that gives way makes the points softer, and that is no failed fit."""
+    rigged = paper_model.with_effect("rig_compliance", {"rig_compliance.compliance": 2e-8})
+    result = replace(fitted(rigged), measured=Range((5.0, 155.0), (1e-3, 0.2), (Direction.AXIAL,)))
+    drawn: list[Figure] = []
+    monkeypatch.setattr("bushfit.plots.to_png", lambda figure: drawn.append(figure) or b"")
+    predictions = [
+        predict(result, direction, FREQUENCIES, AMPLITUDES) for direction in (Direction.RADIAL, Direction.AXIAL)
+    ]
+    prediction_files(result, predictions, [swept(rigged, Direction.RADIAL)], {"png"})
+    radial, axial = drawn
+    for axes, share in ((radial.axes[0], 4.0), (radial.axes[2], 4.0)):
+        plain, rig = ([line for line in lines(axes) if (line.get_linewidth() < 1.0) is thin] for thin in (False, True))
+        assert len(plain) == len(rig) == len(points(axes))
+        for own, seen, spots in zip(plain, rig, points(axes), strict=True):
+            there = np.interp(spots.get_xdata(), seen.get_xdata(), seen.get_ydata())
+            np.testing.assert_allclose(spots.get_ydata(), there, rtol=0.03)
+            assert np.all(own.get_ydata() > (1.0 + share / 100.0) * seen.get_ydata())
+    assert legend(radial.axes[1])[3:] == ["bushing", "with the rig"]
+    note = " ".join(radial.get_supxlabel().split())
+    assert "Thin lines: the same with what belongs to the rig" in note
+    assert "Radial: not fitted; its band holds the scatter of the axial tests" in note
+    assert "hin lines" not in axial.get_supxlabel()
+    assert legend(axial.axes[1]) == ["0.1 mm", "0.2 mm", "0.5 mm"]
 
 
 def test_one_amplitude_or_one_frequency_leaves_one_row(paper_model: Model) -> None:
