@@ -158,7 +158,7 @@ def for_people(unit: str, factor: float, size: float) -> tuple[str, float]:
         return ("ms", 1e3) if number < 0.1 else (unit, factor)
     least = 0.1 if unit.startswith("Pa") else 10.0  # 0.2 MPa, but 9000 N
     for prefix, power in (("M", 1e6), ("k", 1e3)):
-        if unit[0] in "PN" and number >= least * power:
+        if unit.startswith(("P", "N")) and number >= least * power:
             return prefix + unit, factor / power
     return unit, factor
 

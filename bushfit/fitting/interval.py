@@ -12,7 +12,7 @@ import numpy as np
 
 #: Where the best value stands, in steps: lmfit's tolerance is relative to what it finds, and so a small part of a step.
 _ORIGIN = 2.0
-_MOST_STEPS = 60
+_MOST_STEPS = 200
 #: What lmfit takes for the probability at which an interval ends.
 _END = 0.95
 
@@ -39,13 +39,13 @@ def ends(share: Callable[[float], float], least: float, most: float) -> tuple[fl
         most: of the upper one, in first steps.
 
     Returns:
-        Distances; None where the profile is open to that side.
+        Distances; None where the profile is open to that side, up to the bound or as far as so many steps reach.
     """
     parameters = lmfit.Parameters()
     parameters.add("held", value=_ORIGIN, min=_ORIGIN + least, max=_ORIGIN + most)
     parameters.add("others", value=0.0)  # lmfit asks for two
     parameters["held"].stderr = 1.0
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), np.errstate():  # which lmfit leaves changed where a fit fails
         warnings.simplefilter("ignore", UserWarning)  # its word for an open side
         (_, low), _, (_, high) = lmfit.conf_interval(
             _Others(share, parameters),

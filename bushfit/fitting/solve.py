@@ -28,6 +28,8 @@ Bounds = Mapping[str, tuple[float | None, float | None]]
 
 _TOLERANCE = 1e-9
 _MOST_EVALUATIONS = 400
+#: A combination of parameters that moves the residuals by less, relative to the most, is the noise of derivatives.
+_SEEN = 1e-10
 #: A parameter this close to a bound rests on it, in coordinates, which are of order one however wide the bounds.
 _AT_BOUND = 1e-3
 
@@ -84,8 +86,9 @@ class Solution:
     def gain(self, beside: Collection[str]) -> float:
         """How far a Gauss-Newton step of all parameters but those would lower chi-square."""
         free = [i for i, name in enumerate(self.coordinates.names) if name not in beside]
-        basis = np.linalg.qr(self.jacobian[free].T)[0]
-        return float(np.sum(np.square(basis.T @ self.residual)))
+        left, values, _ = np.linalg.svd(self.jacobian[free].T, full_matrices=False)
+        seen = values > _SEEN * values.max(initial=0.0)
+        return float(np.sum(np.square(left[:, seen].T @ self.residual)))
 
     @property
     def flat(self) -> bool:
