@@ -26,7 +26,7 @@ from bushfit.cli.common import (
     "directions",
     type=click.Choice(["axial", "radial", "torsion"]),
     multiple=True,
-    help="Tests to fit; may be given again [axial, as in the paper; all where none is axial].",
+    help="Tests to fit; may be given again [axial, as in the paper; of loops, or of sweeps, all where none is axial].",
 )
 @click.option(
     "--effect",

@@ -57,7 +57,8 @@ def command(
     }
     table = {"name": name, **{f"{side}_radius": radius for side, radius in radii.items()}, "length": length}
     folder, target = _place(options, name)
-    bushing = _bushing(table, folder / target)
+    given = {"inner_radius": inner_diameter, "outer_radius": outer_diameter}
+    bushing = _bushing(table, folder / target, [key for key, diameter in given.items() if diameter])
     options.require_free(folder, [target])
     with options_named():
         seen = [_usable(inspect(file, own)) for file, own in zip(files, stated_of_each(files, stated), strict=True)]
@@ -104,8 +105,8 @@ def _place(options: Options, name: str) -> tuple[Path, str]:
     return options.folder(folder_name(name)), "campaign.toml"
 
 
-def _bushing(table: Mapping[str, str], file: Path) -> Bushing:
-    """The bushing of the campaign to be; errors name the options."""
+def _bushing(table: Mapping[str, str], file: Path, halved: Sequence[str]) -> Bushing:
+    """The bushing of the campaign to be; errors name the options, diameters where these were given and halved."""
     from bushfit.geometry import Bushing
     from bushfit.schema import BushingTable
     from bushfit.toml import check_tables
@@ -115,7 +116,11 @@ def _bushing(table: Mapping[str, str], file: Path) -> Bushing:
     except BushfitError as error:
         error.file = None
         if error.place:
-            error.place = ", ".join("--" + key.replace("_", "-") for key in error.place.split(", "))
+            keys = error.place.split(", ")
+            names = [key.replace("radius", "diameter") if key in halved else key for key in keys]
+            error.place = ", ".join("--" + name.replace("_", "-") for name in names)
+            if set(keys) & set(halved):
+                error.hint = "a diameter given counts by its half; check that inner and outer are not swapped"
         raise
 
 

@@ -346,6 +346,7 @@ USAGE = [
     ("init|loop.csv|--inner-radius|10 mm|--outer-radius|18 mm|--length|34 mm", "loop.csv: nothing says in which direction this was tested", "state it: --direction axial (or radial, torsion)"),
     ("init|loop.csv|--direction|axial|--inner-radius|10|--outer-radius|18 mm|--length|34 mm", "--inner-radius: a number without a unit", 'write "10 mm"'),
     ("init|loop.csv|--direction|axial|--inner-radius|20 mm|--outer-radius|18 mm|--length|34 mm", "--inner-radius, --outer-radius: impossible bushing", "check that radii were given, not diameters, and that they are not swapped"),
+    ("init|loop.csv|--direction|axial|--inner-diameter|40 mm|--outer-diameter|36 mm|--length|34 mm", "--inner-diameter, --outer-diameter: impossible bushing", "a diameter given counts by its half; check that inner and outer are not swapped"),
     ("reduce|lost.csv", "lost.csv: there is no such file", 'did you mean "loop.csv"?'),
     ("reduce|sweep.csv", "sweep.csv, line 1: this is a sweep already", "name it in the campaign under [[sweeps]]"),
     ("reduce|loop.csv|--cycles|1", "Invalid value for '--cycles': 1 is not in the range 3<=x<=1000."),
