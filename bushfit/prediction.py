@@ -17,6 +17,7 @@ from bushfit.geometry import Direction
 from bushfit.measurement import Sweep
 from bushfit.results import Result
 from bushfit.sensitivity import stiffness_jacobian
+from bushfit.units import number
 
 #: The paper's grid: frequencies [Hz], amplitudes [m], and for torsion [rad].
 PAPER_FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
@@ -201,5 +202,5 @@ def _extrapolations(result: Result, direction: Direction, frequency: Array, ampl
 
 
 def _span(low: float, high: float, unit: str) -> str:
-    ends = [f"{100 * end:.2g}" if unit == "%" else f"{end:.3g}" for end in (low, high)]
+    ends = [number(100 * end, 2) if unit == "%" else number(end, 3) for end in (low, high)]
     return f"{' to '.join(dict.fromkeys(ends))} {unit}"

@@ -18,6 +18,7 @@ from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
 from bushfit.harmonics import HarmonicFit
 from bushfit.measurement import Complex, Floats, Loop
+from bushfit.units import number
 
 _FEWEST_ROWS_PER_CYCLE = 5.0
 #: A frequency that changes by this share within a step, or differs by it between steps.
@@ -330,8 +331,8 @@ def _warnings(reduction: Reduction) -> Iterator[str]:
             low, high = (factor * level * (1.0 + end) for end in (off.min(), off.max()))
             yield (
                 f"the rig reached {low:.4g} to {high:.4g} {unit} at the level of {factor * level:.4g} {unit}: |K| "
-                f"there is up to {100 * abs(slope) * np.abs(off).max():.2g} % off that at the level (fits count with "
-                "what was reached)"
+                f"there is up to {number(100 * abs(slope) * np.abs(off).max(), 2)} % off that at the level (fits count "
+                "with what was reached)"
             )
     coarse = [step for step in steps if step.rows_per_cycle < _COARSE]
     if coarse:
@@ -345,7 +346,7 @@ def _warnings(reduction: Reduction) -> Iterator[str]:
         worst = max(bent, key=lambda step: step.displacement_distortion)
         yield (
             f"the displacement is no clean sine at {len(bent)} of {len(steps)} points: up to "
-            f"{100 * worst.displacement_distortion:.2g} % harmonic distortion ({worst.frequency:.4g} Hz, "
+            f"{number(100 * worst.displacement_distortion, 2)} % harmonic distortion ({worst.frequency:.4g} Hz, "
             f"{factor * worst.amplitude:.3g} {unit})"
         )
     rejected = [skip for skip in reduction.skipped if skip.steady]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,8 +33,13 @@ _KINDS = {
     "Pa": ("a stress", "MPa"),
     "1": ("a ratio", "%"),
 }
-#: What people write for an SI unit, and the factor from SI to it.
-_WRITTEN = {"m": ("mm", 1e3), "m/N": ("mm/kN", 1e6), "N/m": ("N/mm", 1e-3), "1": ("-", 1.0)}
+#: What people write for an SI unit, and the factor from SI to it; that of the springpot's constant is the paper's.
+_WRITTEN = {
+    **{"m": ("mm", 1e3), "m/N": ("mm/kN", 1e6), "N/m": ("N/mm", 1e-3), "1": ("-", 1.0)},
+    "Pa*s^alpha": ("MPa*s^alpha", 1e-6),
+}
+#: Numbers from the first to the second are written without an exponent.
+_PLAIN = (1e-4, 1e7)
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _FACTOR = r"(?:[^\W\d_]+|%|°|1)(?:(?:\^|\*\*)-?[1-9]|⁻?[¹²³])?"
 #: The products and quotients of units that are handed on to pint, which would otherwise evaluate any arithmetic.
@@ -161,6 +167,53 @@ def for_people(unit: str, factor: float, size: float) -> tuple[str, float]:
         if unit.startswith(("P", "N")) and number >= least * power:
             return prefix + unit, factor / power
     return unit, factor
+
+
+def number(value: float, digits: int, sign: str = "") -> str:
+    """A number with at most so many digits: 32940, 0.3, 1.09e8; an exponent only where zeros would hide it.
+
+    Args:
+        value: any number.
+        digits: significant ones.
+        sign: "+" to have it said of positive numbers too.
+    """
+    rounded = float(f"{value:.{digits}g}")
+    least, most = _PLAIN
+    if rounded == 0.0 or not math.isfinite(rounded):
+        return f"{rounded + 0.0:{sign}g}"  # no -0
+    if least <= abs(rounded) < most:
+        text = f"{rounded:{sign}.{_decimals(rounded, digits)}f}"
+        return text.rstrip("0").rstrip(".") if "." in text else text
+    mantissa, _, power = f"{rounded:{sign}.{digits - 1}e}".partition("e")
+    return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}e{int(power)}"
+
+
+def alike(values: Sequence[float], digits: int, least: int = 0) -> list[str]:
+    """Numbers that stand together, all down to the decimal at which the first has so many digits: 1.4530, 1.4488.
+
+    Args:
+        values: at least one; the first sets the decimals.
+        digits: significant ones of the first.
+        least: digits that the others have at least; with 0, what is too small to show is 0.
+    """
+    first = float(f"{values[0]:.{digits}g}")
+    if not _PLAIN[0] <= abs(first) < _PLAIN[1]:
+        return [number(value, digits) for value in values]
+    place = digits - 1 - math.floor(math.log10(abs(first)))
+
+    def text(value: float) -> str:
+        rounded = round(value, place) + 0.0 if math.isfinite(value) else value  # no -0
+        if abs(value) >= _PLAIN[1] or not math.isfinite(value):
+            return number(value, digits)
+        if value and least and abs(rounded) < 10.0 ** (least - 1 - place):
+            return number(value, least)
+        return f"{rounded:.{max(place, 0)}f}" if rounded else "0"
+
+    return [text(value) for value in values]
+
+
+def _decimals(value: float, digits: int) -> int:
+    return max(digits - 1 - math.floor(math.log10(abs(value))), 0)
 
 
 def describe(expected: str) -> str:

@@ -18,6 +18,7 @@ from bushfit.errors import UnitError
     [
         (1.09e6, "Pa", "1.09 MPa"),
         (0.19e6, "Pa*s^alpha", "0.19 MPa*s^alpha"),
+        (9.9e4, "Pa*s^alpha", "0.099 MPa*s^alpha"),
         (1.46e4, "Pa", "14.6 kPa"),
         (-1.46e4, "Pa", "-14.6 kPa"),
         (12.0, "Pa", "12 Pa"),
@@ -176,3 +177,47 @@ def test_pounds_of_mass_are_told_from_pounds_of_force(unit: str) -> None:
 @pytest.mark.parametrize("unit", units._EVERYDAY)
 def test_everyday_units_are_what_pint_says(unit: str) -> None:
     assert units._EVERYDAY[unit] == units._by_pint(unit)
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "shown"),
+    [
+        (3.294e4, 4, "32940"),
+        (32943.0, 2, "33000"),
+        (100.4, 2, "100"),
+        (0.3, 4, "0.3"),
+        (-1e-9, 2, "-1e-9"),
+        (1.0949e8, 3, "1.09e8"),
+        (9.9999, 3, "10"),
+        (0.0, 3, "0"),
+        (-0.0, 3, "0"),
+        (math.inf, 3, "inf"),
+        (math.nan, 3, "nan"),
+    ],
+)
+def test_numbers_that_people_read(value: float, digits: int, shown: str) -> None:
+    assert units.number(value, digits) == shown
+
+
+@given(st.floats(-1e6, 1e6).filter(lambda x: abs(x) > 1e-3), st.integers(1, 9))
+def test_a_number_keeps_its_digits(value: float, digits: int) -> None:
+    text = units.number(value, digits)
+    assert "e" not in text
+    assert float(text) == float(f"{value:.{digits}g}")
+
+
+@pytest.mark.parametrize(
+    ("values", "digits", "least", "shown"),
+    [
+        ((1.4509, 1.4488, 1.453), 5, 0, ["1.4509", "1.4488", "1.4530"]),
+        ((14.6, 14.33, 14.9), 4, 0, ["14.60", "14.33", "14.90"]),
+        ((0.3, -4.54e-6), 4, 0, ["0.3000", "0"]),
+        ((370.0, 0.0213, 6.2e6, 3e9), 2, 2, ["370", "0.021", "6200000", "3e9"]),
+        ((0.0, 12.34), 3, 0, ["0", "12.3"]),
+        ((99.96, 9.0), 3, 0, ["100", "9"]),
+    ],
+)
+def test_numbers_that_stand_together_end_alike(
+    values: tuple[float, ...], digits: int, least: int, shown: list[str]
+) -> None:
+    assert units.alike(values, digits, least) == shown

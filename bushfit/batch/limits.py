@@ -38,7 +38,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
 from bushfit.schema import Share, converted, parameter_value
 from bushfit.toml import read_toml
-from bushfit.units import quantity
+from bushfit.units import number, quantity
 
 #: Standard deviations in a median absolute deviation, for a normal distribution.
 _MAD = 1.482602218505602
@@ -304,7 +304,7 @@ class Judge:
         quantity = self._quantities[name].for_people(value)
 
         def shown(x: float) -> str:
-            return f"{x * quantity.factor:.4g}"
+            return number(x * quantity.factor, 4)
 
         unit = "" if quantity.unit == "-" else f" {quantity.unit}"
         span = "" if least is None or most is None else f" ({shown(least)} to {shown(most)})"

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, new_table, number, shared_options, warn
-from bushfit.units import for_people
+from bushfit.cli.common import Options, new_table, shared_options, warn
+from bushfit.units import alike, for_people
 
 if TYPE_CHECKING:
     from bushfit.batch.points import Point
@@ -173,7 +173,7 @@ def _tell(options: Options, summary: Summary, folder: Path, plan: Plan) -> None:
         table = new_table(f"{plan.title}: {status['done']} bushings", "quantity", "median", "robust std dev", "unit")
         for quantity, (middle, spread) in summary.scatter.items():
             unit, factor = for_people(quantity.unit, 1.0, middle)
-            table.add_row(quantity.name, number(middle * factor, 4), number(spread * factor, 2), unit)
+            table.add_row(quantity.name, alike([middle * factor], 4)[0], alike([spread * factor], 2)[0], unit)
         console.print(table)
     rate = status.total() / max(summary.seconds, 1e-9)
     kept = f", {summary.kept} of them from before" if summary.kept else ""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import click
 
 from bushfit.output import check_free, to_json, write_files
-from bushfit.units import for_people
+from bushfit.units import alike, for_people, number
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -184,8 +184,8 @@ def report(options: Options, title: str, result: Result) -> None:
     if result.quality:
         quality = result.quality
         console.print(
-            f"NRMSE {100 * quality.nrmse:.2g} %, reduced chi-square {quality.reduced_chi_square:.3g} over "
-            f"{quality.points} points, noise {100 * quality.noise:.2g} % a point"
+            f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)} "
+            f"over {quality.points} points, noise {number(100 * quality.noise, 2)} % a point"
         )
     tells = result.covariance.correlations()
     shown = tells if options.verbose else [pair for pair in tells if abs(pair[2]) > 0.9]
@@ -212,8 +212,8 @@ def new_table(title: str, *columns: str) -> Table:
     from rich.table import Table
 
     table = Table(title=escape(title), title_justify="left", box=box.SIMPLE_HEAD, title_style="bold")
-    for number, column in enumerate(columns):
-        table.add_column(escape(column), justify="right" if number else "left", no_wrap=True)
+    for place, column in enumerate(columns):
+        table.add_column(escape(column), justify="right" if place else "left", no_wrap=True)
     return table
 
 
@@ -225,9 +225,11 @@ def parameter_table(title: str, result: Result) -> Table:
         value, stderr = result.model.values[name], result.covariance.stderr(name)
         interval = result.profile.get(name) or result.interval(name)
         digits, (unit, factor) = _digits(value, stderr), for_people(parameter.unit, 1.0, value)
-        ends = ["open" if end is None else number(end * factor, digits) for end in interval or ()]
-        error = "" if stderr is None else number(stderr * factor, 2)
-        table.add_row(_labelled(name, result), number(value * factor, digits), error, " to ".join(ends), unit)
+        known = [end * factor for end in interval or () if end is not None]
+        shown, *texts = alike([value * factor, *known], digits, least=2)
+        ends = ["open" if end is None else texts.pop(0) for end in interval or ()]
+        error = "" if stderr is None else alike([stderr * factor], 2)[0]
+        table.add_row(_labelled(name, result), shown, error, " to ".join(ends), unit)
     return table
 
 
@@ -235,12 +237,6 @@ def _labelled(name: str, result: Result) -> str:
     if name in result.at_bound:
         return f"{name} (at {result.at_bound[name]})"
     return name if name in result.fitted else f"{name} (held)"
-
-
-def number(value: float, digits: int) -> str:
-    """A number with that many digits, an exponent only beyond six places, and without padding: 370, 1.09e6."""
-    mantissa, exponent, power = f"{float(f'{value:.{digits}g}'):g}".partition("e")
-    return f"{mantissa}e{int(power)}" if exponent else mantissa
 
 
 def _digits(value: float, stderr: float | None) -> int:

@@ -13,13 +13,12 @@ from bushfit.cli.common import (
     diagnose_loss_option,
     max_nrmse_option,
     new_table,
-    number,
     parameter_table,
     perform,
     shared_options,
     warn,
 )
-from bushfit.units import for_people
+from bushfit.units import alike, for_people
 
 if TYPE_CHECKING:
     from bushfit.jobs.diagnose import Diagnosed
@@ -97,8 +96,8 @@ def tell_diagnosis(options: Options, name: str, outcome: Diagnosed) -> None:
         console.print(f"  [bold]{effect['name']}[/bold] ({effect['level']}): {escape(effect['sentence'])}")
         for parameter, entry in effect["parameters"].items():
             unit, factor = for_people(entry["unit"], 1.0, entry["value"])
-            ends = [number(end * factor, 3) for end in entry["ci95"] or ()]
-            size = f"{number(entry['value'] * factor, 4)} {unit}".removesuffix(" -")
+            value, *ends = alike([factor * x for x in (entry["value"], *(entry["ci95"] or ()))], 4, least=2)
+            size = f"{value} {unit}".removesuffix(" -")
             console.print(f"    {parameter} = {size}" + (f", 95 % {' to '.join(ends)}" if ends else ""))
         console.print(f"    {escape(effect['evidence'])}")
         if effect["alternatives"]:

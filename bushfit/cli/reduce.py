@@ -13,6 +13,7 @@ from bushfit.cli.common import Options, new_table, shared_options, warn
 from bushfit.cli.inspect import KEYS
 from bushfit.cli.raw import direction_error, file_options, options_named
 from bushfit.errors import MeasurementError
+from bushfit.units import alike, number
 
 if TYPE_CHECKING:
     from bushfit.measurement import Loop
@@ -105,14 +106,14 @@ def _tell(options: Options, reduction: Reduction) -> None:
     )  # fmt: skip
     for (level, repeat, *_), steps in sorted(groups.items()):
         table.add_row(
-            f"{length * level:.4g}",
+            number(length * level, 4),
             f"{repeat:.0f}",
             f"{len(steps)}",
             _span([step.nominal_frequency for step in steps], 4),
             _span([factor * abs(step.stiffness) for step in steps], 4),
             _span([step.loss_factor for step in steps], 3),
-            f"{100 * max(step.gain_error for step in steps):.1g}",
-            f"{100 * max(step.force_distortion for step in steps):.2g}",
+            number(100 * max(step.gain_error for step in steps), 1),
+            number(100 * max(step.force_distortion for step in steps), 2),
         )
     options.console.print(table)
     warn(options, reduction.warnings)
@@ -123,7 +124,7 @@ def _tell(options: Options, reduction: Reduction) -> None:
 
 
 def _span(values: Sequence[float], digits: int) -> str:
-    low, high = f"{min(values):.{digits}g}", f"{max(values):.{digits}g}"
+    high, low = alike([max(values), min(values)], digits, least=2)
     return low if low == high else f"{low}-{high}"
 
 

@@ -14,14 +14,13 @@ from bushfit.cli.common import (
     loss_option,
     max_nrmse_option,
     new_table,
-    number,
     open_campaign,
     report,
     shared_options,
     tell_fit,
     warn,
 )
-from bushfit.units import for_people
+from bushfit.units import alike, for_people
 
 if TYPE_CHECKING:
     from bushfit.fitting.data import Data
@@ -117,8 +116,10 @@ def _tell_passes(options: Options, two_step: TwoStep) -> None:
     units = {name: for_people(parameters[name].unit, 1.0, value) for name, value in last.items()}
     headers = (f"{name} [{unit}]" for name, (unit, _) in units.items())
     table = new_table("static and dynamic fit in turn, pass by pass", "pass", *headers)
-    for count, values in enumerate(two_step.passes, start=1):
-        table.add_row(str(count), *(number(values[name] * factor, 5) for name, (_, factor) in units.items()))
+    # from the last pass, whose decimals the others have
+    columns = [alike([p[name] * factor for p in two_step.passes[::-1]], 5, 2) for name, (_, factor) in units.items()]
+    for count, row in enumerate(list(zip(*columns, strict=True))[::-1], start=1):
+        table.add_row(str(count), *row)
     options.console.print(table)
 
 
@@ -133,7 +134,7 @@ def _tell_cost(options: Options, two_step: Result, joint: Result) -> None:
         errors = two_step.covariance.stderr(name), joint.covariance.stderr(name)
         ratio = f"{errors[0] / errors[1]:.1f}" if errors[0] and errors[1] else ""
         unit, factor = for_people(joint.model.parameters[name].unit, 1.0, other)
-        shown = ["" if error is None else number(error * factor, 2) for error in errors]
-        pairs = (number(one * factor, 4), shown[0], number(other * factor, 4), shown[1])
-        table.add_row(name, *pairs, unit, f"{100 * (one / other - 1):+.1f} %", ratio)
+        shown = ["" if error is None else alike([error * factor], 2)[0] for error in errors]
+        second, first = alike([other * factor, one * factor], 4, least=2)
+        table.add_row(name, first, shown[0], second, shown[1], unit, f"{100 * (one / other - 1):+.1f} %", ratio)
     options.console.print(table)

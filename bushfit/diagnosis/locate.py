@@ -12,6 +12,7 @@ from bushfit.diagnosis.record import Where
 from bushfit.effects.contract import Array
 from bushfit.fitting.terms import LoopTerm, SweepTerm
 from bushfit.sheets import display_units
+from bushfit.units import number
 
 #: Smooth misfit: Legendre polynomials up to this degree in ln f, harmonics of a loop up to this number.
 _DEGREE, _HARMONICS = 3, 5
@@ -163,7 +164,7 @@ def _read_sweep(
     largest = pieces[worst]
     at = int(np.argmax(np.abs(largest)))
     unit, factor = display_units(levels[0].term.direction)["length"]
-    size = f"{100 * abs(largest[at]):.2g} % of |K| {'above' if largest[at] > 0 else 'below'} the model"
+    size = f"{number(100 * abs(largest[at]), 2)} % of |K| {'above' if largest[at] > 0 else 'below'} the model"
     if len(touched) == len(levels):
         level = "at every amplitude"
     else:
@@ -228,5 +229,5 @@ def _loop_regions(evidence: Evidence) -> Iterator[Where]:
             "force",
             float(np.sqrt(np.mean(np.square(amounts)))),
             f"the {term.direction} loop of {amplitude * factor:.3g} {unit_name} departs from the model most in "
-            f"{words}: {100 * share:.2g} % of half its force range",
+            f"{words}: {number(100 * share, 2)} % of half its force range",
         )

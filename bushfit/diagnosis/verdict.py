@@ -19,6 +19,7 @@ from bushfit.fitting.assess import Stage, covariance, measured_range, quality
 from bushfit.fitting.procedures import cautions
 from bushfit.fitting.solve import Bounds
 from bushfit.results import Result
+from bushfit.units import number
 
 #: Probability with which noise alone stays below the thresholds of a remainder and of a fault.
 _LEVEL = 0.998
@@ -176,7 +177,7 @@ def _fault_where(fault: Fault) -> Where:
     kind = "loop" if place.kind == "loop" else "sweep"
     component = "force" if kind == "loop" else "storage"
     excess = float(np.sqrt(fault.gain / max(fault.columns, 1)))
-    reading = f"{place.words} departs by {100 * fault.size:.2g} % from what all other tests say"
+    reading = f"{place.words} departs by {number(100 * fault.size, 2)} % from what all other tests say"
     return Where(place.direction, kind, place.frequency, place.amplitude, component, excess, reading)
 
 
@@ -198,11 +199,11 @@ def _candidates(search: Search, kept: set[str]) -> list[Judged]:
         if proposal.name in kept:
             why = "kept"
         elif candidate.gain < search.first.critical:
-            why = f"gain below {search.first.critical:.3g}, which chance alone can make"
+            why = f"gain below {number(search.first.critical, 3)}, which chance alone can make"
         elif base.bic - bic < SAME:
             why = "gain below its price in parameters"
         else:
-            why = f"{bic - leader:.3g} behind the best by BIC"
+            why = f"{number(bic - leader, 3)} behind the best by BIC"
         held = hold_out(base, candidate.evidence).after
         judged.append(Judged(proposal.name, proposal.score, candidate.gain, base.bic - bic, held, own, why))
     return judged

@@ -13,6 +13,7 @@ from bushfit.fitting.terms import Term
 from bushfit.geometry import Direction
 from bushfit.model import Model
 from bushfit.results import Covariance, Quality, Range
+from bushfit.units import number
 
 #: Reduced chi-square beyond which noise alone is no explanation, in standard deviations.
 _LACK_OF_FIT = 5.0
@@ -144,6 +145,6 @@ def misfit(model: Model, terms: Sequence[Term], parameters: int, advice: str = "
         return []
     return [
         "the model misses the data by more than their noise "
-        f"(reduced chi-square {reduced:.2g}): "
+        f"(reduced chi-square {number(reduced, 2)}): "
         f"standard errors are scaled up{advice}"
     ]

@@ -12,6 +12,7 @@ from bushfit.cycles import least_turn, wild_rows
 from bushfit.geometry import Direction
 from bushfit.measurement import Floats, Loop
 from bushfit.sheets import display_units
+from bushfit.units import number
 
 #: A gap is that many usual steps of the clock, and so many times the widest steps of an uneven clock.
 _GAP, _UNEVEN = 5.0, 3.0
@@ -44,7 +45,7 @@ class Channel(NamedTuple):
     values: Floats
 
     def shown(self, row: int) -> str:
-        return f"{self.factor * self.values[row]:.4g}"
+        return number(self.factor * self.values[row], 4)
 
 
 def odd_channels(history: Loop) -> Iterator[str]:

@@ -17,6 +17,7 @@ from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.record import Looked
 from bushfit.measurement import Loop
 from bushfit.sheets import display_units
+from bushfit.units import alike, for_people, number
 
 #: Cycles differ beyond so many standard errors and this share of half the force's range.
 _SURE, _SHARE = 6.0, 2e-3
@@ -34,19 +35,21 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
     """
     drive = drive_of(loop)
     units = display_units(loop.direction)
-    (length, to_length), (force, to_force) = units["length"], units["force"]
+    (length, to_length), half_force = units["length"], np.ptp(loop.force) / 2.0
+    force, to_force = for_people(*units["force"], float(half_force))
     names = ("rotation", "moment") if loop.direction is Direction.TORSION else ("displacement", "force")
     rows = loop.time.size / drive.cycles
-    half_motion, half_force = np.ptp(loop.displacement) / 2.0, np.ptp(loop.force) / 2.0
+    half_motion = np.ptp(loop.displacement) / 2.0
     amplitude, mean_motion, mean_force = drive.amplitude, drive.coefficients[0].real, _mean(drive)
     facts = {
         "cycles": f"{drive.cycles:.3g}, {'the first from rest' if drive.from_rest else 'taken as steady'}",
         "frequency": f"{drive.frequency:.4g} Hz, {waveform(drive.coefficients)}",
         "sampling": f"{clock(loop) if loop.timed else 'no time in the file'}, {rows:.4g} rows a cycle",
-        "amplitude": f"{to_length * amplitude:.4g} {length} zero-to-peak",
-        f"mean {names[0]}": f"{to_length * mean_motion:.3g} {length}",
-        f"mean {names[1]}": f"{to_force * mean_force:.3g} {force}",
-        "noise": f"{100 * drive.noise / half_force:.2g} % of half the {names[1]}'s range, a row",
+        "amplitude": f"{number(to_length * amplitude, 4)} {length} zero-to-peak",
+        # as far down as the amplitude is told: what lies below is noise
+        f"mean {names[0]}": f"{alike([to_length * amplitude, to_length * mean_motion], 4)[1]} {length}",
+        f"mean {names[1]}": f"{alike([to_force * half_force, to_force * mean_force], 4)[1]} {force}",
+        "noise": f"{number(100 * drive.noise / half_force, 2)} % of half the {names[1]}'s range, a row",
     }
     odd = [
         *wrong_labels(file, loop.direction, [amplitude, half_motion], [drive.frequency]),
@@ -56,8 +59,8 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
     ]
     if abs(mean_motion) > _OFF_ZERO * half_motion and not drive.from_rest:
         odd.append(
-            f"the motion is off zero by {to_length * mean_motion:.3g} {length}, {100 * mean_motion / half_motion:.2g} "
-            "% of its amplitude: the loop counts from its own middle"
+            f"the motion is off zero by {number(to_length * mean_motion, 3)} {length}, "
+            f"{number(100 * mean_motion / half_motion, 2)} % of its amplitude: the loop counts from its own middle"
         )
     return Looked(facts, tuple(odd))
 
@@ -90,11 +93,12 @@ def _changing(drive: Drive, names: tuple[str, str]) -> Iterator[str]:
     change = force[-1] - force[0]
     if abs(change) > max(_SURE * 2.0 * error, _SHARE * half):
         last = force[-1] - force[-2]
+        unit, factor = for_people(*units["force"], float(force[-1]))
+        final, first = alike([factor * force[-1], factor * force[0]], 4)
         settled = abs(last) < max(_SURE * error, _SHARE * half / 2.0) and count > 2
         yield (
             f"the cycles {'settle' if settled else 'are still settling'}: the {names[1]} amplitude goes from "
-            f"{units['force'][1] * force[0]:.4g} {units['force'][0]} in the first cycle to "
-            f"{units['force'][1] * force[-1]:.4g} in the last ({100 * change / force[0]:+.2g} %)"
+            f"{first} {unit} in the first cycle to {final} in the last ({number(100 * change / force[0], 2, '+')} %)"
         )
     for name, kind, mean, least in (
         (names[1], "force", means[:, 0], max(_SURE * 1.5 * error, _SHARE * half)),
@@ -104,7 +108,8 @@ def _changing(drive: Drive, names: tuple[str, str]) -> Iterator[str]:
         drift = mean[-1] - mean[0]
         if abs(drift) > least:
             unit, factor = units[kind]
-            yield f"the {name} drifts: its mean goes from {factor * mean[0]:.3g} to {factor * mean[-1]:.3g} {unit}"
+            last, first = alike([factor * mean[-1], factor * mean[0]], 3, least=1)
+            yield f"the {name} drifts: its mean goes from {first} to {last} {unit}"
 
 
 def _least_drift(drive: Drive) -> float:

@@ -14,6 +14,7 @@ from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.record import Looked
 from bushfit.measurement import Sweep
 from bushfit.sheets import display_units
+from bushfit.units import number
 
 #: A point is wild beyond so many standard deviations from its repeats and this share of |K|.
 _WILD, _WILD_SHARE = 8.0, 0.01
@@ -113,7 +114,7 @@ def _wild(sweep: Sweep, noise: SweepNoise, unit: str, factor: float) -> Iterator
     for row in np.flatnonzero(far)[:_MOST_LISTED]:
         yield (
             f"data row {row + 1} ({sweep.frequency[row]:.4g} Hz, {factor * sweep.amplitude[row]:.4g} {unit}, repeat "
-            f"{sweep.repeat[row]}) is {100 * np.expm1(parts[row, 0]):+.2g} % in |K| and "
+            f"{sweep.repeat[row]}) is {number(100 * np.expm1(parts[row, 0]), 2, '+')} % in |K| and "
             f"{np.degrees(parts[row, 1]):+.2g} deg off its repeats"
         )
     if far.sum() > _MOST_LISTED:
@@ -150,15 +151,17 @@ def _blocks(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
     for (level, repeat, offset), own in zip(found, gain, strict=True):
         if abs(own) > max(_BLOCK_OFF * usual, _BLOCK_SHARE):
             yield (
-                f"{factor * level:.4g} {unit}, repeat {repeat} lies {100 * np.expm1(offset.real):+.2g} % off the other "
-                "repeats as a whole: other amplitude, temperature or mounting?"
+                f"{factor * level:.4g} {unit}, repeat {repeat} lies "
+                f"{number(100 * np.expm1(offset.real), 2, '+')} % off the other repeats as a whole: "
+                "other amplitude, temperature or mounting?"
             )
     numbers = np.array([repeat for _, repeat, _ in found], dtype=float)
     if np.unique(numbers).size > 2 and np.ptp(gain) > 0.0:
         line = linregress(numbers, gain)
         drift = line.slope * np.ptp(numbers)
         if line.pvalue < _DRIFT_P and abs(drift) > _DRIFT_SHARE:
-            yield f"|K| drifts by {100 * drift:+.2g} % from the first repeat to the last: warming up, or settling?"
+            share = number(100 * drift, 2, "+")
+            yield f"|K| drifts by {share} % from the first repeat to the last: warming up, or settling?"
 
 
 def _missed(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -26,6 +27,8 @@ def test_files_are_told_and_the_campaign_s_text_can_be_pasted(typed: Callable, r
     ]  # fmt: skip
     assert "bushfit reduce" in done.stdout
     assert done.stderr.count("nothing odd") == 3
+    assert "mean displacement: 0 mm" in done.stderr
+    assert not re.search(r": -?[\d.]+e[-+]?\d", done.stderr)
     for words in ("a hysteresis loop, axial", "taken for", "columns parted by comma", "0.1 Hz, a sine", "frequencies"):
         assert words in done.stderr
 
