@@ -176,7 +176,7 @@ def _on_strays(count: int, *, kept: bool) -> Iterator[str]:
 
 def _report(plan: Plan, spool: Spool, seconds: float) -> Summary:
     """Hold every record against the limits and write what people read."""
-    output, columns = plan.orders.output, spool.columns()
+    output, (columns, intervals) = plan.orders.output, spool.columns()
     parameters = parameter_quantities(columns)
     points = [at_point(point, what) for point in plan.orders.points for what in (STIFFNESS, LOSS_FACTOR)]
     quantities = {quantity.name: quantity for quantity in (*parameters, NRMSE, CHI_SQUARE, *points)}
@@ -212,7 +212,7 @@ def _report(plan: Plan, spool: Spool, seconds: float) -> Summary:
         os.fsync(stream.fileno())
     aside.replace(output / TABLE)
     if plan.picture:
-        _draw(plan, columns, quantities, judge, missed)
+        _draw(plan, columns, intervals, quantities, judge, missed)
     if report and plan.junit:
         with _blamed_on(plan.junit):
             write_files(plan.junit.parent, {plan.junit.name: report.to_xml()}, force=True)
@@ -251,6 +251,7 @@ def _scatter(values: Array, factor: float) -> tuple[float, float]:
 def _draw(
     plan: Plan,
     columns: dict[str, Array],
+    intervals: dict[str, Array],
     quantities: dict[str, Quantity],
     judge: Judge | None,
     missed: Mapping[int, Mapping[str, str]],
@@ -266,7 +267,8 @@ def _draw(
             shown = quantity.for_people(float(np.median(columns[name][known])))
             values, limits = columns[name] * shown.factor, tuple(limit * shown.factor for limit in allowed)
             out = {number for number, names in missed.items() if name in names and known[number]}
-            panels.append(Panel(shown.header, values, limits, out))
+            ends = intervals[name] * shown.factor if name in intervals else None
+            panels.append(Panel(shown.header, values, limits, out, ends))
     if panels:
         names = [row.name for row in plan.rows]
         write_files(plan.orders.output, {PICTURE: to_png(batch_figure(panels, plan.title, names))}, force=True)

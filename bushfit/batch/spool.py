@@ -36,12 +36,17 @@ class Spool:
             self._stream.seek(begin)
             yield json.loads(self._stream.readline())
 
-    def columns(self) -> dict[str, Array]:
-        """Values of every quantity over the rows, (n,), NaN where a row has none."""
+    def columns(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Of every quantity over the rows, NaN where a row has none: values (n,), and ends of 95 % intervals (2, n)."""
         columns: dict[str, Array] = {}
+        intervals: dict[str, Array] = {}
         for number, record in enumerate(self):
-            for name, (value, *_) in figures(record):
+            for name, (value, low, high, _) in figures(record):
                 if name not in columns:
                     columns[name] = np.full(len(self._begins), np.nan)
                 columns[name][number] = value
-        return columns
+                if low is not None and high is not None:
+                    if name not in intervals:
+                        intervals[name] = np.full((2, len(self._begins)), np.nan)
+                    intervals[name][:, number] = low, high
+        return columns, intervals

@@ -94,15 +94,8 @@ class Options:
             click.echo(to_json(document).decode(), nl=False)
 
 
-def shared_options(function: F) -> F:
-    """-o, -v, -q, --json, --no-plots, --force, gathered into one `options` argument."""
-
-    @click.option(
-        "-o",
-        "--output",
-        type=_Folder(path_type=Path),
-        help="Folder for the results [results/<campaign or file>].",
-    )
+def _shared_options(where: str, function: F) -> F:
+    @click.option("-o", "--output", type=_Folder(path_type=Path), help=f"Folder for the results [{where}].")
     @click.option("-v", "--verbose", is_flag=True, help="Say more: all correlations, the equation, the files read.")
     @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
     @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on standard output.")
@@ -116,6 +109,16 @@ def shared_options(function: F) -> F:
         return function(*args, options=options, **kwargs)
 
     return wrapped  # type: ignore[return-value]
+
+
+def shared_options(function: F) -> F:
+    """-o, -v, -q, --json, --no-plots, --force, gathered into one `options` argument."""
+    return _shared_options("results/<campaign or file>", function)
+
+
+def options_without_folder(function: F) -> F:
+    """The same of a command that writes nothing where no folder is given."""
+    return _shared_options("nothing is written", function)
 
 
 max_nrmse_option = click.option(

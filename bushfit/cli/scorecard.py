@@ -9,14 +9,14 @@ from tempfile import TemporaryDirectory
 
 import click
 
-from bushfit.cli.common import Options, new_table, shared_options
+from bushfit.cli.common import Options, new_table, options_without_folder
 
 
 @click.command("scorecard")
 @click.option("--campaigns", type=click.IntRange(min=5), default=300, show_default=True, help="Hidden campaigns.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of everything random.")
 @click.option("--jobs", type=click.IntRange(min=1), default=os.cpu_count() or 1, show_default=True, help="Cores.")
-@shared_options
+@options_without_folder
 def command(campaigns: int, seed: int, jobs: int, options: Options) -> None:
     """Judge `diagnose` on hidden campaigns of random bushings, and print how often it is right.
 

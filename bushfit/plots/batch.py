@@ -25,18 +25,22 @@ _MOST_LETTERS = 24
 _LETTER, _LINE = 0.021, 8.5
 #: Values further out than this many robust standard deviations are drawn at the edge.
 _FURTHEST = 12.0
+#: A panel shows at least this share of the median on either side.
+_LEAST = 5e-4
 _COLUMNS = 2
 
 
 @dataclass(frozen=True, eq=False)
 class Panel:
     """One quantity: its header, values over the bushings (n,) with NaN where there is none, the lowest and highest
-    allowed value where there is a limit, and the places of bushings that miss it."""
+    allowed value where there is a limit, the places of bushings that miss it, and the ends of the 95 % intervals
+    (2, n) where they are known."""
 
     title: str
     values: Array
     allowed: tuple[float, ...] = ()
     missed: Collection[int] = ()
+    intervals: Array | None = None
 
 
 def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> Figure:
@@ -68,19 +72,24 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> F
         axes.set_xlim(0.5, len(names) + 0.5)
     limits = "Dashed: limits; red: out of them, the worst by name." if any(panel.allowed for panel in panels) else ""
     beyond = "Triangles: further out than the panel reaches, the furthest by name and value."
-    explain(figure, "Grey line: median of the batch.", limits, beyond)
+    few = len(names) <= _CLOUD and any(panel.intervals is not None for panel in panels)
+    explain(figure, "Grey line: median of the batch.", "Bars: 95 % intervals." * few, limits, beyond)
     return figure
 
 
 def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     there = np.isfinite(panel.values)
     place, values = np.flatnonzero(there), panel.values[there]
-    low, high = _reach(values, panel.allowed)
+    ends = None if panel.intervals is None else panel.intervals[:, there]
+    low, high = _reach(values, panel.allowed, ends)
     shown = np.clip(values, low, high)
     inside = shown == values
     bad = np.isin(place, list(panel.missed))
     cloud = values.size > _CLOUD
     good_style = {**DOT, "ms": 1.6, "alpha": max(0.15, min(1.0, 1500 / values.size))} if cloud else POINT
+    if ends is not None and not cloud:
+        colors = [_MISS if out else _GOOD for out in bad]
+        axes.vlines(place + 1, *ends, color=colors, lw=0.8, alpha=0.6, zorder=2)
     for chosen, color, style, order in ((~bad, _GOOD, good_style, 2), (bad, _MISS, POINT if not cloud else DOT, 4)):
         for marker, which in (("o", inside), ("^", shown < values), ("v", shown > values)):
             x, y = place[chosen & which] + 1, shown[chosen & which]
@@ -101,17 +110,17 @@ def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
         _histogram(axes, shown)
 
 
-def _reach(values: Array, allowed: Sequence[float]) -> tuple[float, float]:
-    """Lowest and highest value to show: all but the far out, and the limits."""
+def _reach(values: Array, allowed: Sequence[float], ends: Array | None) -> tuple[float, float]:
+    """Lowest and highest value to show: all but the far out, the limits, and a usual 95 % interval, below which no
+    difference means anything."""
     middle = float(np.median(values))
     spread = _FURTHEST * 1.4826 * float(np.median(np.abs(values - middle)))
     limits = [limit for limit in allowed if math.isfinite(limit)]
     near = values[np.abs(values - middle) <= spread] if spread > 0.0 else values
-    low, high = min(float(near.min()), *limits, middle), max(float(near.max()), *limits, middle)
-    if high - low <= 1e-6 * abs(middle):
-        half = 0.05 * abs(middle) or 1.0
-        return middle - half, middle + half
-    return low, high
+    half = np.ptp(ends, axis=0) / 2.0 if ends is not None else np.empty(0)
+    half = half[np.isfinite(half)]
+    least = max(float(np.median(half)) if half.size else 0.0, _LEAST * abs(middle)) or 1.0
+    return min(float(near.min()), *limits, middle - least), max(float(near.max()), *limits, middle + least)
 
 
 def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[str]) -> None:

@@ -43,6 +43,8 @@ _LEVEL, _LEAST_MAP, _LARGEST_MAP, _LOOPS, _SCALE, _LINE = (cm / 2.54 for cm in (
 #: Where the colour changes, in units of noise; the scale ends where 2 % of the points are left beyond.
 _EDGES = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 _LEAST_EDGES, _BEYOND = 4, 0.02
+#: Of more edges, below and above, every other one bears its number: all would run together.
+_MOST_EDGES = 14
 #: The first colour off white, as a share of the way to the darkest.
 _FAINT = 0.12
 #: Cells this far below the model bear a bar: red and blue are one grey in a print without colours.
@@ -199,8 +201,10 @@ def _head(row: Sequence[Axes], sides: Sequence[Side]) -> None:
 def _draw_scale(figure: SubFigure, maps: Sequence[Axes], scale: _Scale) -> None:
     colors = ScalarMappable(scale.norm, scale.cmap)
     bar = figure.colorbar(colors, ax=maps, location="bottom", shrink=0.76, aspect=42, pad=0.03, extendfrac=0.04)
-    edges = scale.edges
-    bar.ax.set_xticks(edges, [f"{edge:g}" for edge in edges], fontsize=SMALL, color=INK)
+    edges, every = scale.edges, 1 if scale.edges.size <= _MOST_EDGES else 2
+    from_end = np.minimum(np.arange(edges.size), np.arange(edges.size)[::-1])
+    numbers = ["" if place % every else f"{edge:g}" for edge, place in zip(edges, from_end, strict=True)]
+    bar.ax.set_xticks(edges, numbers, fontsize=SMALL, color=INK)
     bar.ax.tick_params(length=2, colors=INK)
     bar.outline.set(edgecolor=GREY, linewidth=0.6)
     bar.set_label("measured less model, in units of noise", fontsize=TEXT, color=INK)

@@ -206,3 +206,9 @@ def test_the_gap_in_a_picture(bushfit: Run, tmp_path: Path) -> None:
     picture = (tmp_path / "x" / "gap.png").read_bytes()
     assert picture.startswith(b"\x89PNG")
     assert len(picture) > 20_000
+
+
+def test_scorecard_promises_no_folder(bushfit: Run) -> None:
+    words = " ".join(bushfit("scorecard", "--help").stdout.split())
+    assert "[nothing is written]" in words
+    assert "results/<campaign" not in words

@@ -66,3 +66,20 @@ def test_an_odd_panel_leaves_no_gap_between_the_rows() -> None:
     right, last = figure.axes[3], figure.axes[4]
     lowest = min(label.get_window_extent().y0 for label in right.get_xticklabels())
     assert lowest > min(label.get_window_extent().y0 for label in last.get_xticklabels())
+
+
+def test_a_panel_shows_no_less_than_what_is_known() -> None:
+    rounding = 1e-8 * np.arange(6.0)
+    values, half = 0.010974926 + rounding, 2e-4
+    ends = np.stack((values - half, values + half))
+    names = [f"b{n}" for n in range(6)]
+    figure = batch_figure([Panel("a [-]", values, intervals=ends), Panel("b [-]", values)], "x", names)
+    to_png(figure)
+    known, unknown = figure.axes[:2]
+    assert np.ptp(known.get_ylim()) > 2.0 * half
+    bars = [line for found in known.collections for line in found.get_segments()]
+    np.testing.assert_allclose(np.array(bars)[:, :, 1].T, ends)
+    assert unknown.collections[:] == []
+    for axes in (known, unknown):
+        assert all(len(label.get_text()) < 9 for label in axes.get_yticklabels())
+    assert "95 % intervals" in figure.get_supxlabel()

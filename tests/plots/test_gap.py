@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -205,3 +206,18 @@ def test_a_hole_stays_grey(paper_model: Model, swept: Swept) -> None:
 def test_same_figure_same_bytes(paper_model: Model, heavier: Callable[[float], Model], campaign: list[Term]) -> None:
     pictures = {to_png(gap_figure(paper_model, heavier(0.1), campaign, "$ 衬套", "50 % _of_ $")) for _ in range(2)}
     assert len(pictures) == 1
+
+
+@pytest.mark.parametrize("stiffer", [1.05, 1.3, 3.0, 20.0])
+def test_numbers_of_the_scale_stay_apart(paper_model: Model, swept: Swept, stiffer: float) -> None:
+    off = Model(
+        paper_model.bushing, paper_model.effects, {**paper_model.values, "mu": paper_model.values["mu"] * stiffer}
+    )
+    figure = gap_figure(off, paper_model, [swept(paper_model)], "", "")
+    figure.draw_without_rendering()
+    bar = figure.axes[-1]
+    labels = [label for label in bar.get_xticklabels() if label.get_text()]
+    print(stiffer, [label.get_text() for label in labels])
+    boxes = [label.get_window_extent() for label in labels]
+    assert all(right.x0 - left.x1 > 2.0 for left, right in pairwise(boxes))
+    assert labels[-1].get_text() == f"{bar.get_xticks()[-1]:g}", "where the scale ends"

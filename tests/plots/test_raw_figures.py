@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from stepped import stepped
@@ -103,3 +105,15 @@ def test_inspection(seen: list[Inspected]) -> None:
 def test_one_file_alone_is_whole(seen: list[Inspected]) -> None:
     for one in seen:
         assert outside(inspection_figure([one])) == []
+
+
+def test_what_is_not_as_it_was_recorded_is_said(root: Path, tmp_path: Path) -> None:
+    table = pd.read_csv(root / "data/cmp_15961/loop_axial_1.csv")
+    turned, timeless = tmp_path / "turned_axial.csv", tmp_path / "timeless_axial.csv"
+    table.assign(**{"force [N]": -table["force [N]"]}).to_csv(turned, index=False)
+    table.drop(columns="time [s]").to_csv(timeless, index=False)
+    figure = inspection_figure([inspect(turned, {}), inspect(timeless, {"frequency": "0.1 Hz", "waveform": "sine"})])
+    titles = [axes.get_title(loc="left") for axes in figure.axes if axes.get_title(loc="left")]
+    assert titles == ["turned_axial.csv: loop, axial, force turned, 1 odd", "timeless_axial.csv: loop, axial"]
+    assert {"time [s]", "time rebuilt [s]"} <= labels(figure)
+    assert outside(figure) == []
