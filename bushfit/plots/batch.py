@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from bushfit.effects.contract import Array
 from bushfit.plots.style import DOT, FRAME, GREY, INK, POINT, ROW, SMALL, dress, explain, fonts, new_figure
+from bushfit.units import number
 
 _MISS, _LIMIT, _GOOD = "#c1272d", "#c1272d", "#31688e"
 #: Up to this many bushings are drawn as single points; beyond, as a cloud with its histogram.
@@ -139,7 +140,7 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
         value = float(np.clip(panel.values[k], *reach))
         text = names[k] if len(names[k]) <= _MOST_LETTERS else names[k][: _MOST_LETTERS - 1] + "…"
         if k in beyond:
-            text = f"{text}: {panel.values[k]:.3g}"
+            text = f"{text}: {number(panel.values[k], 3)}"
         place, above = (k + 0.5) / panel.values.size, value < (reach[0] + reach[1]) / 2.0
         half, line = 0.5 * _LETTER * len(text), 1
         center = min(max(place, half), 1.0 - half)

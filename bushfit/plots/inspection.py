@@ -37,15 +37,14 @@ def inspection_figure(files: Sequence[Inspected]) -> Figure:
         if isinstance(seen.measured, Sweep):
             first = _draw_sweep(figure, place, seen.measured)
         elif seen.measured is not None:
-            rebuilt = bool({"rate", "frequency"} & set(seen.entry))
-            first = _draw_history(figure, place, seen.measured, loop=seen.kind == "loop", rebuilt=rebuilt)
+            first = _draw_history(figure, place, seen.measured, loop=seen.kind == "loop")
         first.set_title(title, fontsize=8.5, loc="left", color=GREY)
     if any(isinstance(seen.measured, Sweep) for seen in files):
         explain(figure, "Sweeps: every point as measured, lines through the means of the repeats.")
     return figure
 
 
-def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bool, rebuilt: bool) -> Axes:
+def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bool) -> Axes:
     units = display_units(history.direction)
     (length, to_length), unit_force = units["length"], units["force"]
     force, to_force = for_people(*unit_force, float(np.abs(history.force).max()))
@@ -58,7 +57,7 @@ def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bo
         over_time, (motion, load), (f"{names[0]}\n[{length}]", f"{names[1]}\n[{force}]"), strict=True
     ):
         _draw_over_time(axes, history.time, values)
-        dress(axes, "time rebuilt [s]" if rebuilt else "time [s]", label)
+        dress(axes, "time [s]" if history.timed else "time rebuilt [s]", label)
     figure.align_ylabels(over_time)
     over_time[0].tick_params(labelbottom=False)
     over_time[0].set_xlabel("")
