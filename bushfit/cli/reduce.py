@@ -109,9 +109,9 @@ def _tell(options: Options, reduction: Reduction) -> None:
             number(length * level, 4),
             f"{repeat:.0f}",
             f"{len(steps)}",
-            _span([step.nominal_frequency for step in steps], 4),
-            _span([factor * abs(step.stiffness) for step in steps], 4),
-            _span([step.loss_factor for step in steps], 3),
+            _span([number(frequency, 4) for frequency in sorted(step.nominal_frequency for step in steps)]),
+            _span(alike(sorted((factor * abs(step.stiffness) for step in steps), reverse=True), 4, least=2)[::-1]),
+            _span(alike(sorted((step.loss_factor for step in steps), reverse=True), 3, least=2)[::-1]),
             number(100 * max(step.gain_error for step in steps), 1),
             number(100 * max(step.force_distortion for step in steps), 2),
         )
@@ -123,8 +123,8 @@ def _tell(options: Options, reduction: Reduction) -> None:
             options.console.print(text, markup=False)
 
 
-def _span(values: Sequence[float], digits: int) -> str:
-    high, low = alike([max(values), min(values)], digits, least=2)
+def _span(rising: Sequence[str]) -> str:
+    low, high = rising[0], rising[-1]
     return low if low == high else f"{low}-{high}"
 
 

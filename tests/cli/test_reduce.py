@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -131,3 +132,14 @@ def test_options_that_do_not_fit(typed: Callable, root: Path, tmp_path: Path, op
     assert said in done.stderr
     assert done.stderr.count("error:") == 1
     assert not (tmp_path / "x").exists()
+
+
+def test_numbers_of_a_line_end_alike_and_frequencies_are_plain(typed: Callable, root: Path) -> None:
+    done = typed("reduce", root / RECORD, "-o", "x", "--no-plots")
+    assert "10-155" in done.stderr
+    lines = [line.split() for line in done.stderr.splitlines() if re.match(r"\s+0\.\d+ ", line)]
+    assert len(lines) == 3
+    for line in lines:
+        for cell in line[4:6]:
+            low, high = cell.split("-")
+            assert len(low.partition(".")[2]) == len(high.partition(".")[2])
