@@ -76,13 +76,13 @@ def command(
 def tell_predictions(options: Options, outcome: Predicted) -> None:
     """The corners of each table, and what a user must know before using it."""
     from bushfit.sheets import prediction_table
-    from bushfit.units import alike
+    from bushfit.units import alike, number
 
     for prediction in outcome.predictions:
         table = prediction_table(prediction)
         shown = new_table(f"{outcome.result.model.bushing.name}: {prediction.direction}, corners", *table.columns[:4])
         low, high = table.iloc[:, 0].min(), table.iloc[:, 0].max()
         for row in table[table.iloc[:, 0].isin([low, high])].itertuples(index=False):
-            shown.add_row(*(alike([value], 4)[0] for value in row[:4]))
+            shown.add_row(*(number(value, 6) for value in row[:2]), *(alike([value], 4)[0] for value in row[2:4]))
         options.console.print(shown)
     warn(options, outcome.warnings)
