@@ -216,6 +216,12 @@ def _decimals(value: float, digits: int) -> int:
     return max(digits - 1 - math.floor(math.log10(abs(value))), 0)
 
 
+def modulus(value: float, digits: int) -> str:
+    """A modulus [Pa] with at most so many digits, as people read it: 1.09 MPa."""
+    unit, factor = for_people("Pa", 1.0, value)
+    return f"{number(value * factor, digits)} {unit}"
+
+
 def describe(expected: str) -> str:
     """An expected SI unit in words: "a length, such as mm"."""
     kind, example = _kind(expected)

@@ -20,7 +20,7 @@ from bushfit.fitting.terms import LoopTerm, SweepTerm, Term
 from bushfit.measurement import Loop, Sweep
 from bushfit.model import Model
 from bushfit.results import Z95, Covariance
-from bushfit.units import for_people
+from bushfit.units import modulus
 
 #: Relative standard error beyond which a direction counts as open, and a parameter as not determined.
 _OPEN = 0.15
@@ -179,7 +179,7 @@ def _combinations(model: Model, terms: Sequence[Term], known: _Information, invo
     if set(_FRICTION) <= set(known.names) and set(_FRICTION) & set(involved):
         error = known.error({"sigma_fmax": 1.0, "eps_half": -1.0})
         if error < min(_KNOWN, _BETTER * least):
-            yield f"sigma_fmax/eps_half = {_modulus(values['sigma_fmax'] / values['eps_half'])} to {_percent(error)}"
+            yield f"sigma_fmax/eps_half = {modulus(values['sigma_fmax'] / values['eps_half'], 4)} to {_percent(error)}"
     if {"mu", *_FRICTION} <= set(known.names) and {"mu", *_FRICTION} & set(involved):
         ratio = values["sigma_fmax"] / values["eps_half"]
         total = values["mu"] + ratio
@@ -187,7 +187,7 @@ def _combinations(model: Model, terms: Sequence[Term], known: _Information, invo
         error = known.error(weights)
         if error < min(_KNOWN, _BETTER * least):
             known_as = "the friction of small amplitudes"
-            yield f"mu + sigma_fmax/eps_half = {_modulus(total)} to {_percent(error)} ({known_as})"
+            yield f"mu + sigma_fmax/eps_half = {modulus(total, 4)} to {_percent(error)} ({known_as})"
     if not {"m", "alpha"} & set(involved) or "alpha" not in values:
         return
     omega = 2.0 * np.pi * slow
@@ -195,24 +195,19 @@ def _combinations(model: Model, terms: Sequence[Term], known: _Information, invo
     if {"m", "alpha"} <= set(known.names):
         error = known.error({"m": 1.0, "alpha": values["alpha"] * float(np.log(omega))})
         if error < min(_KNOWN, _BETTER * least):
-            yield f"m omega^alpha at {slow:.3g} Hz = {_modulus(values['m'] * power)} to {_percent(error)}"
+            yield f"m omega^alpha at {slow:.3g} Hz = {modulus(values['m'] * power, 4)} to {_percent(error)}"
         loss = 0.5 * values["m"] * power * np.sin(turn)
         slope = values["alpha"] * (np.log(omega) + np.pi / 2.0 / np.tan(turn))
         error = known.error({"m": 1.0, "alpha": float(slope)})
         if error < min(_KNOWN, _BETTER * least):
-            yield f"m/2 omega^alpha sin(pi alpha/2) at {slow:.3g} Hz = {_modulus(loss)} to {_percent(error)}"
+            yield f"m/2 omega^alpha sin(pi alpha/2) at {slow:.3g} Hz = {modulus(loss, 4)} to {_percent(error)}"
     if {"mu", "m", "alpha"} <= set(known.names):
         storage = values["mu"] + 0.5 * values["m"] * power * np.cos(turn)
         share = 0.5 * values["m"] * power / storage
         slope = values["alpha"] * (np.log(omega) * np.cos(turn) - np.pi / 2.0 * np.sin(turn))
         error = known.error({"mu": values["mu"] / storage, "m": share * np.cos(turn), "alpha": float(share * slope)})
         if error < min(_KNOWN, _BETTER * least):
-            yield f"mu + m/2 omega^alpha cos(pi alpha/2) at {slow:.3g} Hz = {_modulus(storage)} to {_percent(error)}"
-
-
-def _modulus(value: float) -> str:
-    unit, factor = for_people("Pa", 1.0, value)
-    return f"{value * factor:.4g} {unit}"
+            yield f"mu + m/2 omega^alpha cos(pi alpha/2) at {slow:.3g} Hz = {modulus(storage, 4)} to {_percent(error)}"
 
 
 def _next(model: Model, terms: Sequence[Term], known: _Information) -> list[str]:

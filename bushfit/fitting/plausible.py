@@ -10,7 +10,7 @@ from bushfit.fitting.assess import lack_of_fit
 from bushfit.fitting.terms import Term
 from bushfit.geometry import Bushing
 from bushfit.model import Model
-from bushfit.units import for_people
+from bushfit.units import modulus, number
 
 #: Shear modulus of a rubber [Pa]: the softest gel of a mount, the hardest compound at small strain, with room.
 _SOFTEST, _HARDEST = 5e4, 1e8
@@ -28,12 +28,10 @@ def implausible(bushing: Bushing, terms: Sequence[Term]) -> list[str]:
     softest, hardest = (pick(moduli, key=moduli.__getitem__) for pick in (min, max))
     ratio = moduli[hardest] / moduli[softest]
     if ratio > _MOST_STIFFENING:
-        return [f"{hardest} shows {ratio:.2g} times the modulus of {softest}, which no rubber does: {_CHECK}"]
-    modulus = moduli[hardest]
-    if _SOFTEST < modulus < _HARDEST:
+        return [f"{hardest} shows {number(ratio, 2)} times the modulus of {softest}, which no rubber does: {_CHECK}"]
+    if _SOFTEST < moduli[hardest] < _HARDEST:
         return []
-    unit, factor = for_people("Pa", 1.0, modulus)
-    return [f"a shear modulus of {modulus * factor:.3g} {unit} is that of no rubber: {_CHECK}"]
+    return [f"a shear modulus of {modulus(moduli[hardest], 3)} is that of no rubber: {_CHECK}"]
 
 
 def unfitted(model: Model, terms: Sequence[Term], advice: str) -> list[str]:
@@ -43,7 +41,7 @@ def unfitted(model: Model, terms: Sequence[Term], advice: str) -> list[str]:
         if (misfit := lack_of_fit(model, [term], 0)) is not None:
             nrmse = np.sqrt(np.mean(np.square(np.abs(term.relative(model)))))
             lines.append(
-                f"{term.name}, {term.direction}, was not fitted, and the model misses it by {100 * nrmse:.2g} % "
-                f"(NRMSE), {np.sqrt(misfit):.2g} times its noise{advice}"
+                f"{term.name}, {term.direction}, was not fitted, and the model misses it by {number(100 * nrmse, 2)} % "
+                f"(NRMSE), {number(np.sqrt(misfit), 2)} times its noise{advice}"
             )
     return lines
