@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
+from typing import NamedTuple
 
 from scipy.special import ive, kve
 
@@ -21,24 +22,74 @@ SLENDERNESS_RANGE = (0.05, 100.0)
 _ROUNDING = 1e-9
 
 
+class Unit(NamedTuple):
+    """A unit in which people read a quantity, and the factor from SI to it."""
+
+    name: str
+    factor: float
+
+
+class Display(NamedTuple):
+    """The units in which engineers read displacement, force and stiffness."""
+
+    displacement: Unit
+    force: Unit
+    stiffness: Unit
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A kind of motion: what moves, what resists it, and the units of both.
+
+    Args:
+        words: what moves and what resists, as files and reports call them.
+        displacement_unit, force_unit, stiffness_unit: SI units, as `units` writes them.
+        display: the units in which engineers read them.
+    """
+
+    words: tuple[str, str]
+    displacement_unit: str
+    force_unit: str
+    stiffness_unit: str
+    display: Display
+
+
+TRANSLATION = Motion(
+    ("displacement", "force"), "m", "N", "N/m", Display(Unit("mm", 1e3), Unit("N", 1.0), Unit("N/mm", 1e-3))
+)
+ROTATION = Motion(
+    ("rotation", "moment"),
+    "rad",
+    "N*m",
+    "N*m/rad",
+    Display(Unit("deg", math.degrees(1.0)), Unit("N m", 1.0), Unit("N m/rad", 1.0)),
+)
+
+
 class Direction(StrEnum):
-    """Direction of a test. Torsion counts rotation in rad and moment in N m."""
+    """Direction of a test: its name in files, and the kind of motion that it is."""
 
     AXIAL = "axial"
     RADIAL = "radial"
     TORSION = "torsion"
 
     @property
-    def displacement_unit(self) -> str:
-        return "rad" if self is Direction.TORSION else "m"
+    def motion(self) -> Motion:
+        """Translation or rotation."""
+        return _MOTIONS[self]
 
     @property
-    def force_unit(self) -> str:
-        return "N*m" if self is Direction.TORSION else "N"
+    def is_rotation(self) -> bool:
+        """Whether it counts rotation [rad] and moment [N m], and not displacement [m] and force [N]."""
+        return self.motion is ROTATION
 
     @property
-    def stiffness_unit(self) -> str:
-        return "N*m/rad" if self is Direction.TORSION else "N/m"
+    def display(self) -> Display:
+        """The units in which engineers read its displacement, force and stiffness."""
+        return self.motion.display
+
+
+_MOTIONS = {Direction.AXIAL: TRANSLATION, Direction.RADIAL: TRANSLATION, Direction.TORSION: ROTATION}
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from bushfit.effects import Level, effect_named
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction
-from bushfit.measurement import Sweep
-from bushfit.results import Result
-from bushfit.sensitivity import stiffness_jacobian
+from bushfit.model.result import Result
+from bushfit.model.sensitivity import stiffness_jacobian
+from bushfit.reading.measurement import Sweep
 from bushfit.units import number
 
 #: The paper's grid: frequencies [Hz], amplitudes [m], and for torsion [rad].
@@ -73,7 +73,7 @@ def default_grid(result: Result, direction: Direction, sweeps: Sequence[Sweep] =
             _distinct(np.concatenate([getattr(sweep, name) for sweep in mine])) for name in ("frequency", "amplitude")
         )
         return frequency, amplitude
-    amplitudes = np.array(_TORSION_AMPLITUDES if direction is Direction.TORSION else PAPER_AMPLITUDES)
+    amplitudes = np.array(_TORSION_AMPLITUDES if direction.is_rotation else PAPER_AMPLITUDES)
     frequencies = np.array(PAPER_FREQUENCIES)
     if result.measured is None:
         return frequencies, amplitudes
@@ -81,7 +81,7 @@ def default_grid(result: Result, direction: Direction, sweeps: Sequence[Sweep] =
     inside = frequencies[(frequencies >= low * (1 - _MARGIN)) & (frequencies <= high * (1 + _MARGIN))]
     if inside.size < 2:
         inside = _distinct(np.geomspace(low, high, 9))
-    if direction is Direction.TORSION:
+    if direction.is_rotation:
         return inside, amplitudes
     per_displacement = result.model.bushing.unit_strain(Direction.AXIAL)
     least, most = (strain / per_displacement for strain in result.measured.strain)

@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bushfit import rig
-from bushfit.campaign import Campaign
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError, ModelError
 from bushfit.geometry import Direction
-from bushfit.measurement import Loop, Sweep
-from bushfit.model import FIVE, Model
-from bushfit.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.model import rig
+from bushfit.model.model import FIVE, Model
+from bushfit.reading.measurement import Loop, Sweep
 
 if TYPE_CHECKING:
     from numpy.random import Generator
@@ -202,8 +202,8 @@ def _with_noise(clean: Array, plan: SimulateSettings, random: Generator) -> Arra
 
 def to_files(simulated: Simulated) -> dict[str, bytes]:
     """The campaign as files: CSVs, `campaign.toml` that names them, and `truth.json`, the model behind them."""
-    from bushfit.results import Result
-    from bushfit.sheets import raw_loop_table, raw_sweep_table, to_csv
+    from bushfit.model.result import Result
+    from bushfit.reading.csvfile import raw_loop_table, raw_sweep_table, to_csv
 
     files = {f"{loop.name}.csv": to_csv(raw_loop_table(loop)) for loop in simulated.loops}
     files |= {f"{sweep.name}.csv": to_csv(raw_sweep_table(sweep)) for sweep in simulated.sweeps}

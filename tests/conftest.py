@@ -16,7 +16,7 @@ from commandline import Done, call
 
 from bushfit.effects import BASE
 from bushfit.geometry import Bushing
-from bushfit.model import Model
+from bushfit.model.model import Model
 
 ROOT = Path(__file__).parents[1]
 TABLE_1 = {"mu": 1.09e6, "m": 2.0e5, "alpha": 0.24, "sigma_fmax": 1.46e4, "eps_half": 1.3e-2}

@@ -10,8 +10,8 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
 from bushfit.geometry import Direction
-from bushfit.measurement import Loop
-from bushfit.model import Model
+from bushfit.model.model import Model
+from bushfit.reading.measurement import Loop
 
 #: A step: frequency [Hz] and zero-to-peak amplitude [m or rad].
 Point = tuple[float, float]

@@ -20,10 +20,10 @@ from pydantic import TypeAdapter
 
 from bushfit.batch.limits import Limits
 from bushfit.batch.manifest import ManifestFile
-from bushfit.campaign import load_campaign
+from bushfit.campaign.campaign import load_campaign
+from bushfit.campaign.schema import CampaignFile
 from bushfit.cli import cli
 from bushfit.effects import LIBRARY, Effect, qualified
-from bushfit.schema import CampaignFile
 from bushfit.simulation import model_of, simulate, to_files
 
 

@@ -168,6 +168,6 @@ def test_radial_is_refused_beyond_the_checked_shapes(lengths: tuple[float, float
 
 
 def test_directions_name_their_units() -> None:
-    assert [d.displacement_unit for d in Direction] == ["m", "m", "rad"]
-    assert [d.force_unit for d in Direction] == ["N", "N", "N*m"]
-    assert [d.stiffness_unit for d in Direction] == ["N/m", "N/m", "N*m/rad"]
+    assert [d.motion.displacement_unit for d in Direction] == ["m", "m", "rad"]
+    assert [d.motion.force_unit for d in Direction] == ["N", "N", "N*m"]
+    assert [d.motion.stiffness_unit for d in Direction] == ["N/m", "N/m", "N*m/rad"]

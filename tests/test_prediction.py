@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bushfit.campaign import Campaign, load_campaign
+from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.campaign.schema import SimulatedSweep, SimulateSettings
 from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
-from bushfit.measurement import Sweep
-from bushfit.model import FIVE, Model
+from bushfit.model.model import FIVE, Model
+from bushfit.model.result import Covariance, Range, Result
 from bushfit.prediction import PAPER_AMPLITUDES, PAPER_FREQUENCIES, caveats, default_grid, predict
-from bushfit.results import Covariance, Range, Result
-from bushfit.schema import SimulatedSweep, SimulateSettings
-from bushfit.sheets import prediction_table
+from bushfit.reading.measurement import Sweep
+from bushfit.report.tables import prediction_table
 from bushfit.simulation import measure, undisturbed
 
 FREQUENCIES, AMPLITUDES = np.array([155.0, 5.0, 55.0]), np.array([5e-4, 1e-4])

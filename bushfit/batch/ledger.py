@@ -18,10 +18,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from bushfit import __version__, disk
+from bushfit import __version__
 from bushfit.batch.manifest import Row
 from bushfit.batch.points import Point
 from bushfit.errors import OutputError
+from bushfit.report import disk
 
 SCHEMA = "bushfit/row/2"
 RECORD, ROWS, ASIDE = "row.json", "bushings", ".aside"

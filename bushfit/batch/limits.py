@@ -34,11 +34,12 @@ from bushfit.batch.quantities import (
     at_point,
     figures,
 )
+from bushfit.campaign.schema import Share, parameter_value
+from bushfit.campaign.toml import read_toml
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
-from bushfit.schema import Share, converted, parameter_value
-from bushfit.toml import read_toml
 from bushfit.units import number, quantity
+from bushfit.validation import converted
 
 #: Standard deviations in a median absolute deviation, for a normal distribution.
 _MAD = 1.482602218505602
@@ -129,7 +130,7 @@ def _parameters(raw: object, _: ValidationInfo) -> object:
 
 def _stiffness(raw: object, info: ValidationInfo) -> object:
     point = info.data.get("at")
-    return quantity(raw, point.direction.stiffness_unit) if isinstance(point, Point) else 0.0
+    return quantity(raw, point.direction.motion.stiffness_unit) if isinstance(point, Point) else 0.0
 
 
 def _ratio(raw: object, _: ValidationInfo) -> object:

@@ -17,13 +17,14 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, ConfigDict, Field
 
 from bushfit.batch.points import At, Point
+from bushfit.campaign.naming import folder_name
+from bushfit.campaign.schema import Share
+from bushfit.campaign.toml import read_toml
 from bushfit.effects import effect_named
 from bushfit.errors import CampaignError
-from bushfit.files import read_utf8
 from bushfit.geometry import Direction
-from bushfit.output import folder_name
-from bushfit.schema import Share, Text, converted, unknown_key
-from bushfit.toml import check_tables, read_toml
+from bushfit.reading.files import read_utf8
+from bushfit.validation import Text, check_tables, converted, unknown_key
 
 Command = Literal["fit", "diagnose", "predict"]
 

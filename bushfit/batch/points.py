@@ -8,9 +8,8 @@ from typing import Annotated
 
 from bushfit.errors import UnitError
 from bushfit.geometry import Direction
-from bushfit.schema import converted
-from bushfit.sheets import display_units
 from bushfit.units import quantity
+from bushfit.validation import converted
 
 _WORDS = re.compile(r"\s*([a-z]+)[\s,]+([-+\d.eE]+\s*[A-Za-z]+)[\s,]+([-+\d.eE]+\s*[^\d\s.]+)\s*")
 
@@ -24,7 +23,7 @@ class Point:
     amplitude: float
 
     def __str__(self) -> str:
-        unit, factor = display_units(self.direction)["length"]
+        unit, factor = self.direction.display.displacement
         return f"{self.direction} {self.frequency:.6g} Hz {self.amplitude * factor:.6g} {unit}"
 
 
@@ -40,7 +39,7 @@ def parse_point(text: str) -> Point:
         hint = "write numbers with a decimal point" if re.search(r"\d,\d", text) else None
         raise UnitError("this is no operating point", found=repr(text), expected=expected, hint=hint)
     direction = Direction(match[1])
-    frequency, amplitude = quantity(match[2], "Hz"), quantity(match[3], direction.displacement_unit)
+    frequency, amplitude = quantity(match[2], "Hz"), quantity(match[3], direction.motion.displacement_unit)
     if not (frequency > 0.0 and amplitude > 0.0):
         raise UnitError("frequency and amplitude have to be above zero", found=repr(text), expected=expected)
     return Point(direction, frequency, amplitude)

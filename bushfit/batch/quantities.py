@@ -8,7 +8,6 @@ from typing import Any
 
 from bushfit.batch.points import Point
 from bushfit.effects import LIBRARY, qualified
-from bushfit.sheets import display_units
 from bushfit.units import for_people
 
 Record = Mapping[str, Any]
@@ -39,7 +38,7 @@ STIFFNESS, LOSS_FACTOR = "stiffness", "loss factor"
 
 def at_point(point: Point, what: str) -> Quantity:
     """Stiffness or loss factor at an operating point."""
-    unit, factor = display_units(point.direction)["stiffness"] if what == STIFFNESS else ("-", 1.0)
+    unit, factor = point.direction.display.stiffness if what == STIFFNESS else ("-", 1.0)
     return Quantity(f"{what} {point}", unit, factor)
 
 

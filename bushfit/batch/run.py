@@ -34,8 +34,8 @@ from bushfit.batch.table import Table
 from bushfit.batch.work import Orders, given_up, work
 from bushfit.effects.contract import Array
 from bushfit.errors import OutputError
-from bushfit.output import check_free as check_writable
-from bushfit.output import write_files
+from bushfit.report.folder import check_free as check_writable
+from bushfit.report.folder import write_files
 
 SCHEMA = "bushfit/batch/1"
 TABLE, PICTURE = "batch.csv", "batch.png"
@@ -256,8 +256,8 @@ def _draw(
     judge: Judge | None,
     missed: Mapping[int, Mapping[str, str]],
 ) -> None:
-    from bushfit.plots import to_png
-    from bushfit.plots.batch import Panel, batch_figure
+    from bushfit.report.plots import to_png
+    from bushfit.report.plots.batch import Panel, batch_figure
 
     panels = []
     for name, quantity in quantities.items():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from typing import TextIO
 
@@ -10,7 +9,7 @@ from bushfit.batch.ledger import ROWS, Record
 from bushfit.batch.limits import Judgement
 from bushfit.batch.manifest import Row
 from bushfit.batch.quantities import CHI_SQUARE, NRMSE, Quantity, figures
-from bushfit.sheets import defused
+from bushfit.reading.csvfile import Rows
 
 _FIRST = ("name", "campaign", "folder", "status", "error")
 _FOUND = ("verdict", "named effects", "cannot be told from")
@@ -30,7 +29,6 @@ class Table:
         verdicts: bool,
         limits: bool,
     ) -> None:
-        self._writer = csv.writer(stream, lineterminator="\n")
         self._parameters, self._points = parameters, points
         self._verdicts, self._limits = verdicts, limits
         header = [*_FIRST, *(_JUDGED if limits else ()), *(_FOUND if verdicts else ())]
@@ -39,13 +37,13 @@ class Table:
         header += [NRMSE.header, CHI_SQUARE.header]
         for quantity in points:
             header += [quantity.header, f"{quantity.header}, low", f"{quantity.header}, high"]
-        self._writer.writerow([*header, *_LAST])
+        self._rows = Rows(stream, [*header, *_LAST])
 
     def add(self, row: Row, record: Record, judged: Judgement | None) -> None:
         """One line."""
         found = dict(figures(record))
-        done = record["status"] == "done"
-        cells = [row.name, row.listed, f"{ROWS}/{row.folder}" if done else "", record["status"]]
+        folder = f"{ROWS}/{row.folder}" if record["status"] == "done" else ""
+        cells: list[str | float | None] = [row.name, row.listed, folder, record["status"]]
         cells.append(" ".join(record.get("error", "").split()))
         if self._limits:
             cells += (
@@ -63,17 +61,8 @@ class Table:
             cells += [_number(x, quantity) for x in found.get(quantity.name, (None,) * 4)[:3]]
         cells.append(", ".join(f"{name} ({end})" for name, end in record.get("at_bound", {}).items()))
         cells.append("; ".join(record.get("warnings", ())))
-        self._writer.writerow([_safe(cell) for cell in cells])
+        self._rows.add(cells)
 
 
-def _number(value: float | None, quantity: Quantity) -> str:
-    return "" if value is None else f"{value * quantity.factor:.7g}"
-
-
-def _safe(cell: str) -> str:
-    """Numbers stay numbers, negative ones too; other texts are no formulas."""
-    try:
-        float(cell)
-    except ValueError:
-        return defused(cell)
-    return cell
+def _number(value: float | None, quantity: Quantity) -> float | None:
+    return None if value is None else value * quantity.factor

@@ -14,12 +14,12 @@ from bushfit import __version__
 from bushfit.batch import ledger
 from bushfit.batch.ledger import Record
 from bushfit.batch.points import Point
-from bushfit.campaign import Campaign, load_campaign
+from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.effects.contract import Parameter
 from bushfit.errors import BatchError, BushfitError
 from bushfit.fitting.data import Data
+from bushfit.model.result import Result, load_result
 from bushfit.prediction import Band, predict
-from bushfit.results import Result, load_result
 
 if TYPE_CHECKING:
     from bushfit.batch.manifest import Row, Settings

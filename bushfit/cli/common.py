@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 
-from bushfit.output import check_free, to_json, write_files
+from bushfit.report.folder import check_free, to_json, write_files
 from bushfit.units import alike, for_people, number
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from bushfit.campaign import Campaign
+    from bushfit.campaign.campaign import Campaign
+    from bushfit.campaign.schema import Loss
     from bushfit.jobs import Found, Job
     from bushfit.jobs.fits import Fitted
-    from bushfit.results import Result
-    from bushfit.schema import Loss
+    from bushfit.model.result import Result
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -139,7 +139,7 @@ diagnose_loss_option = _loss_option("the same with wild points left out")
 
 def open_campaign(file: Path, loss: str | None) -> Campaign:
     """A campaign as it is, or with another loss."""
-    from bushfit.campaign import load_campaign
+    from bushfit.campaign.campaign import load_campaign
 
     loaded = load_campaign(file)
     return replace(loaded, fit=replace(loaded.fit, loss=cast("Loss", loss))) if loss else loaded

@@ -97,7 +97,7 @@ def _radius(side: str, radius: str | None, diameter: str | None) -> str:
 
 def _place(options: Options, name: str) -> tuple[Path, str]:
     """Folder and name of the campaign."""
-    from bushfit.output import folder_name
+    from bushfit.campaign.naming import folder_name
 
     file = options.output
     if file and file.suffix == ".toml":
@@ -107,9 +107,9 @@ def _place(options: Options, name: str) -> tuple[Path, str]:
 
 def _bushing(table: Mapping[str, str], file: Path, halved: Sequence[str]) -> Bushing:
     """The bushing of the campaign to be; errors name the options, diameters where these were given and halved."""
+    from bushfit.campaign.schema import BushingTable
     from bushfit.geometry import Bushing
-    from bushfit.schema import BushingTable
-    from bushfit.toml import check_tables
+    from bushfit.validation import check_tables
 
     try:
         return Bushing(**vars(check_tables(table, file, BushingTable)))

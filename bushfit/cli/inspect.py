@@ -41,9 +41,9 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     Writes inspect.png (inspect_2.png and so on of more than five files), with -o there, else under results/ in a folder
     of the first file's name.
     """
+    from bushfit.campaign.naming import folder_name
     from bushfit.inspection.draft import pasted_text
     from bushfit.inspection.opening import inspect, stated_of_each
-    from bushfit.output import folder_name
 
     folder = options.folder(folder_name(files[0].stem))
     pages = [f"inspect{f'_{page}' if page > 1 else ''}.png" for page in range(1, -(-len(files) // _PICTURE) + 1)]
@@ -102,7 +102,7 @@ def tell_assumed(options: Options, seen: Inspected) -> None:
 
 
 def _pictures(seen: Sequence[Inspected], pages: Sequence[str]) -> dict[str, bytes]:
-    from bushfit.plots import inspection_figure, to_png
+    from bushfit.report.plots import inspection_figure, to_png
 
     return {
         name: to_png(inspection_figure(seen[page * _PICTURE : (page + 1) * _PICTURE]))

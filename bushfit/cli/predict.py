@@ -46,13 +46,13 @@ def command(
     are left out. Without a grid in the options or the campaign it is that of the campaign's sweeps in each direction,
     or the paper's as far as it was measured. A warning names what leaves the fitted directions, strains or frequencies.
     """
-    from bushfit.campaign import load_campaign
+    from bushfit.campaign.campaign import load_campaign
+    from bushfit.campaign.naming import folder_name
+    from bushfit.campaign.schema import PredictSettings
     from bushfit.cli.grids import parse_grid
     from bushfit.geometry import Direction
     from bushfit.jobs.predict import Predict
-    from bushfit.output import folder_name
-    from bushfit.results import load_result
-    from bushfit.schema import PredictSettings
+    from bushfit.model.result import load_result
 
     result = load_result(model)
     loaded = load_campaign(campaign) if campaign else None
@@ -75,7 +75,7 @@ def command(
 
 def tell_predictions(options: Options, outcome: Predicted) -> None:
     """The corners of each table, and what a user must know before using it."""
-    from bushfit.sheets import prediction_table
+    from bushfit.report.tables import prediction_table
     from bushfit.units import alike, number
 
     for prediction in outcome.predictions:

@@ -105,7 +105,7 @@ def direction_error(file: Path) -> MeasurementError:
 
 
 def _pairs(texts: Sequence[str], option: str, example: str) -> Mapping[str, str]:
-    from bushfit.headers import LOOP_COLUMNS, SWEEP_COLUMNS
+    from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 
     known = list(dict.fromkeys([*LOOP_COLUMNS, *SWEEP_COLUMNS]))
     pairs = {}

@@ -16,8 +16,8 @@ from bushfit.errors import MeasurementError
 from bushfit.units import alike, number
 
 if TYPE_CHECKING:
-    from bushfit.measurement import Loop
-    from bushfit.reduction import Reduction, Step
+    from bushfit.reading.measurement import Loop
+    from bushfit.reduction.steps import Reduction, Step
 
 
 @click.command("reduce")
@@ -41,21 +41,22 @@ def command(
 
     Writes sweep.csv, which a campaign names under [[sweeps]], and reduce.png.
     """
+    from bushfit.campaign.naming import folder_name
     from bushfit.cli.grids import parse_grid
-    from bushfit.output import folder_name
-    from bushfit.reduction import reduce
-    from bushfit.sheets import reduced_table, to_csv
+    from bushfit.reading.csvfile import to_csv
+    from bushfit.reduction.steps import reduce
+    from bushfit.report.tables import reduced_table
 
     folder = options.folder(folder_name(files[0].stem))
     options.require_free(folder, ["sweep.csv", *(["reduce.png"] if options.plots else [])])
     histories = _read(files, stated)
     direction = histories[0].direction
-    asked = parse_grid(levels, "--levels", direction.displacement_unit) or ()
+    asked = parse_grid(levels, "--levels", direction.motion.displacement_unit) or ()
     reduction = reduce(histories, fewest_cycles=cycles, levels=asked)
     _tell(options, reduction)
     output = {"sweep.csv": to_csv(reduced_table(reduction))}
     if options.plots:
-        from bushfit.plots import reduction_figure, to_png
+        from bushfit.report.plots import reduction_figure, to_png
 
         names = histories[0].name if len(histories) == 1 else f"{len(histories)} histories"
         title = f"{names}: {len(reduction.steps)} points, {direction}"
@@ -90,10 +91,9 @@ def _read(files: Sequence[Path], stated: Mapping[str, Any]) -> list[Loop]:
 
 def _tell(options: Options, reduction: Reduction) -> None:
     """A line a level and repeat, with -v a line a point."""
-    from bushfit.sheets import display_units
 
-    units = display_units(reduction.direction)
-    (unit, length), (stiffness_unit, factor) = units["length"], units["stiffness"]
+    units = reduction.direction.display
+    (unit, length), (stiffness_unit, factor) = units.displacement, units.stiffness
     groups: dict[tuple[float, ...], list[Step]] = {}
     for step in reduction.steps:
         key = (step.level, step.repeat, *((step.nominal_frequency,) if options.verbose else ()))
@@ -129,7 +129,7 @@ def _span(rising: Sequence[str]) -> str:
 
 
 def _document(reduction: Reduction, snippet: str) -> dict[str, Any]:
-    from bushfit.sheets import reduced_table
+    from bushfit.report.tables import reduced_table
 
     return {
         "direction": str(reduction.direction),

@@ -25,7 +25,7 @@ from bushfit.units import alike, for_people
 if TYPE_CHECKING:
     from bushfit.fitting.data import Data
     from bushfit.fitting.procedures import TwoStep
-    from bushfit.results import Result
+    from bushfit.model.result import Result
 
 
 @click.command("run")
@@ -46,11 +46,11 @@ def command(campaign: Path, loss: str | None, max_nrmse: float | None, options: 
     from bushfit.cli.diagnose import tell_diagnosis
     from bushfit.cli.predict import tell_predictions
     from bushfit.fitting.data import Data
-    from bushfit.jobs.artifacts import artifact_names, diagnosis_files, loop_files, sweep_files
     from bushfit.jobs.diagnose import Diagnose
     from bushfit.jobs.fits import Fit, FitStatic, tests_of
     from bushfit.jobs.predict import Predict
-    from bushfit.output import to_json
+    from bushfit.report.artifacts import artifact_names, diagnosis_files, loop_files, sweep_files
+    from bushfit.report.folder import to_json
 
     loaded = open_campaign(campaign, loss)
     folder = options.folder(loaded.slug)

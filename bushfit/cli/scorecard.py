@@ -28,8 +28,8 @@ def command(campaigns: int, seed: int, jobs: int, options: Options) -> None:
 
     from rich.progress import Progress
 
-    from bushfit.diagnosis.scorecard import card, confusion, run, tasks
-    from bushfit.output import to_json
+    from bushfit.report.folder import to_json
+    from bushfit.scorecard.scorecard import card, confusion, run, tasks
 
     folder = options.output
     if folder:

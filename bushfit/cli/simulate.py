@@ -11,8 +11,8 @@ import click
 from bushfit.cli.common import Options, shared_options
 
 if TYPE_CHECKING:
-    from bushfit.model import Model
-    from bushfit.schema import SimulateSettings
+    from bushfit.campaign.schema import SimulateSettings
+    from bushfit.model.model import Model
 
 
 @click.command("simulate")
@@ -59,9 +59,9 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
 
 
 def _task(source: Path) -> tuple[Model, SimulateSettings]:
-    from bushfit.campaign import load_campaign
-    from bushfit.results import load_result
-    from bushfit.schema import SimulateSettings
+    from bushfit.campaign.campaign import load_campaign
+    from bushfit.campaign.schema import SimulateSettings
+    from bushfit.model.result import load_result
     from bushfit.simulation import model_of
 
     if source.suffix.lower() == ".json":
@@ -118,6 +118,6 @@ def _with_effect(model: Model, text: str) -> Model:
 
 
 def _slug(model: Model) -> str:
-    from bushfit.output import folder_name
+    from bushfit.campaign.naming import folder_name
 
     return folder_name(model.bushing.name)

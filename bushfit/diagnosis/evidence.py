@@ -10,10 +10,10 @@ from itertools import pairwise
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.fitting.data_sets import DataSet, SweepData
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.solve import Bounds, Solution
-from bushfit.fitting.terms import SweepTerm, Term
-from bushfit.model import Model
+from bushfit.model.model import Model
 
 #: Evaluations after which a model that fits badly is taken as it is.
 EVALUATIONS = 40
@@ -24,7 +24,7 @@ class Evidence:
     """A model fitted to all tests of a campaign."""
 
     solution: Solution
-    terms: tuple[Term, ...]
+    data_sets: tuple[DataSet, ...]
 
     @property
     def model(self) -> Model:
@@ -51,7 +51,7 @@ class Evidence:
     @property
     def counted(self) -> int:
         """Residuals that carry weight."""
-        return sum(term.counted for term in self.terms)
+        return sum(data_set.counted for data_set in self.data_sets)
 
     @property
     def penalty(self) -> float:
@@ -75,19 +75,19 @@ class Evidence:
 
     @cached_property
     def slices(self) -> list[slice]:
-        """Where each term's residuals stand."""
-        ends = np.cumsum([term.size for term in self.terms])
-        return [slice(int(end - term.size), int(end)) for end, term in zip(ends, self.terms, strict=True)]
+        """Where each data set's residuals stand."""
+        ends = np.cumsum([data_set.size for data_set in self.data_sets])
+        return [slice(int(end - data_set.size), int(end)) for end, data_set in zip(ends, self.data_sets, strict=True)]
 
     @cached_property
     def blocks(self) -> list[Array]:
         """Indices of the residuals of each block and part (gain, phase) of the sweeps, which share an error."""
         groups = []
-        for term, place in zip(self.terms, self.slices, strict=True):
-            if not isinstance(term, SweepTerm):
+        for data_set, place in zip(self.data_sets, self.slices, strict=True):
+            if not isinstance(data_set, SweepData):
                 continue
-            count = term.frequency.size
-            edges = [*term.block_starts.tolist(), count]
+            count = data_set.frequency.size
+            edges = [*data_set.block_starts.tolist(), count]
             for part in (place.start, place.start + count):
                 groups += [part + np.arange(a, b) for a, b in pairwise(edges)]
         return groups
@@ -95,21 +95,21 @@ class Evidence:
     @property
     def shared_freedom(self) -> int:
         """Degrees of freedom behind the errors that blocks share; 0 where these are not measured."""
-        sweeps = [term for term in self.terms if isinstance(term, SweepTerm)]
+        sweeps = [data_set for data_set in self.data_sets if isinstance(data_set, SweepData)]
         return sweeps[0].noise.freedom if sweeps else 0
 
 
-def fit(model: Model, terms: Sequence[Term], held: Sequence[str], bounds: Bounds) -> Evidence:
+def fit(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Evidence:
     """Fit every parameter of a model but the held ones, from its own values.
 
     Raises:
         FitError: fewer data than parameters, or no finite response.
         ModelError: no response.
     """
-    descent = begun(model, terms, held, bounds).finished(EVALUATIONS)
-    return Evidence(descent.solution, tuple(terms))
+    descent = begun(model, data_sets, held, bounds).finished(EVALUATIONS)
+    return Evidence(descent.solution, tuple(data_sets))
 
 
-def begun(model: Model, terms: Sequence[Term], held: Sequence[str], bounds: Bounds) -> Descent:
+def begun(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Descent:
     """The same fit at its start."""
-    return Descent.start(model, terms, [name for name in model.parameters if name not in held], bounds)
+    return Descent.start(model, data_sets, [name for name in model.parameters if name not in held], bounds)

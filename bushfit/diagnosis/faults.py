@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bushfit.diagnosis.calibrate import PATTERN_LEFT, Questions
 from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.effects.contract import Array
-from bushfit.fitting.terms import LoopTerm, SweepTerm
-from bushfit.sheets import display_units
+from bushfit.fitting.data_sets import LoopData, SweepData
+from bushfit.geometry import Direction
 
 #: A disturbance covers at most this many neighbouring frequencies.
 _WIDEST = 3
@@ -23,8 +23,8 @@ _WIDEST = 3
 _FAR, _FARTHEST = 4.0, 8
 
 
-#: Points that deviate together: per sweep term its place among the residuals and the points touched.
-Together = Sequence[tuple[SweepTerm, slice, Array]]
+#: Points that deviate together: per sweep data set its place among the residuals and the points touched.
+Together = Sequence[tuple[SweepData, slice, Array]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class Place:
     words: str
     kind: str
     columns: Sequence[Array]
-    direction: str
+    direction: Direction
     frequency: tuple[float, float]
     amplitude: tuple[float, float]
     looked: int = 0
@@ -83,7 +83,7 @@ def faults(evidence: Evidence, level: float) -> tuple[list[Fault], float]:
     columns = {id(column): column for place in suspects for column in place.columns}
     index = {key: number for number, key in enumerate(columns)}
     groups = [np.array([index[id(column)] for column in place.columns]) for place in suspects]
-    questions = Questions(evidence, np.array(list(columns.values())), groups, PATTERN_LEFT)
+    questions = ScoreTest(evidence, np.array(list(columns.values())), groups, PATTERN_LEFT)
     looked = Counter(place.kind for place in suspects)
     found = [
         Fault(
@@ -100,9 +100,9 @@ def faults(evidence: Evidence, level: float) -> tuple[list[Fault], float]:
     return found, questions.largest_by_chance(level)
 
 
-def _sweeps(evidence: Evidence) -> list[tuple[SweepTerm, slice]]:
-    pairs = zip(evidence.terms, evidence.slices, strict=True)
-    return [(term, place) for term, place in pairs if isinstance(term, SweepTerm)]
+def _sweeps(evidence: Evidence) -> list[tuple[SweepData, slice]]:
+    pairs = zip(evidence.data_sets, evidence.slices, strict=True)
+    return [(data_set, place) for data_set, place in pairs if isinstance(data_set, SweepData)]
 
 
 def _columns(evidence: Evidence, together: Together) -> list[Array]:
@@ -110,8 +110,8 @@ def _columns(evidence: Evidence, together: Together) -> list[Array]:
     columns = []
     for unit in (1.0, 1.0j):
         column = np.zeros(evidence.residual.size)
-        for term, place, chosen in together:
-            column[place] = term.whiten(unit * chosen.astype(complex))
+        for data_set, place, chosen in together:
+            column[place] = data_set.whiten(unit * chosen.astype(complex))
         columns.append(column)
     return columns
 
@@ -119,11 +119,11 @@ def _columns(evidence: Evidence, together: Together) -> list[Array]:
 def _frequencies(evidence: Evidence) -> Iterator[Place]:
     """A disturbance at one frequency or a few neighbours, in one direction or in all."""
     sweeps = _sweeps(evidence)
-    steps = np.unique(np.concatenate([term.frequency for term, _ in sweeps])) if sweeps else np.empty(0)
+    steps = np.unique(np.concatenate([data_set.frequency for data_set, _ in sweeps])) if sweeps else np.empty(0)
     if steps.size < 5:
         return
     for scope in [[pair] for pair in sweeps] + ([sweeps] if len(sweeps) > 1 else []):
-        touched = [[(term, place, term.frequency == f) for term, place in scope] for f in steps]
+        touched = [[(data_set, place, data_set.frequency == f) for data_set, place in scope] for f in steps]
         columns = [_columns(evidence, together) for together in touched]
         where = scope[0][0].direction if len(scope) == 1 else "all directions"
         for width in range(1, _WIDEST + 1):
@@ -137,42 +137,42 @@ def _frequencies(evidence: Evidence) -> Iterator[Place]:
 
 def _levels(evidence: Evidence) -> Iterator[Place]:
     """One amplitude of one sweep, wrong as a whole: its label, its gain."""
-    for term, place in _sweeps(evidence):
-        levels = np.unique(term.amplitude)
+    for data_set, place in _sweeps(evidence):
+        levels = np.unique(data_set.amplitude)
         if levels.size < 2:
             continue
         for level in levels:
-            words = f"the {term.direction} level {_amplitude(term, level)}"
-            together = [(term, place, term.amplitude == level)]
+            words = f"the {data_set.direction} level {_amplitude(data_set, level)}"
+            together = [(data_set, place, data_set.amplitude == level)]
             yield _place(words, "level", _columns(evidence, together), together)
 
 
 def _repeats(evidence: Evidence) -> Iterator[Place]:
     """One repeat of one level."""
-    for term, place in _sweeps(evidence):
-        repeat = term.sweep.repeat[term.order]
-        for level in np.unique(term.amplitude):
-            numbers = np.unique(repeat[term.amplitude == level])
+    for data_set, place in _sweeps(evidence):
+        repeat = data_set.sweep.repeat[data_set.order]
+        for level in np.unique(data_set.amplitude):
+            numbers = np.unique(repeat[data_set.amplitude == level])
             if numbers.size < 3:
                 continue
             for number in numbers:
-                together = [(term, place, (term.amplitude == level) & (repeat == number))]
-                words = f"repeat {number} of the {term.direction} level {_amplitude(term, level)}"
+                together = [(data_set, place, (data_set.amplitude == level) & (repeat == number))]
+                words = f"repeat {number} of the {data_set.direction} level {_amplitude(data_set, level)}"
                 yield _place(words, "repeat", _columns(evidence, together), together)
 
 
 def _rows(evidence: Evidence) -> Iterator[Place]:
     """Single points of a sweep that lie far out."""
-    for term, place in _sweeps(evidence):
+    for data_set, place in _sweeps(evidence):
         residual = evidence.residual[place]
-        count = term.frequency.size
+        count = data_set.frequency.size
         distance = np.maximum(np.abs(residual[:count]), np.abs(residual[count:]))
         farthest = np.argsort(-distance, kind="stable")[:_FARTHEST]
         for row in farthest[distance[farthest] > _FAR]:
-            together = [(term, place, np.arange(count) == row)]
+            together = [(data_set, place, np.arange(count) == row)]
             words = (
-                f"the point at {term.frequency[row]:.4g} Hz, {_amplitude(term, term.amplitude[row])}, "
-                f"repeat {term.sweep.repeat[term.order][row]}, {term.direction}"
+                f"the point at {data_set.frequency[row]:.4g} Hz, {_amplitude(data_set, data_set.amplitude[row])}, "
+                f"repeat {data_set.sweep.repeat[data_set.order][row]}, {data_set.direction}"
             )
             yield replace(_place(words, "row", _columns(evidence, together), together), looked=count)
 
@@ -180,24 +180,26 @@ def _rows(evidence: Evidence) -> Iterator[Place]:
 def _loops(evidence: Evidence) -> Iterator[Place]:
     """One loop among several, wrong in gain or offset."""
     pairs = [
-        (term, place) for term, place in zip(evidence.terms, evidence.slices, strict=True) if isinstance(term, LoopTerm)
+        (data_set, place)
+        for data_set, place in zip(evidence.data_sets, evidence.slices, strict=True)
+        if isinstance(data_set, LoopData)
     ]
-    for term, place in pairs if len(pairs) > 1 else ():
+    for data_set, place in pairs if len(pairs) > 1 else ():
         columns = np.zeros((2, evidence.residual.size))
-        scale = np.sqrt(term.drive.weight) / term.drive.noise
-        columns[0, place], columns[1, place] = term.drive.force * scale, term.drive.half_range * scale
-        ends = (term.drive.frequency,) * 2, (term.drive.amplitude,) * 2
-        yield Place(f"the loop {term.loop.name}", "loop", list(columns), str(term.direction), *ends)
+        scale = np.sqrt(data_set.drive.weight) / data_set.drive.noise
+        columns[0, place], columns[1, place] = data_set.drive.force * scale, data_set.drive.half_range * scale
+        ends = (data_set.drive.frequency,) * 2, (data_set.drive.amplitude,) * 2
+        yield Place(f"the loop {data_set.loop.name}", "loop", list(columns), data_set.direction, *ends)
 
 
 def _place(words: str, kind: str, columns: Sequence[Array], parts: Together) -> Place:
-    frequency = np.concatenate([term.frequency[chosen] for term, _, chosen in parts])
-    amplitude = np.concatenate([term.amplitude[chosen] for term, _, chosen in parts])
+    frequency = np.concatenate([data_set.frequency[chosen] for data_set, _, chosen in parts])
+    amplitude = np.concatenate([data_set.amplitude[chosen] for data_set, _, chosen in parts])
     return Place(
         words,
         kind,
         columns,
-        str(parts[0][0].direction),
+        parts[0][0].direction,
         (float(frequency.min()), float(frequency.max())),
         (float(amplitude.min()), float(amplitude.max())),
     )
@@ -209,6 +211,6 @@ def _span(values: Array, unit: str) -> str:
     return f"{values[0]:.4g} to {values[-1]:.4g} {unit}"
 
 
-def _amplitude(term: SweepTerm, level: float) -> str:
-    unit, factor = display_units(term.direction)["length"]
+def _amplitude(data_set: SweepData, level: float) -> str:
+    unit, factor = data_set.direction.display.displacement
     return f"{level * factor:.4g} {unit}"

@@ -13,7 +13,7 @@ import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.effects.contract import Array
-from bushfit.fitting.terms import LoopTerm, SweepTerm
+from bushfit.fitting.data_sets import LoopData, SweepData
 
 #: Parts without which some parameter's variance would grow by more than this say nothing about a prediction.
 _MOST_GROWTH = 100.0
@@ -82,26 +82,28 @@ def _predicted(evidence: Evidence, chosen: Array) -> Array | None:
 
 def _parts(evidence: Evidence) -> Iterator[tuple[str, Array]]:
     """Name and rows of each part: levels, the top third of the frequencies, directions, loops."""
-    pairs = list(zip(evidence.terms, evidence.slices, strict=True))
-    sweeps = [(term, place) for term, place in pairs if isinstance(term, SweepTerm)]
-    loops = [(term, place) for term, place in pairs if isinstance(term, LoopTerm)]
-    ranks = [np.unique(term.amplitude, return_inverse=True)[1] for term, _ in sweeps]
+    pairs = list(zip(evidence.data_sets, evidence.slices, strict=True))
+    sweeps = [(data_set, place) for data_set, place in pairs if isinstance(data_set, SweepData)]
+    loops = [(data_set, place) for data_set, place in pairs if isinstance(data_set, LoopData)]
+    ranks = [np.unique(data_set.amplitude, return_inverse=True)[1] for data_set, _ in sweeps]
     for rank in range(max((int(r.max()) + 1 for r in ranks), default=0)):
         picked = [(place, np.tile(r == rank, 2)) for (_, place), r in zip(sweeps, ranks, strict=True)]
         yield f"amplitude level {rank + 1}", _rows(evidence, picked)
     if sweeps:
-        top = np.quantile(np.concatenate([term.frequency for term, _ in sweeps]), 2.0 / 3.0)
+        top = np.quantile(np.concatenate([data_set.frequency for data_set, _ in sweeps]), 2.0 / 3.0)
         yield (
             "top third of the frequencies",
-            _rows(evidence, [(place, np.tile(term.frequency > top, 2)) for term, place in sweeps]),
+            _rows(evidence, [(place, np.tile(data_set.frequency > top, 2)) for data_set, place in sweeps]),
         )
-    for direction in dict.fromkeys(term.direction for term, _ in pairs):
-        whole = [(place, np.ones(term.size, dtype=bool)) for term, place in pairs if term.direction is direction]
+    for direction in dict.fromkeys(data_set.direction for data_set, _ in pairs):
+        whole = [
+            (place, np.ones(data_set.size, dtype=bool)) for data_set, place in pairs if data_set.direction is direction
+        ]
         if len(whole) < len(pairs):
             yield f"{direction} direction", _rows(evidence, whole)
     if len(loops) > 1:
-        for term, place in loops:
-            yield f"loop {term.loop.name}", _rows(evidence, [(place, np.ones(term.size, dtype=bool))])
+        for data_set, place in loops:
+            yield f"loop {data_set.loop.name}", _rows(evidence, [(place, np.ones(data_set.size, dtype=bool))])
 
 
 def _rows(evidence: Evidence, picked: Sequence[tuple[slice, Array]]) -> Array:

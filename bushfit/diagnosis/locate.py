@@ -10,8 +10,7 @@ import numpy as np
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.record import Where
 from bushfit.effects.contract import Array
-from bushfit.fitting.terms import LoopTerm, SweepTerm
-from bushfit.sheets import display_units
+from bushfit.fitting.data_sets import LoopData, SweepData
 from bushfit.units import number
 
 #: Smooth misfit: Legendre polynomials up to this degree in ln f, harmonics of a loop up to this number.
@@ -28,7 +27,7 @@ _PARTS = ("storage", "loss")
 class _Level:
     """Mean misfit of one amplitude of one sweep over its repeats: measured over model less 1, complex, (n,)."""
 
-    term: SweepTerm
+    data_set: SweepData
     amplitude: float
     frequency: Array
     misfit: Array
@@ -38,17 +37,17 @@ class _Level:
 def contrasts(evidence: Evidence) -> Array:
     """Whitened columns of all that is smooth: per level and part a polynomial in ln f, per loop its harmonics."""
     rows = []
-    for term, place in zip(evidence.terms, evidence.slices, strict=True):
-        if isinstance(term, LoopTerm):
-            rows += [_row(evidence, place, column) for column in _loop_columns(term)]
+    for data_set, place in zip(evidence.data_sets, evidence.slices, strict=True):
+        if isinstance(data_set, LoopData):
+            rows += [_row(evidence, place, column) for column in _loop_columns(data_set)]
             continue
-        for level in np.unique(term.amplitude):
-            chosen = term.amplitude == level
-            basis = _polynomials(term.frequency[chosen])
+        for level in np.unique(data_set.amplitude):
+            chosen = data_set.amplitude == level
+            basis = _polynomials(data_set.frequency[chosen])
             for column in basis.T:
                 values = np.zeros(chosen.size, dtype=complex)
                 values[chosen] = column
-                rows += [_row(evidence, place, term.whiten(unit * values)) for unit in (1.0, 1.0j)]
+                rows += [_row(evidence, place, data_set.whiten(unit * values)) for unit in (1.0, 1.0j)]
     return np.array(rows)
 
 
@@ -58,9 +57,9 @@ def _row(evidence: Evidence, place: slice, values: Array) -> Array:
     return row
 
 
-def _loop_columns(term: LoopTerm) -> Iterator[Array]:
-    scale = np.sqrt(term.drive.weight) / term.drive.noise * term.drive.half_range
-    angle = 2.0 * np.pi * term.drive.phase
+def _loop_columns(data_set: LoopData) -> Iterator[Array]:
+    scale = np.sqrt(data_set.drive.weight) / data_set.drive.noise * data_set.drive.half_range
+    angle = 2.0 * np.pi * data_set.drive.phase
     yield scale
     for order in range(1, _HARMONICS + 1):
         yield scale * np.cos(order * angle)
@@ -77,12 +76,12 @@ def _polynomials(frequency: Array) -> Array:
 def largest_smooth_misfit(evidence: Evidence) -> float:
     """Largest smooth misfit anywhere, relative to |K| or to half a loop's force range."""
     sizes = [float(np.abs(_smooth(level)).max()) for level in _levels(evidence)]
-    for term, place in zip(evidence.terms, evidence.slices, strict=True):
-        if isinstance(term, LoopTerm):
-            columns = np.array(list(_loop_columns(term)))
+    for data_set, place in zip(evidence.data_sets, evidence.slices, strict=True):
+        if isinstance(data_set, LoopData):
+            columns = np.array(list(_loop_columns(data_set)))
             fitted = np.linalg.lstsq(columns.T, evidence.residual[place], rcond=None)[0] @ columns
-            weighty = term.drive.weight > 0.0
-            scale = term.drive.noise / (term.drive.half_range * np.sqrt(term.drive.weight[weighty]))
+            weighty = data_set.drive.weight > 0.0
+            scale = data_set.drive.noise / (data_set.drive.half_range * np.sqrt(data_set.drive.weight[weighty]))
             sizes.append(float(np.abs(fitted[weighty] * scale).max()))
     return max(sizes, default=0.0)
 
@@ -96,22 +95,22 @@ def locate(evidence: Evidence) -> tuple[Where, ...]:
 
 def _levels(evidence: Evidence) -> list[_Level]:
     levels = []
-    for term in evidence.terms:
-        if not isinstance(term, SweepTerm):
+    for data_set in evidence.data_sets:
+        if not isinstance(data_set, SweepData):
             continue
-        ratio = term.measured / term.stiffness(evidence.model) - 1.0
-        for amplitude in np.unique(term.amplitude):
-            chosen = term.amplitude == amplitude
-            frequency, place = np.unique(term.frequency[chosen], return_inverse=True)
+        ratio = data_set.measured / data_set.stiffness(evidence.model) - 1.0
+        for amplitude in np.unique(data_set.amplitude):
+            chosen = data_set.amplitude == amplitude
+            frequency, place = np.unique(data_set.frequency[chosen], return_inverse=True)
             counts = np.bincount(place)
             values = ratio[chosen]
             mean = (np.bincount(place, values.real) + 1j * np.bincount(place, values.imag)) / counts
             repeats = float(np.median(counts))
-            random = term.noise.random[term.sweep.name, float(amplitude)]
+            random = data_set.noise.random[data_set.sweep.name, float(amplitude)]
             gain, phase = (
-                float(np.sqrt((r**2 + s**2) / repeats)) for r, s in zip(random, term.noise.shared, strict=True)
+                float(np.sqrt((r**2 + s**2) / repeats)) for r, s in zip(random, data_set.noise.shared, strict=True)
             )
-            levels.append(_Level(term, float(amplitude), frequency, mean, (gain, phase)))
+            levels.append(_Level(data_set, float(amplitude), frequency, mean, (gain, phase)))
     return levels
 
 
@@ -122,8 +121,8 @@ def _smooth(level: _Level) -> Array:
 
 def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
     levels = _levels(evidence)
-    for direction in dict.fromkeys(level.term.direction for level in levels):
-        mine = [level for level in levels if level.term.direction is direction]
+    for direction in dict.fromkeys(level.data_set.direction for level in levels):
+        mine = [level for level in levels if level.data_set.direction is direction]
         for part, name in enumerate(_PARTS):
             pieces = [(np.real if part == 0 else np.imag)(_smooth(level)) for level in mine]
             sizes = [piece / level.noise[part] for piece, level in zip(pieces, mine, strict=True)]
@@ -134,7 +133,7 @@ def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
             if max(float(np.abs(piece).max()) for piece in pieces) < _LEAST:
                 continue
             yield Where(
-                str(direction),
+                direction,
                 "sweep",
                 band,
                 (mine[touched[0]].amplitude, mine[touched[-1]].amplitude),
@@ -163,7 +162,7 @@ def _read_sweep(
     worst = max(touched, key=lambda i: float(np.abs(pieces[i]).max()))
     largest = pieces[worst]
     at = int(np.argmax(np.abs(largest)))
-    unit, factor = display_units(levels[0].term.direction)["length"]
+    unit, factor = levels[0].data_set.direction.display.displacement
     size = f"{number(100 * abs(largest[at]), 2)} % of |K| {'above' if largest[at] > 0 else 'below'} the model"
     if len(touched) == len(levels):
         level = "at every amplitude"
@@ -201,15 +200,15 @@ def _over_amplitude(pieces: Sequence[Array]) -> str:
 
 
 def _loop_regions(evidence: Evidence) -> Iterator[Where]:
-    for term, place in zip(evidence.terms, evidence.slices, strict=True):
-        if not isinstance(term, LoopTerm):
+    for data_set, place in zip(evidence.data_sets, evidence.slices, strict=True):
+        if not isinstance(data_set, LoopData):
             continue
-        columns = np.array(list(_loop_columns(term)))
+        columns = np.array(list(_loop_columns(data_set)))
         unit = columns / np.linalg.norm(columns, axis=1)[:, None]
         amounts = -(unit @ evidence.residual[place])
         sizes = np.concatenate(([abs(amounts[0])], np.hypot(amounts[1::2], amounts[2::2])))
         order = int(np.argmax(sizes))
-        share = np.sqrt(2.0) * sizes[order] / np.sqrt(term.size) * term.drive.noise / term.drive.half_range
+        share = np.sqrt(2.0) * sizes[order] / np.sqrt(data_set.size) * data_set.drive.noise / data_set.drive.half_range
         names = {
             0: "a constant force",
             1: "its first harmonic (slope or area)",
@@ -217,17 +216,17 @@ def _loop_regions(evidence: Evidence) -> Iterator[Where]:
             3: "its third harmonic (a bend at the ends)",
         }
         words = names.get(order, f"harmonic {order}")
-        unit_name, factor = display_units(term.direction)["length"]
-        amplitude = term.drive.amplitude
+        unit_name, factor = data_set.direction.display.displacement
+        amplitude = data_set.drive.amplitude
         if share < _LEAST:
             continue
         yield Where(
-            str(term.direction),
+            data_set.direction,
             "loop",
-            (term.drive.frequency,) * 2,
+            (data_set.drive.frequency,) * 2,
             (amplitude,) * 2,
             "force",
             float(np.sqrt(np.mean(np.square(amounts)))),
-            f"the {term.direction} loop of {amplitude * factor:.3g} {unit_name} departs from the model most in "
+            f"the {data_set.direction} loop of {amplitude * factor:.3g} {unit_name} departs from the model most in "
             f"{words}: {number(100 * share, 2)} % of half its force range",
         )

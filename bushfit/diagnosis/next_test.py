@@ -10,9 +10,9 @@ import numpy as np
 
 from bushfit.effects import effect_named
 from bushfit.effects.contract import Array, Level
-from bushfit.fitting.terms import Term
+from bushfit.fitting.data_sets import DataSet
 from bushfit.geometry import Direction
-from bushfit.model import Model
+from bushfit.model.model import Model
 
 #: Relative noise of one point of a test that does not exist yet.
 _NOISE = 5e-3
@@ -58,7 +58,7 @@ MENU = (
 )
 
 
-def deciding_test(models: Sequence[Model], terms: Sequence[Term]) -> str:
+def deciding_test(models: Sequence[Model], data_sets: Sequence[DataSet]) -> str:
     """The entry with the largest predicted distance between any two of the models, in noise per effort.
 
     The distance is that of complex stiffness over the test's points, less what a common gain could explain; a test
@@ -66,9 +66,9 @@ def deciding_test(models: Sequence[Model], terms: Sequence[Term]) -> str:
     """
     if len(models) < 2:
         return ""
-    swept = {term.direction for term in terms if term.kind == "sweep"}
+    swept = {data_set.direction for data_set in data_sets if data_set.kind == "sweep"}
     menu = [entry for entry in MENU if entry.direction not in swept]
-    scored = [(_distance(entry, models, terms) / entry.effort, entry.words) for entry in menu]
+    scored = [(_distance(entry, models, data_sets) / entry.effort, entry.words) for entry in menu]
     best, words = max(scored)
     return words if best > 0.0 else ""
 
@@ -78,13 +78,13 @@ def confirming_test(name: str) -> str:
     return effect_named(name).confirmed_by
 
 
-def _distance(entry: MenuEntry, models: Sequence[Model], terms: Sequence[Term]) -> float:
-    frequency, amplitude, direction = _points(entry, terms)
+def _distance(entry: MenuEntry, models: Sequence[Model], data_sets: Sequence[DataSet]) -> float:
+    frequency, amplitude, direction = _points(entry, data_sets)
     if entry.without_rig:
         kinds = [{effect_named(name).level for name in model.effects} for model in models]
         if len({Level.INSTRUMENT in kind for kind in kinds}) < 2:
             return 0.0
-        frequency, amplitude, direction = _points(MenuEntry("", 1.0), terms)
+        frequency, amplitude, direction = _points(MenuEntry("", 1.0), data_sets)
         responses = [_rig_share(model, direction, frequency, amplitude) for model in models]
     else:
         responses = [np.log(model.stiffness(direction, frequency, amplitude)) for model in models]
@@ -101,15 +101,15 @@ def _apart(one: Array, other: Array) -> float:
     return float(np.sum(np.abs(difference) ** 2)) / _NOISE**2
 
 
-def _points(entry: MenuEntry, terms: Sequence[Term]) -> tuple[Array, Array, Direction]:
-    direction = entry.direction or terms[-1].direction
-    same = [term for term in terms if term.direction is direction] or list(terms)
-    amplitudes = np.unique(np.concatenate([term.amplitude for term in same]))
-    if direction is Direction.TORSION and same[0].direction is not Direction.TORSION:
+def _points(entry: MenuEntry, data_sets: Sequence[DataSet]) -> tuple[Array, Array, Direction]:
+    direction = entry.direction or data_sets[-1].direction
+    same = [data_set for data_set in data_sets if data_set.direction is direction] or list(data_sets)
+    amplitudes = np.unique(np.concatenate([data_set.amplitude for data_set in same]))
+    if direction.is_rotation and not same[0].direction.is_rotation:
         amplitudes = np.array([0.02])
     if entry.amplitudes:
         amplitudes = np.array([amplitudes.min() * -x if x < 0 else amplitudes.max() * x for x in entry.amplitudes])
-    measured = np.unique(np.concatenate([term.frequency for term in terms]))
+    measured = np.unique(np.concatenate([data_set.frequency for data_set in data_sets]))
     frequencies = np.array(entry.frequencies) if entry.frequencies else measured
     if entry.beyond:
         frequencies = frequencies * measured.max()

@@ -9,7 +9,8 @@ from typing import Any, Literal
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.holdout import HoldOut
 from bushfit.effects import effect_named
-from bushfit.results import Result
+from bushfit.geometry import Direction
+from bushfit.model.result import Result
 
 SCHEMA = "bushfit/diagnosis/1"
 Verdict = Literal["consistent", "named", "ambiguous", "partly", "unexplained"]
@@ -46,7 +47,7 @@ class Where:
         reading: a sentence.
     """
 
-    direction: str
+    direction: Direction
     kind: str
     frequency: tuple[float, float]
     amplitude: tuple[float, float]
@@ -177,10 +178,9 @@ def _rms(evidence: Evidence) -> float:
 
 
 def _where(where: Where) -> dict[str, Any]:
-    rotation = where.direction == "torsion"
-    unit, factor = ("deg", 57.29577951308232) if rotation else ("mm", 1e3)
+    unit, factor = where.direction.display.displacement
     return {
-        "direction": where.direction,
+        "direction": str(where.direction),
         "kind": where.kind,
         "frequency_Hz": list(where.frequency),
         f"amplitude_{unit}": [x * factor for x in where.amplitude],

@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bushfit.diagnosis.calibrate import PATTERN_LEFT, Questions
-from bushfit.diagnosis.close import SAME, Search, Step
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.faults import Fault, faults
 from bushfit.diagnosis.holdout import hold_out
 from bushfit.diagnosis.locate import contrasts, largest_smooth_misfit, locate
 from bushfit.diagnosis.next_test import confirming_test, deciding_test
 from bushfit.diagnosis.record import Diagnosis, Judged, Named, Verdict, Where
+from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
+from bushfit.diagnosis.search import SAME, Search, Step
 from bushfit.fitting.assess import Stage, covariance, measured_range, quality
 from bushfit.fitting.procedures import cautions
 from bushfit.fitting.solve import Bounds
-from bushfit.results import Result
+from bushfit.model.result import Result
 from bushfit.units import number
 
 #: Probability with which noise alone stays below the thresholds of a remainder and of a fault.
@@ -77,11 +77,11 @@ def _ambiguous(search: Search, final: Evidence, steps: Sequence[Step], names: Se
         if not step.rivals:
             own = {key: value for key, value in final.model.values.items() if key.startswith(f"{step.name}.")}
             model = model.with_effect(step.name, own)
-    kept = search.base if model is search.base.model else fit(model, final.terms, search.held, search.bounds)
+    kept = search.base if model is search.base.model else fit(model, final.data_sets, search.held, search.bounds)
     sets = "; ".join(f"{name.name} from {' or '.join(name.alternatives)}" for name in names if name.alternatives)
     rivals = [[final.model, *(rival.evidence.model for rival in step.rivals)] for step in steps if step.rivals]
     words = f"these tests cannot tell {sets}"
-    return _finish(search, "ambiguous", words, kept, names, next_test=deciding_test(rivals[0], final.terms))
+    return _finish(search, "ambiguous", words, kept, names, next_test=deciding_test(rivals[0], final.data_sets))
 
 
 def find_remainder(search: Search, evidence: Evidence) -> Remainder | None:
@@ -90,7 +90,7 @@ def find_remainder(search: Search, evidence: Evidence) -> Remainder | None:
     if fault:
         return Remainder(_fault_words(fault), fault)
     columns = contrasts(evidence)
-    smooth = Questions(evidence, columns, [np.arange(len(columns))], PATTERN_LEFT)
+    smooth = ScoreTest(evidence, columns, [np.arange(len(columns))], PATTERN_LEFT)
     if (
         smooth.gains()[0] > smooth.largest_by_chance(_LEVEL)
         and largest_smooth_misfit(evidence) > search.settings.tolerance
@@ -213,15 +213,15 @@ def _result(evidence: Evidence, bounds: Bounds) -> Result:
     """The model with its uncertainty; a parameter at rest on a bound counts as held there."""
     model, names = evidence.model, evidence.solution.coordinates.names
     moving = tuple(name for name in names if name not in evidence.solution.at_bound)
-    cov = covariance(model, [Stage(moving, evidence.terms)])
-    sources = tuple(term.source for term in evidence.terms if term.source is not None)
+    cov = covariance(model, [Stage(moving, evidence.data_sets)])
+    sources = tuple(data_set.source for data_set in evidence.data_sets if data_set.source is not None)
     return Result(
         model,
         moving,
         cov,
-        quality(model, evidence.terms, len(moving)),
-        measured_range(model, evidence.terms),
-        tuple(cautions(model, evidence.solution, evidence.terms, bounds, cov)),
+        quality(model, evidence.data_sets, len(moving)),
+        measured_range(model, evidence.data_sets),
+        tuple(cautions(model, evidence.solution, evidence.data_sets, bounds, cov)),
         sources,
         at_bound=evidence.solution.at_bound,
     )
@@ -233,7 +233,7 @@ def _notes(search: Search, after: Evidence) -> tuple[str, ...]:
     notes = []
     if blind:
         notes.append(f"not identifiable from these tests: {', '.join(blind)}")
-    noise = next((term.noise for term in after.terms if hasattr(term, "noise")), None)
+    noise = next((data_set.noise for data_set in after.data_sets if hasattr(data_set, "noise")), None)
     if noise is not None and noise.origin == "assumed":
         notes.append(
             "nothing was repeated at three frequencies or more: "

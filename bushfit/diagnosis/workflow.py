@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from bushfit.diagnosis.close import Search
 from bushfit.diagnosis.evidence import fit
 from bushfit.diagnosis.record import Diagnosis, Settings
+from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import judge
 from bushfit.effects import BASE, effect_named
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import DataSet, SweepData
 from bushfit.fitting.robust import estimate, outliers_at, told
 from bushfit.fitting.starts import start_values
-from bushfit.fitting.terms import SweepTerm, Term
-from bushfit.model import Model
-from bushfit.results import Outlier
+from bushfit.model.model import Model
+from bushfit.model.result import Outlier
 
 
 def diagnose(data: Data, model: Model | None = None, settings: Settings | None = None) -> Diagnosis:
@@ -33,8 +33,8 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     settings = settings or Settings()
     for name in (*settings.adopt, *settings.without):
         effect_named(name)
-    terms: list[Term] = [*data.loops, *data.sweeps]
-    if not terms:
+    data_sets: list[DataSet] = [*data.loops, *data.sweeps]
+    if not data_sets:
         raise FitError(
             "there is nothing to diagnose",
             file=data.campaign.path,
@@ -42,7 +42,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
             hint="add measured tests to the campaign",
         )
     held = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
-    start = {**start_values(data.campaign.bushing, terms, {}), **data.given}
+    start = {**start_values(data.campaign.bushing, data_sets, {}), **data.given}
     model = model or Model.started(data.campaign.bushing, BASE, start)
     start = {name: value for name, value in start.items() if name in model.values and name not in held}
     for name in settings.adopt:
@@ -50,19 +50,19 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     outliers: tuple[Outlier, ...] = ()
     if data.robust:
         names = [name for name in model.parameters if name not in held]
-        robust = estimate(model, terms, names, data.bounds, robust=True)
-        outliers, terms = robust.outliers, [_standing(term) for term in robust.terms]
-    search = Search.begin(fit(model, terms, held, data.bounds), settings, start, held, data.bounds)
+        robust = estimate(model, data_sets, names, data.bounds, robust=True)
+        outliers, data_sets = robust.outliers, [_standing(data_set) for data_set in robust.data_sets]
+    search = Search.begin(fit(model, data_sets, held, data.bounds), settings, start, held, data.bounds)
     grown, added = search.grow()
     found = judge(search, *search.reconsider(grown, added))
     if not data.robust:
-        outliers = outliers_at(found.after.model, found.after.terms)
+        outliers = outliers_at(found.after.model, found.after.data_sets)
     notes = (*found.notes, *told(outliers, robust=data.robust))
     return replace(found, notes=notes, result=replace(found.result, outliers=outliers))
 
 
-def _standing(term: Term) -> Term:
-    return term.standing() if isinstance(term, SweepTerm) else term
+def _standing(data_set: DataSet) -> DataSet:
+    return data_set.standing() if isinstance(data_set, SweepData) else data_set
 
 
 def _adopted(model: Model, name: str) -> Model:

@@ -7,7 +7,6 @@ import numpy as np
 from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Values
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
 from bushfit.effects.history import History
-from bushfit.geometry import Direction
 
 #: Samples of the cycle from which the first harmonic of the bent waveform is taken.
 SAMPLES = 64
@@ -23,7 +22,7 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     steady cycle of the dead-zoned sine, less the first term from the same samples.
     """
     delta = p["delta"]
-    if setting.direction is Direction.TORSION or not np.any(delta):
+    if setting.direction.is_rotation or not np.any(delta):
         return below(omega, amplitude)
     reach = np.maximum(amplitude - delta, 0.0)
     share = first_harmonic(amplitude, delta)
@@ -42,7 +41,7 @@ def _harmonic(force: Array) -> Array:
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
     """The force of the bushing moved by what exceeds +-delta [N]."""
-    if setting.direction is Direction.TORSION:
+    if setting.direction.is_rotation:
         return below(history)
     return below(history.with_value(dead_zone(history.value, p["delta"])))
 

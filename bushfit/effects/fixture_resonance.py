@@ -18,7 +18,6 @@ from bushfit.effects.contract import (
     linear_response,
 )
 from bushfit.effects.history import History
-from bushfit.geometry import Direction
 
 
 def fixture(p: Values, omega: Array) -> Array:
@@ -29,7 +28,7 @@ def fixture(p: Values, omega: Array) -> Array:
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
     """K - M omega^2 wr^2/(wr^2 - omega^2 + 2 i zeta omega wr) [N/m]; does not act in torsion."""
-    if setting.direction is Direction.TORSION:
+    if setting.direction.is_rotation:
         return below(omega, amplitude)
     return below(omega, amplitude) + fixture(p, omega)
 
@@ -39,7 +38,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
 
     From rest the mode rings for 1/(2 pi zeta frequency) seconds before it has fallen to 37 %.
     """
-    if setting.direction is Direction.TORSION:
+    if setting.direction.is_rotation:
         return below(history)
     if history.periodic:
         return below(history) + linear_response(partial(fixture, p), history)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Values
 from bushfit.effects.history import History
-from bushfit.geometry import Direction
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
@@ -14,7 +13,7 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
     """F + offset [N]; the torque cell is another one, so not in torsion."""
-    if setting.direction is Direction.TORSION:
+    if setting.direction.is_rotation:
         return below(history)
     return below(history) + p["offset"]
 

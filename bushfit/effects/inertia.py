@@ -16,19 +16,18 @@ from bushfit.effects.contract import (
     linear_response,
 )
 from bushfit.effects.history import History
-from bushfit.geometry import Direction
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
     """K - M omega^2 [N/m]; a mass that is moved, not turned, does not act in torsion."""
-    if setting.direction is Direction.TORSION:
+    if setting.direction.is_rotation:
         return below(omega, amplitude)
     return below(omega, amplitude) - p["mass"] * np.asarray(omega) ** 2
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
     """F + M d2x/dt2 [N]; exact in every harmonic of a steady cycle, second differences from rest."""
-    if setting.direction is Direction.TORSION:
+    if setting.direction.is_rotation:
         return below(history)
     if history.periodic:
         return below(history) + linear_response(lambda omega: -p["mass"] * omega**2, history)

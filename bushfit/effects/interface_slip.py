@@ -6,7 +6,6 @@ import numpy as np
 
 from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
 from bushfit.effects.history import History
-from bushfit.geometry import Direction
 
 #: Amplitude below which the slip stiffness grows no more [m or rad].
 SMALLEST_AMPLITUDE = 1e-12
@@ -14,7 +13,7 @@ SMALLEST_AMPLITUDE = 1e-12
 
 def _force(p: Values, setting: Setting) -> Value:
     """The slip force [N], or its moment about the axis in torsion, at the outer sleeve's face [N m]."""
-    arm = setting.bushing.outer_radius if setting.direction is Direction.TORSION else 1.0
+    arm = setting.bushing.outer_radius if setting.direction.is_rotation else 1.0
     return p["force"] * arm
 
 

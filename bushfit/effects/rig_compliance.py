@@ -8,7 +8,6 @@ from scipy.fft import next_fast_len
 from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
 from bushfit.effects.history import History
 from bushfit.errors import ModelError
-from bushfit.geometry import Direction
 
 #: The iterations stop when the motions balance to this share of the imposed one, or after so many rounds.
 TOLERANCE = 1e-14
@@ -19,7 +18,7 @@ ROUNDS = 60
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
     """K/(1 + c K) [N/m] with K at the amplitude X/|1 + c K| that reaches the bushing; does not act in torsion."""
-    if setting.direction is Direction.TORSION:
+    if setting.direction.is_rotation:
         return below(omega, amplitude)
     compliance = p["compliance"]
     inside = below(omega, amplitude * np.exp(_log_share(compliance, below, omega, amplitude)))
@@ -54,7 +53,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     motion: the moment for which it sticks is left out.
     """
     compliance = p["compliance"]
-    if setting.direction is Direction.TORSION or not np.any(compliance):
+    if setting.direction.is_rotation or not np.any(compliance):
         return below(history)
     imposed, history = history.value, history.driven()
     count = imposed.shape[-1]

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.solve import Coordinates, jacobian, residual
-from bushfit.fitting.terms import Term
 from bushfit.geometry import Direction
-from bushfit.model import Model
-from bushfit.results import Covariance, Quality, Range
+from bushfit.model.model import Model
+from bushfit.model.result import Covariance, Quality, Range
 from bushfit.units import number
 
 #: Reduced chi-square beyond which noise alone is no explanation, in standard deviations.
@@ -26,7 +26,7 @@ class Stage:
     """One fit of a procedure: the parameters it moved and the data it saw."""
 
     names: tuple[str, ...]
-    terms: Sequence[Term]
+    data_sets: Sequence[DataSet]
 
 
 def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = None) -> Covariance:
@@ -50,10 +50,10 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
     bases = []
     for stage in stages:
         own = slice(begin, begin + len(stage.names))
-        slope = jacobian(model, stage.terms, names)
+        slope = jacobian(model, stage.data_sets, names)
         basis = np.linalg.qr(slope[own].T)[0]
         system[own] = basis.T @ slope.T
-        inflation = np.sqrt(_inflation(*_reduced(model, stage.terms, len(stage.names))))
+        inflation = np.sqrt(_inflation(*_reduced(model, stage.data_sets, len(stage.names))))
         root[own, own] = inflation * np.eye(len(stage.names))
         bases.append((own, inflation * basis.T))
         begin = own.stop
@@ -82,16 +82,16 @@ def linear_errors(slope: Array) -> Array:
 
 def _unsure(stages: Sequence[Stage], reactions: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
     """Per estimated variance of the noise: how far the covariance moves with its standard error, and the covariance
-    that its error adds by giving the data wrong weights. The same variance may act in many terms."""
+    that its error adds by giving the data wrong weights. The same variance may act in many data sets."""
     parts: dict[Hashable, tuple[Array, Array]] = {}
     for stage, (reaction, basis) in zip(stages, reactions, strict=True):
         influence = reaction @ basis
         unit = basis / np.linalg.norm(basis[0])
-        ends = np.cumsum([0, *(term.size for term in stage.terms)])
+        ends = np.cumsum([0, *(data_set.size for data_set in stage.data_sets)])
         moved: dict[Hashable, tuple[Array, Array, Array]] = {}
-        for term, first, last in zip(stage.terms, ends[:-1], ends[1:], strict=True):
+        for data_set, first, last in zip(stage.data_sets, ends[:-1], ends[1:], strict=True):
             own = influence[:, first:last]
-            for variance, move in term.unsure(own).items():
+            for variance, move in data_set.unsure(own).items():
                 products = move @ own.T, move @ move.T, move @ unit[:, first:last].T
                 so_far = moved.get(variance, (0.0, 0.0, 0.0))
                 moved[variance] = products[0] + so_far[0], products[1] + so_far[1], products[2] + so_far[2]
@@ -101,10 +101,10 @@ def _unsure(stages: Sequence[Stage], reactions: Sequence[tuple[Array, Array]]) -
     return list(parts.values())
 
 
-def _reduced(model: Model, terms: Sequence[Term], parameters: int) -> tuple[float, int]:
+def _reduced(model: Model, data_sets: Sequence[DataSet], parameters: int) -> tuple[float, int]:
     """Reduced chi-square and its degrees of freedom."""
-    residuals = residual(model, terms)
-    freedom = max(sum(term.counted for term in terms) - parameters, 1)
+    residuals = residual(model, data_sets)
+    freedom = max(sum(data_set.counted for data_set in data_sets) - parameters, 1)
     return float(residuals @ residuals) / freedom, freedom
 
 
@@ -112,35 +112,37 @@ def _inflation(reduced: float, freedom: int) -> float:
     return reduced if reduced > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else 1.0
 
 
-def quality(model: Model, terms: Sequence[Term], parameters: int) -> Quality:
-    """NRMSE, reduced chi-square, number of residuals and relative noise over some terms."""
-    relative = np.concatenate([np.abs(term.relative(model)) for term in terms])
-    noise = np.repeat([term.relative_noise for term in terms], [term.counted for term in terms])
+def quality(model: Model, data_sets: Sequence[DataSet], parameters: int) -> Quality:
+    """NRMSE, reduced chi-square, number of residuals and relative noise over some data sets."""
+    relative = np.concatenate([np.abs(data_set.relative(model)) for data_set in data_sets])
+    noise = np.repeat([data_set.relative_noise for data_set in data_sets], [data_set.counted for data_set in data_sets])
     return Quality(
         nrmse=float(np.sqrt(np.mean(relative**2))),
-        reduced_chi_square=_reduced(model, terms, parameters)[0],
-        points=sum(term.counted for term in terms),
+        reduced_chi_square=_reduced(model, data_sets, parameters)[0],
+        points=sum(data_set.counted for data_set in data_sets),
         noise=float(np.sqrt(np.mean(noise**2))),
     )
 
 
-def measured_range(model: Model, terms: Sequence[Term]) -> Range:
-    """Frequencies, equivalent strains and directions that the terms reach."""
-    f = np.concatenate([term.frequency for term in terms])
-    e = np.concatenate([term.amplitude * model.bushing.unit_strain(term.direction) for term in terms])
-    directions = tuple(direction for direction in Direction if any(term.direction is direction for term in terms))
+def measured_range(model: Model, data_sets: Sequence[DataSet]) -> Range:
+    """Frequencies, equivalent strains and directions that the data sets reach."""
+    f = np.concatenate([data_set.frequency for data_set in data_sets])
+    e = np.concatenate([data_set.amplitude * model.bushing.unit_strain(data_set.direction) for data_set in data_sets])
+    directions = tuple(
+        direction for direction in Direction if any(data_set.direction is direction for data_set in data_sets)
+    )
     return Range((float(f.min()), float(f.max())), (float(e.min()), float(e.max())), directions)
 
 
-def lack_of_fit(model: Model, terms: Sequence[Term], parameters: int) -> float | None:
+def lack_of_fit(model: Model, data_sets: Sequence[DataSet], parameters: int) -> float | None:
     """Reduced chi-square where the model misses the data by more than their noise, else None."""
-    reduced, freedom = _reduced(model, terms, parameters)
+    reduced, freedom = _reduced(model, data_sets, parameters)
     return None if _inflation(reduced, freedom) == 1.0 else reduced
 
 
-def misfit(model: Model, terms: Sequence[Term], parameters: int, advice: str = "") -> list[str]:
+def misfit(model: Model, data_sets: Sequence[DataSet], parameters: int, advice: str = "") -> list[str]:
     """A sentence where the model misses the data by more than their noise, with advice."""
-    reduced = lack_of_fit(model, terms, parameters)
+    reduced = lack_of_fit(model, data_sets, parameters)
     if reduced is None:
         return []
     return [

@@ -7,7 +7,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.harmonics import basis, order, reach, sample, solve, turned
-from bushfit.measurement import Loop
+from bushfit.reading.measurement import Loop
 
 _HARMONICS, _MOST_ROUNDS, _SETTLED = 15, 10, 1e-12
 #: Rows that are enough to refine a frequency.
@@ -70,7 +70,7 @@ def fundamental(loop: Loop, clock: Array, x: Array) -> tuple[float, float]:
             if closed * frequency > 1.0 and _repeats(clock, x, 1.0 / frequency):
                 return frequency, closed * frequency
     if period is None and apart > band:
-        unit = loop.direction.displacement_unit
+        unit = loop.direction.motion.displacement_unit
         raise FitError(
             "the loop does not hold a whole cycle",
             file=loop.source.file if loop.source else None,

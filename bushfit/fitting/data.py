@@ -9,23 +9,23 @@ from typing import TypeVar
 
 import numpy as np
 
-from bushfit.campaign import Campaign
+from bushfit.campaign.campaign import Campaign
 from bushfit.errors import FitError
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data, sweep_data
 from bushfit.fitting.solve import Bounds
-from bushfit.fitting.terms import LoopTerm, SweepTerm, Term, loop_terms, sweep_terms
 from bushfit.geometry import Direction
-from bushfit.results import Outlier
+from bushfit.model.result import Outlier
 
-_Term = TypeVar("_Term", LoopTerm, SweepTerm)
+_Term = TypeVar("_Term", LoopData, SweepData)
 
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """A campaign made ready to fit: one term per loop and per sweep, and the user's settings."""
+    """A campaign made ready to fit: one data set per loop and per sweep, and the user's settings."""
 
     campaign: Campaign
-    loops: tuple[LoopTerm, ...]
-    sweeps: tuple[SweepTerm, ...]
+    loops: tuple[LoopData, ...]
+    sweeps: tuple[SweepData, ...]
     bounds: Bounds = field(default_factory=dict)
 
     @classmethod
@@ -33,8 +33,8 @@ class Data:
         settings = campaign.fit.parameters
         return cls(
             campaign,
-            tuple(loop_terms(campaign.loops, without_wild=campaign.fit.loss != "linear")),
-            tuple(sweep_terms(campaign.sweeps, campaign.fit.residuals)),
+            tuple(loop_data(campaign.loops, without_wild=campaign.fit.loss != "linear")),
+            tuple(sweep_data(campaign.sweeps, campaign.fit.residuals)),
             {name: (setting.min, setting.max) for name, setting in settings.items()},
         )
 
@@ -46,9 +46,9 @@ class Data:
     def without(self, outliers: Sequence[Outlier]) -> Data:
         """The same data, those points of the sweeps without weight; wild rows of loops have none where `robust`."""
         sweeps = []
-        for term in self.sweeps:
-            rows = [outlier.row - 1 for outlier in outliers if outlier.test == term.name]
-            sweeps.append(term.weighted(np.where(np.isin(term.rows, rows), 0.0, 1.0)) if rows else term)
+        for data_set in self.sweeps:
+            rows = [outlier.row - 1 for outlier in outliers if outlier.test == data_set.name]
+            sweeps.append(data_set.weighted(np.where(np.isin(data_set.rows, rows), 0.0, 1.0)) if rows else data_set)
         return replace(self, sweeps=tuple(sweeps))
 
     @property
@@ -62,15 +62,15 @@ class Data:
         settings = self.campaign.fit.parameters
         return tuple(name for name in names if name not in settings or settings[name].vary)
 
-    def chosen(self, directions: Sequence[Direction] | None) -> list[Term]:
+    def chosen(self, directions: Sequence[Direction] | None) -> list[DataSet]:
         """Terms of the given directions; by default the axial loops and sweeps, as in the paper, and where a kind has
         none that is axial all of it.
 
         Raises:
             FitError: there is none.
         """
-        terms: list[Term] = [*self.loops, *self.sweeps]
-        if not terms:
+        data_sets: list[DataSet] = [*self.loops, *self.sweeps]
+        if not data_sets:
             raise FitError(
                 "there is nothing to fit",
                 file=self.campaign.path,
@@ -79,17 +79,17 @@ class Data:
             )
         if directions is None:
             return [*_axial(self.loops), *_axial(self.sweeps)]
-        chosen = [term for term in terms if term.direction in directions]
+        chosen = [data_set for data_set in data_sets if data_set.direction in directions]
         if not chosen:
             raise FitError(
                 "no test in the directions asked for",
                 file=self.campaign.path,
-                found=", ".join(sorted({str(term.direction) for term in terms})) or "no tests",
+                found=", ".join(sorted({str(data_set.direction) for data_set in data_sets})) or "no tests",
                 expected=", ".join(str(direction) for direction in directions),
             )
         return chosen
 
-    def static_terms(self) -> list[Term]:
+    def static_terms(self) -> list[DataSet]:
         """The loops `fit-static` uses: the axial ones, or all where none is axial.
 
         Raises:
@@ -105,7 +105,7 @@ class Data:
         return [*_axial(self.loops)]
 
     @cached_property
-    def smallest_sweep(self) -> SweepTerm:
+    def smallest_sweep(self) -> SweepData:
         """The sweep levels `fit-dynamic` uses: those the campaign names, else the smallest axial one.
 
         Raises:
@@ -121,7 +121,7 @@ class Data:
             )
         wanted = self.campaign.fit.dynamic_amplitudes
         if not wanted:
-            sweep = min(sweeps, key=lambda term: float(term.amplitude.min()))
+            sweep = min(sweeps, key=lambda data_set: float(data_set.amplitude.min()))
             return sweep.at_amplitudes((float(sweep.amplitude.min()),))
         for sweep in sweeps:
             there = tuple(float(x) for x in np.unique(sweep.amplitude) if np.any(np.isclose(x, wanted, rtol=1e-3)))
@@ -137,6 +137,6 @@ class Data:
         )
 
 
-def _axial(terms: Sequence[_Term]) -> Sequence[_Term]:
+def _axial(data_sets: Sequence[_Term]) -> Sequence[_Term]:
     """The axial ones, or all where none is."""
-    return [term for term in terms if term.direction is Direction.AXIAL] or terms
+    return [data_set for data_set in data_sets if data_set.direction is Direction.AXIAL] or data_sets

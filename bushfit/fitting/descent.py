@@ -14,6 +14,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
+from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.solve import (
     Bounds,
     Coordinates,
@@ -24,8 +25,7 @@ from bushfit.fitting.solve import (
     opening,
     residual,
 )
-from bushfit.fitting.terms import Term
-from bushfit.model import Model
+from bushfit.model.model import Model
 
 #: Share of the curvature that damps the first step, and by how much less it damps the next at best.
 _DAMPING, _EASED = 1e-3, 1.0 / 3.0
@@ -50,7 +50,7 @@ class Descent:
 
     Args:
         model: the best so far.
-        terms: the data.
+        data_sets: the data.
         coordinates: in which it moves.
         low, high: walls, (k,) each.
         point: where the model lies, (k,).
@@ -63,7 +63,7 @@ class Descent:
     """
 
     model: Model
-    terms: Sequence[Term]
+    data_sets: Sequence[DataSet]
     coordinates: Coordinates
     low: Array
     high: Array
@@ -76,22 +76,22 @@ class Descent:
     growth: float = 2.0
 
     @classmethod
-    def start(cls, model: Model, terms: Sequence[Term], names: Sequence[str], bounds: Bounds) -> Descent:
+    def start(cls, model: Model, data_sets: Sequence[DataSet], names: Sequence[str], bounds: Bounds) -> Descent:
         """A fit of the named parameters, the others held, at the model's own values.
 
         Raises:
             FitError: fewer data than parameters, or no finite response.
             ModelError: no response.
         """
-        coordinates, point, low, high = opening(model, terms, names, bounds)
+        coordinates, point, low, high = opening(model, data_sets, names, bounds)
         inside = _INSIDE * (high - low)
         low, high = low + inside, high - inside
         point = np.clip(point, low, high)
         model = model.with_values(coordinates.values(point))
-        begun, slopes = residual(model, terms), jacobian(model, terms, names)
+        begun, slopes = residual(model, data_sets), jacobian(model, data_sets, names)
         if not np.all(np.isfinite(begun)) or not np.all(np.isfinite(slopes)):
             raise no_finite_response(model)
-        return cls(model, terms, coordinates, low, high, point, begun, slopes)
+        return cls(model, data_sets, coordinates, low, high, point, begun, slopes)
 
     @property
     def chi_square(self) -> float:
@@ -124,12 +124,12 @@ class Descent:
         try:
             model = self.model.with_values(self.coordinates.values(point))
             with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-                reached = residual(model, self.terms)
+                reached = residual(model, self.data_sets)
                 fall = self.chi_square - float(reached @ reached)
                 if not fall > _WORTH * promise:
                     return cautious
                 # what is left of a last step is too short for the derivatives to change
-                slopes = self.jacobian if settled else jacobian(model, self.terms, self.coordinates.names)
+                slopes = self.jacobian if settled else jacobian(model, self.data_sets, self.coordinates.names)
         except ModelError:  # no response there
             return cautious
         if not np.all(np.isfinite(slopes)):

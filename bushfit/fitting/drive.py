@@ -13,8 +13,6 @@ from functools import cached_property
 
 import numpy as np
 
-from bushfit.blocks import BLOCK, by_blocks
-from bushfit.cycles import HOLE
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History, reversals
 from bushfit.errors import FitError
@@ -31,7 +29,9 @@ from bushfit.fitting.harmonics import (
 from bushfit.fitting.noise import FLOOR
 from bushfit.fitting.runin import steady_part, thinned
 from bushfit.fitting.waveform import wrong_clock
-from bushfit.measurement import Loop
+from bushfit.reading.measurement import Loop
+from bushfit.reading.parallel import CHUNK, by_chunks
+from bushfit.reduction.cycles import HOLE
 
 #: Cycles whose bins are kept apart, and how fast the groups of later ones grow.
 _APART, _GROWTH = 4, 1.5
@@ -159,7 +159,7 @@ def drive_of(loop: Loop, *, without_wild: bool = False) -> Drive:
     motion, force_mean, force_noise, wild = harmonics(loop, frequency, cycles)
     rows = wild["force"].rows
     sound = np.delete(loop.force, rows) if rows.size else loop.force
-    ends = np.array(by_blocks(lambda part: (sound[part].min(), sound[part].max()), sound.size))
+    ends = np.array(by_chunks(lambda part: (sound[part].min(), sound[part].max()), sound.size))
     half_motion, half_force = np.ptp(series(motion, np.arange(GRID) / GRID)) / 2.0, float(np.ptp(ends)) / 2.0
     noise = loop.noise * half_force if loop.noise is not None else force_noise
     from_rest = first == 0 and _from_rest(loop, frequency, half_motion, half_force, noise)
@@ -270,8 +270,8 @@ def _binned(
         in_bins = np.add.reduceat(clock[start:stop], first) * (frequency * GRID) - count * number
         return np.stack((number, count, in_bins, np.add.reduceat(force[start:stop], first)))
 
-    blocks = by_blocks(sums, edges.size - 1, 1 + BLOCK * edges.size // clock.size)
-    bins, *parts = np.concatenate(blocks, axis=1)
+    chunks = by_chunks(sums, edges.size - 1, 1 + CHUNK * edges.size // clock.size)
+    bins, *parts = np.concatenate(chunks, axis=1)
     bins = bins.astype(np.intp)
     place = GRID * group[bins // GRID] + bins % GRID
     rows, inside, total = (np.bincount(place, weights=part) for part in parts)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from bushfit.effects.contract import Array
 from bushfit.fitting.noise import FLOOR
 from bushfit.fitting.outliers import MEDIAN_TO_SIGMA, limit, stuck_rows, wild_rows
-from bushfit.measurement import Loop
+from bushfit.reading.measurement import Loop
 
 #: Samples of the model's cycle; measured rows lie between them and are reached by linear interpolation.
 GRID = 1024

@@ -14,12 +14,12 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.assess import measured_range
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
 from bushfit.fitting.drive import Drive
 from bushfit.fitting.solve import Coordinates, jacobian
-from bushfit.fitting.terms import LoopTerm, SweepTerm, Term
-from bushfit.measurement import Loop, Sweep
-from bushfit.model import Model
-from bushfit.results import Z95, Covariance
+from bushfit.model.model import Model
+from bushfit.model.result import Z95, Covariance
+from bushfit.reading.measurement import Loop, Sweep
 from bushfit.units import modulus
 
 #: Relative standard error beyond which a direction counts as open, and a parameter as not determined.
@@ -47,12 +47,12 @@ class _Information:
     matrix: Array
 
     @classmethod
-    def of(cls, model: Model, terms: Sequence[Term], names: Sequence[str]) -> _Information:
-        slope = jacobian(model, terms, names) * _sizes(model, names)[:, None]
+    def of(cls, model: Model, data_sets: Sequence[DataSet], names: Sequence[str]) -> _Information:
+        slope = jacobian(model, data_sets, names) * _sizes(model, names)[:, None]
         return cls(tuple(names), slope @ slope.T)
 
-    def with_more(self, model: Model, terms: Sequence[Term]) -> _Information:
-        return replace(self, matrix=self.matrix + _Information.of(model, terms, self.names).matrix)
+    def with_more(self, model: Model, data_sets: Sequence[DataSet]) -> _Information:
+        return replace(self, matrix=self.matrix + _Information.of(model, data_sets, self.names).matrix)
 
     def directions(self) -> tuple[Array, Array]:
         """Relative standard error of each direction, (k,), and the directions, (k, k) by column."""
@@ -80,14 +80,14 @@ def _sizes(model: Model, names: Sequence[str]) -> Array:
     return np.array(sizes)
 
 
-def left_open(model: Model, terms: Sequence[Term], names: Sequence[str], covariance: Covariance) -> list[str]:
+def left_open(model: Model, data_sets: Sequence[DataSet], names: Sequence[str], covariance: Covariance) -> list[str]:
     """Sentences on what the tests leave open of a fitted model; none where everything is determined.
 
     Each group of parameters that share open directions has a sentence, with the standard errors of the covariance.
     """
     if not names:
         return []
-    known = _Information.of(model, terms, names)
+    known = _Information.of(model, data_sets, names)
     slopes = Coordinates.of(model, names).slopes(model.values) * _sizes(model, names)
     stderr = np.array([covariance.stderr(name) or 0.0 for name in names])
     each = dict(zip(names, stderr / np.abs(slopes), strict=True))
@@ -99,17 +99,17 @@ def left_open(model: Model, terms: Sequence[Term], names: Sequence[str], covaria
         rest = [name for name in names if name.partition(".")[0] not in idle]
         if not rest:
             return lines
-        known = _Information.of(model, terms, rest)
+        known = _Information.of(model, data_sets, rest)
         groups = _groups(known)
     combinations: list[str] = []
     for group in groups:
         told = ", ".join(f"{name} {_percent(float(each[name]))}" for name in group)
-        reasons = "; ".join(_reasons(model, terms, group)) or "these tests do not tell"
+        reasons = "; ".join(_reasons(model, data_sets, group)) or "these tests do not tell"
         lines.append(f"{reasons}: {_meaning(known, group)} (standard errors: {told})")
-        combinations += [x for x in _combinations(model, terms, known, group) if x not in combinations]
+        combinations += [x for x in _combinations(model, data_sets, known, group) if x not in combinations]
     if combinations:
         lines.append("what is known all the same: " + "; ".join(combinations))
-    return [*lines, *_next(model, terms, known)] if groups else []
+    return [*lines, *_next(model, data_sets, known)] if groups else []
 
 
 def _groups(known: _Information) -> list[list[str]]:
@@ -147,10 +147,10 @@ def _percent(error: float) -> str:
     return f"{float(f'{100.0 * error:.2g}'):g} %" if error < 10.0 else "beyond 1000 %"
 
 
-def _reasons(model: Model, terms: Sequence[Term], involved: Sequence[str]) -> Iterator[str]:
-    reach = measured_range(model, terms)
+def _reasons(model: Model, data_sets: Sequence[DataSet], involved: Sequence[str]) -> Iterator[str]:
+    reach = measured_range(model, data_sets)
     (slow, fast), (small, large) = reach.frequency, reach.strain
-    loops = [term for term in terms if isinstance(term, LoopTerm)]
+    loops = [data_set for data_set in data_sets if isinstance(data_set, LoopData)]
     if set(involved) & set(_FRICTION) and "eps_half" in model.values:
         ratio = large / model.values["eps_half"]
         span = f"{small / model.values['eps_half']:.2g} to {ratio:.2g} of eps_half"
@@ -164,18 +164,20 @@ def _reasons(model: Model, terms: Sequence[Term], involved: Sequence[str]) -> It
             yield f"amplitudes begin at {small / model.values['eps_half']:.2g} of eps_half"
     if set(involved) & set(_RATE) and "alpha" in model.values:
         if fast < _ONE * slow:
-            yield f"one {'loop rate' if len(loops) == len(terms) else 'frequency'}, {slow:.3g} Hz"
+            yield f"one {'loop rate' if len(loops) == len(data_sets) else 'frequency'}, {slow:.3g} Hz"
         elif fast < _NARROW_RATE * slow:
             yield f"frequencies span only {slow:.3g} to {fast:.3g} Hz"
     if not loops and set(involved) & {*_FRICTION, "mu"}:
         yield "there is no loop"
 
 
-def _combinations(model: Model, terms: Sequence[Term], known: _Information, involved: Sequence[str]) -> Iterator[str]:
+def _combinations(
+    model: Model, data_sets: Sequence[DataSet], known: _Information, involved: Sequence[str]
+) -> Iterator[str]:
     """Combinations of what is open that are known well, with their errors."""
     values, worst = model.values, known.errors()
     least = min(float(worst[known.names.index(name)]) for name in involved)
-    slow = measured_range(model, terms).frequency[0]
+    slow = measured_range(model, data_sets).frequency[0]
     if set(_FRICTION) <= set(known.names) and set(_FRICTION) & set(involved):
         error = known.error({"sigma_fmax": 1.0, "eps_half": -1.0})
         if error < min(_KNOWN, _BETTER * least):
@@ -210,14 +212,14 @@ def _combinations(model: Model, terms: Sequence[Term], known: _Information, invo
             yield f"mu + m/2 omega^alpha cos(pi alpha/2) at {slow:.3g} Hz = {modulus(storage, 4)} to {_percent(error)}"
 
 
-def _next(model: Model, terms: Sequence[Term], known: _Information) -> list[str]:
+def _next(model: Model, data_sets: Sequence[DataSet], known: _Information) -> list[str]:
     """The further test that shrinks the worst error most, and to what."""
     before = known.errors()
     worst = int(np.argmax(before))
-    bearable = max(_BEARABLE, measured_range(model, terms).strain[1])
+    bearable = max(_BEARABLE, measured_range(model, data_sets).strain[1])
     after = {
         words: known.with_more(model, more).errors()
-        for words, more in _further(model, terms)
+        for words, more in _further(model, data_sets)
         if measured_range(model, more).strain[1] <= bearable
     }
     best = min(after, key=lambda words: float(after[words].max()))
@@ -229,66 +231,73 @@ def _next(model: Model, terms: Sequence[Term], known: _Information) -> list[str]
     ]
 
 
-def _further(model: Model, terms: Sequence[Term]) -> Iterator[tuple[str, list[Term]]]:
-    """Tests a lab could add, each as the terms it would make, with the campaign's own noise."""
-    loops = [term for term in terms if isinstance(term, LoopTerm)]
-    sweeps = [term for term in terms if isinstance(term, SweepTerm)]
-    yield "every test once more", list(terms)
+def _further(model: Model, data_sets: Sequence[DataSet]) -> Iterator[tuple[str, list[DataSet]]]:
+    """Tests a lab could add, each as the data sets it would make, with the campaign's own noise."""
+    loops = [data_set for data_set in data_sets if isinstance(data_set, LoopData)]
+    sweeps = [data_set for data_set in data_sets if isinstance(data_set, SweepData)]
+    yield "every test once more", list(data_sets)
     if loops:
-        largest = max(loops, key=lambda term: term.drive.amplitude * model.bushing.unit_strain(term.direction))
+        largest = max(
+            loops, key=lambda data_set: data_set.drive.amplitude * model.bushing.unit_strain(data_set.direction)
+        )
         for factor in (3.0, 10.0):
             yield f"a loop of {factor:g} times the largest amplitude", [_loop(largest, model, amplitude=factor)]
         for words, factor in (("a tenth of", 0.1), ("ten times", 10.0)):
             yield f"a loop at {words} the rate", [_loop(largest, model, rate=factor)]
     else:
         for times, words in ((1.0, ""), (3.0, "three times "), (10.0, "ten times ")):
-            yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", [_new_loop(model, terms, times)]
-    reach = measured_range(model, terms)
-    direction = terms[0].direction
+            yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", [_new_loop(model, data_sets, times)]
+    reach = measured_range(model, data_sets)
+    direction = data_sets[0].direction
     strain = model.bushing.unit_strain(direction)
     small, large = (x / strain for x in reach.strain)
     slow, fast = reach.frequency
     band = (5.0, 150.0) if fast < 2.0 else (slow, fast)
     if sweeps:
-        yield f"a sweep to {2.0 * fast:.3g} Hz", [_sweep(model, sweeps, terms[-1], (fast, 2.0 * fast), (small, large))]
+        yield (
+            f"a sweep to {2.0 * fast:.3g} Hz",
+            [_sweep(model, sweeps, data_sets[-1], (fast, 2.0 * fast), (small, large))],
+        )
         yield (
             f"a sweep down to {slow / 10.0:.3g} Hz",
-            [_sweep(model, sweeps, terms[-1], (slow / 10.0, slow), (small, large))],
+            [_sweep(model, sweeps, data_sets[-1], (slow / 10.0, slow), (small, large))],
         )
     yield (
         f"a sweep from {band[0]:.3g} to {band[1]:.3g} Hz at a tenth and all of the largest amplitude",
-        [_sweep(model, sweeps, terms[-1], band, (0.1 * large, large))],
+        [_sweep(model, sweeps, data_sets[-1], band, (0.1 * large, large))],
     )
     yield (
         f"a sweep from {band[0]:.3g} to {band[1]:.3g} Hz at three times the largest amplitude",
-        [_sweep(model, sweeps, terms[-1], band, (3.0 * large,))],
+        [_sweep(model, sweeps, data_sets[-1], band, (3.0 * large,))],
     )
 
 
-def _loop(term: LoopTerm, model: Model, *, amplitude: float = 1.0, rate: float = 1.0) -> LoopTerm:
-    drive = term.drive
+def _loop(data_set: LoopData, model: Model, *, amplitude: float = 1.0, rate: float = 1.0) -> LoopData:
+    drive = data_set.drive
     moved = replace(drive, coefficients=drive.coefficients * amplitude, frequency=drive.frequency * rate)
-    fresh = LoopTerm(moved).noise_free(model)
+    fresh = LoopData(moved).noise_free(model)
     noise = drive.noise / drive.half_range * fresh.drive.half_range
-    return LoopTerm(replace(fresh.drive, noise=noise))
+    return LoopData(replace(fresh.drive, noise=noise))
 
 
-def _new_loop(model: Model, terms: Sequence[Term], times: float) -> LoopTerm:
+def _new_loop(model: Model, data_sets: Sequence[DataSet], times: float) -> LoopData:
     """Two cycles of a slow sine where the campaign has no loop, with the noise of most force sensors."""
-    direction = terms[0].direction
-    amplitude = times * max(float(term.amplitude.max()) for term in terms if term.direction is direction)
+    direction = data_sets[0].direction
+    amplitude = times * max(
+        float(data_set.amplitude.max()) for data_set in data_sets if data_set.direction is direction
+    )
     phase = 2.0 * np.arange(_ROWS) / _ROWS
     motion, nil = amplitude * np.sin(2.0 * np.pi * phase), np.zeros(_ROWS)
     loop = Loop("new", direction, phase / _NEW_RATE, motion, nil)
     coefficients = np.array([0.0, -1j * amplitude])
     silent = Drive(loop, _NEW_RATE, 2.0, True, phase, nil, np.ones(_ROWS), 1.0, coefficients, 1.0)
-    fresh = LoopTerm(silent).noise_free(model)
-    return LoopTerm(replace(fresh.drive, noise=_FORCE_NOISE * fresh.drive.half_range))
+    fresh = LoopData(silent).noise_free(model)
+    return LoopData(replace(fresh.drive, noise=_FORCE_NOISE * fresh.drive.half_range))
 
 
 def _sweep(
-    model: Model, sweeps: Sequence[SweepTerm], like: Term, band: tuple[float, float], amplitudes: Sequence[float]
-) -> SweepTerm:
+    model: Model, sweeps: Sequence[SweepData], like: DataSet, band: tuple[float, float], amplitudes: Sequence[float]
+) -> SweepData:
     """Nine frequencies at each amplitude, with the noise of the campaign's sweeps, or that of most rigs."""
     from bushfit.fitting.noise import ASSUMED_SHARED, SweepNoise
 
@@ -298,4 +307,4 @@ def _sweep(
     shared = sweeps[0].noise.shared if sweeps else ASSUMED_SHARED
     random = sweeps[0].relative_noise if sweeps else ASSUMED_SHARED[0]
     noise = SweepNoise({("new", float(x)): (random, random) for x in amplitudes}, shared, "stated", 0)
-    return SweepTerm(Sweep("new", direction, frequency, amplitude, stiffness), noise)
+    return SweepData(Sweep("new", direction, frequency, amplitude, stiffness), noise)

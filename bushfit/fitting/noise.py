@@ -16,7 +16,7 @@ from scipy.special import chdtrc
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.outliers import MEDIAN_TO_SIGMA
-from bushfit.measurement import Sweep
+from bushfit.reading.measurement import Sweep
 
 #: No rig measures better than this, relative to the largest force or to |K|.
 FLOOR = 1e-4

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from bushfit.fitting.assess import lack_of_fit
-from bushfit.fitting.terms import Term
+from bushfit.fitting.data_sets import DataSet
 from bushfit.geometry import Bushing
-from bushfit.model import Model
+from bushfit.model.model import Model
 from bushfit.units import modulus, number
 
 #: Shear modulus of a rubber [Pa]: the softest gel of a mount, the hardest compound at small strain, with room.
@@ -19,11 +19,11 @@ _MOST_STIFFENING = 20.0
 _CHECK = "check the units of displacement and force, and the dimensions of the bushing"
 
 
-def implausible(bushing: Bushing, terms: Sequence[Term]) -> list[str]:
+def implausible(bushing: Bushing, data_sets: Sequence[DataSet]) -> list[str]:
     """Sentences on moduli that no rubber has, and on tests too far apart to be of one bushing: most often a unit."""
     moduli = {
-        term.name: float(np.median(np.abs(term.measured))) / bushing.stiffness_per_modulus(term.direction)
-        for term in terms
+        data_set.name: float(np.median(np.abs(data_set.measured))) / bushing.stiffness_per_modulus(data_set.direction)
+        for data_set in data_sets
     }
     softest, hardest = (pick(moduli, key=moduli.__getitem__) for pick in (min, max))
     ratio = moduli[hardest] / moduli[softest]
@@ -34,14 +34,15 @@ def implausible(bushing: Bushing, terms: Sequence[Term]) -> list[str]:
     return [f"a shear modulus of {modulus(moduli[hardest], 3)} is that of no rubber: {_CHECK}"]
 
 
-def unfitted(model: Model, terms: Sequence[Term], advice: str) -> list[str]:
+def unfitted(model: Model, data_sets: Sequence[DataSet], advice: str) -> list[str]:
     """Sentences on tests that a model was not fitted to and misses by more than their noise."""
     lines = []
-    for term in terms:
-        if (misfit := lack_of_fit(model, [term], 0)) is not None:
-            nrmse = np.sqrt(np.mean(np.square(np.abs(term.relative(model)))))
+    for data_set in data_sets:
+        if (misfit := lack_of_fit(model, [data_set], 0)) is not None:
+            nrmse = np.sqrt(np.mean(np.square(np.abs(data_set.relative(model)))))
             lines.append(
-                f"{term.name}, {term.direction}, was not fitted, and the model misses it by {number(100 * nrmse, 2)} % "
+                f"{data_set.name}, {data_set.direction}, was not fitted, and the model misses it by "
+                f"{number(100 * nrmse, 2)} % "
                 f"(NRMSE), {number(np.sqrt(misfit), 2)} times its noise{advice}"
             )
     return lines

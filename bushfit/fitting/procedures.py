@@ -12,16 +12,16 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import Stage, covariance, measured_range, misfit, quality
 from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
 from bushfit.fitting.identify import left_open
 from bushfit.fitting.plausible import implausible, unfitted
 from bushfit.fitting.profile import profile95
 from bushfit.fitting.robust import Estimate, estimate, told
 from bushfit.fitting.solve import Bounds, Coordinates, Solution
 from bushfit.fitting.starts import start_values
-from bushfit.fitting.terms import LoopTerm, SweepTerm, Term
 from bushfit.geometry import Direction
-from bushfit.model import Model
-from bushfit.results import Covariance, End, Result
+from bushfit.model.model import Model
+from bushfit.model.result import Covariance, End, Result
 
 STATIC = ("mu", "sigma_fmax", "eps_half")
 DYNAMIC = ("m", "alpha")
@@ -67,9 +67,12 @@ def fit_joint(
     Raises:
         FitError: no test in those directions, or data that cannot support the fit.
     """
-    terms = data.chosen(directions)
-    found = _solve(data, terms, effects, {})
-    left: list[Term] = [*(x for x in data.loops if x not in terms), *(x for x in data.sweeps if x not in terms)]
+    data_sets = data.chosen(directions)
+    found = _solve(data, data_sets, effects, {})
+    left: list[DataSet] = [
+        *(x for x in data.loops if x not in data_sets),
+        *(x for x in data.sweeps if x not in data_sets),
+    ]
     result = _result(data, [found], notes=unfitted(found.solution.model, left, _NEXT))
     if profile is None:
         return result
@@ -88,10 +91,10 @@ def fit_static(data: Data, springpot: Result | None = None) -> Result:
     Raises:
         FitError: no loop, or data that cannot support the fit.
     """
-    terms = data.static_terms()
+    data_sets = data.static_terms()
     held, known = _springpot(data, springpot)
-    found = _solve(data, terms, BASE if held else ("elastic", "friction"), held)
-    notes = [] if held else [_without_springpot(data, found.solution, terms)]
+    found = _solve(data, data_sets, BASE if held else ("elastic", "friction"), held)
+    notes = [] if held else [_without_springpot(data, found.solution, data_sets)]
     return _result(data, [found], known, notes)
 
 
@@ -100,9 +103,9 @@ def fit_dynamic(data: Data, static: Result) -> Result:
 
     The static parameters' own errors are carried into those of m and alpha.
     """
-    terms: list[Term] = [data.smallest_sweep]
+    data_sets: list[DataSet] = [data.smallest_sweep]
     held = {name: static.model.values[name] for name in STATIC}
-    return _result(data, [_solve(data, terms, BASE, held)], static.covariance.restricted(STATIC))
+    return _result(data, [_solve(data, data_sets, BASE, held)], static.covariance.restricted(STATIC))
 
 
 def given_static(data: Data) -> Result | None:
@@ -168,7 +171,7 @@ def _springpot(data: Data, springpot: Result | None) -> tuple[dict[str, float], 
     return (given if len(given) == len(DYNAMIC) else {}), None
 
 
-def _without_springpot(data: Data, solution: Solution, terms: Sequence[Term]) -> str:
+def _without_springpot(data: Data, solution: Solution, data_sets: Sequence[DataSet]) -> str:
     """What leaving the springpot out did to the static parameters, in words and per cent."""
     found = solution.model.values
     try:
@@ -176,7 +179,7 @@ def _without_springpot(data: Data, solution: Solution, terms: Sequence[Term]) ->
     except FitError:  # no sweep, or none that goes with the loops: a typical rubber tells as much as can be told
         ratio, alpha = _TYPICAL_SPRINGPOT
         held = {"m": ratio * found["mu"], "alpha": alpha}
-        better = _solve(data, terms, BASE, held).solution.model.values
+        better = _solve(data, data_sets, BASE, held).solution.model.values
         source = f"with the springpot of a typical filled rubber (m = {ratio} mu s^alpha, alpha = {alpha})"
     changes = ", ".join(f"{name} by {100 * (better[name] / found[name] - 1):+.1f} %" for name in STATIC)
     return (
@@ -186,10 +189,10 @@ def _without_springpot(data: Data, solution: Solution, terms: Sequence[Term]) ->
     )
 
 
-def _solve(data: Data, terms: Sequence[Term], effects: Sequence[str], held: Mapping[str, float]) -> Estimate:
+def _solve(data: Data, data_sets: Sequence[DataSet], effects: Sequence[str], held: Mapping[str, float]) -> Estimate:
     """Fit what the campaign leaves free of a model, from start values taken from the data."""
     bushing = data.campaign.bushing
-    start = {**start_values(bushing, terms, held), **data.given, **held}
+    start = {**start_values(bushing, data_sets, held), **data.given, **held}
     try:
         model = Model.started(bushing, effects, start)
     except ModelError as error:
@@ -203,12 +206,12 @@ def _solve(data: Data, terms: Sequence[Term], effects: Sequence[str], held: Mapp
             hint="check the units of displacement and force, and the dimensions of the bushing",
         ) from error
     names = [name for name in data.free(tuple(model.parameters)) if name not in held]
-    return estimate(model, terms, names, data.bounds, robust=data.robust)
+    return estimate(model, data_sets, names, data.bounds, robust=data.robust)
 
 
 def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = None, notes: Sequence[str] = ()) -> Result:
     """What the steps of a procedure found, the last one's model, with the uncertainty of all of them."""
-    solution, terms = steps[-1].solution, [term for step in steps for term in step.terms]
+    solution, data_sets = steps[-1].solution, [data_set for step in steps for data_set in step.data_sets]
     stages = [Stage(step.solution.coordinates.names, step.weighed) for step in steps]
     fitted = tuple(name for stage in stages for name in stage.names)
     cov = covariance(solution.model, stages, held)
@@ -217,16 +220,16 @@ def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = Non
         solution.model,
         fitted,
         cov,
-        quality(solution.model, terms, len(fitted)),
-        measured_range(solution.model, terms),
+        quality(solution.model, data_sets, len(fitted)),
+        measured_range(solution.model, data_sets),
         (
             *notes,
-            *implausible(data.campaign.bushing, terms),
-            *_assumed(terms),
+            *implausible(data.campaign.bushing, data_sets),
+            *_assumed(data_sets),
             *told(outliers, robust=data.robust),
             *_cautions(steps, data.bounds, cov),
         ),
-        tuple(term.source for term in terms if term.source is not None),
+        tuple(data_set.source for data_set in data_sets if data_set.source is not None),
         outliers,
         at_bound={name: end for step in steps for name, end in step.solution.at_bound.items()},
     )
@@ -235,21 +238,33 @@ def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = Non
 def _cautions(steps: Sequence[Estimate], bounds: Bounds, covariance: Covariance) -> list[str]:
     """What the data of each step cannot tell of the last one's model."""
     model = steps[-1].solution.model
-    return [line for step in steps for line in cautions(model, step.solution, step.terms, bounds, covariance, _NEXT)]
+    return [
+        line for step in steps for line in cautions(model, step.solution, step.data_sets, bounds, covariance, _NEXT)
+    ]
 
 
 def cautions(
-    model: Model, solution: Solution, terms: Sequence[Term], bounds: Bounds, covariance: Covariance, advice: str = ""
+    model: Model,
+    solution: Solution,
+    data_sets: Sequence[DataSet],
+    bounds: Bounds,
+    covariance: Covariance,
+    advice: str = "",
 ) -> list[str]:
     """What is odd about the loops of a fit, and what its data cannot tell: bounds met, what stays open, and a model
     that does not fit."""
     names, at_bound = solution.coordinates.names, solution.at_bound
     return [
-        *(f"{term.name}: {note}" for term in terms if isinstance(term, LoopTerm) for note in term.drive.notes),
+        *(
+            f"{data_set.name}: {note}"
+            for data_set in data_sets
+            if isinstance(data_set, LoopData)
+            for note in data_set.drive.notes
+        ),
         *(_stopped(solution) if solution.stopped else []),
         *(_at_edge(name, end, bounds) for name, end in at_bound.items()),
-        *left_open(model, terms, [name for name in names if name not in at_bound], covariance),
-        *misfit(model, terms, len(names), advice),
+        *left_open(model, data_sets, [name for name in names if name not in at_bound], covariance),
+        *misfit(model, data_sets, len(names), advice),
     ]
 
 
@@ -264,7 +279,7 @@ def _at_edge(name: str, end: End, bounds: Bounds) -> str:
     return f"{name} ended at the edge of what is possible: the data do not determine it"
 
 
-def _assumed(terms: Sequence[Term]) -> list[str]:
+def _assumed(data_sets: Sequence[DataSet]) -> list[str]:
     """What was assumed of the noise because nothing was repeated."""
-    noises = {id(term.noise): term.noise for term in terms if isinstance(term, SweepTerm)}
+    noises = {id(data_set.noise): data_set.noise for data_set in data_sets if isinstance(data_set, SweepData)}
     return [f"noise of the sweeps: {noise.describe()}" for noise in noises.values() if noise.origin == "assumed"]

@@ -14,10 +14,10 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.assess import linear_errors, quality
+from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.solve import Bounds, Coordinates, Solution, solve, walls
-from bushfit.fitting.terms import Term
-from bushfit.model import Model
-from bushfit.results import Z95, Covariance
+from bushfit.model.model import Model
+from bushfit.model.result import Z95, Covariance
 
 #: Longest step of the search, in coordinates, which are of order one.
 _STEP = 0.5
@@ -41,7 +41,7 @@ class _Profile:
 
     name: str
     best: Solution
-    terms: Sequence[Term]
+    data_sets: Sequence[DataSet]
     bounds: Bounds
     known: dict[float, Model]
 
@@ -56,7 +56,7 @@ class _Profile:
         others = [name for name in self.best.coordinates.names if name != self.name]
         found = solve(
             near.with_values({self.name: self.value(at)}),
-            self.terms,
+            self.data_sets,
             others,
             self.bounds,
             evaluations=_EVALUATIONS,
@@ -96,7 +96,7 @@ class _Profile:
 
 def profile95(
     best: Solution,
-    terms: Sequence[Term],
+    data_sets: Sequence[DataSet],
     covariance: Covariance,
     bounds: Bounds,
     advance: Callable[[str, int], None],
@@ -110,7 +110,7 @@ def profile95(
 
     Args:
         best: the fit.
-        terms: the data.
+        data_sets: the data.
         covariance: of the fit.
         bounds: limits inside the parameters' own.
         advance: called with the name of each parameter when it is done, and how many are left.
@@ -131,19 +131,19 @@ def profile95(
         )
     start, walled = best.coordinates.point(best.model.values), np.transpose(walls(best.coordinates, bounds))
     linear = linear_errors(best.jacobian)
-    allowed = _allowed(best, terms, covariance, linear)
+    allowed = _allowed(best, data_sets, covariance, linear)
     found: dict[str, Interval] = {}
     for i, name in enumerate(names):
-        profile = _Profile(name, best, terms, bounds, {start[i]: best.model})
+        profile = _Profile(name, best, data_sets, bounds, {start[i]: best.model})
         step = min(1.1 * allowed[i] * linear[i], _STEP)
         found[name] = profile.interval(start[i], walled[i], step, allowed[i])
         advance(name, len(names) - len(found))
     return found
 
 
-def _allowed(best: Solution, terms: Sequence[Term], covariance: Covariance, linear: Array) -> Array:
+def _allowed(best: Solution, data_sets: Sequence[DataSet], covariance: Covariance, linear: Array) -> Array:
     """Root of the rise of chi-square that each parameter's interval may reach."""
     names = best.coordinates.names
     half = covariance.half_width(np.eye(len(covariance.names)))[[covariance.names.index(name) for name in names]]
-    excess = max(quality(best.model, terms, len(names)).reduced_chi_square, 1.0)
+    excess = max(quality(best.model, data_sets, len(names)).reduced_chi_square, 1.0)
     return np.clip(half / best.coordinates.slopes(best.model.values) / linear, Z95, _WIDEST * Z95 * np.sqrt(excess))

@@ -17,11 +17,11 @@ from scipy.special import chdtri
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
 from bushfit.fitting.outliers import WINDOW, from_neighbours, limit
 from bushfit.fitting.solve import Bounds, Solution, solve
-from bushfit.fitting.terms import LoopTerm, SweepTerm, Term
-from bushfit.model import Model
-from bushfit.results import Outlier
+from bushfit.model.model import Model
+from bushfit.model.result import Outlier
 
 #: Distance, in units of noise, around which soft_l1 turns from squares to distances.
 _SOFT = 2.0
@@ -39,32 +39,41 @@ class Estimate:
 
     Args:
         solution: where it ended.
-        terms: the data, outliers without weight where the loss leaves them out.
+        data_sets: the data, outliers without weight where the loss leaves them out.
         minimised: the same with the weights at which the solution is the least sum of squares.
         weighed: the same with the weights that give its covariance.
-        wild: rows of each term that are wild, in the order of its data.
+        wild: rows of each data set that are wild, in the order of its data.
     """
 
     solution: Solution
-    terms: tuple[Term, ...]
-    minimised: tuple[Term, ...]
-    weighed: tuple[Term, ...]
+    data_sets: tuple[DataSet, ...]
+    minimised: tuple[DataSet, ...]
+    weighed: tuple[DataSet, ...]
     wild: tuple[Array, ...]
 
     @property
     def outliers(self) -> tuple[Outlier, ...]:
         """The wild points by file and row."""
-        model, terms = self.solution.model, self.terms
-        return tuple(entry for term, rows in zip(terms, self.wild, strict=True) for entry in _listed(term, rows, model))
+        model, data_sets = self.solution.model, self.data_sets
+        return tuple(
+            entry
+            for data_set, rows in zip(data_sets, self.wild, strict=True)
+            for entry in _listed(data_set, rows, model)
+        )
 
 
-def outliers_at(model: Model, terms: Sequence[Term]) -> tuple[Outlier, ...]:
-    """The wild points of some terms as a model sees them, by file and row."""
-    return tuple(entry for term in terms for entry in _listed(term, wild_points(term, model), model))
+def outliers_at(model: Model, data_sets: Sequence[DataSet]) -> tuple[Outlier, ...]:
+    """The wild points of some data sets as a model sees them, by file and row."""
+    return tuple(entry for data_set in data_sets for entry in _listed(data_set, wild_points(data_set, model), model))
 
 
 def estimate(
-    model: Model, terms: Sequence[Term], names: Sequence[str], bounds: Bounds | None = None, *, robust: bool = False
+    model: Model,
+    data_sets: Sequence[DataSet],
+    names: Sequence[str],
+    bounds: Bounds | None = None,
+    *,
+    robust: bool = False,
 ) -> Estimate:
     """Fit the named parameters by least squares, or robustly: soft_l1, the wild points of sweeps left out.
 
@@ -73,19 +82,21 @@ def estimate(
     slope. Wild rows of loops have no weight from the start, see `drive`.
     """
     if not robust:
-        solution = solve(model, terms, names, bounds)
-        wild = tuple(wild_points(term, solution.model) for term in terms)
-        return Estimate(solution, tuple(terms), tuple(terms), tuple(terms), wild)
+        solution = solve(model, data_sets, names, bounds)
+        wild = tuple(wild_points(data_set, solution.model) for data_set in data_sets)
+        return Estimate(solution, tuple(data_sets), tuple(data_sets), tuple(data_sets), wild)
     for _ in range(_MOST_ROUNDS):
-        wild = tuple(wild_points(term, model) for term in terms)
-        kept = tuple(_without(term, rows) for term, rows in zip(terms, wild, strict=True))
-        softened = tuple(_softened(term, model) for term in kept)
+        wild = tuple(wild_points(data_set, model) for data_set in data_sets)
+        kept = tuple(_without(data_set, rows) for data_set, rows in zip(data_sets, wild, strict=True))
+        softened = tuple(_softened(data_set, model) for data_set in kept)
         solution = solve(model, softened, names, bounds)
         before = solution.coordinates.point(model.values)
         moved = (solution.coordinates.point(solution.model.values) - before) @ solution.jacobian
         model = solution.model
         if float(moved @ moved) < _SETTLED**2:
-            weighed = tuple(term.weighted(np.full(_points(term), _efficiency(_parts(term)))) for term in kept)
+            weighed = tuple(
+                data_set.weighted(np.full(_points(data_set), _efficiency(_parts(data_set)))) for data_set in kept
+            )
             return Estimate(solution, kept, softened, weighed, wild)
     raise FitError(
         "the robust fit does not settle",
@@ -94,42 +105,44 @@ def estimate(
     )
 
 
-def wild_points(term: Term, model: Model) -> Array:
-    """Points that lie farther off the model than noise reaches, and as far off their neighbours, in the term's order.
+def wild_points(data_set: DataSet, model: Model) -> Array:
+    """Points that lie farther off the model than noise reaches, and as far off their neighbours, (n,).
 
     Where the same point was repeated, it must stand out from its repeats as well: what all of them do is no fault of
     one row. Where two repeats or more agree against it that is enough, so that wild neighbours do not hide each other.
     """
-    if isinstance(term, LoopTerm):
-        return term.drive.wild["force"].rows
-    deviation = term.deviation(model)
-    distance = term.apart(deviation)
-    reach = limit(deviation.size, 2, term.noise.scatter_freedom or np.inf) * _misfit(distance, 2)
+    if isinstance(data_set, LoopData):
+        return data_set.drive.wild["force"].rows
+    deviation = data_set.deviation(model)
+    distance = data_set.apart(deviation)
+    reach = limit(deviation.size, 2, data_set.noise.scatter_freedom or np.inf) * _misfit(distance, 2)
     far = distance > reach
     if not far.any():
         return np.flatnonzero(far)
-    local = _from_neighbours(term, deviation, _WINDOW)
-    repeats, beside = _from_repeats(term, local)
-    alone = np.minimum(term.apart(local, shared=False), np.where(repeats > 0, term.apart(beside, shared=False), np.inf))
-    against = _from_neighbours(term, _from_repeats(term, deviation)[1], WINDOW)
-    agreed = term.apart(against, shared=False) / np.sqrt(1.0 + np.pi / 2.0 / np.maximum(repeats, 1))
+    local = _from_neighbours(data_set, deviation, _WINDOW)
+    repeats, beside = _from_repeats(data_set, local)
+    alone = np.minimum(
+        data_set.apart(local, shared=False), np.where(repeats > 0, data_set.apart(beside, shared=False), np.inf)
+    )
+    against = _from_neighbours(data_set, _from_repeats(data_set, deviation)[1], WINDOW)
+    agreed = data_set.apart(against, shared=False) / np.sqrt(1.0 + np.pi / 2.0 / np.maximum(repeats, 1))
     return np.flatnonzero(far & (np.where(repeats > 1, agreed, alone) > reach))
 
 
-def _from_neighbours(term: SweepTerm, values: Array, window: int) -> Array:
+def _from_neighbours(data_set: SweepData, values: Array, window: int) -> Array:
     """Distance of each point from the median of those around it in its block, complex (n,)."""
     local = np.zeros_like(values)
-    for first, last in pairwise([*term.block_starts.tolist(), values.size]):
+    for first, last in pairwise([*data_set.block_starts.tolist(), values.size]):
         rows = np.arange(last - first)
         real, imag = (from_neighbours(part[first:last], rows, window) for part in (values.real, values.imag))
         local[first:last] = real + 1j * imag
     return local
 
 
-def _from_repeats(term: SweepTerm, values: Array) -> tuple[Array, Array]:
+def _from_repeats(data_set: SweepData, values: Array) -> tuple[Array, Array]:
     """How many other repeats each point has, (n,), and its distance from their median, 0 without any, complex (n,)."""
     repeats, distance = np.zeros(values.size, dtype=int), np.zeros_like(values)
-    points = np.stack((term.frequency, term.amplitude))
+    points = np.stack((data_set.frequency, data_set.amplitude))
     _, place = np.unique(points, axis=1, return_inverse=True)
     for row, same in enumerate(place == place[:, None]):
         same[row] = False
@@ -139,28 +152,28 @@ def _from_repeats(term: SweepTerm, values: Array) -> tuple[Array, Array]:
     return repeats, distance
 
 
-def _without(term: Term, rows: Array) -> Term:
+def _without(data_set: DataSet, rows: Array) -> DataSet:
     """A sweep without some of its points."""
-    if isinstance(term, LoopTerm) or not rows.size:
-        return term
-    weight = np.ones(term.frequency.size)
+    if isinstance(data_set, LoopData) or not rows.size:
+        return data_set
+    weight = np.ones(data_set.frequency.size)
     weight[rows] = 0.0
-    return term.weighted(weight)
+    return data_set.weighted(weight)
 
 
-def _softened(term: Term, model: Model) -> Term:
-    distance = term.distance(model)
-    scale = _SOFT * _misfit(distance[distance > 0.0] * np.sqrt(_parts(term)), _parts(term))
-    return term.weighted(1.0 / np.sqrt(1.0 + (distance / scale) ** 2))
+def _softened(data_set: DataSet, model: Model) -> DataSet:
+    distance = data_set.distance(model)
+    scale = _SOFT * _misfit(distance[distance > 0.0] * np.sqrt(_parts(data_set)), _parts(data_set))
+    return data_set.weighted(1.0 / np.sqrt(1.0 + (distance / scale) ** 2))
 
 
-def _parts(term: Term) -> int:
+def _parts(data_set: DataSet) -> int:
     """Numbers that make up a point."""
-    return 1 if isinstance(term, LoopTerm) else 2
+    return 1 if isinstance(data_set, LoopData) else 2
 
 
-def _points(term: Term) -> int:
-    return term.size // _parts(term)
+def _points(data_set: DataSet) -> int:
+    return data_set.size // _parts(data_set)
 
 
 def _misfit(distance: Array, parts: int) -> float:
@@ -182,16 +195,16 @@ def _efficiency(parts: int) -> float:
     return float(slope**2 * parts / (density @ (weight * z) ** 2))
 
 
-def _listed(term: Term, rows: Array, model: Model) -> Iterator[Outlier]:
-    file = str(term.source.file) if term.source else None
-    if isinstance(term, LoopTerm):
-        for column, (wild, off) in term.drive.wild.items():
+def _listed(data_set: DataSet, rows: Array, model: Model) -> Iterator[Outlier]:
+    file = str(data_set.source.file) if data_set.source else None
+    if isinstance(data_set, LoopData):
+        for column, (wild, off) in data_set.drive.wild.items():
             for row, distance in zip(wild.tolist(), off.tolist(), strict=True):
-                yield Outlier(term.name, file, row + term.drive.first_row + 1, column, distance)
+                yield Outlier(data_set.name, file, row + data_set.drive.first_row + 1, column, distance)
     elif rows.size:
-        distance = term.apart(term.deviation(model)) / np.sqrt(2.0)
-        for row, off in sorted(zip((term.rows[rows] + 1).tolist(), distance[rows].tolist(), strict=True)):
-            yield Outlier(term.name, file, row, "stiffness", off)
+        distance = data_set.apart(data_set.deviation(model)) / np.sqrt(2.0)
+        for row, off in sorted(zip((data_set.rows[rows] + 1).tolist(), distance[rows].tolist(), strict=True)):
+            yield Outlier(data_set.name, file, row, "stiffness", off)
 
 
 def told(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:

@@ -11,11 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from bushfit.cycles import HOLE
 from bushfit.effects.contract import Array
 from bushfit.fitting.harmonics import ENOUGH_ROWS
 from bushfit.fitting.outliers import gross_rows
-from bushfit.measurement import Loop
+from bushfit.reading.measurement import Loop
+from bushfit.reduction.cycles import HOLE
 
 #: The motion comes again where it is the same a period later within this share of its range, for all but this share
 #: of a period.

@@ -17,9 +17,9 @@ import numpy as np
 from bushfit.effects import BASE, Parameter
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.terms import Term
-from bushfit.model import Model
-from bushfit.results import Z95, End
+from bushfit.fitting.data_sets import DataSet
+from bushfit.model.model import Model
+from bushfit.model.result import Z95, End
 
 if TYPE_CHECKING:
     import lmfit
@@ -96,21 +96,21 @@ class Solution:
         return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
 
 
-def residual(model: Model, terms: Sequence[Term]) -> Array:
-    """Whitened residuals of all terms, (n,)."""
-    return np.concatenate([term.residual(model) for term in terms])
+def residual(model: Model, data_sets: Sequence[DataSet]) -> Array:
+    """Whitened residuals of all data sets, (n,)."""
+    return np.concatenate([data_set.residual(model) for data_set in data_sets])
 
 
-def jacobian(model: Model, terms: Sequence[Term], names: Sequence[str]) -> Array:
+def jacobian(model: Model, data_sets: Sequence[DataSet], names: Sequence[str]) -> Array:
     """Derivatives of `residual` by parameter coordinate, (len(names), n)."""
     slopes = Coordinates.of(model, names).slopes(model.values)
-    by_value = np.concatenate([term.jacobian(model, names) for term in terms], axis=-1)
+    by_value = np.concatenate([data_set.jacobian(model, names) for data_set in data_sets], axis=-1)
     return by_value * slopes[:, None]
 
 
 def solve(
     model: Model,
-    terms: Sequence[Term],
+    data_sets: Sequence[DataSet],
     names: Sequence[str],
     bounds: Bounds | None = None,
     *,
@@ -126,7 +126,7 @@ def solve(
 
     Args:
         model: where to start.
-        terms: the data.
+        data_sets: the data.
         names: parameters to move.
         bounds: limits inside the parameters' own.
         evaluations: most evaluations of the model.
@@ -139,11 +139,11 @@ def solve(
     """
     import lmfit
 
-    coordinates, start, low, high = opening(model, terms, names, bounds or {})
+    coordinates, start, low, high = opening(model, data_sets, names, bounds or {})
     inside = 1e-6 * (high - low)
     start = np.clip(start, low + inside, high - inside)
 
-    @lru_cache(maxsize=2)  # terms know again the model they answered last: the best so far, and the one tried
+    @lru_cache(maxsize=2)  # data sets know again the model they answered last: the best so far, and the one tried
     def model_at(point: tuple[float, ...]) -> Model:
         return model.with_values(coordinates.values(point))
 
@@ -151,10 +151,10 @@ def solve(
         return model_at(tuple(parameter.value for parameter in parameters.values()))
 
     def misfit(parameters: lmfit.Parameters) -> Array:
-        return residual(at(parameters), terms)
+        return residual(at(parameters), data_sets)
 
     def slopes(parameters: lmfit.Parameters) -> Array:
-        return jacobian(at(parameters), terms, coordinates.names)
+        return jacobian(at(parameters), data_sets, coordinates.names)
 
     ends = list(zip(low.tolist(), high.tolist(), strict=True))
 
@@ -182,8 +182,8 @@ def solve(
     found = Solution(
         best,
         coordinates,
-        residual(best, terms),
-        jacobian(best, terms, coordinates.names),
+        residual(best, data_sets),
+        jacobian(best, data_sets, coordinates.names),
         int(fit.nfev),
         at_bound(coordinates.names, end, low, high),
         bool(fit.aborted),
@@ -202,14 +202,14 @@ class _WallMetError(Exception):
 
 
 def opening(
-    model: Model, terms: Sequence[Term], names: Sequence[str], bounds: Bounds
+    model: Model, data_sets: Sequence[DataSet], names: Sequence[str], bounds: Bounds
 ) -> tuple[Coordinates, Array, Array, Array]:
     """The coordinates of a fit, where in them the model's own values lie, and the walls, (k,) each.
 
     Raises:
         FitError: fewer data than parameters.
     """
-    points = sum(term.size for term in terms)
+    points = sum(data_set.size for data_set in data_sets)
     if points <= len(names):
         raise FitError("too few points for the fit", found=f"{points} points for {len(names)} parameters")
     coordinates = Coordinates.of(model, names)

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bushfit.effects.friction import harmonic_shape
-from bushfit.fitting.terms import Term
+from bushfit.fitting.data_sets import DataSet
 from bushfit.geometry import Bushing
 
 #: The strain amplitude of the largest test over eps_half, before anything is known.
@@ -19,7 +19,7 @@ _SCALED_STRAIN = 3.0
 _LEAST_SHARE = 0.1
 
 
-def start_values(bushing: Bushing, terms: Sequence[Term], known: Mapping[str, float]) -> dict[str, float]:
+def start_values(bushing: Bushing, data_sets: Sequence[DataSet], known: Mapping[str, float]) -> dict[str, float]:
     """Values of mu, m, alpha, sigma_fmax, eps_half to start from; `known` ones are kept and allowed for.
 
     - eps_half from the largest strain reached;
@@ -27,7 +27,7 @@ def start_values(bushing: Bushing, terms: Sequence[Term], known: Mapping[str, fl
     - mu from the slope (secant of a loop's fundamental) of the slowest test, less what friction adds;
     - alpha from the slope of ln K'' over ln f, m from the growth of K' over ln f.
     """
-    strain, frequency, modulus = _points(bushing, terms)
+    strain, frequency, modulus = _points(bushing, data_sets)
     slowest = frequency <= 1.5 * frequency.min()
     largest = int(np.argmax(np.where(slowest, strain, 0.0)))
     eps_half = known.get("eps_half", float(strain.max()) / _SCALED_STRAIN)
@@ -55,11 +55,11 @@ def _slope(x: np.ndarray, y: np.ndarray) -> float:
     return float(apart @ y / (apart @ apart))
 
 
-def _points(bushing: Bushing, terms: Sequence[Term]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _points(bushing: Bushing, data_sets: Sequence[DataSet]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Strain amplitude, frequency [Hz] and complex modulus [Pa] of every operating point, loops included."""
-    factors = [bushing.stiffness_per_modulus(term.direction) for term in terms]
+    factors = [bushing.stiffness_per_modulus(data_set.direction) for data_set in data_sets]
     return (
-        np.concatenate([term.amplitude * bushing.unit_strain(term.direction) for term in terms]),
-        np.concatenate([term.frequency for term in terms]),
-        np.concatenate([term.measured / factor for term, factor in zip(terms, factors, strict=True)]),
+        np.concatenate([data_set.amplitude * bushing.unit_strain(data_set.direction) for data_set in data_sets]),
+        np.concatenate([data_set.frequency for data_set in data_sets]),
+        np.concatenate([data_set.measured / factor for data_set, factor in zip(data_sets, factors, strict=True)]),
     )

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.geometry import Direction
-from bushfit.measurement import Loop
+from bushfit.reading.measurement import Loop
 
 #: Third harmonic of a triangle over its first, and how near to it, or to none, a motion is called by its name.
 _TRIANGLE, _LIKE = 1.0 / 9.0, 0.03
@@ -33,7 +32,7 @@ def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
     like, other = ("a sine", "a triangle") if outer > _CROWDED else ("a triangle", "a sine")
     if waveform(coefficients) != other:
         return None
-    name = "rotation" if loop.direction is Direction.TORSION else "displacement"
+    name = loop.direction.motion.words[0]
     return (
         f"{100 * outer:.2g} % of the rows lie beyond {_OUTER:g} of the amplitude, as those of {like} recorded evenly "
         f"in time, but the {name} over time is {other}: where a file has no time, rate means a triangle, and frequency "

@@ -8,10 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bushfit.cycles import least_turn, wild_rows
-from bushfit.geometry import Direction
-from bushfit.measurement import Floats, Loop
-from bushfit.sheets import display_units
+from bushfit.reading.measurement import Floats, Loop
+from bushfit.reduction.cycles import least_turn, wild_rows
 from bushfit.units import number
 
 #: A gap is that many usual steps of the clock, and so many times the widest steps of an uneven clock.
@@ -50,10 +48,10 @@ class Channel(NamedTuple):
 
 def odd_channels(history: Loop) -> Iterator[str]:
     """Sentences on the channels of a loop or a raw history."""
-    names = ("rotation", "moment") if history.direction is Direction.TORSION else ("displacement", "force")
-    units = display_units(history.direction)
-    motion = Channel(names[0], *units["length"], history.displacement)
-    force = Channel(names[1], *units["force"], history.force)
+    names = history.direction.motion.words
+    units = history.direction.display
+    motion = Channel(names[0], *units.displacement, history.displacement)
+    force = Channel(names[1], *units.force, history.force)
     still = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
     yield from _gaps(history.time) if history.timed else _jumps(motion, history.time)
     yield from _stuck(motion, force, still)

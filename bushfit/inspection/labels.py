@@ -8,7 +8,6 @@ from pathlib import Path
 
 from bushfit import units
 from bushfit.geometry import Direction
-from bushfit.sheets import display_units
 
 #: "0.5mm", "0,5 mm", "0p5mm", "10Hz", "2deg"; not "10mm_min" nor the "18mm" of "abc18mm".
 _LABEL = re.compile(
@@ -36,8 +35,8 @@ def wrong_labels(
     file: Path, direction: Direction, amplitudes: Sequence[float], frequencies: Sequence[float]
 ) -> Iterator[str]:
     """A sentence where a file's name states an amplitude or a frequency that the file does not contain."""
-    unit, factor = display_units(direction)["length"]
-    stated = labelled(file, direction.displacement_unit)
+    unit, factor = direction.display.displacement
+    stated = labelled(file, direction.motion.displacement_unit)
     if stated and not any(_near(value, x) for _, value in stated for x in amplitudes):
         double = any(_near(value, 2.0 * x) for _, value in stated for x in amplitudes)
         found = _listed([factor * x for x in amplitudes])

@@ -7,16 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from bushfit.cycles import least_turn
 from bushfit.effects.contract import Array
 from bushfit.fitting.drive import Drive, drive_of
 from bushfit.fitting.waveform import waveform
-from bushfit.geometry import Direction
 from bushfit.inspection.channels import clock, odd_channels
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.record import Looked
-from bushfit.measurement import Loop
-from bushfit.sheets import display_units
+from bushfit.reading.measurement import Loop
+from bushfit.reduction.cycles import least_turn
 from bushfit.units import alike, for_people, number
 
 #: Cycles differ beyond so many standard errors and this share of half the force's range.
@@ -34,10 +32,10 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
         FitError: no whole cycle, or a loop that runs the wrong way round.
     """
     drive = drive_of(loop)
-    units = display_units(loop.direction)
-    (length, to_length), half_force = units["length"], np.ptp(loop.force) / 2.0
-    force, to_force = for_people(*units["force"], float(half_force))
-    names = ("rotation", "moment") if loop.direction is Direction.TORSION else ("displacement", "force")
+    units = loop.direction.display
+    (length, to_length), half_force = units.displacement, np.ptp(loop.force) / 2.0
+    force, to_force = for_people(*units.force, float(half_force))
+    names = loop.direction.motion.words
     rows = loop.time.size / drive.cycles
     half_motion = np.ptp(loop.displacement) / 2.0
     amplitude, mean_motion, mean_force = drive.amplitude, drive.coefficients[0].real, _mean(drive)
@@ -75,7 +73,7 @@ def _changing(drive: Drive, names: tuple[str, str]) -> Iterator[str]:
     count = int(drive.cycles + 0.01)
     if count < 2:
         return
-    units = display_units(loop.direction)
+    units = loop.direction.display
     phase = (loop.time - loop.time[0]) * drive.frequency
     numbers = sorted({*range(min(count, _ENDS)), *range(max(count - _ENDS, 0), count)})
     wild = drive.wild["force"].rows
@@ -93,21 +91,20 @@ def _changing(drive: Drive, names: tuple[str, str]) -> Iterator[str]:
     change = force[-1] - force[0]
     if abs(change) > max(_SURE * 2.0 * error, _SHARE * half):
         last = force[-1] - force[-2]
-        unit, factor = for_people(*units["force"], float(force[-1]))
+        unit, factor = for_people(*units.force, float(force[-1]))
         final, first = alike([factor * force[-1], factor * force[0]], 4)
         settled = abs(last) < max(_SURE * error, _SHARE * half / 2.0) and count > 2
         yield (
             f"the cycles {'settle' if settled else 'are still settling'}: the {names[1]} amplitude goes from "
             f"{first} {unit} in the first cycle to {final} in the last ({number(100 * change / force[0], 2, '+')} %)"
         )
-    for name, kind, mean, least in (
-        (names[1], "force", means[:, 0], max(_SURE * 1.5 * error, _SHARE * half)),
+    for name, (unit, factor), mean, least in (
+        (names[1], units.force, means[:, 0], max(_SURE * 1.5 * error, _SHARE * half)),
         # a time that was made from the motion turns its noise into drift
-        (names[0], "length", means[:, 1], _least_drift(drive)),
+        (names[0], units.displacement, means[:, 1], _least_drift(drive)),
     ):
         drift = mean[-1] - mean[0]
         if abs(drift) > least:
-            unit, factor = units[kind]
             last, first = alike([factor * mean[-1], factor * mean[0]], 3, least=1)
             yield f"the {name} drifts: its mean goes from {first} to {last} {unit}"
 

@@ -10,24 +10,24 @@ from typing import Any
 
 import numpy as np
 
-from bushfit.campaign import reader_keywords
-from bushfit.directions import direction_of_file, named_direction
+from bushfit.campaign.campaign import reader_keywords
+from bushfit.campaign.schema import LoopFile, SweepFile
 from bushfit.errors import BushfitError, MeasurementError, NoColumnError
 from bushfit.geometry import Direction
-from bushfit.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary
 from bushfit.inspection.channels import clock, odd_channels
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.loops import look_at_loop
 from bushfit.inspection.record import ColumnSeen, Inspected, Kind, Looked
 from bushfit.inspection.sweeps import look_at_sweep
-from bushfit.layout import FileFormat
-from bushfit.measurement import Loop, Sweep
-from bushfit.reading import STIFFNESS_PAIRS, read_loop, read_sweep
-from bushfit.reduction import reduce, sines
-from bushfit.schema import LoopFile, SweepFile
-from bushfit.sheets import display_units
-from bushfit.table import Table
-from bushfit.toml import check_tables
+from bushfit.reading.directions import direction_of_file, named_direction
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary
+from bushfit.reading.layout import FileFormat
+from bushfit.reading.loops import read_loop
+from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.sweeps import STIFFNESS_PAIRS, read_sweep
+from bushfit.reading.table import Table
+from bushfit.reduction.steps import reduce, sines
+from bushfit.validation import check_tables
 
 #: Steps are of a stepped sine where one is faster than this [Hz], or one is by this factor faster than another; one
 #: sine is a loop.
@@ -255,7 +255,7 @@ def _look(measured: Loop, file: Path) -> tuple[Kind, Looked]:
 def _look_at_history(history: Loop, file: Path) -> Looked:
     reduction = reduce([history])
     steps = reduction.steps
-    unit, factor = display_units(history.direction)["length"]
+    unit, factor = history.direction.display.displacement
     levels = sorted({step.level for step in steps})
     frequencies = sorted({step.nominal_frequency for step in steps})
     facts = {

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from bushfit.geometry import Direction
-from bushfit.measurement import Loop, Sweep
+from bushfit.reading.measurement import Loop, Sweep
 
 #: A hysteresis loop, a sweep, or the raw history of a stepped sine.
 Kind = Literal["loop", "sweep", "history"]

@@ -12,8 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.record import Looked
-from bushfit.measurement import Sweep
-from bushfit.sheets import display_units
+from bushfit.reading.measurement import Sweep
 from bushfit.units import number
 
 #: A point is wild beyond so many standard deviations from its repeats and this share of |K|.
@@ -31,7 +30,7 @@ _MOST_LISTED = 4
 
 def look_at_sweep(sweep: Sweep, file: Path) -> Looked:
     """Facts and oddities of a sweep."""
-    unit, factor = display_units(sweep.direction)["length"]
+    unit, factor = sweep.direction.display.displacement
     frequencies, levels = np.unique(sweep.frequency), np.unique(sweep.amplitude)
     repeats = np.unique(sweep.repeat)
     noise = sweep_noise([sweep])

@@ -10,9 +10,9 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 if TYPE_CHECKING:
-    from bushfit.campaign import Campaign
+    from bushfit.campaign.campaign import Campaign
     from bushfit.fitting.data import Data
-    from bushfit.results import Result
+    from bushfit.model.result import Result
 
 #: Files that a job makes besides its JSON documents.
 TABLES, PLOTS = "csv", "png"

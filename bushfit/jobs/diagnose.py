@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
-from bushfit.jobs.artifacts import artifact_names, diagnosis_files
-from bushfit.output import to_json
+from bushfit.report.artifacts import artifact_names, diagnosis_files
+from bushfit.report.folder import to_json
 
 if TYPE_CHECKING:
-    from bushfit.campaign import Campaign
+    from bushfit.campaign.campaign import Campaign
     from bushfit.fitting.data import Data
-    from bushfit.model import Model
-    from bushfit.results import Result
+    from bushfit.model.model import Model
+    from bushfit.model.result import Result
 
 
 @dataclass(frozen=True, eq=False)

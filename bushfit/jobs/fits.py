@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 from bushfit.effects import BASE
 from bushfit.errors import FitError
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, given_static
-from bushfit.jobs.artifacts import artifact_names, loop_files, sweep_files
-from bushfit.output import to_json
+from bushfit.report.artifacts import artifact_names, loop_files, sweep_files
+from bushfit.report.folder import to_json
 
 if TYPE_CHECKING:
-    from bushfit.campaign import Campaign
+    from bushfit.campaign.campaign import Campaign
     from bushfit.fitting.data import Data
     from bushfit.geometry import Direction
-    from bushfit.results import Result
+    from bushfit.model.result import Result
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,16 +6,16 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from bushfit.fitting.terms import SweepTerm, sweep_terms
+from bushfit.campaign.schema import PredictSettings
+from bushfit.fitting.data_sets import SweepData, sweep_data
 from bushfit.geometry import Direction
-from bushfit.jobs.artifacts import artifact_names, prediction_files
 from bushfit.prediction import Prediction, caveats, default_grid, predict
-from bushfit.schema import PredictSettings
-from bushfit.sheets import prediction_table
+from bushfit.report.artifacts import artifact_names, prediction_files
+from bushfit.report.tables import prediction_table
 
 if TYPE_CHECKING:
-    from bushfit.campaign import Campaign
-    from bushfit.results import Result
+    from bushfit.campaign.campaign import Campaign
+    from bushfit.model.result import Result
 
 _DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
 
@@ -26,7 +26,7 @@ class Predicted:
 
     result: Result
     predictions: Sequence[Prediction]
-    measured: Sequence[SweepTerm]
+    measured: Sequence[SweepData]
 
     @property
     def document(self) -> Mapping[str, Any]:
@@ -62,9 +62,9 @@ class Predict:
         predictions = []
         for direction in settings.directions or _DIRECTIONS:
             frequencies, amplitudes = default_grid(result, direction, sweeps)
-            asked = settings.torsion_amplitudes if direction is Direction.TORSION else settings.amplitudes
+            asked = settings.torsion_amplitudes if direction.is_rotation else settings.amplitudes
             predictions.append(predict(result, direction, settings.frequencies or frequencies, asked or amplitudes))
-        return Predicted(result, predictions, sweep_terms(sweeps))
+        return Predicted(result, predictions, sweep_data(sweeps))
 
     def _settings(self, campaign: Campaign | None) -> PredictSettings:
         given = {key: value for key, value in vars(self.asked).items() if value is not None}

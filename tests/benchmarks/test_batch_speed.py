@@ -23,8 +23,8 @@ from bushfit.batch.manifest import Settings, read_manifest
 from bushfit.batch.pool import LocalPool
 from bushfit.batch.run import Plan, run
 from bushfit.batch.work import Orders
-from bushfit.model import Model
-from bushfit.schema import SimulateSettings
+from bushfit.campaign.schema import SimulateSettings
+from bushfit.model.model import Model
 from bushfit.simulation import simulate, to_files
 
 _PROGRAM = str(Path(sys.executable).with_name("bushfit"))

@@ -19,10 +19,11 @@ import polars
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from bushfit import rig
 from bushfit.geometry import Direction
-from bushfit.model import Model
-from bushfit.reading import read_loop, read_sweep
+from bushfit.model import rig
+from bushfit.model.model import Model
+from bushfit.reading.loops import read_loop
+from bushfit.reading.sweeps import read_sweep
 
 _WHOLE = """
 import json, resource, sys, time
@@ -44,11 +45,11 @@ BUSHFIT = (
     "import lmfit, pandas, scipy.optimize\n"
     "from bushfit import units\n"
     "units.factor('mm', 'm')  # imports what knows units\n"
-    "from bushfit.campaign import Campaign\n"
+    "from bushfit.campaign.campaign import Campaign\n"
     "from bushfit.fitting.data import Data\n"
     "from bushfit.fitting.procedures import fit_static\n"
     "from bushfit.geometry import Bushing, Direction\n"
-    "from bushfit.reading import read_loop",
+    "from bushfit.reading.loops import read_loop",
     "loop = read_loop(file, Direction.AXIAL)\n"
     "bushing = Bushing('CMP 15 961', 0.010, 0.018, 0.034)\n"
     "result = fit_static(Data.of(Campaign('c', file, bushing, (loop,))))\n"

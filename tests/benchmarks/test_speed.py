@@ -22,22 +22,22 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.optimize import leastsq
 
-from bushfit.campaign import load_campaign
-from bushfit.diagnosis.hidden import hidden_campaign
+from bushfit.campaign.campaign import load_campaign
 from bushfit.diagnosis.record import Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE, History
 from bushfit.effects.springpot import grunwald_letnikov_weights
 from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import DataSet, SweepData, loop_data, sweep_data
 from bushfit.fitting.procedures import STATIC, fit_dynamic, fit_joint, fit_two_step
 from bushfit.fitting.solve import Coordinates, jacobian, residual, solve
 from bushfit.fitting.starts import start_values
-from bushfit.fitting.terms import SweepTerm, Term, loop_terms, sweep_terms
 from bushfit.geometry import Direction
-from bushfit.measurement import Loop, Sweep
-from bushfit.model import FIVE, Model
+from bushfit.model.model import FIVE, Model
+from bushfit.model.result import Result
 from bushfit.prediction import PAPER_AMPLITUDES, PAPER_FREQUENCIES, predict
-from bushfit.results import Result
+from bushfit.reading.measurement import Loop, Sweep
+from bushfit.scorecard.hidden import hidden_campaign
 
 #: Cycles and steps of the stepped rig that keep it within 1e-4 of the steady state: m and alpha answer with ten times
 #: that.
@@ -118,18 +118,18 @@ def test_stiffness_against_bare_numpy(
 def test_joint_fit_against_bare_minpack(benchmark: BenchmarkFixture, data: Data, table: Rows) -> None:
     """lmfit, covariance and advice over MINPACK with the same residual, Jacobian, start and tolerance."""
     found = benchmark(fit_joint, data)
-    terms = data.chosen(None)
+    data_sets = data.chosen(None)
     coordinates = Coordinates.of(found.model, FIVE)
-    start = coordinates.point(start_values(data.campaign.bushing, terms, {}))
+    start = coordinates.point(start_values(data.campaign.bushing, data_sets, {}))
 
     def model_at(point: np.ndarray) -> Model:
         return found.model.with_values(coordinates.values(point))
 
     def bare() -> np.ndarray:
         best, _ = leastsq(
-            lambda point: residual(model_at(point), terms),
+            lambda point: residual(model_at(point), data_sets),
             start,
-            Dfun=lambda point: jacobian(model_at(point), terms, FIVE),
+            Dfun=lambda point: jacobian(model_at(point), data_sets, FIVE),
             col_deriv=True,
             ftol=1e-9,
             xtol=1e-9,
@@ -169,14 +169,14 @@ def stepped(
     return (force[:, -steps:] @ turn) / (motion[:, -steps:] @ turn)
 
 
-def by_time_stepping(term: SweepTerm, static: Result, start: dict[str, float]) -> tuple[dict[str, float], int]:
+def by_time_stepping(data_set: SweepData, static: Result, start: dict[str, float]) -> tuple[dict[str, float], int]:
     """The paper's dynamic fit, differenced by MINPACK, and how often it asks for the stiffness."""
-    points, where = np.unique(np.stack((term.frequency, term.amplitude)), axis=1, return_inverse=True)
+    points, where = np.unique(np.stack((data_set.frequency, data_set.amplitude)), axis=1, return_inverse=True)
 
     def misfit(point: np.ndarray) -> np.ndarray:
         values = {"m": float(np.exp(point[0])), "alpha": float(np.clip(point[1], 0.02, 1.0))}
         stiffness = stepped(static.model.with_values(values), *points)
-        return term.whiten(stiffness[where.ravel()] / term.measured - 1.0)
+        return data_set.whiten(stiffness[where.ravel()] / data_set.measured - 1.0)
 
     unknowns = [np.log(start["m"]), start["alpha"]]
     best, _, told, *_ = leastsq(misfit, unknowns, epsfcn=1e-6, xtol=1e-6, ftol=1e-8, full_output=True)
@@ -186,18 +186,18 @@ def by_time_stepping(term: SweepTerm, static: Result, start: dict[str, float]) -
 def test_fit_dynamic_against_time_stepping(
     benchmark: BenchmarkFixture, data: Data, static: Result, table: Rows
 ) -> None:
-    term = data.smallest_sweep
+    data_set = data.smallest_sweep
     start = {"m": 0.5 * static.model.values["m"], "alpha": 0.3}
-    slow_answer, asked = by_time_stepping(term, static, start)
+    slow_answer, asked = by_time_stepping(data_set, static, start)
     found = benchmark(fit_dynamic, data, static)
     apart = max(abs(found.model.values[name] / slow_answer[name] - 1.0) for name in ("m", "alpha"))
     steps = STEPS if benchmark.enabled else 64
-    frequency = np.unique(term.frequency)
-    points = frequency, np.full(frequency.size, term.amplitude[0])
+    frequency = np.unique(data_set.frequency)
+    points = frequency, np.full(frequency.size, data_set.amplitude[0])
     both = [stepped(found.model, *points, looking_back=back, steps=steps) for back in (True, False)]
     np.testing.assert_allclose(*both, rtol=1e-9)
     fast, by_transform = seconds(
-        [lambda: fit_dynamic(data, static), lambda: by_time_stepping(term, static, start)],
+        [lambda: fit_dynamic(data, static), lambda: by_time_stepping(data_set, static, start)],
         7 if benchmark.enabled else 1,
     )
     (once,) = seconds([lambda: stepped(found.model, *points, looking_back=True, steps=steps)], 1)
@@ -303,9 +303,9 @@ def fitted(model: Model, loops: Sequence[Loop], sweeps: Sequence[Sweep]) -> Call
     """From measurements to a solution."""
 
     def work() -> object:
-        terms: list[Term] = [*loop_terms(loops), *sweep_terms(sweeps)]
+        data_sets: list[DataSet] = [*loop_data(loops), *sweep_data(sweeps)]
         names = [name for name in model.parameters if name in FIVE]
-        return solve(model, terms, names)
+        return solve(model, data_sets, names)
 
     return work
 

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bushfit.campaign import load_campaign
+from bushfit.campaign.campaign import load_campaign
 from bushfit.inspection.draft import toml_value
 
 GEOMETRY = ("--inner-radius", "10 mm", "--outer-radius", "18 mm", "--length", "34 mm")

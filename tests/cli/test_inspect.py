@@ -11,7 +11,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from bushfit.campaign import load_campaign
+from bushfit.campaign.campaign import load_campaign
 
 CLEAN = ("data/arm_bushing/loop_axial_1.csv", "data/arm_bushing/sweep_radial.csv")
 RECORD = "data/cmp_15961_raw/stepped_sine_axial.csv"

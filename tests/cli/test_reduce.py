@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 
 from bushfit.geometry import Direction
-from bushfit.model import Model
-from bushfit.reading import read_sweep
+from bushfit.model.model import Model
+from bushfit.reading.sweeps import read_sweep
 
 RECORD = "data/cmp_15961_raw/stepped_sine_axial.csv"
 CAMPAIGN = """[bushing]

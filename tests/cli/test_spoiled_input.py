@@ -15,8 +15,8 @@ from unittest import mock
 import pytest
 from spoiled import FILES, ROWS, Spoiled
 
-from bushfit import disk
 from bushfit.cli import cli, main
+from bushfit.report import disk
 
 ERROR = re.compile(r"^(bushfit: error: |Error: )", re.MULTILINE)
 

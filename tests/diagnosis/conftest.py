@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from rigged import PLAN, Diagnosed, Effects, Fitted, Measured
 
-from bushfit.campaign import Campaign
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import SimulateSettings
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE
 from bushfit.fitting.data import Data
 from bushfit.fitting.starts import start_values
-from bushfit.model import Model
-from bushfit.schema import SimulateSettings
+from bushfit.model.model import Model
 from bushfit.simulation import Undisturbed, measure, undisturbed
 
 
@@ -68,8 +68,8 @@ def fitted() -> Fitted:
 
     def evidence(campaign: Campaign, *effects: str) -> Evidence:
         data = Data.of(campaign)
-        terms = [*data.loops, *data.sweeps]
-        start = start_values(campaign.bushing, terms, {})
-        return fit(Model.started(campaign.bushing, (*BASE, *effects), start), terms, (), {})
+        data_sets = [*data.loops, *data.sweeps]
+        start = start_values(campaign.bushing, data_sets, {})
+        return fit(Model.started(campaign.bushing, (*BASE, *effects), start), data_sets, (), {})
 
     return evidence

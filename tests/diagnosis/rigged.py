@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from bushfit.campaign import Campaign
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects.contract import Array
 from bushfit.geometry import Direction
-from bushfit.measurement import Sweep
-from bushfit.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.reading.measurement import Sweep
 
 BOTH = [Direction.AXIAL, Direction.RADIAL]
 FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))

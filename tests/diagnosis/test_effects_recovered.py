@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from rigged import BOTH, Measured, changed
 
-from bushfit.diagnosis.hidden import hidden_campaign, hideable
 from bushfit.effects import BASE
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
+from bushfit.scorecard.hidden import hidden_campaign, hideable
 
 #: The rig steps a compliant mount in time with many more steps than any other.
 SLOW = {"rig_compliance"}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rigged import LEVELS, SHARED, Measured, changed, with_sweep
 
-from bushfit.campaign import Campaign
+from bushfit.campaign.campaign import Campaign
 from bushfit.diagnosis.faults import faults
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.fitting.data import Data

@@ -10,7 +10,7 @@ from rigged import SHARED, Fitted, Measured, cut
 
 from bushfit.diagnosis.evidence import fit
 from bushfit.diagnosis.holdout import HeldOut, HoldOut, hold_out
-from bushfit.fitting.terms import SweepTerm
+from bushfit.fitting.data_sets import SweepData
 
 INERTIA = {"inertia": {"mass": 0.06}}
 
@@ -37,19 +37,19 @@ def test_the_gap_is_that_of_a_refit(measured: Measured, fitted: Fitted, which: s
     after = fitted(campaign, "inertia")
     (part,) = [part for part in hold_out(after, after).parts if part.part == which]
     kept, gone = [], []
-    for term in after.terms:
-        out = np.zeros(term.frequency.size, dtype=bool)
-        if isinstance(term, SweepTerm):
-            out = term.frequency > 105.0 if "third" in which else term.amplitude == term.amplitude.max()
+    for data_set in after.data_sets:
+        out = np.zeros(data_set.frequency.size, dtype=bool)
+        if isinstance(data_set, SweepData):
+            out = data_set.frequency > 105.0 if "third" in which else data_set.amplitude == data_set.amplitude.max()
         if not out.any():
-            kept.append(term)
+            kept.append(data_set)
             continue
-        assert isinstance(term, SweepTerm)
-        restored = out[np.argsort(term.order)]
+        assert isinstance(data_set, SweepData)
+        restored = out[np.argsort(data_set.order)]
         for chosen, place in ((~restored, kept), (restored, gone)):
-            place.append(replace(term, sweep=cut(term.sweep, chosen)))
+            place.append(replace(data_set, sweep=cut(data_set.sweep, chosen)))
     refitted = fit(after.model, kept, (), {})
-    expected = np.sqrt(np.mean(np.concatenate([term.residual(refitted.model) for term in gone]) ** 2))
+    expected = np.sqrt(np.mean(np.concatenate([data_set.residual(refitted.model) for data_set in gone]) ** 2))
     print(f"{which}: {part.after:.4f}, refitted {expected:.4f}")
     # the parts of a block that is cut in two share an error, which whitening then treats apart
     assert part.after == pytest.approx(expected, rel=0.05)
@@ -63,8 +63,10 @@ def test_a_model_that_misses_something_is_stepped_to_where_the_rest_would_have_i
     (part,) = [part for part in hold_out(evidence, evidence).parts if "third" in part.part]
     top = np.concatenate(
         [
-            np.tile(term.frequency > 105.0, 2) if isinstance(term, SweepTerm) else np.zeros(term.size, dtype=bool)
-            for term in evidence.terms
+            np.tile(data_set.frequency > 105.0, 2)
+            if isinstance(data_set, SweepData)
+            else np.zeros(data_set.size, dtype=bool)
+            for data_set in evidence.data_sets
         ]
     )
     slopes, residual = evidence.solution.jacobian, evidence.residual

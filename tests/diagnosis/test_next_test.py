@@ -10,22 +10,22 @@ from rigged import Measured
 from bushfit.diagnosis.next_test import MENU, confirming_test, deciding_test
 from bushfit.effects import BASE, LIBRARY
 from bushfit.fitting.data import Data
-from bushfit.fitting.terms import Term
-from bushfit.model import Model
+from bushfit.fitting.data_sets import DataSet
+from bushfit.model.model import Model
 
 WORDS = [entry.words for entry in MENU]
 
 
 @pytest.fixture
-def terms(measured: Measured) -> list[Term]:
+def data_sets(measured: Measured) -> list[DataSet]:
     data = Data.of(measured())
     return [*data.loops, *data.sweeps]
 
 
-def test_one_model_needs_none(paper_model: Model, terms: list[Term]) -> None:
-    assert deciding_test([paper_model], terms) == ""
-    assert deciding_test([], terms) == ""
-    assert deciding_test([paper_model, paper_model], terms) == ""
+def test_one_model_needs_none(paper_model: Model, data_sets: list[DataSet]) -> None:
+    assert deciding_test([paper_model], data_sets) == ""
+    assert deciding_test([], data_sets) == ""
+    assert deciding_test([paper_model, paper_model], data_sets) == ""
 
 
 SLIP = {"interface_slip.force": 2.0}
@@ -45,14 +45,14 @@ STOP = {"bump_stop.gap": 4e-4, "bump_stop.stiffness": 1e5}
     ids=lambda value: next(iter(value)).partition(".")[0] if isinstance(value, dict) else "",
 )
 def test_pairs(
-    paper_model: Model, terms: list[Term], one: dict[str, float], other: dict[str, float], words: tuple[str, ...]
+    paper_model: Model, data_sets: list[DataSet], one: dict[str, float], other: dict[str, float], words: tuple[str, ...]
 ) -> None:
     models = [paper_model.with_effect(next(iter(values)).partition(".")[0], values) for values in (one, other)]
-    found = deciding_test(models, terms)
+    found = deciding_test(models, data_sets)
     print(f"{' or '.join(model.effects[-1] for model in models)}: {found}")
     assert found in WORDS
     assert any(word in found for word in words)
-    assert deciding_test(models[::-1], terms) == found
+    assert deciding_test(models[::-1], data_sets) == found
 
 
 def test_a_direction_that_is_swept_is_no_next_test(paper_model: Model, measured: Measured) -> None:
@@ -68,12 +68,12 @@ def test_a_direction_that_is_swept_is_no_next_test(paper_model: Model, measured:
     assert not any(direction in deciding_test(models, both) for direction in ("axial", "radial"))
 
 
-def test_a_test_without_the_rig_parts_nothing_inside_the_rubber(paper_model: Model, terms: list[Term]) -> None:
+def test_a_test_without_the_rig_parts_nothing_inside_the_rubber(paper_model: Model, data_sets: list[DataSet]) -> None:
     models = [
         paper_model.with_effect("viscous", {"viscous.eta": 100.0}),
         paper_model.with_effect("strain_stiffening", {"strain_stiffening.c3": 20.0}),
     ]
-    found = deciding_test(models, terms)
+    found = deciding_test(models, data_sets)
     assert found in WORDS
     assert "fixture" not in found
     assert "dummy" not in found

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from bushfit.campaign import load_campaign
+from bushfit.campaign.campaign import load_campaign
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.fitting.data import Data

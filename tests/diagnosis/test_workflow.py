@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from rigged import LEVELS, PLAN, SHARED, Diagnosed, Measured, changed, cut
 
-from bushfit.campaign import Campaign
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import FitSettings, Loss, ParameterSetting, SimulateSettings
 from bushfit.diagnosis import verdict
 from bushfit.diagnosis.holdout import HoldOut
 from bushfit.diagnosis.next_test import MENU
@@ -21,8 +22,7 @@ from bushfit.errors import BushfitError
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction
-from bushfit.model import Model
-from bushfit.schema import FitSettings, Loss, ParameterSetting, SimulateSettings
+from bushfit.model.model import Model
 from bushfit.simulation import measure, undisturbed
 
 INERTIA = {"inertia": {"mass": 0.06}}

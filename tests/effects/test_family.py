@@ -12,9 +12,9 @@ import pytest
 
 from bushfit.effects import BASE, LIBRARY, Effect, History, Level, Modifier, Parameter, qualified
 from bushfit.geometry import Bushing, Direction
-from bushfit.model import Model
-from bushfit.rig import lock_in, record
-from bushfit.sensitivity import force_jacobian, stiffness_jacobian
+from bushfit.model.model import Model
+from bushfit.model.rig import lock_in, record
+from bushfit.model.sensitivity import force_jacobian, stiffness_jacobian
 
 ADDED = tuple(name for name in LIBRARY if name not in BASE)
 #: Work can come out of these: a late force channel is no passive system.

@@ -11,7 +11,7 @@ from bushfit.effects import BASE, History
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
 from bushfit.effects.maxwell import relaxed
 from bushfit.geometry import Bushing, Direction
-from bushfit.model import Model
+from bushfit.model.model import Model
 
 PLAIN = Model(
     Bushing("CMP 15 961", 0.010, 0.018, 0.034),

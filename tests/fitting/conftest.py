@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from bushfit.campaign import Campaign
-from bushfit.model import Model
-from bushfit.schema import SimulateSettings
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import SimulateSettings
+from bushfit.model.model import Model
 from bushfit.simulation import Undisturbed, measure, undisturbed
 
 #: The noise of data/cmp_15961: 0.5 % a sweep point, 0.3 % of a loop's force, three repeats.

@@ -11,7 +11,7 @@ from bushfit.errors import FitError
 from bushfit.fitting.clock import fundamental
 from bushfit.fitting.runin import thinned
 from bushfit.geometry import Direction
-from bushfit.measurement import Loop
+from bushfit.reading.measurement import Loop
 
 FREQUENCY = 0.1
 

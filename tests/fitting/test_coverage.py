@@ -7,14 +7,14 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pytest
 
-from bushfit.campaign import Campaign
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import SimulateSettings
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
-from bushfit.model import FIVE, Model
+from bushfit.model.model import FIVE, Model
+from bushfit.model.result import Result
 from bushfit.prediction import Band, predict
-from bushfit.results import Result
-from bushfit.schema import SimulateSettings
 
 SEEDS = 300
 #: Three standard errors of a share of 95 % over that many campaigns.

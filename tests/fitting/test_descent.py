@@ -8,40 +8,40 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bushfit.campaign import Campaign
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import SimulateSettings
 from bushfit.effects import BASE
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.solve import Bounds, residual, solve
 from bushfit.fitting.starts import start_values
-from bushfit.fitting.terms import Term
-from bushfit.model import Model
-from bushfit.schema import SimulateSettings
+from bushfit.model.model import Model
 
 Rig = Callable[..., Campaign]
 
 
 @pytest.fixture
-def terms(rig: Rig, paper_model: Model, paper_noise: SimulateSettings) -> list[Term]:
+def data_sets(rig: Rig, paper_model: Model, paper_noise: SimulateSettings) -> list[DataSet]:
     data = Data.of(rig(paper_model, paper_noise, 1))
     return [*data.loops, *data.sweeps]
 
 
-def started(paper_model: Model, terms: list[Term], *effects: str) -> Model:
-    start = start_values(paper_model.bushing, terms, {})
+def started(paper_model: Model, data_sets: list[DataSet], *effects: str) -> Model:
+    start = start_values(paper_model.bushing, data_sets, {})
     return Model.started(paper_model.bushing, (*BASE, *effects), start)
 
 
 @pytest.mark.parametrize("effects", [(), ("delay",), ("viscous", "strain_stiffening")], ids="+".join)
 @pytest.mark.parametrize("bounds", [{}, {"alpha": (0.26, 0.5)}, {"mu": (None, 9e5)}], ids=str)
 def test_it_ends_where_lmfit_ends(
-    paper_model: Model, terms: list[Term], effects: tuple[str, ...], bounds: Bounds
+    paper_model: Model, data_sets: list[DataSet], effects: tuple[str, ...], bounds: Bounds
 ) -> None:
-    model = started(paper_model, terms, *effects)
+    model = started(paper_model, data_sets, *effects)
     names = tuple(model.parameters)
-    found = Descent.start(model, terms, names, bounds).finished(100)
-    known = solve(model, terms, names, bounds)
+    found = Descent.start(model, data_sets, names, bounds).finished(100)
+    known = solve(model, data_sets, names, bounds)
     errors = np.sqrt(np.diag(np.linalg.pinv(known.jacobian @ known.jacobian.T)))
     points = [end.coordinates.point(end.model.values) for end in (found.solution, known)]
     off = np.abs(points[0] - points[1]) / errors
@@ -53,14 +53,14 @@ def test_it_ends_where_lmfit_ends(
     np.testing.assert_allclose(found.solution.jacobian, known.jacobian, atol=1e-2 * np.abs(known.jacobian).max())
 
 
-def test_it_never_climbs_and_counts_its_evaluations(paper_model: Model, terms: list[Term]) -> None:
-    model = started(paper_model, terms)
-    here = Descent.start(model, terms, tuple(model.parameters), {})
+def test_it_never_climbs_and_counts_its_evaluations(paper_model: Model, data_sets: list[DataSet]) -> None:
+    model = started(paper_model, data_sets)
+    here = Descent.start(model, data_sets, tuple(model.parameters), {})
     path = [here]
     while not here.settled:
         here = here.stepped()
         path.append(here)
-    chi_square = [float(np.sum(residual(step.model, terms) ** 2)) for step in path]
+    chi_square = [float(np.sum(residual(step.model, data_sets) ** 2)) for step in path]
     print(", ".join(f"{x:.6g}" for x in chi_square))
     assert chi_square == pytest.approx([step.chi_square for step in path], rel=1e-12)
     assert all(np.diff(chi_square) <= 0.0)
@@ -68,23 +68,23 @@ def test_it_never_climbs_and_counts_its_evaluations(paper_model: Model, terms: l
     assert path[-1].promise < 0.01 < path[0].promise
 
 
-def test_it_can_be_left_anywhere(paper_model: Model, terms: list[Term]) -> None:
-    model = started(paper_model, terms)
-    left = Descent.start(model, terms, tuple(model.parameters), {}).finished(3)
+def test_it_can_be_left_anywhere(paper_model: Model, data_sets: list[DataSet]) -> None:
+    model = started(paper_model, data_sets)
+    left = Descent.start(model, data_sets, tuple(model.parameters), {}).finished(3)
     assert left.evaluations == left.solution.evaluations == 3
     assert not left.settled
 
 
-def test_what_is_not_seen_stays(paper_model: Model, terms: list[Term]) -> None:
+def test_what_is_not_seen_stays(paper_model: Model, data_sets: list[DataSet]) -> None:
     """An effect of no amount has no shape that data could tell."""
-    model = started(paper_model, terms, "maxwell")
-    first = Descent.start(model, terms, tuple(model.parameters), {"maxwell.mu1": (0.0, 1e-9)}).finished(100)
+    model = started(paper_model, data_sets, "maxwell")
+    first = Descent.start(model, data_sets, tuple(model.parameters), {"maxwell.mu1": (0.0, 1e-9)}).finished(100)
     assert first.model.values["maxwell.tau"] == pytest.approx(model.values["maxwell.tau"], rel=1e-9)
     assert first.solution.at_bound["maxwell.mu1"] in ("min", "max")
 
 
-def test_too_few_points_are_refused(paper_model: Model, terms: list[Term]) -> None:
-    sweep = terms[-1]
+def test_too_few_points_are_refused(paper_model: Model, data_sets: list[DataSet]) -> None:
+    sweep = data_sets[-1]
     few = replace(
         sweep,
         sweep=replace(

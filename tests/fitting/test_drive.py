@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bushfit import rig
 from bushfit.errors import FitError
+from bushfit.fitting.data_sets import LoopData
 from bushfit.fitting.drive import drive_of
 from bushfit.fitting.harmonics import MOST_ROWS
-from bushfit.fitting.terms import LoopTerm
 from bushfit.geometry import Direction
-from bushfit.measurement import Loop
-from bushfit.model import Model
+from bushfit.model import rig
+from bushfit.model.model import Model
+from bushfit.reading.measurement import Loop
 
 FREQUENCY, AMPLITUDE = 0.1, 1e-3
 
@@ -89,11 +89,11 @@ def test_turning_points_are_those_of_the_motion(paper_model: Model, case: str) -
 @pytest.mark.parametrize("case", CASES)
 def test_the_true_model_leaves_only_noise(paper_model: Model, case: str) -> None:
     loop = measured(paper_model, **CASES[case])  # type: ignore[arg-type]
-    term = LoopTerm(drive_of(loop))
-    residual = term.residual(paper_model)
+    data_set = LoopData(drive_of(loop))
+    residual = data_set.residual(paper_model)
     reduced = float(residual @ residual) / residual.size
     print(f"{case}: reduced chi-square of the true model {reduced:.3f} over {residual.size} rows")
-    assert term.relative_noise == pytest.approx(3e-3, rel=0.35)
+    assert data_set.relative_noise == pytest.approx(3e-3, rel=0.35)
     assert reduced < 1.0 + 6.0 * np.sqrt(2.0 / residual.size) + 0.1
 
 
@@ -103,7 +103,7 @@ def test_from_rest_the_virgin_curve_is_followed(paper_model: Model) -> None:
     drive = drive_of(loop)
     assert drive.from_rest
     assert not drive.history(settles=False).periodic
-    gap = np.max(np.abs(LoopTerm(drive).force(paper_model) - loop.force)) / drive.half_range
+    gap = np.max(np.abs(LoopData(drive).force(paper_model) - loop.force)) / drive.half_range
     print(f"from rest: model within {gap:.1e} of the record")
     assert gap < 2e-3
     settled = drive_of(measured(paper_model))
@@ -116,7 +116,7 @@ def test_many_rows_are_binned_without_loss(paper_model: Model) -> None:
     assert drive.force.size <= 5 * 1024 + 1
     assert 0.99 * loop.force.size < drive.weight.sum() < loop.force.size  # the turning points carry none
     assert loop.force.size > MOST_ROWS
-    residual = LoopTerm(drive).residual(paper_model)
+    residual = LoopData(drive).residual(paper_model)
     reduced = float(residual @ residual) / residual.size
     print(f"{loop.force.size} rows in {drive.force.size} bins: reduced chi-square {reduced:.3f}")
     assert 0.9 < reduced < 1.15
@@ -131,22 +131,22 @@ def test_first_harmonic_is_the_stiffness_of_the_loop(paper_model: Model) -> None
 
 def test_a_wrong_zero_of_the_load_cell_alone_stays_visible(paper_model: Model) -> None:
     """Only where the displacement is off zero too is the mean force taken for unknown."""
-    term = LoopTerm(drive_of(measured(paper_model, preload=5.0)))
-    assert np.mean(term.drive.force - term.force(paper_model)) == pytest.approx(5.0, abs=0.3)
+    data_set = LoopData(drive_of(measured(paper_model, preload=5.0)))
+    assert np.mean(data_set.drive.force - data_set.force(paper_model)) == pytest.approx(5.0, abs=0.3)
 
 
 def test_jacobian_of_an_offset_loop(paper_model: Model) -> None:
-    term = LoopTerm(drive_of(measured(paper_model, offset=3e-4, preload=40.0)))
+    data_set = LoopData(drive_of(measured(paper_model, offset=3e-4, preload=40.0)))
     names = ("mu", "eps_half")
-    for name, row in zip(names, term.jacobian(paper_model, names), strict=True):
+    for name, row in zip(names, data_set.jacobian(paper_model, names), strict=True):
         value = paper_model.values[name]
-        high, low = (term.residual(paper_model.with_values({name: value * (1.0 + s)})) for s in (1e-5, -1e-5))
+        high, low = (data_set.residual(paper_model.with_values({name: value * (1.0 + s)})) for s in (1e-5, -1e-5))
         np.testing.assert_allclose(row * value, (high - low) / 2e-5, atol=1e-4)
 
 
 def test_stated_noise_is_taken(paper_model: Model) -> None:
-    term = LoopTerm(drive_of(replace(measured(paper_model), noise=0.02)))
-    assert term.relative_noise == pytest.approx(0.02)
+    data_set = LoopData(drive_of(replace(measured(paper_model), noise=0.02)))
+    assert data_set.relative_noise == pytest.approx(0.02)
 
 
 def test_half_a_cycle_is_refused(paper_model: Model) -> None:

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bushfit.campaign import Campaign, load_campaign
+from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.campaign.schema import FitSettings, ParameterSetting, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import STATIC, fit_dynamic, fit_joint, fit_static, fit_two_step
 from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
-from bushfit.model import FIVE, Model
-from bushfit.results import Result
-from bushfit.schema import FitSettings, ParameterSetting, SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.model.model import FIVE, Model
+from bushfit.model.result import Result
 
 Rig = Callable[..., Campaign]
 NAMES = ("paper", "soft and long", "stiff and thin", "strongly filled")
@@ -130,13 +130,13 @@ def test_two_step_errors_are_those_of_300_campaigns(
 def test_100_random_starts_end_at_one_minimum(measured: Data) -> None:
     """Two decades per parameter: a tenth to ten times the answer, alpha over its own range."""
     best = fit_joint(measured)
-    terms, names, rng = measured.chosen(None), list(FIVE), np.random.default_rng(1)
+    data_sets, names, rng = measured.chosen(None), list(FIVE), np.random.default_rng(1)
     ends, costs, evaluations = [], [], []
     for _ in range(100):
         factor = dict(zip(names, 10.0 ** rng.uniform(-1.0, 1.0, 5), strict=True))
         start = {name: best.model.values[name] * factor[name] for name in names}
         start["alpha"] = np.clip(10.0 ** rng.uniform(-2.0, 0.0), *best.model.parameters["alpha"].bounds)
-        solution = solve(best.model.with_values(start), terms, names)
+        solution = solve(best.model.with_values(start), data_sets, names)
         ends.append([solution.model.values[name] for name in names])
         costs.append(solution.chi_square)
         evaluations.append(solution.evaluations)
@@ -160,7 +160,7 @@ def test_start_values_of_the_campaign_do_not_matter(measured: Data, factor: floa
 def test_radial_sweep_follows_from_axial_tests(measured: Data) -> None:
     """The paper's claim: within 3 % in magnitude and 0.01 in loss factor of the means over the repeats."""
     model = fit_joint(measured).model
-    (sweep,) = [term.sweep for term in measured.sweeps if term.direction is Direction.RADIAL]
+    (sweep,) = [data_set.sweep for data_set in measured.sweeps if data_set.direction is Direction.RADIAL]
     gaps = []
     for amplitude in np.unique(sweep.amplitude):
         for frequency in np.unique(sweep.frequency):
@@ -293,11 +293,11 @@ def test_missing_tests_are_said(measured: Data) -> None:
 
 
 def test_axial_tests_are_used_unless_told(measured: Data) -> None:
-    assert {term.direction for term in measured.chosen(None)} == {Direction.AXIAL}
+    assert {data_set.direction for data_set in measured.chosen(None)} == {Direction.AXIAL}
     every = fit_joint(measured, directions=list(Direction))
     assert every.quality.points > fit_joint(measured).quality.points  # type: ignore[union-attr]
     radial = with_tests(measured.campaign, loops=(), sweeps=measured.campaign.sweeps[1:])
-    assert {term.direction for term in radial.chosen(None)} == {Direction.RADIAL}
+    assert {data_set.direction for data_set in radial.chosen(None)} == {Direction.RADIAL}
 
 
 def test_a_fit_leaves_its_input_alone(measured: Data) -> None:

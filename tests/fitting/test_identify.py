@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import pytest
 
-from bushfit.campaign import Campaign
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import FitSettings, ParameterSetting, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
-from bushfit.model import Model
-from bushfit.schema import FitSettings, ParameterSetting, SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.model.model import Model
 
 Rig = Callable[..., Campaign]
 BAND = tuple(float(f) for f in range(5, 156, 10))
@@ -84,7 +84,7 @@ def test_a_span_is_a_reason_only_where_it_is_narrow(
 def test_a_bound_of_the_user_is_named_as_the_user_s(
     rig: Rig, paper_noise: SimulateSettings, paper_model: Model
 ) -> None:
-    bounded = FitSettings({"mu": ParameterSetting(max=1e6)})
+    bounded = FitSettings(parameters={"mu": ParameterSetting(max=1e6)})
     campaign = replace(rig(paper_model, paper_noise, 1), fit=bounded)
     lines = fit_joint(Data.of(campaign)).warnings
     print(*lines, sep="\n")

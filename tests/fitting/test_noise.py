@@ -10,8 +10,8 @@ import pytest
 
 from bushfit.fitting.noise import ASSUMED_SHARED, sweep_noise
 from bushfit.geometry import Direction
-from bushfit.measurement import Sweep
-from bushfit.model import Model
+from bushfit.model.model import Model
+from bushfit.reading.measurement import Sweep
 
 FREQUENCIES = np.arange(5.0, 156.0, 10.0)
 AMPLITUDES = (1e-4, 2e-4, 5e-4)

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import pytest
 
-from bushfit.campaign import Campaign
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
-from bushfit.measurement import Loop, Sweep
-from bushfit.model import Model
-from bushfit.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.model.model import Model
+from bushfit.reading.measurement import Loop, Sweep
 
 BAND = (5.0, 15.0, 45.0, 100.0, 155.0)
 

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bushfit.campaign import Campaign
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import FitSettings, ParameterSetting, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
-from bushfit.model import FIVE, Model
-from bushfit.results import Result
-from bushfit.schema import FitSettings, ParameterSetting, SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.model.model import FIVE, Model
+from bushfit.model.result import Result
 
 SEEDS = 100
 FREQUENCIES = (5.0, 15.0, 45.0, 100.0, 155.0)
@@ -75,9 +75,9 @@ def test_an_end_is_where_chi_square_has_risen_as_far_as_is_allowed(
     rig: Callable[..., Campaign], paper_model: Model, largest: float
 ) -> None:
     data = Data.of(rig(paper_model, replace(plan(largest), loops=()), 3))
-    terms = data.chosen(None)
+    data_sets = data.chosen(None)
     result = profiled(data.campaign)
-    best = solve(result.model, terms, FIVE)
+    best = solve(result.model, data_sets, FIVE)
     linear = np.sqrt(np.diag(np.linalg.inv(best.jacobian @ best.jacobian.T)))
     slopes = best.coordinates.slopes(best.model.values)
     allowed = result.covariance.half_width(np.eye(5)) / slopes / linear
@@ -86,7 +86,7 @@ def test_an_end_is_where_chi_square_has_risen_as_far_as_is_allowed(
         others = [other for other in FIVE if other != name]
         for end in result.profile[name]:
             if end is not None:
-                refit = solve(result.model.with_values({name: end}), terms, others)
+                refit = solve(result.model.with_values({name: end}), data_sets, others)
                 rises[name, end] = (refit.chi_square - best.chi_square) / ratio**2
     print(rises)
     assert len(rises) >= (10 if largest == 1e-3 else 5)
@@ -141,7 +141,7 @@ def test_profiles_are_kept_in_the_document(rig: Callable[..., Campaign], paper_m
 
 def test_a_single_parameter_has_no_profile(rig: Callable[..., Campaign], paper_model: Model) -> None:
     held = {name: ParameterSetting(paper_model.values[name], vary=False) for name in FIVE[1:]}
-    campaign = replace(rig(paper_model, plan(1e-3), 0), fit=FitSettings(held))
+    campaign = replace(rig(paper_model, plan(1e-3), 0), fit=FitSettings(parameters=held))
     with pytest.raises(FitError, match="two parameters or more"):
         profiled(campaign)
 

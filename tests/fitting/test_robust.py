@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bushfit.campaign import Campaign
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import FitSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.fitting.data import Data
 from bushfit.fitting.drive import drive_of
 from bushfit.fitting.harmonics import MOST_ROWS
@@ -16,10 +17,9 @@ from bushfit.fitting.outliers import limit
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, fit_two_step
 from bushfit.fitting.robust import told
 from bushfit.geometry import Direction
-from bushfit.measurement import Loop, Sweep
-from bushfit.model import FIVE, Model
-from bushfit.results import Outlier, Result
-from bushfit.schema import FitSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.model.model import FIVE, Model
+from bushfit.model.result import Outlier, Result
+from bushfit.reading.measurement import Loop, Sweep
 
 Rig = Callable[..., Campaign]
 SHARE = 0.03

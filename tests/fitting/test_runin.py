@@ -11,12 +11,12 @@ import pytest
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
 from bushfit.errors import FitError
+from bushfit.fitting.data_sets import LoopData
 from bushfit.fitting.drive import drive_of
 from bushfit.fitting.runin import steady_part, thinned
-from bushfit.fitting.terms import LoopTerm
 from bushfit.geometry import Direction
-from bushfit.measurement import Loop
-from bushfit.model import Model
+from bushfit.model.model import Model
+from bushfit.reading.measurement import Loop
 
 PERIOD, AMPLITUDE = 10.0, 1e-3
 
@@ -58,8 +58,8 @@ def recorded(model: Model, motion: Array, noise: float = 3e-3) -> Loop:
 def test_the_true_model_leaves_only_noise_of_the_steady_cycles(paper_model: Model, case: str) -> None:
     loop = recorded(paper_model, RUN_INS[case])
     drive = drive_of(loop)
-    term = LoopTerm(drive)
-    gap = float(np.sqrt(np.mean(np.square(term.relative(paper_model)))))
+    data_set = LoopData(drive)
+    gap = float(np.sqrt(np.mean(np.square(data_set.relative(paper_model)))))
     print(f"{case}: {drive.notes}; true model within {100 * gap:.2f} % of half the force range, noise 0.3 %")
     (note,) = drive.notes
     assert "left out" in note

@@ -9,11 +9,12 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
-from bushfit.campaign import load_campaign
+from bushfit.campaign.campaign import load_campaign
 from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
-from bushfit.reading import read_loop, read_sweep
-from bushfit.results import load_result
+from bushfit.model.result import load_result
+from bushfit.reading.loops import read_loop
+from bushfit.reading.sweeps import read_sweep
 
 CORPUS = Path(__file__).with_name("corpus")
 _LONGEST_ERROR = 5000

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from targets import CORPUS, TARGETS, ready
 
-from bushfit.campaign import load_campaign
+from bushfit.campaign.campaign import load_campaign
 from bushfit.errors import BushfitError
-from bushfit.results import load_result
+from bushfit.model.result import load_result
 
 each_target = pytest.mark.parametrize("name", TARGETS)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from looking import plan
 
-from bushfit.measurement import Loop, Sweep
-from bushfit.model import Model
+from bushfit.model.model import Model
+from bushfit.reading.measurement import Loop, Sweep
 from bushfit.simulation import Undisturbed, measure, undisturbed
 
 

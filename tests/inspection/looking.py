@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.geometry import Direction
 from bushfit.inspection.opening import inspect
 from bushfit.inspection.record import Inspected
-from bushfit.measurement import Loop, Sweep
-from bushfit.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
-from bushfit.sheets import raw_loop_table, raw_sweep_table, to_csv
+from bushfit.reading.csvfile import raw_loop_table, raw_sweep_table, to_csv
+from bushfit.reading.measurement import Loop, Sweep
 
 NOISE = {
     "good": {"noise": 1e-3, "force_noise": 5e-4, "displacement_noise": 1e-4},

@@ -12,14 +12,14 @@ import pandas as pd
 import pytest
 from looking import NOISE, SEEDS, look, plan, without
 
+from bushfit.campaign.schema import SimulatedLoop, SimulateSettings
 from bushfit.errors import BushfitError, FitError
 from bushfit.geometry import Direction
 from bushfit.inspection.draft import file_text
 from bushfit.inspection.opening import inspect
-from bushfit.measurement import Loop, Sweep
-from bushfit.model import Model
-from bushfit.schema import SimulatedLoop, SimulateSettings
-from bushfit.sheets import raw_loop_table, raw_sweep_table
+from bushfit.model.model import Model
+from bushfit.reading.csvfile import raw_loop_table, raw_sweep_table
+from bushfit.reading.measurement import Loop, Sweep
 from bushfit.simulation import Undisturbed, measure, undisturbed
 
 
@@ -90,7 +90,7 @@ def test_a_triangle_and_torsion_are_recognised(paper_model: Model, tmp_path: Pat
     test = SimulatedLoop(Direction.TORSION, 0.02, 0.1, cycles=2, waveform="triangle")
     made = measure(undisturbed(paper_model, SimulateSettings(loops=(test,))), SimulateSettings(force_noise=1e-3))
     seen = look(tmp_path, made.loops[0], "x.csv")
-    assert seen.direction is Direction.TORSION
+    assert seen.direction.is_rotation
     assert seen.looked.facts["frequency"] == "0.1 Hz, a triangle"
     assert seen.looked.facts["amplitude"].endswith("deg zero-to-peak")
     assert seen.looked.odd == ()
@@ -312,7 +312,7 @@ def test_rows_of_a_sine_do_not_pass_for_a_triangle(root: Path, tmp_path: Path) -
     """A sine's file without time, of which a rate was stated."""
     from bushfit.geometry import Direction
     from bushfit.inspection.loops import look_at_loop
-    from bushfit.reading import read_loop
+    from bushfit.reading.loops import read_loop
 
     lines = (root / "data/arm_bushing/loop_axial_1.csv").read_text(encoding="utf-8").splitlines()
     file = tmp_path / "loop.csv"

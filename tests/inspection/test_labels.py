@@ -13,8 +13,8 @@ from bushfit.geometry import Direction
 from bushfit.inspection.draft import file_text
 from bushfit.inspection.labels import labelled
 from bushfit.inspection.opening import inspect
-from bushfit.measurement import Loop, Sweep
-from bushfit.sheets import raw_loop_table, to_csv
+from bushfit.reading.csvfile import raw_loop_table, to_csv
+from bushfit.reading.measurement import Loop, Sweep
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def test_labels_are_read_with_their_units() -> None:
     ],
 )
 def test_direction_from_the_name(loop: Loop, tmp_path: Path, name: str, direction: Direction | None) -> None:
-    if direction is Direction.TORSION:
+    if direction and direction.is_rotation:
         table = raw_loop_table(loop).set_axis(["time [s]", "rotation [deg]", "moment [N m]"], axis=1)
         (tmp_path / name).write_bytes(to_csv(table))
         assert inspect(tmp_path / name, {}).direction is direction

@@ -81,7 +81,7 @@ class Problem:
         values = self.starts[start - 1]
         return Curve(values, {name: _parameter(name, values[name], self._is_positive(name)) for name in values})
 
-    def term(self) -> CurveTerm:
+    def data_set(self) -> CurveTerm:
         return CurveTerm(self)
 
     def _is_positive(self, name: str) -> bool:
@@ -96,7 +96,7 @@ def _parameter(name: str, start: float, log: bool) -> Parameter:
 
 @dataclass(frozen=True, eq=False)
 class CurveTerm:
-    """The data of a problem as a term of a fit: residual and Jacobian in units of `noise`."""
+    """The data of a problem as a data set of a fit: residual and Jacobian in units of `noise`."""
 
     problem: Problem
     noise: float = 1.0

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from agreement import Agree, digits
 
-from bushfit import rig
 from bushfit.effects import History
 from bushfit.effects.contract import Array
 from bushfit.effects.springpot import stress
 from bushfit.geometry import Bushing, Direction
-from bushfit.model import Model
+from bushfit.model import rig
+from bushfit.model.model import Model
 
 ALPHAS = (0.1, 0.24, 0.5, 0.9)
 STEPS = 2048

@@ -27,7 +27,7 @@ def fitted(problem: Problem, start: int, tolerance: float | None = None) -> Solu
     names = tuple(problem.certified)
     stop = {} if tolerance is None else {"tolerance": tolerance}
     with np.errstate(over="ignore", invalid="ignore"):  # some starts lead astray before they lead home
-        return solve(problem.curve(start), [problem.term()], names, evaluations=1000, **stop)
+        return solve(problem.curve(start), [problem.data_set()], names, evaluations=1000, **stop)
 
 
 def test_the_files_are_whole() -> None:
@@ -53,7 +53,7 @@ def test_certified_values_from_both_starts(agree: Agree) -> None:
         solution = fitted(problem, start, FINEST)
         found = np.array([solution.model.values[name] for name in names])
         scatter = math.sqrt(solution.chi_square / (problem.response.size - len(names)))
-        cov = covariance(solution.model, [Stage(names, [replace(problem.term(), noise=scatter)])])
+        cov = covariance(solution.model, [Stage(names, [replace(problem.data_set(), noise=scatter)])])
         default[at], values[at] = digits(coarse, certified), digits(found, certified)
         apart[at] = np.max(np.abs(coarse - certified) / stderr)
         errors[at] = digits([cov.stderr(name) for name in names], stderr)
@@ -76,7 +76,7 @@ def test_what_is_not_solved_has_an_error_beyond_all_values(name: str, start: int
     problem = next(problem for problem in PROBLEMS if problem.name == name)
     names = tuple(problem.certified)
     solution = fitted(problem, start)
-    cov = covariance(solution.model, [Stage(names, [problem.term()])])
+    cov = covariance(solution.model, [Stage(names, [problem.data_set()])])
     relative = {each: cov.stderr(each) / abs(solution.model.values[each]) for each in names}
     print(f"{name}, start {start}: {relative}")
     assert max(relative.values()) > 100.0

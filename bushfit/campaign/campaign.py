@@ -1,0 +1,97 @@
+"""Campaign files: TOML -> Campaign, in SI, with every measurement read."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from bushfit.campaign.naming import folder_name
+from bushfit.campaign.schema import CampaignFile, FitSettings, LoopFile, PredictSettings, SimulateSettings, SweepFile
+from bushfit.campaign.toml import read_toml
+from bushfit.errors import CampaignError, ModelError
+from bushfit.geometry import Bushing
+from bushfit.reading.layout import FileFormat
+from bushfit.reading.loops import read_loop
+from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.sweeps import read_sweep
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """One bushing, its tests, and what to do with them.
+
+    Args:
+        name: of the campaign; default the name of the bushing.
+        path: the campaign file.
+        bushing: geometry [m].
+        loops, sweeps: the measurements, SI.
+        fit, predict: settings, SI; their defaults where the file has none.
+        simulate: settings, SI; None where the file has none.
+    """
+
+    name: str
+    path: Path
+    bushing: Bushing
+    loops: tuple[Loop, ...] = ()
+    sweeps: tuple[Sweep, ...] = ()
+    fit: FitSettings = field(default_factory=FitSettings)
+    predict: PredictSettings = field(default_factory=PredictSettings)
+    simulate: SimulateSettings | None = None
+
+    @property
+    def slug(self) -> str:
+        """The name as that of one folder; it never leads out of the folder it is put in."""
+        return folder_name(self.name)
+
+
+def load_campaign(path: str | Path) -> Campaign:
+    """Read a campaign file and the measurements that it names, each once.
+
+    Raises:
+        CampaignError: the file is missing, no TOML, or has keys or values that are not understood.
+        UnitError: a quantity without a unit, or with one that does not fit.
+        ModelError: an impossible bushing.
+        MeasurementError: a measurement that cannot be used.
+    """
+    path = Path(path)
+    content = read_toml(path, CampaignFile)
+    if not (content.loops or content.sweeps or content.simulate):
+        raise CampaignError(
+            "the campaign has no tests",
+            file=path,
+            expected="[[loops]] or [[sweeps]] tables, or a [simulate] table",
+            hint='add [[loops]] with file = "..." and direction = "axial"',
+        )
+    try:
+        bushing = Bushing(**vars(content.bushing))
+    except ModelError as error:
+        error.file = path
+        raise
+    return Campaign(
+        content.name or bushing.name,
+        path,
+        bushing,
+        tuple(read_loop(**keywords) for keywords in reader_keywords(path, content.loops)),
+        tuple(read_sweep(**keywords) for keywords in reader_keywords(path, content.sweeps)),
+        content.fit,
+        content.predict,
+        content.simulate,
+    )
+
+
+def reader_keywords(campaign: Path, tests: Sequence[LoopFile | SweepFile]) -> Iterator[dict[str, Any]]:
+    """The reader's keywords for each file; it is named by its stem, or as the campaign lists it where stems agree."""
+    stems = [Path(test.file).stem for test in tests]
+    seen = set()
+    for test, stem in zip(tests, stems, strict=True):
+        file = campaign.parent / test.file
+        if (place := os.path.normpath(file)) in seen:
+            raise CampaignError("a file is listed twice", file=campaign, found=test.file, expected="each file once")
+        seen.add(place)
+        stated = {key: value for key, value in vars(test).items() if value is not None}
+        written = FileFormat(**{entry.name: stated.pop(entry.name, None) for entry in fields(FileFormat)})
+        name = stem if stems.count(stem) == 1 else test.file
+        yield {**stated, "file": file, "name": name, "listed_as": Path(test.file), "written": written}

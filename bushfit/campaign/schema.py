@@ -1,0 +1,295 @@
+"""The tables of a campaign file, key by key: pydantic checks them, quantities become SI."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo
+
+from bushfit.errors import BushfitError, CampaignError
+from bushfit.geometry import Direction
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
+from bushfit.reading.layout import FileFormat
+from bushfit.reading.measurement import Waveform
+from bushfit.units import quantity
+from bushfit.validation import Name, Text, converted, known_keys, standing_in_table, unknown_key
+
+Residuals = Literal["complex", "magnitude_loss_factor"]
+Loss = Literal["linear", "soft_l1"]
+
+_LARGEST_GRID = 100_000
+_LARGEST_NUMBER = 1e100
+#: One error of a list is enough: a hundred thousand would fill the memory.
+_FIRST_ERROR = Field(fail_fast=True)
+_S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
+
+
+def _si(*units: str) -> BeforeValidator:
+    return converted(lambda raw, _: quantity(raw, *units))
+
+
+def _displacement(raw: object, info: ValidationInfo) -> float:
+    """A displacement [m], or a rotation [rad] in a table with direction = "torsion"."""
+    return quantity(raw, info.data.get("direction", Direction.AXIAL).motion.displacement_unit)
+
+
+def _speed(raw: object, info: ValidationInfo) -> float:
+    return quantity(raw, info.data.get("direction", Direction.AXIAL).motion.displacement_unit + "/s")
+
+
+def _frequencies(raw: object, _: ValidationInfo) -> object:
+    """Frequencies [Hz] from a list, or from { start, stop, step } with both ends."""
+    if not isinstance(raw, dict):
+        return raw
+    expected = '{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }, or a list such as ["5 Hz", "15 Hz"]'
+    if set(raw) != {"start", "stop", "step"}:
+        raise CampaignError("this is no range of frequencies", found=str(raw), expected=expected)
+    start, stop, step = (quantity(raw[key], "Hz") for key in ("start", "stop", "step"))
+    if not (0.0 < start <= stop and step > 0.0 and (stop - start) / step < _LARGEST_GRID):
+        raise CampaignError("this is no range of frequencies", found=str(raw), expected="0 < start <= stop, step > 0")
+    count = int((stop - start) / step * (1.0 + 1e-9)) + 1
+    return [f"{value!r} Hz" for value in (start + step * np.arange(count)).tolist()]
+
+
+@cache
+def _parameter_units() -> dict[str, str]:
+    """SI unit of each parameter of the library by name; the s^alpha of m is left out."""
+    from bushfit.effects import LIBRARY, qualified
+
+    return {
+        qualified(effect, parameter): _S_TO_ALPHA.sub("", parameter.unit)
+        for effect in LIBRARY.values()
+        for parameter in effect.parameters
+    }
+
+
+def _parameter(name: str, raw: Any) -> float:
+    """The SI value of a model parameter; ratios, and parameters of added effects, may be plain numbers."""
+    units = _parameter_units()
+    if name not in units:
+        raise unknown_key(name, units)
+    is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
+    if is_number and (units[name] == "1" or "." in name) and abs(raw) <= _LARGEST_NUMBER:
+        return float(raw)
+    return quantity(_S_TO_ALPHA.sub("", raw) if name == "m" and isinstance(raw, str) else raw, units[name])
+
+
+def parameter_value(place: str, name: str, raw: object) -> float:
+    """The SI value of a model parameter by its name in files; an error names the place."""
+    try:
+        return _parameter(name, raw)
+    except BushfitError as error:
+        error.place = place
+        raise
+
+
+def _parameters(raw: object, _: ValidationInfo) -> object:
+    return {name: parameter_value(name, name, value) for name, value in raw.items()} if isinstance(raw, dict) else raw
+
+
+def _effects(raw: object, _: ValidationInfo) -> object:
+    """Parameters by effect, in SI."""
+    if not isinstance(raw, dict):
+        return raw
+    return {
+        effect: {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in table.items()}
+        if isinstance(table, dict)
+        else table
+        for effect, table in raw.items()
+    }
+
+
+def _parameter_settings(raw: object, _: ValidationInfo) -> object:
+    """Tables of value, min, max and vary, by parameter, with the first three in SI."""
+    if not isinstance(raw, dict):
+        return raw
+    settings = {}
+    for name, table in raw.items():
+        if isinstance(table, dict):
+            given = [key for key in ("min", "value", "max") if key in table]
+            numbers = {key: parameter_value(f"{name}.{key}", name, table[key]) for key in given}
+            ordered = list(numbers.values())
+            if ordered != sorted(ordered) or numbers.get("min", -np.inf) == numbers.get("max", np.inf):
+                expected = "min below max, and value between them"
+                raise CampaignError("these limits hold no value", place=name, found=str(table), expected=expected)
+            table = {**table, **numbers}
+        settings[name] = table
+    return settings
+
+
+def _fit_table(raw: object, _: ValidationInfo) -> object:
+    """Gather [fit.mu], [fit."inertia.mass"] and the like under one key."""
+    if not isinstance(raw, dict):
+        return raw
+    if "parameters" in raw:
+        raise unknown_key("parameters", known_keys(FitSettings))
+    settings = {key: value for key, value in raw.items() if key not in _parameter_units()}
+    return {**settings, "parameters": {key: value for key, value in raw.items() if key not in settings}}
+
+
+def _roles(known: Collection[str]) -> BeforeValidator:
+    def check_keys(raw: object, _: ValidationInfo) -> object:
+        for role in raw if isinstance(raw, dict) else ():
+            if role not in known:
+                raise unknown_key(role, known)
+        return raw
+
+    return converted(check_keys)
+
+
+Length = Annotated[float, _si("m"), Field(gt=0)]
+Angle = Annotated[float, _si("rad"), Field(gt=0)]
+Frequency = Annotated[float, _si("Hz"), Field(gt=0)]
+Frequencies = Annotated[tuple[Frequency, ...], _FIRST_ERROR, converted(_frequencies), Field(min_length=1)]
+Displacement = Annotated[float, converted(_displacement), Field(gt=0)]
+Share = Annotated[float, _si("1"), Field(ge=0, lt=1)]
+Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
+
+
+@dataclass(frozen=True)
+class BushingTable:
+    """[bushing]: geometry [m]."""
+
+    name: Name
+    inner_radius: Length
+    outer_radius: Length
+    length: Length
+
+
+@dataclass(frozen=True)
+class LoopFile(FileFormat):
+    """[[loops]]: a file and what it does not say itself. See reading.read_loop."""
+
+    file: Text
+    direction: Direction
+    columns: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS)] = field(default_factory=dict)
+    units: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS)] = field(default_factory=dict)
+    force_sign: Literal[1, -1] = 1
+    rate: Annotated[float, converted(_speed), Field(gt=0)] | None = None
+    frequency: Frequency | None = None
+    waveform: Waveform | None = None
+    noise: Share | None = None
+
+    def __post_init__(self) -> None:
+        if (self.frequency is None) != (self.waveform is None) or (self.rate and self.frequency):
+            raise ValueError(
+                CampaignError(
+                    "these keys do not settle the time of a loop",
+                    found=", ".join(key for key in ("rate", "frequency", "waveform") if getattr(self, key)),
+                    expected='rate, or frequency and waveform ("sine" or "triangle") together',
+                )
+            )
+
+
+@dataclass(frozen=True)
+class SweepFile(FileFormat):
+    """[[sweeps]]: a file and what it does not say itself. See reading.read_sweep."""
+
+    file: Text
+    direction: Direction
+    columns: Annotated[Mapping[str, Text], _roles(SWEEP_COLUMNS)] = field(default_factory=dict)
+    units: Annotated[Mapping[str, Text], _roles(SWEEP_COLUMNS)] = field(default_factory=dict)
+    amplitude: AmplitudeConvention | None = None
+    noise: Share | None = None
+
+
+@dataclass(frozen=True)
+class ParameterSetting:
+    """[fit.<parameter>]: start value and bounds [SI], None where the fit chooses; vary = False holds the value."""
+
+    value: float | None = None
+    min: float | None = None
+    max: float | None = None
+    vary: Annotated[bool, Field(strict=True)] = True
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """[fit]: settings by parameter; amplitudes [m or rad] that fit-dynamic uses, none for the smallest; residuals; and
+    the loss: squares, or soft_l1 with wild points left out."""
+
+    dynamic_amplitudes: Annotated[tuple[Annotated[float, _si("m", "rad"), Field(gt=0)], ...], _FIRST_ERROR] = ()
+    residuals: Residuals = "complex"
+    loss: Loss = "linear"
+    parameters: Annotated[Mapping[str, ParameterSetting], converted(_parameter_settings)] = field(
+        default_factory=dict, metadata=standing_in_table(_parameter_units)
+    )
+
+
+@dataclass(frozen=True)
+class PredictSettings:
+    """[predict]: frequencies [Hz], amplitudes [m], rotation amplitudes [rad] and directions; None for the default."""
+
+    frequencies: Frequencies | None = None
+    amplitudes: Annotated[tuple[Length, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
+    torsion_amplitudes: Annotated[tuple[Angle, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
+    directions: Annotated[tuple[Direction, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
+
+
+@dataclass(frozen=True)
+class SimulatedLoop:
+    """[[simulate.loops]]: zero-to-peak amplitude [m or rad], frequency [Hz], cycles and waveform."""
+
+    direction: Direction
+    amplitude: Displacement
+    frequency: Frequency
+    cycles: Count = 3
+    waveform: Waveform = "sine"
+
+
+@dataclass(frozen=True)
+class SimulatedSweep:
+    """[[simulate.sweeps]]: zero-to-peak amplitudes [m or rad] and frequencies [Hz], all combinations."""
+
+    direction: Direction
+    amplitudes: Annotated[tuple[Displacement, ...], _FIRST_ERROR, Field(min_length=1)]
+    frequencies: Frequencies
+
+
+@dataclass(frozen=True)
+class SimulateSettings:
+    """[simulate]: what the virtual rig tests, and how well it measures.
+
+    Args:
+        parameters: values by name [SI].
+        effects: added effects, each with the values of its parameters [SI].
+        seed: of the random numbers.
+        repeats: of each sweep.
+        noise: standard deviation of a sweep point's real and imaginary part, relative to |K|.
+        force_noise, displacement_noise: standard deviation of a loop's samples, relative to the amplitude.
+        gain_error: standard deviation of the gain of a block (one repeat of one sweep).
+        phase_error: standard deviation of the phase of a block [rad].
+        loops, sweeps: the tests; empty for the rig's own choice.
+    """
+
+    parameters: Annotated[Mapping[str, float], converted(_parameters)] = field(default_factory=dict)
+    effects: Annotated[Mapping[str, Mapping[str, float]], converted(_effects)] = field(default_factory=dict)
+    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+    repeats: Count = 1
+    noise: Share = 0.0
+    force_noise: Share = 0.0
+    displacement_noise: Share = 0.0
+    gain_error: Share = 0.0
+    phase_error: Annotated[float, _si("rad"), Field(ge=0)] = 0.0
+    loops: tuple[SimulatedLoop, ...] = ()
+    sweeps: tuple[SimulatedSweep, ...] = ()
+
+
+@dataclass(frozen=True)
+class CampaignFile:
+    """A whole campaign file."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
+    bushing: BushingTable
+    name: Name | None = None
+    loops: tuple[LoopFile, ...] = ()
+    sweeps: tuple[SweepFile, ...] = ()
+    fit: Annotated[FitSettings, converted(_fit_table)] = field(default_factory=FitSettings)
+    predict: PredictSettings = field(default_factory=PredictSettings)
+    simulate: SimulateSettings | None = None

@@ -1,0 +1,64 @@
+"""TOML files of the user's: parsed, and checked against a schema."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any, TypeVar
+
+from bushfit.errors import CampaignError
+from bushfit.reading.files import read_utf8
+from bushfit.validation import check_tables
+
+T = TypeVar("T")
+
+_LARGEST_BYTES = 1_000_000
+#: A key of many parts costs the parser the square of their number.
+_DEEP_KEY = re.compile(rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}""")
+
+
+def read_toml(path: Path, schema: type[T], *, what: str = "a campaign file", largest: int = _LARGEST_BYTES) -> T:
+    """The content of a TOML file as the dataclass `schema`, all quantities in SI.
+
+    Args:
+        path: the file.
+        schema: a pydantic dataclass, or one of its tables; unknown keys are refused.
+        what: the file in words, for errors.
+        largest: refuse more bytes than this.
+
+    Raises:
+        CampaignError: the file is missing, too large, no TOML, or has keys or values that are not understood.
+        UnitError: a quantity without a unit, or with one that does not fit.
+    """
+    return check_tables(_parse(path, what, largest), path, schema)
+
+
+def _parse(path: Path, what: str, largest: int) -> dict[str, Any]:
+    data = read_utf8(path, CampaignError, largest=largest, hint=f"give {what}, not a measurement")
+    if chain := _DEEP_KEY.search(data):
+        line = data.count(b"\n", 0, chain.start()) + 1
+        raise _too_deep(path, f"line {line}")
+    try:
+        tables = tomllib.loads(data.decode("utf-8-sig"))
+        repr(tables)  # an error may have to quote any part of it
+    except ValueError as error:
+        reason = re.fullmatch(r"(?P<problem>.*) \(at (?P<place>.*)\)", str(error), re.DOTALL)
+        raise CampaignError(
+            "this is not valid TOML",
+            file=path,
+            place=reason["place"] if reason else None,
+            found=reason["problem"] if reason else "a whole number of thousands of digits",
+            expected='lines such as length = "34 mm"',
+            hint="put texts and quantities in quotes",
+        ) from error
+    except RecursionError:
+        tables = None
+    if tables is None:  # outside of `except`: an error of a thousand frames cannot be pickled
+        raise _too_deep(path, None)
+    return tables
+
+
+def _too_deep(file: Path, place: str | None) -> CampaignError:
+    expected = "keys of a few parts, such as simulate.effects.inertia.mass"
+    return CampaignError("the tables are nested too deeply", file=file, place=place, expected=expected)

@@ -1,0 +1,116 @@
+"""Which effect is missing: every effect of the library proposes itself with evidence.
+
+A score test ranks them all: residuals projected on the candidate's sensitivity beside the model's own parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.score_test import SENSITIVITY_LEFT, ScoreTest
+from bushfit.effects import LIBRARY, Effect, Parameter, qualified
+from bushfit.effects.contract import Array
+from bushfit.fitting.data_sets import DataSet
+from bushfit.model.model import Model
+
+#: Values tried of a shape parameter.
+_PROBES = 5
+#: Amount at which a sensitivity is taken, relative to the typical one.
+_STEP = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """One effect's claim before any refit.
+
+    Args:
+        name: the effect.
+        model: the model with the effect in its best shape, at no amount yet, but what has a logarithm as suggested.
+        score: what it would take off chi-square if everything were linear.
+        column: its sensitivity, whitened, (n,).
+        sense: +1 where only positive amounts are physical, 0 where both signs are.
+        visible: whether these tests could show the effect at all, beside the model's own parameters.
+    """
+
+    name: str
+    model: Model
+    score: float
+    column: Array
+    sense: int
+    visible: bool
+
+
+def proposals(evidence: Evidence, excluded: Collection[str]) -> list[Proposal]:
+    """Every effect of the library that is not yet in the model, in its best shape, best score first."""
+    asked = [effect for name, effect in LIBRARY.items() if name not in (*evidence.model.effects, *excluded)]
+    probed = [_probed(evidence, effect) for effect in asked]
+    ends = np.cumsum([0, *(len(columns) for _, columns in probed)])
+    every = np.concatenate([np.empty((0, evidence.residual.size)), *(columns for _, columns in probed)])
+    questions = ScoreTest(evidence, every, list(np.arange(len(every))[:, None]), SENSITIVITY_LEFT)
+    amounts, gains, sizes = np.ravel(questions.answers()), np.array(questions.gains()), questions.sizes
+    found = []
+    for effect, (shapes, columns), first, last in zip(asked, probed, ends[:-1], ends[1:], strict=True):
+        amount = _amount(effect)
+        sense = 1 if amount.neutral == amount.bounds[0] else 0
+        scores = np.where((amounts[first:last] > 0.0) | (sense == 0), gains[first:last], 0.0)
+        best = int(np.argmax(scores))
+        suggested = float(np.clip(amounts[first + best] * amount.typical, *amount.bounds))
+        shape = shapes[best] | ({qualified(effect, amount): suggested} if amount.log else {})
+        model = evidence.model.with_effect(effect.name, shape)
+        visible = sizes[first + best] > 0
+        found.append(Proposal(effect.name, model, float(scores[best]), columns[best], sense, visible))
+    return sorted(found, key=lambda proposal: -proposal.score)
+
+
+def _amount(effect: Effect) -> Parameter:
+    """The parameter whose neutral value makes the effect vanish."""
+    return next(parameter for parameter in effect.parameters if parameter.neutral is not None)
+
+
+def _probed(evidence: Evidence, effect: Effect) -> tuple[list[dict[str, float]], Array]:
+    """Shapes of an effect on a grid that the tests suggest, and its whitened sensitivity at next to no amount."""
+    model = evidence.model.with_effect(effect.name)
+    axes = {
+        qualified(effect, parameter): _probes(evidence.data_sets, model, parameter)
+        for parameter in effect.parameters
+        if parameter.neutral is None
+    }
+    shapes = [dict(zip(axes, point, strict=True)) for point in product(*axes.values())]
+    amount = _amount(effect)
+    little = np.full((len(shapes), 1), model.values[qualified(effect, amount)] + _STEP * amount.typical)
+    grids = {name: np.array([[shape[name]] for shape in shapes]) for name in axes}
+    values = {**model.values, **grids, qualified(effect, amount): little}
+    answers = [
+        np.broadcast_to(data_set.residual(model, values), (len(shapes), data_set.size))
+        for data_set in evidence.data_sets
+    ]
+    return shapes, (np.concatenate(answers, axis=-1) - evidence.residual) / _STEP
+
+
+def _probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> Array:
+    frequencies = np.concatenate([data_set.frequency for data_set in data_sets])
+    match parameter.scale:
+        case "period":
+            low, high = 0.1 / (2.0 * np.pi * frequencies.max()), 2.0 / (2.0 * np.pi * np.median(frequencies))
+        case "frequency":
+            low, high = 0.7 * frequencies.max(), 4.0 * frequencies.max()
+        case "displacement":
+            low, high = stroke(data_sets)
+        case "strain":
+            strains = [data_set.amplitude * model.bushing.unit_strain(data_set.direction) for data_set in data_sets]
+            low = 0.03 * np.concatenate(strains).min()
+            high = max(0.5 * model.values.get("eps_half", np.concatenate(strains).max()), low)
+        case None:
+            return np.array([parameter.typical])
+    return np.clip(np.geomspace(low, high, _PROBES), *parameter.bounds)
+
+
+def stroke(data_sets: Sequence[DataSet]) -> tuple[float, float]:
+    """Displacements that some test reaches and some test just misses [m]."""
+    amplitudes = np.concatenate([data_set.amplitude for data_set in data_sets])
+    return 0.8 * float(amplitudes.min()), 0.95 * float(amplitudes.max())

@@ -1,0 +1,128 @@
+"""How large a gain noise alone makes: a parametric bootstrap in the space of the questions asked.
+
+A question is a group of columns in residual space that one answer would use together: a candidate's sensitivity, a
+fault's pattern, smooth contrasts. Noise is drawn as the campaign has it: independent residuals, and blocks whose
+shared variance was itself estimated from a few repeats, which makes the tails of what acts on whole blocks heavier.
+Only the columns' inner products enter, so thousands of draws cost one small matrix product; the underlying draws
+depend on their number alone and are kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.effects.contract import Array
+
+DRAWS = 4000
+_SEED = 20260101
+#: Share of a unit column that must be left beside the model's own parameters: of a candidate's sensitivity, and of a
+#: pattern, of which what little remains would be the curvature of the model and the grid of the computation.
+SENSITIVITY_LEFT, PATTERN_LEFT = 1e-4, 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class ScoreTest:
+    """Groups of columns, asked of one fitted model.
+
+    Args:
+        evidence: the fitted model.
+        columns: whitened residuals that a unit of each answer would make, (c, n).
+        groups: indices of the columns that each question uses together.
+        least: share of a unit column that must be left beside the model's own parameters.
+    """
+
+    evidence: Evidence
+    columns: Array
+    groups: Sequence[Array]
+    least: float
+
+    @cached_property
+    def _lengths(self) -> Array:
+        lengths = np.linalg.norm(self.columns, axis=1)
+        return np.where(lengths > 0.0, lengths, 1.0)
+
+    @cached_property
+    def _left(self) -> Array:
+        """Unit columns less what the model's own parameters absorb."""
+        return self.evidence.beside(self.columns / self._lengths[:, None])
+
+    @cached_property
+    def _roots(self) -> list[Array]:
+        """Per question a matrix that makes its columns orthonormal, those all but absorbed dropped, (k, r)."""
+        gram = self._left @ self._left.T
+        roots = []
+        for group in self.groups:
+            size, vectors = np.linalg.eigh(gram[np.ix_(group, group)])
+            kept = size > self.least**2
+            roots.append(vectors[:, kept] / np.sqrt(size[kept]))
+        return roots
+
+    @property
+    def sizes(self) -> list[int]:
+        """Number of columns of each question that are visible."""
+        return [root.shape[1] for root in self._roots]
+
+    def gains(self) -> list[float]:
+        """What each question would take off chi-square."""
+        amounts = self._left @ self.evidence.residual
+        pairs = zip(self.groups, self._roots, strict=True)
+        return [float(np.sum(np.square(amounts[group] @ root))) for group, root in pairs]
+
+    def answers(self) -> list[Array]:
+        """Least-squares amounts of each question's columns, in their own units; 0 for what is not visible."""
+        amounts = self._left @ self.evidence.residual
+        pairs = zip(self.groups, self._roots, strict=True)
+        return [-(root @ (root.T @ amounts[group])) / self._lengths[group] for group, root in pairs]
+
+    def largest_by_chance(self, level: float, senses: Sequence[int] | None = None) -> float:
+        """The gain that the best question exceeds by chance with probability 1 - level.
+
+        Args:
+            level: probability, such as 0.995.
+            senses: per question +1 where only positive answers are physical, 0 where both signs are.
+        """
+        drawn = _draw(self.evidence, self._left)
+        best = np.zeros(DRAWS)
+        for number, (group, root) in enumerate(zip(self.groups, self._roots, strict=True)):
+            if not root.size:
+                continue
+            amounts = root.T @ drawn[group]
+            if senses is not None and senses[number]:
+                amounts = np.maximum(-senses[number] * np.sign(root[0, 0]) * amounts, 0.0)
+            best = np.maximum(best, np.sum(np.square(amounts), axis=0))
+        return float(np.quantile(best, level)) if best.any() else np.inf
+
+
+def _draw(evidence: Evidence, rows: Array) -> Array:
+    """Amounts of noise along rows, (c, DRAWS)."""
+    blocks = evidence.blocks
+    shared = (
+        np.stack([rows[:, block].sum(axis=1) / np.sqrt(block.size) for block in blocks], axis=1) if blocks else None
+    )
+    rest = rows @ rows.T
+    amounts = np.zeros((rows.shape[0], DRAWS))
+    if shared is not None:
+        rest = rest - shared @ shared.T
+        scale = np.ones(DRAWS)
+        if evidence.shared_freedom:
+            scale = np.sqrt(evidence.shared_freedom / _chi_squares(evidence.shared_freedom))
+        amounts += (shared @ _normals(shared.shape[1], 0)) * scale
+    size, vectors = np.linalg.eigh(rest)
+    root = vectors * np.sqrt(np.maximum(size, 0.0))
+    kept = size > 1e-10 * max(float(size.max()), 1e-300)
+    return amounts + root[:, kept] @ _normals(int(kept.sum()), 1)
+
+
+@lru_cache(maxsize=32)
+def _normals(rows: int, stream: int) -> Array:
+    return np.random.default_rng([_SEED, stream]).standard_normal((rows, DRAWS))
+
+
+@lru_cache(maxsize=32)
+def _chi_squares(freedom: int) -> Array:
+    return np.random.default_rng([_SEED, 2]).chisquare(freedom, DRAWS)

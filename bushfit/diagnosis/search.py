@@ -1,0 +1,227 @@
+"""The workflow: detect, name, add, refit, hold out, and say what is certain and what is not.
+
+Nowhere does it ask for an effect by name: effects propose themselves with evidence, and evidence decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from bushfit.diagnosis.evidence import Evidence, begun, fit
+from bushfit.diagnosis.propose import Proposal, proposals
+from bushfit.diagnosis.record import Settings
+from bushfit.diagnosis.refit import PLAIN, Candidate, hopeful, race
+from bushfit.diagnosis.score_test import SENSITIVITY_LEFT, ScoreTest
+from bushfit.errors import FitError, ModelError
+from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.solve import Bounds
+
+#: Probability with which noise alone stays below the threshold of the best candidate.
+_LEVEL = 0.995
+#: Candidates within this of the best by BIC are one set; a rival must stay this far by chi-square to be excluded.
+SAME, APART = 6.0, 10.0
+#: A richer rival that meets a simpler model's prediction this closely contains it.
+_CONTAINS = 1.0
+_MOST_SWAPS = 4
+#: Reduced chi-square beyond which the values of the model as it came are no place to start from.
+_BENT = 1.5
+#: Candidates that are refitted in each round at most, the best scores first, and the share of the best that they need.
+_REFITTED, _PROMISING = 6, 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One effect of the model.
+
+    Args:
+        name: the effect.
+        gain: chi-square that it takes off, all others refitted without it.
+        rivals: candidates in its place that these tests cannot tell from it.
+        richer: candidates that contain it as a limit.
+        tried: best refit of every candidate in its place.
+    """
+
+    name: str
+    gain: float
+    rivals: tuple[Candidate, ...]
+    richer: tuple[Candidate, ...]
+    tried: tuple[Candidate, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """A refitted model, every effect's claim on it, and the best claims refitted, best by BIC first."""
+
+    evidence: Evidence
+    proposed: tuple[Proposal, ...]
+    tried: tuple[Candidate, ...]
+
+    @cached_property
+    def critical(self) -> float:
+        """The gain that noise alone exceeds with probability 1 - _LEVEL."""
+        return critical_gain(self.evidence, self.proposed)
+
+    @property
+    def best(self) -> Candidate | None:
+        return self.tried[0] if self.tried else None
+
+    @property
+    def real(self) -> Candidate | None:
+        """The best candidate, where it is more than chance and more than its price."""
+        best = self.best
+        worth = best is not None and self.evidence.bic - best.evidence.bic > SAME and best.gain > self.critical
+        return best if worth else None
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """The search for effects on one campaign.
+
+    Args:
+        settings: of the user.
+        start: values of the paper's parameters read off the data.
+        held: parameters the campaign holds.
+        bounds: limits the campaign sets.
+        rounds: per set of added effects the refitted model and what every effect says of it.
+    """
+
+    settings: Settings
+    start: Mapping[str, float]
+    held: tuple[str, ...]
+    bounds: Bounds
+    rounds: dict[frozenset[str], Round] = field(default_factory=dict)
+
+    @classmethod
+    def begin(
+        cls, base: Evidence, settings: Settings, start: Mapping[str, float], held: Sequence[str], bounds: Bounds
+    ) -> Search:
+        """Ask every effect of the library, and refit the best."""
+        search = cls(settings, start, tuple(held), bounds)
+        search._round(base, ())
+        return search
+
+    @property
+    def first(self) -> Round:
+        """What every effect says of the model as it came, refitted."""
+        return self.rounds[frozenset()]
+
+    @property
+    def base(self) -> Evidence:
+        """The model as it came, refitted."""
+        return self.first.evidence
+
+    def _round(self, evidence: Evidence, added: Sequence[str], known: Sequence[Candidate] = ()) -> Round:
+        """Ask every effect that is not there, and refit the best but those known already.
+
+        A model that lacks something large has bent its own parameters to make up for it; the way back is long, and
+        shorter from the start values read off the data.
+        """
+        key = frozenset(added)
+        if key not in self.rounds:
+            proposed = tuple(proposals(evidence, (*self.settings.without, *added)))
+            least = max(evidence.penalty / 2.0, _PROMISING * max((claim.score for claim in proposed), default=0.0))
+            fitted = {candidate.name for candidate in known}
+            best = [claim for claim in proposed[:_REFITTED] if claim.score > least and claim.name not in fitted]
+            start = self.start if not added and evidence.reduced > _BENT else {}
+            tried = race(evidence, best, known, start, self.held, self.bounds)
+            self.rounds[key] = Round(evidence, proposed, tuple(tried))
+        return self.rounds[key]
+
+    def grow(self) -> tuple[Evidence, list[str]]:
+        """Add the best effect, look again, and stop when what is left is chance or too small to matter."""
+        current, added = self.base, list[str]()
+        while len(added) < self.settings.max_effects:
+            best = self._round(current, added).real
+            if best is None or not self._large(current, best):
+                break
+            current, added = best.evidence, [*added, best.name]
+        return current, added
+
+    def _large(self, current: Evidence, best: Candidate) -> bool:
+        return footprint(current, best.evidence) > self.settings.tolerance
+
+    def trace(self) -> Candidate | None:
+        """The best candidate on the base model where it is real but too small to matter."""
+        best = self.first.real
+        return None if best is None or self._large(self.base, best) else best
+
+    def reconsider(self, current: Evidence, added: Sequence[str]) -> tuple[Evidence, list[Step]]:
+        """Try every added effect's rivals in its place, and dropping it; swap where that is better."""
+        names = list(added)
+        steps: list[Step] = []
+        for swaps_left in range(_MOST_SWAPS, -1, -1):
+            steps, swapped = [], False
+            for name in names:
+                others = [other for other in names if other != name]
+                place = self._place(current, name, others)
+                best, reduced = place.best, place.evidence
+                if swaps_left and best and best.name != name and best.evidence.bic < current.bic - 1e-6:
+                    names[names.index(name)] = best.name
+                    current, swapped = best.evidence, True
+                    break
+                if swaps_left and reduced.bic - current.bic < SAME and others:
+                    names.remove(name)
+                    current, swapped = reduced, True
+                    break
+                steps.append(self._step(name, current, place))
+            if not swapped:
+                break
+        return current, steps
+
+    def _step(self, name: str, current: Evidence, place: Round) -> Step:
+        """Sort an effect's rivals: those these tests cannot tell from it, and those that contain it.
+
+        A rival is the same within SAME by BIC, or nearer than APART to the model's own noise-free prediction. A richer
+        one that meets this prediction contains the model: then the simpler name stands.
+        """
+        rivals, richer = [], []
+        clean = [data_set.noise_free(current.model) for data_set in current.data_sets]
+        for rival in place.tried:
+            if rival.name == name or rival.evidence.chi_square - current.chi_square > PLAIN:
+                continue
+            distance = self._distance(clean, rival)
+            if distance < _CONTAINS and rival.evidence.parameters > current.parameters:
+                richer.append(rival)
+            elif rival.evidence.bic - current.bic < SAME or distance < APART:
+                rivals.append(rival)
+        gain = place.evidence.chi_square - current.chi_square
+        return Step(name, gain, tuple(rivals), tuple(richer), place.tried)
+
+    def _place(self, current: Evidence, name: str, others: Sequence[str]) -> Round:
+        """The model without an added effect, refitted, and its candidates, of which that effect is one; each once."""
+        if frozenset(others) in self.rounds:
+            return self.rounds[frozenset(others)]
+        model = self.base.model
+        for other in others:
+            model = model.with_effect(other)
+        start = {parameter: value for parameter, value in current.model.values.items() if parameter in model.values}
+        reduced = fit(model.with_values(start), current.data_sets, self.held, self.bounds)
+        known = Candidate(name, current, reduced.chi_square - current.chi_square)
+        return self._round(reduced, others, [known])
+
+    def _distance(self, clean: Sequence[DataSet], rival: Candidate) -> float:
+        """Chi-square of the rival, fitted to what the model itself would have measured without noise; no further than
+        it takes to see whether that is far or next to nothing."""
+        try:
+            descent = begun(rival.evidence.model, clean, self.held, self.bounds)
+        except (FitError, ModelError):
+            return float("inf")
+        while descent.chi_square > _CONTAINS and hopeful(descent, APART):
+            descent = descent.stepped()
+        return descent.chi_square
+
+
+def critical_gain(evidence: Evidence, proposed: Sequence[Proposal]) -> float:
+    """The gain that the best of all candidates makes of noise alone, with probability 1 - _LEVEL."""
+    columns = np.array([proposal.column for proposal in proposed])
+    questions = ScoreTest(evidence, columns, [np.array([i]) for i in range(len(proposed))], SENSITIVITY_LEFT)
+    return questions.largest_by_chance(_LEVEL, [proposal.sense for proposal in proposed])
+
+
+def footprint(before: Evidence, after: Evidence) -> float:
+    """Largest change of the model's prediction over all tests, relative to |K| or to half a loop's force range."""
+    return max(data_set.change(before.model, after.model) for data_set in before.data_sets)

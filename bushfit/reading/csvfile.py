@@ -1,0 +1,103 @@
+"""CSV as bushfit writes it, and tests as CSV that the reader takes back.
+
+Every file of rows comes through here: a comma between cells, a decimal point, seven digits, UTF-8, and no text that a
+spreadsheet would run as a formula.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, TextIO
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import NDArray
+
+    from bushfit.reading.measurement import Floats, Loop, Sweep
+
+#: How a text begins that a spreadsheet takes for a formula, in ASCII or full width, be it after blanks.
+_FORMULA = re.compile("[\\s\"']*[=+\\-@\uff1d\uff0b\uff0d\uff20|%]|\\t")
+_LINES = re.compile("[\\r\\n]+")
+
+
+class Rows:
+    """Writes rows of texts and numbers to a stream as they come."""
+
+    def __init__(self, stream: TextIO, headers: Iterable[str]) -> None:
+        self._writer = csv.writer(stream, lineterminator="\n")
+        self._writer.writerow([defused(header) for header in headers])
+
+    def add(self, cells: Iterable[str | float | None]) -> None:
+        """One row; None and nan are empty cells."""
+        self._writer.writerow([_cell(value) for value in cells])
+
+
+def to_csv(table: pd.DataFrame) -> bytes:
+    """A table as the bytes of its file."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([defused(str(name)) for name in table.columns])
+    writer.writerows(zip(*(_cells(column.tolist()) for _, column in table.items()), strict=True))
+    return text.getvalue().encode("utf-8", "replace")
+
+
+def _cells(values: list[object]) -> list[str]:
+    """The cells of a column; a text that stands in many of them is looked at once."""
+    known = {value: _cell(value) for value in set(values) if isinstance(value, str)}
+    return [known[value] if isinstance(value, str) else _cell(value) for value in values]
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return "" if value != value else f"{value:.7g}"
+    if isinstance(value, str):
+        return defused(value)
+    return "" if value is None else str(value)
+
+
+def defused(text: str) -> str:
+    """A text as one line, with an apostrophe before one that a spreadsheet would run as a formula."""
+    line = " ".join(_LINES.split(text))
+    return f"'{line}" if _FORMULA.match(line) else line
+
+
+def raw_loop_table(loop: Loop) -> pd.DataFrame:
+    """A loop as a rig writes it: time, displacement, force."""
+    import pandas as pd
+
+    units = loop.direction.display
+    (length, length_factor), (force, force_factor) = units.displacement, units.force
+    return pd.DataFrame(
+        {
+            "time [s]": loop.time,
+            f"displacement [{length}]": loop.displacement * length_factor,
+            f"force [{force}]": loop.force * force_factor,
+        }
+    )
+
+
+def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
+    """A sweep as a rig writes it: frequency, amplitude, repeat, stiffness, loss factor."""
+    import pandas as pd
+
+    units = sweep.direction.display
+    (length, length_factor), (stiffness, factor) = units.displacement, units.stiffness
+    return pd.DataFrame(
+        {
+            "frequency [Hz]": sweep.frequency,
+            f"amplitude [{length}]": sweep.amplitude * length_factor,
+            "repeat": sweep.repeat,
+            f"stiffness [{stiffness}]": np.abs(sweep.stiffness) * factor,
+            "loss factor [-]": loss_factor(sweep.stiffness),
+        }
+    )
+
+
+def loss_factor(stiffness: NDArray[np.complex128]) -> Floats:
+    """Loss over storage stiffness."""
+    return np.imag(stiffness) / np.real(stiffness)

@@ -1,0 +1,248 @@
+"""Where a table begins in a file, and what parts its columns.
+
+Of the candidates of tests/test_dialects.py (csv.Sniffer, clevercsv, DuckDB, polars), each left to itself, none reads
+half of the dialects; told the encoding and the decimal mark, clevercsv parts the columns of nearly all, in twenty times
+the time. What wins is a rule of the domain: the header is the line that names the columns a test must have, with rows
+of as many numbers below it.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from bushfit import units
+from bushfit.reading.headers import Vocabulary, split_convention
+from bushfit.reading.numerals import is_like_number
+
+#: Campaign names of the delimiters, in the order in which they are tried.
+DELIMITERS = {"semicolon": ";", "tab": "\t", "pipe": "|", "comma": ",", "blanks": " "}
+#: The header lies within this many bytes and filled lines.
+HEAD = 1 << 18
+MOST_LINES = 500
+MOST_COLUMNS = 1000
+#: Characters of a line, and of a header's.
+_LONGEST_LINE, _LONGEST_HEADER = 1 << 20, 10_000
+#: Filled lines below a header within which its units row and first numbers lie.
+_NEAR = 8
+_COMMENTS = ("#", "%", "//")
+_BLANK_BEFORE_BRACKET = re.compile(r"\s+(?=[\[(])")
+_COLUMN_GAP = re.compile(r"\t|\s{2,}")
+
+
+#: A line of a text, or the cells of a workbook's row: texts and numbers.
+Content = str | Sequence[str | float]
+
+
+class Line(NamedTuple):
+    """A line of a file that holds something: its number from 1, and what it holds."""
+
+    number: int
+    content: Content
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileFormat:
+    """What a user states of a file's format; None where the file itself settles it.
+
+    Args:
+        encoding: by Python's name, such as "cp1252".
+        delimiter: what parts columns.
+        decimal: decimal mark.
+        thousands: what parts thousands; "none" where nothing does.
+        header_line: line of the header, from 1; in a workbook the row.
+        sheet: sheet of a workbook.
+    """
+
+    encoding: str | None = None
+    delimiter: Literal["comma", "semicolon", "tab", "pipe", "blanks"] | None = None
+    decimal: Literal[".", ","] | None = None
+    thousands: Literal[".", ",", " ", "'", "none"] | None = None
+    header_line: int | None = None
+    sheet: str | None = None
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where a table lies in its file.
+
+    Args:
+        delimiter: what parts the cells; " " for runs of blanks; "" where cells come apart by themselves.
+        headers: header cells in order.
+        header_line: line of the header, from 1.
+        units: cells of the units row, "" where a column has none.
+        units_line: line of the units row; None where there is none.
+    """
+
+    delimiter: str
+    headers: tuple[str, ...]
+    header_line: int
+    units: tuple[str, ...]
+    units_line: int | None
+
+    @property
+    def lines_before_data(self) -> int:
+        """Lines down to the header and its units row."""
+        return self.units_line or self.header_line
+
+
+def split(content: Content, delimiter: str) -> list[str]:
+    """The cells of a line, without blanks around them.
+
+    Raises:
+        csv.Error: a line or a quoted cell beyond all measure.
+    """
+    if not isinstance(content, str):
+        return [cell if isinstance(cell, str) else repr(cell) for cell in content]
+    if len(content) > _LONGEST_LINE:
+        raise csv.Error(f"a line of {len(content)} characters")
+    if delimiter == " ":
+        return content.split()
+    if '"' in content:
+        return [cell.strip() for cell in next(csv.reader([content], delimiter=delimiter, skipinitialspace=True), ())]
+    return [cell.strip() for cell in content.split(delimiter)]
+
+
+def is_comment(content: Content, delimiter: str) -> bool:
+    """Whether a line is none of the table's; a semicolon begins a comment where it does not part columns."""
+    text = content if isinstance(content, str) else next((str(cell) for cell in content if cell != ""), "")
+    return text.lstrip().startswith(_COMMENTS if delimiter == ";" else (*_COMMENTS, ";"))
+
+
+def fits(cells: Sequence[str | float], width: int) -> bool:
+    """Whether a row has as many cells as the header; empty ones may follow."""
+    return len(cells) == width or (len(cells) > width and all(cell == "" for cell in cells[width:]))
+
+
+def find_layout(
+    lines: Sequence[Line], vocabulary: Vocabulary, *, delimiter: str | None = None, header_line: int | None = None
+) -> Layout:
+    """Find the header of a table: the line that names most columns of the test and has rows like itself below it.
+
+    Where no line names two columns, the line above the first rows of numbers is taken, or else the first one, so that
+    an error can show it. A comment is a header where nothing else is.
+
+    Args:
+        lines: the filled lines at the start of the file.
+        vocabulary: what columns are called.
+        delimiter: what parts the cells, where that is stated; "" for a workbook.
+        header_line: number of the header's line, where that is stated.
+    """
+    if not lines:
+        return Layout(delimiter or ",", (), 1, (), None)
+    delimiters = tuple(DELIMITERS.values()) if delimiter is None else (delimiter,)
+    end = _first_rows(lines, delimiters)
+    before = [index for index in range(end) if header_line in (None, lines[index].number)]
+    if header_line is not None and not before:
+        before = [index for index, line in enumerate(lines) if line.number == header_line]
+    for commented in (False, True):
+        found = max(
+            _candidates(lines, before, delimiters, vocabulary, commented), key=lambda entry: entry[0], default=None
+        )
+        if found:
+            return _layout(lines, *found[1:])
+    return _layout(lines, *_likeliest(lines, before, end, delimiters))
+
+
+def _candidates(
+    lines: Sequence[Line], before: Sequence[int], delimiters: Sequence[str], vocabulary: Vocabulary, commented: bool
+) -> Iterator[tuple[tuple[int, ...], int, str, list[str]]]:
+    """Lines that name two columns or more, with their rank, delimiter and cells."""
+    for index in before:
+        for order, delimiter in enumerate(delimiters):
+            content = lines[index].content
+            if is_comment(content, delimiter) != commented:
+                continue
+            if commented and isinstance(content, str):
+                content = content.lstrip().lstrip("#%/; ")
+            for cells in _header_cells(content, delimiter):
+                roles = vocabulary.roles(cells)
+                if len(roles) > 1 and not any(is_like_number(cell) for cell in cells):
+                    followed = _is_followed(lines, index, delimiter, len(cells))
+                    yield (followed, len(roles), index, -order), index, delimiter, cells
+
+
+def _header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
+    """The ways to take a header apart, without empty cells at its end."""
+    if len(content) > _LONGEST_HEADER:
+        return
+    ways = [split(content, delimiter)]
+    if delimiter == " " and isinstance(content, str):
+        ways = [_COLUMN_GAP.split(content.strip()), split(_BLANK_BEFORE_BRACKET.sub("", content), delimiter)]
+    for cells in ways:
+        while cells and not cells[-1]:
+            cells.pop()
+        if 1 < len(cells) <= MOST_COLUMNS:
+            yield cells
+
+
+def _is_followed(lines: Sequence[Line], header: int, delimiter: str, width: int) -> bool:
+    """Whether the first row of numbers below a header has as many cells."""
+    for line in lines[header + 1 : header + 1 + _NEAR]:
+        if not is_comment(line.content, delimiter) and _is_row(cells := split(line.content, delimiter)):
+            return fits(cells, width)
+    return False
+
+
+def _is_row(cells: Sequence[str]) -> bool:
+    """Whether two cells or more, and no fewer than half of them, hold numbers."""
+    numbers = sum(is_like_number(cell) for cell in cells[:MOST_COLUMNS])
+    return numbers > 1 and 2 * numbers >= len(cells)
+
+
+def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> int:
+    """Index of the first of three rows of numbers in a row; else the number of lines."""
+    inside = [index for index, line in enumerate(lines) if not is_comment(line.content, ";")]
+    for start, *others in zip(inside, inside[1:], inside[2:], strict=False):
+        if all(
+            any(_is_row(split(lines[index].content, delimiter)) for delimiter in delimiters)
+            for index in (start, *others)
+        ):
+            return start
+    return len(lines)
+
+
+def _likeliest(
+    lines: Sequence[Line], before: Sequence[int], end: int, delimiters: Sequence[str]
+) -> tuple[int, str, list[str]]:
+    """A line that might have been meant as the header, where none names the columns of a test: the last one above the
+    first rows of numbers that has as many cells and is no units row, or else that row itself; the first line where
+    there is no row."""
+    if end == len(lines):
+        content = lines[before[0] if before else 0].content
+        delimiter = max(delimiters, key=lambda mark: len(split(content, mark)) if mark != " " else 0)
+        return before[0] if before else 0, delimiter, split(content, delimiter)
+    rows = [(mark, split(lines[end].content, mark)) for mark in delimiters]
+    rows = [(mark, cells) for mark, cells in rows if len(cells) > 1 and all(map(is_like_number, cells))] or rows
+    for delimiter, row in rows:
+        for index in reversed(before):
+            cells = split(lines[index].content, delimiter)
+            if fits(row, len(cells)) and not _is_units_row([cell.strip("[]() ") for cell in cells]):
+                return index, delimiter, cells
+    delimiter, row = max(rows, key=lambda entry: len(entry[1]))
+    return end, delimiter, row
+
+
+def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence[str]) -> Layout:
+    """The layout of a header, with the units row that may follow it."""
+    nothing = ("",) * len(headers)
+    for line in lines[index + 1 : index + 1 + _NEAR]:
+        if is_comment(line.content, delimiter):
+            continue
+        cells = [cell.strip("[]() ") for cell in split(line.content, delimiter)]
+        if fits(cells, len(headers)) and _is_units_row(cells):
+            row = tuple(cells[: len(headers)])
+            return Layout(delimiter, tuple(headers), lines[index].number, row, line.number)
+        break
+    return Layout(delimiter, tuple(headers), lines[index].number, nothing, None)
+
+
+def _is_units_row(cells: Sequence[str]) -> bool:
+    """Whether half of the filled cells or more are units, and none is a number; a ratio may have the unit "1"."""
+    filled = [split_convention(cell)[0] for cell in cells if cell]
+    if any(is_like_number(cell) and cell != "1" for cell in filled):
+        return False
+    return 0 < len(filled) <= 2 * sum(units.is_unit(cell) for cell in filled)

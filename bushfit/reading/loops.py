@@ -1,0 +1,116 @@
+"""A table of time, displacement and force -> Loop in SI, with one clear error for what cannot be a loop."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from bushfit.geometry import Direction
+from bushfit.reading.headers import LOOP_COLUMNS
+from bushfit.reading.layout import FileFormat
+from bushfit.reading.measurement import Loop, Source, Waveform, rebuild_time
+from bushfit.reading.parallel import by_chunks
+from bushfit.reading.table import Table
+
+_FEWEST_LOOP_ROWS = 10
+
+
+def read_loop(
+    file: Path,
+    direction: Direction,
+    *,
+    name: str | None = None,
+    listed_as: Path | None = None,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    written: FileFormat | None = None,
+    force_sign: Literal[1, -1] = 1,
+    rate: float | None = None,
+    frequency: float | None = None,
+    waveform: Waveform = "triangle",
+    noise: float | None = None,
+) -> Loop:
+    """Read a hysteresis loop.
+
+    Args:
+        file: a table with columns time (optional), displacement and force.
+        direction: direction of the test, which settles the units that fit.
+        name: of the loop; default the stem of the file.
+        listed_as: the file as the campaign names it, for provenance; default its name.
+        columns: header of a role (a key of LOOP_COLUMNS), where it is not the usual one.
+        units: unit of a role, where the file does not carry it.
+        written: how the file is written, where it does not tell.
+        force_sign: -1 turns the recorded force around.
+        rate: speed of the displacement [m/s or rad/s], for a file without time.
+        frequency: cycles per time [Hz], for a file without time; goes with `waveform`.
+        waveform: course of the displacement in time.
+        noise: passed on.
+
+    Raises:
+        MeasurementError, UnitError: a file, column, unit or value that cannot be used.
+    """
+    table = Table.open(file, LOOP_COLUMNS, columns, units, written)
+    _check_not_swapped(table, direction)
+    wanted = {
+        "displacement": table.column("displacement", direction.motion.displacement_unit),
+        "force": table.column("force", direction.motion.force_unit),
+    }
+    wanted["force"] = replace(wanted["force"], scale=force_sign * wanted["force"].scale)
+    if "time" in table.roles:
+        wanted["time"] = table.column("time", "s")
+    elif rate is None and frequency is None:
+        raise table.missing(
+            "time",
+            "s",
+            hint='or state rate = "10 mm/min", or frequency = "0.1 Hz" and waveform = "sine", in the campaign',
+        )
+    values = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
+
+    for role in ("displacement", "force"):
+        if np.ptp(values[role][:_FEWEST_LOOP_ROWS]) == 0.0 == np.ptp(values[role]):
+            raise table.error(f"the {role} never changes", column=wanted[role], expected="a loop")
+    displacement, force = values["displacement"], values["force"]
+
+    def sums(rows: slice) -> tuple[float, float, float]:
+        return np.einsum("i,i", displacement[rows], force[rows]), displacement[rows].sum(), force[rows].sum()
+
+    product, *each = np.sum(by_chunks(sums, force.size), axis=0)
+    if product < each[0] * each[1] / force.size:
+        raise table.error(
+            "the force falls where the displacement rises",
+            column=wanted["force"],
+            expected="force and displacement counted in the same direction",
+            hint="if the load cell counts the other way round, write force_sign = -1 in the campaign"
+            if force_sign == 1
+            else "take force_sign = -1 out of the campaign",
+        )
+    if "time" in values:
+        time = values["time"]
+        after, before = time[1:], time[:-1]
+        if any(by_chunks(lambda rows: bool((after[rows] <= before[rows]).any()), after.size)):
+            late = np.append(False, after <= before)
+            table.refuse(late, wanted["time"], "time does not increase", "a later time on every row")
+    else:
+        time = rebuild_time(displacement, rate=rate, frequency=frequency, waveform=waveform)
+    source = Source(listed_as or Path(file.name), table.sha256)
+    return Loop(name or file.stem, direction, time, displacement, force, noise, source, "time" in values)
+
+
+def _check_not_swapped(table: Table, direction: Direction) -> None:
+    """Refuse a displacement in units of force beside a force in units of displacement."""
+    if table.agrees("displacement", direction.motion.force_unit) and table.agrees(
+        "force", direction.motion.displacement_unit
+    ):
+        displacement, force = (table.roles[role].header for role in ("displacement", "force"))
+        raise table.error(
+            "displacement and force are swapped",
+            line=table.layout.header_line,
+            found=f'"{displacement}" and "{force}"',
+            expected="a displacement in units of displacement, and a force in units of force",
+            hint="correct the header, or name the columns in the campaign: columns = "
+            f'{{ displacement = "{force}", force = "{displacement}" }}',
+        )

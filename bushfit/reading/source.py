@@ -1,0 +1,230 @@
+"""The rows of a file: of a text in any encoding, or of a sheet of a workbook."""
+
+from __future__ import annotations
+
+import csv
+import io
+import mmap
+import re
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from bushfit.reading.encoding import to_utf8
+from bushfit.reading.files import Bytes
+from bushfit.reading.layout import HEAD, MOST_LINES, Layout, Line, is_comment, split
+from bushfit.reading.measurement import Floats
+from bushfit.reading.numerals import Numerals
+from bushfit.reading.parallel import by_chunks
+
+if TYPE_CHECKING:
+    from _typeshed import WriteableBuffer
+
+#: In SI; far beyond every rig, and its square is still a number.
+LARGEST = 1e100
+#: Bytes of lines that are read at a time.
+_BUFFER = 1 << 16
+_LINE_END = re.compile(rb"\r\n|\n|\r")
+#: Signs that, inside a number, part thousands.
+_SEPARATORS = ("'", "\u2019", "\u00a0", "\u2009", "\u202f")
+_GROUP_BY_BLANK = re.compile(rb"\d \d{3}(?!\d)")
+
+
+class Source(Protocol):
+    """A file as rows of cells, with the line or row, from 1, that each stands on."""
+
+    @property
+    def encoding(self) -> str | None:
+        """The encoding of a text."""
+
+    @property
+    def sheet(self) -> str | None:
+        """The name of a sheet."""
+
+    def head(self) -> list[Line]:
+        """The filled lines at its start."""
+
+    def lines(self, after: int) -> Iterator[Line]:
+        """All filled lines after a line."""
+
+    def may_have_comma(self, layout: Layout) -> bool:
+        """Whether cells below the header may have a comma in them."""
+
+    def may_group(self, layout: Layout, decimal: str) -> bool:
+        """Whether numbers below the header may have thousands separators, when that is the decimal mark."""
+
+    def columns(
+        self, layout: Layout, width: int, scales: Mapping[int, float], numerals: Numerals
+    ) -> dict[int, Floats] | None:
+        """Columns by index times their scale, each (n,); None where the rows are not so tidy that a library reads them,
+        or hold no number, or one beyond LARGEST."""
+
+
+@dataclass(frozen=True, eq=False)
+class Text:
+    """A text: its file, its bytes in UTF-8, and the encoding they had."""
+
+    file: Path
+    data: Bytes
+    encoding: str | None
+    sheet: str | None = None
+
+    @classmethod
+    def open(cls, data: Bytes, file: Path, encoding: str | None) -> Text:
+        """Decode a text.
+
+        Raises:
+            MeasurementError: no text, or not in the encoding stated.
+        """
+        return cls(file, *to_utf8(data, file, encoding))
+
+    def head(self) -> list[Line]:
+        """The filled lines at its start."""
+        return list(islice(_lines(io.BytesIO(self.data[:HEAD]), 0), MOST_LINES))
+
+    def lines(self, after: int) -> Iterator[Line]:
+        """All filled lines after a line."""
+        return _lines(io.BufferedReader(_View(self.data, self._offset(after)), _BUFFER), after)
+
+    def may_have_comma(self, layout: Layout) -> bool:
+        """Whether cells below the header may have a comma in them."""
+        return self._has('"' if layout.delimiter == "," else ",", self._offset(layout.lines_before_data))
+
+    def may_group(self, layout: Layout, decimal: str) -> bool:
+        """Whether numbers below the header may have thousands separators, when that is the decimal mark."""
+        offset = self._offset(layout.lines_before_data)
+        if self.may_have_comma(layout) if decimal == "." else self._has(".", offset):
+            return True
+        if self._has("'", offset) or (any(self._has(sign, offset) for sign in _SEPARATORS)):
+            return True
+        return layout.delimiter != " " and self._has(" ", offset) and bool(_GROUP_BY_BLANK.search(self.data, offset))
+
+    def columns(
+        self, layout: Layout, width: int, scales: Mapping[int, float], numerals: Numerals
+    ) -> dict[int, Floats] | None:
+        """Columns by index times their scale, each (n,); None where the rows are not so tidy that pandas reads them.
+
+        pandas rounds correctly from 3.1 on, and reads a large file on all cores if it is given the path of plain UTF-8.
+        """
+        import pandas as pd
+
+        before = self._offset(layout.lines_before_data)
+        from_path = isinstance(self.data, mmap.mmap) and b'"' not in self.data[:before]
+        rest = io.BytesIO(b"" if from_path else self.data)
+        rest.seek(before)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", pd.errors.ParserWarning)
+                frame = pd.read_csv(
+                    self.file if from_path else rest,
+                    skiprows=layout.lines_before_data if from_path else None,
+                    sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
+                    header=None,
+                    names=list(range(width)),
+                    index_col=False,
+                    decimal=numerals.decimal,
+                    # one type for all columns spares pandas a copy
+                    dtype=np.float64
+                    if len(scales) == width
+                    else {index: np.float64 if index in scales else str for index in range(width)},
+                    na_filter=False,
+                    compression=None,
+                )
+        except (ValueError, pd.errors.ParserWarning):
+            return None
+        if self._has('"', before) and len(frame) != sum(1 for _ in self.lines(layout.lines_before_data)):
+            return None  # a quote left open took lines into its cell
+        columns = {index: frame[index].to_numpy() for index in scales}
+
+        def scaled(rows: slice) -> bool:
+            """Multiply some rows by their scales; False where one holds no number, or one beyond LARGEST."""
+            for index, scale in scales.items():
+                part, largest = columns[index][rows], LARGEST / abs(scale)
+                if not (part.min() >= -largest and part.max() <= largest):
+                    return False
+                if scale != 1.0:
+                    part *= scale
+            return True
+
+        for column in columns.values():
+            column.flags.writeable = True  # the frame is nobody else's
+        return columns if all(by_chunks(scaled, len(frame))) else None
+
+    def _has(self, sign: str, offset: int) -> bool:
+        return self.data.find(sign.encode(), offset) >= 0
+
+    def _offset(self, after: int) -> int:
+        """Index of the first byte after a line of the head."""
+        ends = [end.end() for end in islice(_LINE_END.finditer(self.data), after)]
+        return 0 if after == 0 else ends[-1] if len(ends) == after else len(self.data)
+
+
+class _View(io.RawIOBase):
+    """The bytes of a file from a place on, as a stream that copies nothing ahead."""
+
+    def __init__(self, data: Bytes, start: int) -> None:
+        self._rest = memoryview(data)[start:]
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: WriteableBuffer) -> int:
+        place = memoryview(buffer)
+        count = min(len(place), len(self._rest))
+        place[:count], self._rest = self._rest[:count], self._rest[count:]
+        return count
+
+
+def _lines(data: io.BytesIO | io.BufferedReader, after: int) -> Iterator[Line]:
+    for number, line in enumerate(io.TextIOWrapper(data, encoding="utf-8", errors="replace"), start=after + 1):
+        if line.strip(" \t\r\n,;|"):
+            yield Line(number, line.rstrip("\n"))
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """A sheet of a workbook: its rows of texts and numbers, "" where a cell is empty."""
+
+    sheet: str
+    content: Sequence[Sequence[str | float]]
+    encoding: None = None
+
+    def head(self) -> list[Line]:
+        """The filled rows at its start."""
+        return list(islice(self.lines(0), MOST_LINES))
+
+    def lines(self, after: int) -> Iterator[Line]:
+        """All filled rows after a row."""
+        for number, cells in enumerate(islice(self.content, after, None), start=after + 1):
+            if any(cell != "" for cell in cells):
+                yield Line(number, cells)
+
+    def may_have_comma(self, _: Layout) -> bool:
+        """Whether cells may be texts with commas."""
+        return True
+
+    def may_group(self, _: Layout, __: str) -> bool:
+        """Whether cells may be texts with thousands separators."""
+        return True
+
+    def columns(self, *_: object) -> None:
+        """Cells are told apart already."""
+
+
+def rows(source: Source, layout: Layout) -> Iterator[tuple[int, Sequence[str | float]]]:
+    """Line and cells of each row of data, comments left out.
+
+    Raises:
+        csv.Error: a line or a quoted cell beyond all measure.
+    """
+    for number, content in source.lines(layout.lines_before_data):
+        if not is_comment(content, layout.delimiter):
+            try:
+                yield number, split(content, layout.delimiter) if isinstance(content, str) else content
+            except csv.Error as error:
+                raise csv.Error(f"{error}, line {number}") from error

@@ -1,0 +1,1 @@
+"""Reduction of raw histories: cycles and steps to operating points."""

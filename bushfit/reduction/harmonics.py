@@ -1,0 +1,148 @@
+"""The harmonics of displacement and force over the whole cycles of one steady sine, by least squares.
+
+Rows may lie anywhere in time. Drift and overtones are fitted with the fundamental, so that neither leaks into it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import fdtri
+
+from bushfit.reading.measurement import Complex, Floats
+
+#: Overtones in the fit, as far as the rows can tell them apart.
+_HARMONICS = 15
+_WORST_CONDITION = 100.0
+#: Terms of the drift: mean, slope, curvature.
+_DRIFT = 3
+_CHUNK = 1 << 14
+#: The frequency is found when the phase drifts by no more than this over the whole step [cycles].
+_SETTLED = 1e-7
+#: Rows that the search for the frequency takes of a long step.
+_FREQUENCY_ROWS = 1 << 17
+#: Cycles scatter more than white noise where chance would do so this rarely.
+_WHITE_P = 0.005
+
+
+@dataclass(frozen=True, eq=False)
+class HarmonicFit:
+    """Drift and harmonics of displacement and force over the whole cycles of one step, and what they leave.
+
+    Args:
+        frequency: [Hz].
+        solution: drift, then cosine and negative sine of each harmonic, of both channels, (p, 2).
+        covariance: of the solution for unit variance of the values, (p, p).
+        freedom: rows less unknowns.
+        squares: products of the residuals of the channels, summed over the rows, (2, 2).
+        left_over: what each cycle's fundamental differs by from the fit's, (2, cycles).
+    """
+
+    frequency: float
+    solution: Floats
+    covariance: Floats
+    freedom: int
+    squares: Floats
+    left_over: Complex
+
+    @classmethod
+    def of(cls, time: Floats, displacement: Floats, force: Floats, edges: Floats) -> HarmonicFit:
+        """Fit with the frequency at which the phase of the displacement does not drift from cycle to cycle."""
+        middle = (edges[0] + edges[-1]) / 2.0
+        time, values = time - middle, np.stack((displacement, force))
+        count = edges.size - 1
+        frequency = count / float(edges[-1] - edges[0])
+        thin = slice(None, None, max(1, time.size // _FREQUENCY_ROWS))
+        number = np.arange(count) - (count - 1) / 2.0
+        for _ in range(4):
+            fit = cls._solved(time[thin], values[:, thin], count, frequency, 3)
+            phase = np.unwrap(np.angle(fit.coefficients[0, 1] + fit.left_over[0]))
+            drift = float(number @ phase / (number @ number)) / (2.0 * np.pi)
+            frequency *= 1.0 + drift
+            if abs(drift) * count < _SETTLED:
+                break
+        return cls._solved(time, values, count, frequency, _HARMONICS)
+
+    @classmethod
+    def _solved(cls, time: Floats, values: Floats, count: int, frequency: float, order: int) -> HarmonicFit:
+        size = _DRIFT + 2 * max(1, min(order, (time.size - _DRIFT) // 4))
+        gram, moments = np.zeros((size, size)), np.zeros((size, 2))
+        for rows, basis in _bases(time, frequency, size):
+            gram += basis @ basis.T
+            moments += basis @ values[:, rows].T
+        scale = 1.0 / np.sqrt(np.diag(gram))
+        unit = gram * np.outer(scale, scale)
+        while size > _DRIFT + 2 and np.linalg.cond(unit[:size, :size]) > _WORST_CONDITION:
+            size -= 2
+        covariance = np.linalg.inv(unit[:size, :size]) * np.outer(scale[:size], scale[:size])
+        solution = covariance @ moments[:size]
+        squares, sums, rows_in = np.zeros((2, 2)), np.zeros((2, 2, count)), np.zeros(count)
+        for rows, basis in _bases(time, frequency, size):
+            left = values[:, rows] - solution.T @ basis
+            squares += left @ left.T
+            number = np.clip(time[rows] * frequency + count / 2.0, 0, count - 1).astype(np.intp)
+            rows_in += np.bincount(number, minlength=count)
+            for channel, part in np.ndindex(2, 2):  # times exp(-i omega t)
+                sums[channel, part] += np.bincount(number, left[channel] * basis[_DRIFT + part], count)
+        sums *= 2.0 / np.maximum(rows_in, 1.0)
+        left_over = sums[:, 0] + 1j * sums[:, 1]
+        return cls(frequency, solution, covariance, max(time.size - size, 1), squares, left_over)
+
+    @property
+    def coefficients(self) -> Complex:
+        """Complex harmonics of displacement and force, with the mean at 0: (2, order + 1)."""
+        waves = self.solution[_DRIFT::2] + 1j * self.solution[_DRIFT + 1 :: 2]
+        return np.vstack((self.solution[:1], waves)).T
+
+    @property
+    def chance(self) -> Floats:
+        """Expected square of each harmonic of white noise of unit variance, (order,)."""
+        return np.diag(self.covariance)[_DRIFT:].reshape(-1, 2).sum(axis=1)
+
+    def errors(self) -> tuple[float, float]:
+        """Standard errors of |K| relative to |K|, and of its phase [rad].
+
+        e = f - K x is what the noise of both channels leaves in the force. Its scatter over the rows gives the errors
+        where it is white; where the cycles scatter more than white noise would let them (hum, slow wander), their own
+        scatter does.
+        """
+        x, f = self.coefficients[:, 1]
+        k = f / x
+        (xx, xf), (_, ff) = self.squares
+        white = (ff - 2.0 * k.real * xf + abs(k) ** 2 * xx) / self.freedom * self.chance[0] / 2.0
+        variance = np.full(2, white)
+        cycles = self.left_over.shape[1]
+        if cycles > 2:
+            scatter = (self.left_over[1] - k * self.left_over[0]) / (f / abs(f))
+            own = np.array([scatter.real.var(ddof=1), scatter.imag.var(ddof=1)]) / cycles
+            high = fdtri(2 * (cycles - 1), self.freedom, 1.0 - _WHITE_P)
+            if own.mean() > high * white:
+                variance = own
+        gain, phase = np.sqrt(variance) / abs(f)
+        return float(gain), float(phase)
+
+    def distortion(self) -> tuple[float, float]:
+        """Total harmonic distortion of displacement and force, less what noise alone would show."""
+        power = np.square(np.abs(self.coefficients[:, 1:]))
+        noise = np.outer(np.diag(self.squares) / self.freedom, self.chance)
+        overtones = np.maximum((power - noise)[:, 1:].sum(axis=1), 0.0)
+        displacement, force = np.sqrt(overtones / power[:, 0])
+        return float(displacement), float(force)
+
+
+def _bases(time: Floats, frequency: float, size: int) -> Iterator[tuple[slice, Floats]]:
+    """Chunk by chunk: its rows, and drift, then cosine and negative sine of each harmonic there, (size, m)."""
+    half = max(float(np.abs(time[[0, -1]]).max()), 1e-300)
+    for start in range(0, time.size, _CHUNK):
+        rows = slice(start, min(start + _CHUNK, time.size))
+        basis = np.empty((size, rows.stop - start))
+        span = time[rows] / half
+        basis[0], basis[1], basis[2] = 1.0, span, 1.5 * span**2 - 0.5
+        turn = np.exp(2j * np.pi * frequency * time[rows])
+        power = turn.copy()
+        for column in range(_DRIFT, size, 2):
+            basis[column], basis[column + 1] = power.real, -power.imag
+            power *= turn
+        yield rows, basis

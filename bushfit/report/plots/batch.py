@@ -1,0 +1,174 @@
+"""The picture of a batch: the scatter of each quantity over its bushings, limits drawn, the ones out of them named."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from bushfit.effects.contract import Array
+from bushfit.report.plots.style import DOT, FRAME, GREY, INK, POINT, ROW, SMALL, dress, explain, fonts, new_figure
+from bushfit.units import number
+
+_MISS, _LIMIT, _GOOD = "#c1272d", "#c1272d", "#31688e"
+#: Up to this many bushings are drawn as single points; beyond, as a cloud with its histogram.
+_CLOUD = 200
+_MOST_NAMED = 4
+#: More names do not fit along a panel.
+_MOST_ALONG = 40
+_MOST_LETTERS = 24
+#: Room of a letter, as a share of the panel's width, and of a line [points].
+_LETTER, _LINE = 0.021, 8.5
+#: Values further out than this many robust standard deviations are drawn at the edge.
+_FURTHEST = 12.0
+#: A panel shows at least this share of the median on either side.
+_LEAST = 5e-4
+_COLUMNS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One quantity: its header, values over the bushings (n,) with NaN where there is none, the lowest and highest
+    allowed value where there is a limit, the places of bushings that miss it, and the ends of the 95 % intervals
+    (2, n) where they are known."""
+
+    title: str
+    values: Array
+    allowed: tuple[float, ...] = ()
+    missed: Collection[int] = ()
+    intervals: Array | None = None
+
+
+def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> Figure:
+    """Two columns of panels, the bushings along x in the manifest's order.
+
+    Args:
+        panels: the quantities.
+        title: of the batch.
+        names: of all bushings, (n,); they stand along x too where they are few.
+    """
+    along = names if len(names) <= _MOST_ALONG else ()
+    lines = math.ceil(len(panels) / _COLUMNS)
+    height = ROW * (0.9 + 0.1 * bool(along)) * lines + 0.35 * FRAME
+    figure = new_figure(f"{title}: {len(names)} bushings", height)
+    grid = figure.subplots(lines, _COLUMNS, sharex=True, squeeze=False)
+    for axes, panel in zip(grid.flat, panels, strict=False):
+        _draw(axes, panel, names)
+    for axes in grid.flat[len(panels) :]:
+        axes.set_visible(False)
+    for place, axes in enumerate(grid.flat[: len(panels)]):
+        lowest = place + _COLUMNS >= len(panels)
+        axes.tick_params(labelbottom=lowest)
+        axes.xaxis.set_in_layout(place // _COLUMNS == lines - 1)  # else its labels hang into the empty cell below
+        if along:
+            ticks = range(1, len(along) + 1)
+            axes.set_xticks(ticks, along, rotation=90, fontsize=SMALL - 1, family=fonts(), parse_math=False)
+        elif lowest:
+            axes.set_xlabel("bushing, in the manifest's order", fontsize=SMALL, color=INK)
+        axes.set_xlim(0.5, len(names) + 0.5)
+    limits = "Dashed: limits; red: out of them, the worst by name." if any(panel.allowed for panel in panels) else ""
+    beyond = "Triangles: further out than the panel reaches, the furthest by name and value."
+    few = len(names) <= _CLOUD and any(panel.intervals is not None for panel in panels)
+    explain(figure, "Grey line: median of the batch.", "Bars: 95 % intervals." * few, limits, beyond)
+    return figure
+
+
+def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
+    there = np.isfinite(panel.values)
+    place, values = np.flatnonzero(there), panel.values[there]
+    ends = None if panel.intervals is None else panel.intervals[:, there]
+    low, high = _reach(values, panel.allowed, ends)
+    shown = np.clip(values, low, high)
+    inside = shown == values
+    bad = np.isin(place, list(panel.missed))
+    cloud = values.size > _CLOUD
+    good_style = {**DOT, "ms": 1.6, "alpha": max(0.15, min(1.0, 1500 / values.size))} if cloud else POINT
+    if ends is not None and not cloud:
+        colors = [_MISS if out else _GOOD for out in bad]
+        axes.vlines(place + 1, *ends, color=colors, lw=0.8, alpha=0.6, zorder=2)
+    for chosen, color, style, order in ((~bad, _GOOD, good_style, 2), (bad, _MISS, POINT if not cloud else DOT, 4)):
+        for marker, which in (("o", inside), ("^", shown < values), ("v", shown > values)):
+            x, y = place[chosen & which] + 1, shown[chosen & which]
+            axes.plot(x, y, marker, color=color, zorder=order, rasterized=cloud, **(style if marker == "o" else POINT))
+    axes.axhline(float(np.median(values)), color=GREY, lw=0.9, zorder=1)
+    for limit in panel.allowed:
+        if math.isfinite(limit):
+            axes.axhline(limit, color=_LIMIT, lw=0.9, ls=(0, (5, 2)), zorder=3)
+    dress(axes, "", "")
+    margin = 0.08 * (high - low)
+    axes.set_ylim(low - margin, high + margin)
+    axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
+    axes.yaxis.get_offset_text().set_fontsize(SMALL)
+    count = f": {len(panel.missed)} out" if panel.missed else ""
+    axes.set_title(panel.title + count, fontsize=SMALL, loc="left", color=_MISS if count else INK, pad=3)
+    _name(axes, panel, (low, high), names)
+    if cloud:
+        _histogram(axes, shown)
+
+
+def _reach(values: Array, allowed: Sequence[float], ends: Array | None) -> tuple[float, float]:
+    """Lowest and highest value to show: all but the far out, the limits, and a usual 95 % interval, below which no
+    difference means anything."""
+    middle = float(np.median(values))
+    spread = _FURTHEST * 1.4826 * float(np.median(np.abs(values - middle)))
+    limits = [limit for limit in allowed if math.isfinite(limit)]
+    near = values[np.abs(values - middle) <= spread] if spread > 0.0 else values
+    half = np.ptp(ends, axis=0) / 2.0 if ends is not None else np.empty(0)
+    half = half[np.isfinite(half)]
+    least = max(float(np.median(half)) if half.size else 0.0, _LEAST * abs(middle)) or 1.0
+    return min(float(near.min()), *limits, middle - least), max(float(near.max()), *limits, middle + least)
+
+
+def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[str]) -> None:
+    """The bushings that miss a limit or lie beyond the panel, furthest out first, where their names do not cover each
+    other; beyond the panel with the value that it does not show."""
+    low, high = panel.allowed if panel.allowed else (-math.inf, math.inf)
+    middle = float(np.nanmedian(panel.values))
+    beyond = set(np.flatnonzero((panel.values < reach[0]) | (panel.values > reach[1])).tolist())
+
+    def order(k: int) -> tuple[bool, float]:
+        value = panel.values[k]
+        return k not in panel.missed, min(high - value, value - low) if k in panel.missed else -abs(value - middle)
+
+    taken: list[tuple[float, float, int, bool]] = []
+    for k in sorted(beyond.union(panel.missed), key=order)[:_MOST_NAMED]:
+        value = float(np.clip(panel.values[k], *reach))
+        text = names[k] if len(names[k]) <= _MOST_LETTERS else names[k][: _MOST_LETTERS - 1] + "…"
+        if k in beyond:
+            text = f"{text}: {number(panel.values[k], 3)}"
+        place, above = (k + 0.5) / panel.values.size, value < (reach[0] + reach[1]) / 2.0
+        half, line = 0.5 * _LETTER * len(text), 1
+        center = min(max(place, half), 1.0 - half)
+        while any(
+            abs(center - other) < half + room and at == line and side == above for other, room, at, side in taken
+        ):
+            line += 1
+        taken.append((center, half, line, above))
+        axes.annotate(
+            text,
+            (center, value),
+            xycoords=("axes fraction", "data"),
+            xytext=(0, (1 if above else -1) * _LINE * line),
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            bbox={"facecolor": "white", "alpha": 0.7, "lw": 0, "pad": 0.3},
+            fontsize=SMALL - 1,
+            color=_MISS if k in panel.missed else GREY,
+            family=fonts(),
+            parse_math=False,
+            zorder=5,
+        )
+
+
+def _histogram(axes: Axes, values: Array) -> None:
+    """How many bushings lie where, at the right edge."""
+    counts, edges = np.histogram(values, bins=60, range=axes.get_ylim())
+    side = axes.inset_axes((1.005, 0.0, 0.13, 1.0), sharey=axes)
+    side.barh(edges[:-1], counts, height=np.diff(edges), align="edge", color=_GOOD, alpha=0.5, lw=0)
+    side.set_axis_off()

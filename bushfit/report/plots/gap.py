@@ -1,0 +1,261 @@
+"""The gap between model and measurement before and after a diagnosis, in units of noise: maps and loops."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+from bushfit.effects.contract import Array
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
+from bushfit.geometry import Direction
+from bushfit.model.model import Model
+from bushfit.report.plots.fits import loops_legend
+from bushfit.report.plots.misfit import Curve, Map, Side, by_direction, columns, has_holes, side_of
+from bushfit.report.plots.points import SECTORS, Repeats
+from bushfit.report.plots.style import (
+    GREY,
+    INK,
+    SMALL,
+    TEXT,
+    dress,
+    explain,
+    fonts,
+    logarithmic,
+    new_figure,
+    noise_band,
+    styles,
+)
+
+#: Heights in inches: a level's row in a map, the least and the largest map, the loops' panels, the colour scale, a
+#: line of the summary.
+_LEVEL, _LEAST_MAP, _LARGEST_MAP, _LOOPS, _SCALE, _LINE = (cm / 2.54 for cm in (0.6, 1.7, 4.2, 4.4, 2.6, 0.42))
+#: Where the colour changes, in units of noise; the scale ends where 2 % of the points are left beyond.
+_EDGES = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+_LEAST_EDGES, _BEYOND = 4, 0.02
+#: Of more edges, below and above, every other one bears its number: all would run together.
+_MOST_EDGES = 14
+#: The first colour off white, as a share of the way to the darkest.
+_FAINT = 0.12
+#: Cells this far below the model bear a bar: red and blue are one grey in a print without colours.
+_BARRED = 3.0
+#: A step this many times its neighbour is a point that was left out, not a coarse grid.
+_HOLE = 1.75
+#: Loops further off than the first are drawn on a scale that is logarithmic beyond the second.
+_FAR, _NEAR = 40.0, 5.0
+_ABSENT = "#c8c8c8"
+_MOST_LABELS = 10
+_SUMMARY_LETTERS, _COLUMN_LETTERS = 92, 40
+
+
+class _Scale(NamedTuple):
+    """Colours and the values at which they change, in units of noise."""
+
+    edges: Array
+    norm: BoundaryNorm
+    cmap: ListedColormap
+
+
+def gap_figure(before: Model, after: Model, data_sets: Sequence[DataSet], title: str, summary: str) -> Figure:
+    """Where measurement and model part, before and after: sweeps over frequency and amplitude, loops over phase.
+
+    Every value is measured less model, the mean of the repeats or of a sector of the cycle, in units of the noise of
+    that mean. All maps share one scale of colours, the loops of a direction one axis. Models that respond alike make
+    one column.
+
+    Args:
+        before: the model as it came.
+        after: the model with what was added.
+        data_sets: the tests of the diagnosis, at least one.
+        title: names the bushing.
+        summary: the finding in a sentence or two.
+    """
+    sweeps = by_direction([data_set for data_set in data_sets if isinstance(data_set, SweepData)])
+    loops = by_direction([data_set for data_set in data_sets if isinstance(data_set, LoopData)])
+    sides = [side_of(model, name, data_sets, sweeps, loops) for model, name in columns(before, after, data_sets)]
+    rows = [(direction, part) for direction in sweeps for part in ("storage", "loss")]
+    heights = [_map_height(sides[0].maps[direction]) for direction, _ in rows] + [_LOOPS] * len(loops)
+    lines = textwrap.wrap(summary, _SUMMARY_LETTERS)
+    figure = new_figure(title, sum(heights) + _SCALE * bool(rows) + _LINE * (len(lines) + 2))
+    body: SubFigure = figure.subfigures(1, 1, squeeze=False)[0, 0]
+    body.suptitle("\n".join(lines), fontsize=TEXT, color=INK, family=fonts(), parse_math=False)
+    grid = body.subplots(len(heights), len(sides), squeeze=False, height_ratios=heights)
+    if rows:
+        scale = _scale(sides)
+        for row, (direction, part) in zip(grid, rows, strict=False):
+            for axes, side in zip(row, sides, strict=True):
+                _draw_map(axes, side.maps[direction], part, scale)
+            _label_maps(row, direction, part, sides[0].maps[direction])
+        _draw_scale(body, [axes for row in grid[: len(rows)] for axes in row], scale)
+    for row, (direction, mine) in zip(grid[len(rows) :], loops.items(), strict=True):
+        _draw_loops(row, direction, mine, [side.loops[direction] for side in sides])
+    _head(grid[0], sides)
+    explain(figure, *_words(sides[0]))
+    return figure
+
+
+def _map_height(drawn: Map) -> float:
+    return float(np.clip(_LEVEL * np.unique(drawn.points.amplitude).size, _LEAST_MAP, _LARGEST_MAP))
+
+
+def _scale(sides: Sequence[Side]) -> _Scale:
+    """Steps from white (within the noise) to dark; blue where the measurement is below the model, red above."""
+    values = np.abs(np.concatenate([part for side in sides for drawn in side.maps.values() for part in drawn[1:]]))
+    needed = int(np.searchsorted(_EDGES, np.quantile(values, 1.0 - _BEYOND))) + 1
+    edges = np.array(_EDGES[: max(needed, _LEAST_EDGES)])
+    shades = np.linspace(_FAINT, 1.0, edges.size) / 2.0
+    colors = colormaps["RdBu_r"](0.5 + np.concatenate((-shades[::-1], [0.0], shades)))
+    colors[edges.size] = 1.0
+    both = np.concatenate((-edges[::-1], edges))
+    return _Scale(both, BoundaryNorm(both, len(colors), extend="both"), ListedColormap(colors))
+
+
+def _draw_map(axes: Axes, drawn: Map, part: str, scale: _Scale) -> None:
+    """A row of cells a level, as wide as the steps of frequency; what was left out stays grey."""
+    values: Array = getattr(drawn, part)
+    points = drawn.points
+    even = _evenly(points)
+    levels, row = np.unique(points.amplitude, return_inverse=True)
+    low, high = np.empty_like(values), np.empty_like(values)
+    for level in range(levels.size):
+        at = row == level
+        low[at], high[at] = _cells(points.frequency[at], logarithmic=even)
+    cells = np.stack(
+        [np.stack((x, row + y), axis=1) for x, y in ((low, -0.5), (high, -0.5), (high, 0.5), (low, 0.5))], axis=1
+    )
+    axes.add_collection(
+        PolyCollection(list(cells), array=values, norm=scale.norm, cmap=scale.cmap, ec="face", lw=0.2), autolim=False
+    )
+    below = values < -_BARRED
+    inset = 0.3 * (high - low)[below]
+    axes.hlines(row[below], low[below] + inset, high[below] - inset, color="white", lw=1.1)
+    axes.hlines(np.arange(1, levels.size) - 0.5, low.min(), high.max(), color="white", lw=1.5)
+    axes.set(facecolor=_ABSENT, ylim=(-0.5, levels.size - 0.5))
+    if even:
+        logarithmic(axes, points.frequency)
+    axes.set_xlim(low.min(), high.max())
+    axes.tick_params(labelsize=SMALL, colors=INK)
+    axes.spines[:].set_color(GREY)
+    step = -(-levels.size // _MOST_LABELS)
+    axes.set_yticks(np.arange(0, levels.size, step))
+
+
+def _evenly(points: Repeats) -> bool:
+    """Whether the frequencies are spaced more evenly by ratio than by difference."""
+    frequency = np.unique(points.frequency)
+    if frequency.size < 3:
+        return False
+    ratios, steps = np.diff(np.log(frequency)), np.diff(frequency)
+    return bool(np.std(ratios) / np.mean(ratios) < np.std(steps) / np.mean(steps))
+
+
+def _cells(frequency: Array, *, logarithmic: bool) -> tuple[Array, Array]:
+    """Edges half way to the neighbours; where one is much further off than the other, as far as to the other."""
+    x = np.log(frequency) if logarithmic else frequency
+    if x.size == 1:
+        width = 0.1 if logarithmic else 0.1 * x[0]
+        return (np.exp(x - width), np.exp(x + width)) if logarithmic else (x - width, x + width)
+    steps = np.diff(x)
+    left, right = np.concatenate((steps[:1], steps)), np.concatenate((steps, steps[-1:]))
+    left, right = np.where(left > _HOLE * right, right, left), np.where(right > _HOLE * left, left, right)
+    low, high = x - left / 2.0, x + right / 2.0
+    return (np.exp(low), np.exp(high)) if logarithmic else (np.maximum(low, 0.0), high)
+
+
+def _label_maps(row: Sequence[Axes], direction: Direction, part: str, drawn: Map) -> None:
+    unit, length = direction.display.displacement
+    levels = np.unique(drawn.points.amplitude)
+    for axes in row:
+        axes.set_yticklabels([f"{length * levels[round(tick)]:.3g} {unit}" for tick in axes.get_yticks()])
+        axes.tick_params(labelleft=axes is row[0], labelbottom=part == "loss")
+        if part == "loss":
+            axes.set_xlabel("frequency [Hz]", fontsize=TEXT, color=INK)
+    _name(row[0], f"{direction}\n{part}")
+
+
+def _name(axes: Axes, words: str) -> None:
+    """What a row shows, in lines left of its ticks."""
+    axes.set_ylabel(words, fontsize=TEXT, color=INK, rotation=0, ha="right", va="center", ma="center")
+
+
+def _head(row: Sequence[Axes], sides: Sequence[Side]) -> None:
+    """Says above the first row, and above its legend if it has one, what each column shows."""
+    legend = row[0].get_legend()
+    height = legend.get_window_extent().height * 72.0 / row[0].figure.dpi if legend else 0.0
+    for axes, side in zip(row, sides, strict=True):
+        lines = [*textwrap.wrap(side.title, _COLUMN_LETTERS * (3 - len(sides))), f"gap {side.gap:.2f} x noise"]
+        pad = 7.0 + height
+        axes.set_title("\n".join(lines), fontsize=TEXT, color=INK, weight="bold", pad=pad, parse_math=False)
+
+
+def _draw_scale(figure: SubFigure, maps: Sequence[Axes], scale: _Scale) -> None:
+    colors = ScalarMappable(scale.norm, scale.cmap)
+    bar = figure.colorbar(colors, ax=maps, location="bottom", shrink=0.76, aspect=42, pad=0.03, extendfrac=0.04)
+    edges, every = scale.edges, 1 if scale.edges.size <= _MOST_EDGES else 2
+    from_end = np.minimum(np.arange(edges.size), np.arange(edges.size)[::-1])
+    numbers = ["" if place % every else f"{edge:g}" for edge, place in zip(edges, from_end, strict=True)]
+    bar.ax.set_xticks(edges, numbers, fontsize=SMALL, color=INK)
+    bar.ax.tick_params(length=2, colors=INK)
+    bar.outline.set(edgecolor=GREY, linewidth=0.6)
+    bar.set_label("measured less model, in units of noise", fontsize=TEXT, color=INK)
+    for x, side, words in ((-0.05, "right", "measured\nbelow model"), (1.05, "left", "measured\nabove model")):
+        bar.ax.text(x, 0.5, words, transform=bar.ax.transAxes, ha=side, va="center", fontsize=TEXT, color=INK)
+    middle = (edges[:-1] + edges[1:]) / 2.0
+    barred = middle[middle < -_BARRED]
+    bar.ax.plot(barred, np.full(barred.size, 0.5), "_", color="white", ms=6, mew=1.1)
+
+
+def _draw_loops(
+    row: Sequence[Axes], direction: Direction, data_sets: Sequence[LoopData], sides: Sequence[Sequence[Curve]]
+) -> None:
+    furthest = max(float(np.abs(curve.values).max()) for curves in sides for curve in curves)
+    for axes, curves in zip(row, sides, strict=True):
+        dress(axes, "phase after the upper turn [deg]", "")
+        for curve, style in zip(curves, styles(len(curves), "loop"), strict=True):
+            axes.plot(curve.phase, curve.values, color=style.color, ls=style.dashes, lw=1.3)
+        if furthest > _FAR:
+            axes.set_yscale("symlog", linthresh=_NEAR, linscale=0.7)
+            powers = 10.0 ** np.arange(1, int(np.log10(furthest)) + 1)
+            axes.yaxis.set_major_locator(FixedLocator([*-powers[::-1], 0.0, *powers]))
+            axes.yaxis.set_minor_locator(NullLocator())
+            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        noise_band(axes)
+        axes.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
+    limits = [axes.get_ylim() for axes in row]
+    for axes in row:
+        axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
+        axes.tick_params(labelleft=axes is row[0])
+    _name(row[0], f"{direction}\nloops\n/ noise")
+    loops_legend(
+        row[0],
+        data_sets,
+        ncols=4 // len(row),
+        loc="lower left",
+        bbox_to_anchor=(-0.02, 1.0),
+        handlelength=2.4,
+        columnspacing=1.2,
+    )
+
+
+def _words(side: Side) -> list[str]:
+    maps, loops = bool(side.maps), bool(side.loops)
+    repeated = any(drawn.points.count.max() > 1 for drawn in side.maps.values())
+    within = " and ".join(["within 2 (maps)"] * maps + ["in the grey (loops)"] * loops)
+    return [
+        "Maps: frequency across, amplitude upwards; white: model and measurement agree within the noise. A bar in a "
+        "cell: 3 and more below." * maps,
+        "A cell is the mean of its repeats, in units of the noise of that mean." * repeated,
+        "Grey: not measured." * any(has_holes(drawn) for drawn in side.maps.values()),
+        f"Loops: measured less model over the cycle, means over {360 // SECTORS} deg, in units of the noise of that "
+        "mean." * loops,
+        f"Where the model is right, 95 % lie {within}.",
+    ]

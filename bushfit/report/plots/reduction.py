@@ -1,0 +1,127 @@
+"""Raw stepped-sine histories and the sweep they were reduced to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bushfit.effects.contract import Array
+from bushfit.reading.measurement import Loop
+from bushfit.reduction.steps import Reduction, Step
+from bushfit.report.plots.style import (
+    GREY,
+    POINT,
+    ROW,
+    Style,
+    dress,
+    explain,
+    legend,
+    new_figure,
+    readable,
+    styles,
+)
+from bushfit.units import for_people
+
+_STRIP, _NOISE_ROW = 2.7 / 2.54, 4.2 / 2.54
+#: Bins of time in which a history is drawn, from its least to its largest value.
+_BINS = 1500
+_MOST_HISTORIES = 4
+
+
+def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str) -> Figure:
+    """Each history with the cycles used; stiffness and loss factor over frequency; noise and harmonic distortion.
+
+    Of more than four histories the first four are drawn.
+    """
+    shown = histories[:_MOST_HISTORIES]
+    figure = new_figure(title, _STRIP * len(shown) + ROW + _NOISE_ROW)
+    grid = figure.add_gridspec(len(shown) + 2, 2, height_ratios=[_STRIP] * len(shown) + [ROW, _NOISE_ROW])
+    levels = sorted({step.level for step in reduction.steps})
+    looks = dict(zip(levels, styles(len(levels), "amplitude"), strict=True))
+    for row, history in enumerate(shown):
+        strip = figure.add_subplot(grid[row, :])
+        _draw_history(strip, history, reduction, looks)
+        if len(histories) > 1:  # the title names one
+            strip.set_title(history.name.replace("$", r"\$"), fontsize=7.5, loc="left", color=GREY, pad=2)
+    points = [figure.add_subplot(grid[len(shown), column]) for column in range(2)]
+    _draw_points(points, reduction, looks)
+    quality = [figure.add_subplot(grid[len(shown) + 1, column], sharex=points[0]) for column in range(2)]
+    _draw_quality(quality, reduction, looks)
+    left_out = f" The first {len(shown)} of {len(histories)} histories." if len(histories) > len(shown) else ""
+    explain(
+        figure,
+        f"Top: displacement over time; coloured: the steady cycles used, grey: ramps, pauses, transients.{left_out}",
+        "Bars: twice the standard error. Noise: standard error of a point, relative to |K|.",
+        "Distortion: overtones over the fundamental (THD), filled of the force, hollow of the displacement.",
+    )
+    return figure
+
+
+def _draw_history(axes: Axes, history: Loop, reduction: Reduction, looks: dict[float, Style]) -> None:
+    unit, factor = reduction.direction.display.displacement
+    mine = [step for step in reduction.steps if step.name == history.name]
+    edges = np.linspace(history.time[0], history.time[-1], _BINS + 1)
+    first = np.unique(np.searchsorted(history.time, edges[:-1]))
+    low, high = (factor * extreme.reduceat(history.displacement, first) for extreme in (np.minimum, np.maximum))
+    middle = history.time[first]
+    axes.fill_between(middle, low, high, color="#c8c8c8", lw=0.4, step="post")
+    for level, look in looks.items():
+        inside = np.zeros(middle.size, dtype=bool)
+        for step in mine:
+            if step.level == level:
+                inside |= (middle >= step.start) & (middle <= step.end)
+        axes.fill_between(middle, low, high, where=inside, color=look.color, lw=0.4, step="post")
+    motion = reduction.direction.motion.words[0]
+    dress(axes, "time [s]", f"{motion}\n[{unit}]")
+    axes.margins(x=0.01)
+
+
+def _draw_points(pair: Sequence[Axes], reduction: Reduction, looks: dict[float, Style]) -> None:
+    units = reduction.direction.display
+    unit, length = units.displacement
+    steps = reduction.steps
+    stiffness_unit, factor = for_people(*units.stiffness, max(abs(step.stiffness) for step in steps))
+    names = f"{reduction.direction} stiffness |K| [{stiffness_unit}]", f"{reduction.direction} loss factor [-]"
+    for axes, name in zip(pair, names, strict=True):
+        for level, look in looks.items():
+            mine = [step for step in steps if step.level == level]
+            frequency = np.array([step.frequency for step in mine])
+            value, error = _stiffness(mine, factor) if axes is pair[0] else _loss(mine)
+            order = np.argsort(frequency, kind="stable")
+            axes.plot(frequency[order], value[order], color=look.color, ls=look.dashes, lw=0.7, alpha=0.6)
+            axes.vlines(frequency, value - 2 * error, value + 2 * error, color=look.color, lw=0.9)
+            axes.plot(frequency, value, look.marker, color=look.color, **POINT)
+        dress(axes, "", name)
+        axes.tick_params(labelbottom=False)
+        readable(axes, np.array([step.frequency for step in steps]))
+    handles = [look.handle(True) for look in looks.values()]
+    legend(pair[-1], handles, [f"{length * level:.4g} {unit}" for level in looks], "amplitude")
+
+
+def _draw_quality(pair: Sequence[Axes], reduction: Reduction, looks: dict[float, Style]) -> None:
+    for level, look in looks.items():
+        mine = [step for step in reduction.steps if step.level == level]
+        frequency = np.array([step.frequency for step in mine])
+        noise = np.array([np.hypot(step.gain_error, step.phase_error) / 2**0.5 for step in mine])
+        pair[0].plot(frequency, 100 * noise, look.marker, color=look.color, **POINT)
+        pair[1].plot(frequency, [100 * step.force_distortion for step in mine], look.marker, color=look.color, **POINT)
+        hollow = [100 * step.displacement_distortion for step in mine]
+        pair[1].plot(frequency, hollow, look.marker, color=look.color, ms=3.4, mfc="none", mew=0.7)
+    dress(pair[0], "frequency [Hz]", "noise [%]")
+    dress(pair[1], "frequency [Hz]", "distortion [%]")
+    for axes in pair:
+        axes.set_ylim(bottom=0.0)
+        readable(axes, np.array([step.frequency for step in reduction.steps]))
+
+
+def _stiffness(steps: Sequence[Step], factor: float) -> tuple[Array, Array]:
+    magnitude = factor * np.abs([step.stiffness for step in steps])
+    return magnitude, magnitude * np.array([step.gain_error for step in steps])
+
+
+def _loss(steps: Sequence[Step]) -> tuple[Array, Array]:
+    loss_factor = np.array([step.loss_factor for step in steps])
+    return loss_factor, (1.0 + loss_factor**2) * np.array([step.phase_error for step in steps])

@@ -1,0 +1,179 @@
+"""Tables for spreadsheets: units in every header, one row a point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bushfit.effects import effect_named
+from bushfit.reading.csvfile import loss_factor
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from bushfit.diagnosis.record import Diagnosis
+    from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
+    from bushfit.model.model import Model
+    from bushfit.prediction import Prediction
+    from bushfit.reduction.steps import Reduction
+
+
+def prediction_table(prediction: Prediction) -> pd.DataFrame:
+    """The table of `predict`: six columns, then low and high of the last four."""
+    import pandas as pd
+
+    units = prediction.direction.display
+    length, length_factor = units.displacement
+    stiffness, factor = units.stiffness
+    columns = {
+        "frequency [Hz]": prediction.frequency,
+        f"amplitude [{length}]": prediction.amplitude * length_factor,
+    }
+    bands = {
+        f"stiffness [{stiffness}]": (prediction.stiffness, factor),
+        "loss factor [-]": (prediction.loss_factor, 1.0),
+        f"storage stiffness [{stiffness}]": (prediction.storage_stiffness, factor),
+        f"loss stiffness [{stiffness}]": (prediction.loss_stiffness, factor),
+    }
+    columns |= {name: band.value * scale for name, (band, scale) in bands.items()}
+    for name, (band, scale) in bands.items():
+        columns |= {f"{name}, low": band.low * scale, f"{name}, high": band.high * scale}
+    return pd.DataFrame(columns)
+
+
+def loops_table(model: Model, data_sets: Sequence[LoopData]) -> pd.DataFrame:
+    """Measured and modelled force of every loop, row by row (or by bin of phase where a loop is long)."""
+    import pandas as pd
+
+    frames = []
+    for data_set in data_sets:
+        units = data_set.direction.display
+        (length, length_factor), (force, force_factor) = units.displacement, units.force
+        drive = data_set.drive
+        frames.append(
+            pd.DataFrame(
+                {
+                    "loop": data_set.loop.name,
+                    "direction": str(data_set.direction),
+                    "time [s]": drive.phase / drive.frequency,
+                    f"displacement [{length}]": drive.displacement(drive.phase) * length_factor,
+                    f"force [{force}]": drive.force * force_factor,
+                    f"model force [{force}]": data_set.force(model) * force_factor,
+                    "residual [noise]": data_set.shown(model),
+                }
+            )
+        )
+    return pd.concat(frames, ignore_index=True)
+
+
+def sweeps_table(model: Model, data_sets: Sequence[SweepData]) -> pd.DataFrame:
+    """Measured and modelled dynamic stiffness of every sweep, sorted by amplitude, repeat and frequency."""
+    import pandas as pd
+
+    frames = []
+    for data_set in data_sets:
+        units = data_set.direction.display
+        (length, length_factor), (stiffness, factor) = units.displacement, units.stiffness
+        modelled = data_set.stiffness(model)
+        gain, phase = np.split(data_set.shown(model), 2)
+        frames.append(
+            pd.DataFrame(
+                {
+                    "sweep": data_set.sweep.name,
+                    "direction": str(data_set.direction),
+                    "frequency [Hz]": data_set.frequency,
+                    f"amplitude [{length}]": data_set.amplitude * length_factor,
+                    "repeat": data_set.sweep.repeat[data_set.order],
+                    f"stiffness [{stiffness}]": np.abs(data_set.measured) * factor,
+                    "loss factor [-]": loss_factor(data_set.measured),
+                    f"model stiffness [{stiffness}]": np.abs(modelled) * factor,
+                    "model loss factor [-]": loss_factor(modelled),
+                    "stiffness residual [noise]": gain,
+                    "loss residual [noise]": phase,
+                }
+            )
+        )
+    return pd.concat(frames, ignore_index=True)
+
+
+def gap_table(before: Model, after: Model, data_sets: Sequence[DataSet]) -> pd.DataFrame:
+    """Every residual of a diagnosis, before and after, in units of noise: a row a sweep point, or a loop's row."""
+    import pandas as pd
+
+    frames = []
+    for data_set in data_sets:
+        columns: dict[str, Any] = {"test": data_set.name, "kind": data_set.kind, "direction": str(data_set.direction)}
+        length, factor = data_set.direction.display.displacement
+        first, second = (data_set.residual(model) for model in (before, after))
+        if data_set.kind == "loop":
+            columns |= {"time [s]": data_set.drive.phase / data_set.drive.frequency}
+            columns |= {
+                "frequency [Hz]": data_set.drive.frequency,
+                f"amplitude [{length}]": data_set.drive.amplitude * factor,
+            }
+            columns |= {"force before [noise]": first, "force after [noise]": second}
+        else:
+            columns |= {"frequency [Hz]": data_set.frequency, f"amplitude [{length}]": data_set.amplitude * factor}
+            columns |= {"repeat": data_set.sweep.repeat[data_set.order]}
+            for name, values in (("before", first), ("after", second)):
+                storage, loss = np.split(values, 2)
+                columns |= {f"storage {name} [noise]": storage, f"loss {name} [noise]": loss}
+        frames.append(pd.DataFrame(columns))
+    return pd.concat(frames, ignore_index=True)
+
+
+def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
+    """Every effect of the library, judged: score, gain, BIC, held-out gap, parameters, and why it won or lost."""
+    import pandas as pd
+
+    rows = [
+        {
+            "effect": judged.name,
+            "level": str(effect_named(judged.name).level),
+            "score": judged.score,
+            "chi-square gain": judged.gain,
+            "BIC gain": judged.bic,
+            "held-out gap [noise]": judged.heldout,
+            "parameters": "; ".join(f"{name} = {value:.6g}" for name, value in judged.parameters.items()),
+            "why": judged.why,
+        }
+        for judged in diagnosis.candidates
+    ]
+    return pd.DataFrame(rows)
+
+
+def reduced_table(reduction: Reduction) -> pd.DataFrame:
+    """Raw histories reduced to a sweep: what the sweep reader takes, then what tells how good each point is."""
+    import pandas as pd
+
+    units = reduction.direction.display
+    (length, length_factor), (stiffness, factor) = units.displacement, units.stiffness
+    steps = reduction.steps
+    measured = np.array([step.stiffness for step in steps])
+    loss_factors = loss_factor(measured)
+    frame = pd.DataFrame(
+        {
+            "frequency [Hz]": [float(f"{step.nominal_frequency:.5g}") for step in steps],
+            f"amplitude [{length}]": [float(f"{length_factor * step.level:.5g}") for step in steps],
+            f"amplitude reached [{length}]": [step.amplitude * length_factor for step in steps],
+            "repeat": [step.repeat for step in steps],
+            f"stiffness [{stiffness}]": np.abs(measured) * factor,
+            "loss factor [-]": loss_factors,
+            f"stiffness std error [{stiffness}]": [step.gain_error * abs(step.stiffness) * factor for step in steps],
+            "loss factor std error [-]": [
+                step.phase_error * (1.0 + eta**2) for step, eta in zip(steps, loss_factors, strict=True)
+            ],
+            "frequency found [Hz]": [step.frequency for step in steps],
+            "displacement distortion [-]": [step.displacement_distortion for step in steps],
+            "force distortion [-]": [step.force_distortion for step in steps],
+            "cycles used": [step.cycles for step in steps],
+            "rows per cycle": [step.rows_per_cycle for step in steps],
+            "start [s]": [step.start for step in steps],
+            "end [s]": [step.end for step in steps],
+            "history": [step.name for step in steps],
+        }
+    )
+    order = [f"amplitude [{length}]", "repeat", "frequency [Hz]"]
+    return frame.sort_values(order, ignore_index=True, kind="stable")

@@ -1,0 +1,1 @@
+"""The score card: the workflow judged on hidden campaigns."""

@@ -1,0 +1,290 @@
+"""Hidden campaigns: random bushings with a hidden effect, measured by the time-domain rig, the truth sealed apart.
+
+The frequency faces that fits use never make these data. Sizes are random, from hardly visible to plain, where visible
+means what is left of the effect after the plain model has absorbed what it can.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.random import Generator
+
+from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.diagnosis.evidence import fit
+from bushfit.diagnosis.search import footprint
+from bushfit.effects import BASE, LIBRARY, Effect, effect_named, qualified
+from bushfit.effects.contract import Array
+from bushfit.fitting.data_sets import DataSet, loop_data, sweep_data
+from bushfit.geometry import Bushing, Direction
+from bushfit.model import rig
+from bushfit.model.model import Model
+from bushfit.simulation import Simulated, Undisturbed, measure, undisturbed
+
+#: What the library does not have.
+OUTSIDE = ("spot_disturbance", "mislabelled_level", "velocity_weakening_slip")
+#: Sizes of what stays visible, relative to |K| or half a loop's force range.
+_VISIBLE = (0.015, 0.12)
+_NOISE = (0.003, 0.006)
+_FORCE_NOISE = (0.002, 0.004)
+_SHARED = (0.004, float(np.radians(0.2)))
+_FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
+_TRIES = 30
+#: Time steps of a cycle: their error is a tenth of the noise.
+_STEPS = 1024
+#: No effect is larger than this many times its typical size.
+_LARGEST = 30.0
+_MOST_LOSS = 1.0
+
+
+@dataclass(frozen=True)
+class Sealed:
+    """The truth of a hidden campaign: what is hidden, how large, and how visible.
+
+    Args:
+        hidden: names of effects of the library.
+        outside: what the library does not have, or "".
+        without: effects the library is made to lack.
+        values: true values of every parameter.
+        visible: largest misfit of the plain model without noise, relative.
+        shared: whether blocks share gain and phase errors.
+        seed: of the campaign.
+    """
+
+    hidden: tuple[str, ...]
+    outside: str
+    without: tuple[str, ...]
+    values: Mapping[str, float]
+    visible: float
+    shared: bool
+    seed: int
+
+
+def hidden_campaign(seed: int, hidden: Sequence[str], outside: str = "") -> tuple[Simulated, Sealed]:
+    """One hidden campaign; the same seed makes the same.
+
+    Args:
+        seed: of everything random.
+        hidden: effects of the library to hide; none for a clean campaign.
+        outside: one of OUTSIDE, or "".
+    """
+    random = np.random.default_rng([seed, 7])
+    for _ in range(_TRIES):
+        plain = _bushing(random)
+        plan = _plan(plain, random, seed)
+        model, visible = _with_hidden(plain, hidden, plan, random)
+        if model is not None:
+            break
+    else:
+        raise RuntimeError(f"no visible size of {', '.join(hidden)} was found for seed {seed}")
+    clean = undisturbed(model, plan, steps_per_cycle=_STEPS)
+    if outside:
+        clean = _disturbed(clean, outside, random)
+    sealed = Sealed(tuple(hidden), outside, (), dict(model.values), visible, plan.gain_error > 0.0, seed)
+    return measure(clean, plan), sealed
+
+
+def _bushing(random: Generator) -> Model:
+    """A random bushing and a random filled rubber, elastic, springpot and friction."""
+    inner = random.uniform(0.006, 0.022)
+    bushing = Bushing("hidden", inner, inner * random.uniform(1.4, 2.3), random.uniform(0.02, 0.07))
+    mu = float(np.exp(random.uniform(np.log(0.6e6), np.log(1.8e6))))
+    return Model(
+        bushing,
+        BASE,
+        {
+            "mu": mu,
+            "m": mu * random.uniform(0.1, 0.3),
+            "alpha": random.uniform(0.15, 0.3),
+            "sigma_fmax": mu * random.uniform(0.008, 0.022),
+            "eps_half": random.uniform(0.007, 0.02),
+        },
+    )
+
+
+def _plan(plain: Model, random: Generator, seed: int) -> SimulateSettings:
+    """Two directions at three levels of like strain, two loops, three repeats."""
+    bushing = plain.bushing
+    top = random.uniform(0.03, 0.06)
+    levels = np.array([0.2, 0.4, 1.0])
+    sweeps = []
+    for direction in (Direction.AXIAL, Direction.RADIAL):
+        largest = float(f"{top / bushing.unit_strain(direction):.2g}")
+        sweeps.append(SimulatedSweep(direction, tuple(float(x) for x in levels * largest), _FREQUENCIES))
+    largest = max(sweeps[0].amplitudes)
+    shared = random.random() < 0.5
+    return SimulateSettings(
+        seed=seed,
+        repeats=3,
+        noise=random.uniform(*_NOISE),
+        force_noise=random.uniform(*_FORCE_NOISE),
+        displacement_noise=2e-4,
+        gain_error=_SHARED[0] if shared else 0.0,
+        phase_error=_SHARED[1] if shared else 0.0,
+        loops=tuple(SimulatedLoop(Direction.AXIAL, factor * largest, 0.1, cycles=3) for factor in (1.0, 2.0)),
+        sweeps=tuple(sweeps),
+    )
+
+
+def _with_hidden(
+    plain: Model, hidden: Sequence[str], plan: SimulateSettings, random: Generator
+) -> tuple[Model | None, float]:
+    """The plain model with effects of random visible size, and that size; None where none can be reached."""
+    if not hidden:
+        return plain, 0.0
+    model, sizes = plain, []
+    for name in hidden:
+        wanted = float(np.exp(random.uniform(*np.log(_VISIBLE))))
+        sized, size = _sized(plain, effect_named(name), wanted, plan, random)
+        if sized is None:
+            return None, 0.0
+        model = model.with_effect(name, sized)
+        sizes.append(size)
+    return model, min(sizes)
+
+
+def _sized(
+    plain: Model, effect: Effect, wanted: float, plan: SimulateSettings, random: Generator
+) -> tuple[dict[str, float] | None, float]:
+    """Values of an effect of which about the wanted size stays visible after a plain fit; None out of bounds."""
+    values = {
+        qualified(effect, parameter): _shape(plain, plan, parameter.scale, parameter.typical, random)
+        for parameter in effect.parameters
+        if parameter.neutral is None
+    }
+    amount = next(parameter for parameter in effect.parameters if parameter.neutral is not None)
+    name, value = qualified(effect, amount), amount.typical
+    if amount.bounds[0] < 0.0 and random.random() < 0.5:
+        value = -value
+    size = 0.0
+    for _ in range(4):
+        if not (amount.bounds[0] <= value <= amount.bounds[1] and abs(value) <= _LARGEST * amount.typical):
+            return None, 0.0
+        model = plain.with_effect(effect.name, {**values, name: value})
+        if not _plausible(model, plan):
+            value *= 0.3
+            continue
+        size = _visible(plain, model, plan)
+        if size <= 0.0:
+            return None, 0.0
+        if abs(np.log(size / wanted)) < 0.15:
+            break
+        value *= float(np.clip(wanted / size, 0.1, 10.0))
+    if not 0.7 * _VISIBLE[0] < size < 2.0 * _VISIBLE[1]:
+        return None, 0.0
+    return {**values, name: value}, size
+
+
+def _shape(plain: Model, plan: SimulateSettings, scale: str | None, typical: float, random: Generator) -> float:
+    """A random value of a parameter that has no neutral one, on the scale of the tests."""
+    amplitudes = plan.sweeps[0].amplitudes
+    ranges = {
+        "period": (1.0 / (2.0 * np.pi * 300.0), 1.0 / (2.0 * np.pi * 10.0)),
+        "frequency": (190.0, 400.0),
+        "displacement": (1.2 * amplitudes[1], 0.9 * amplitudes[2]),
+        "strain": tuple(x * plain.values["eps_half"] for x in (0.02, 0.1)),
+        None: (0.7 * typical, 1.4 * typical),
+    }
+    return float(np.exp(random.uniform(*np.log(ranges[scale]))))
+
+
+def _plausible(model: Model, plan: SimulateSettings) -> bool:
+    """Whether every test meets a bushing: one that resists, which beyond its clearance it does not, and that does not
+    lose more than it stores."""
+    for test in plan.sweeps:
+        frequency, amplitude = np.meshgrid(test.frequencies, test.amplitudes)
+        stiffness = model.stiffness(test.direction, frequency.ravel(), amplitude.ravel())
+        if not np.all(np.abs(stiffness.imag) < _MOST_LOSS * stiffness.real):
+            return False
+    return True
+
+
+def _visible(plain: Model, model: Model, plan: SimulateSettings) -> float:
+    """Largest misfit of a plain model fitted to what the model itself predicts, relative."""
+    data_sets = _terms(model, plan)
+    before = fit(plain, data_sets, (), {})
+    return footprint(before, replace(before, solution=replace(before.solution, model=model)))
+
+
+def _terms(model: Model, plan: SimulateSettings) -> list[DataSet]:
+    """The plan's tests as the model's own closed form has them: used for the choice of a size, never as data."""
+    from bushfit.reading.measurement import Loop, Sweep
+
+    sweeps = []
+    for number, swept in enumerate(plan.sweeps):
+        frequency, amplitude = (x.ravel() for x in np.meshgrid(swept.frequencies, swept.amplitudes))
+        stiffness = model.stiffness(swept.direction, frequency, amplitude)
+        sweeps.append(Sweep(str(number), swept.direction, frequency, amplitude, stiffness, noise=5e-3))
+    loops = []
+    for number, test in enumerate(plan.loops):
+        phase = np.arange(600) / 200.0
+        motion = test.amplitude * np.sin(2.0 * np.pi * phase)
+        data_set = loop_data([Loop(str(number), test.direction, phase / test.frequency, motion, motion)])[0]
+        data_set = data_set.noise_free(model)
+        loops.append(replace(data_set, drive=replace(data_set.drive, noise=3e-3 * data_set.drive.half_range)))
+    return [*loops, *sweep_data(sweeps)]
+
+
+def _disturbed(clean: Undisturbed, outside: str, random: Generator) -> Undisturbed:
+    """What the library does not have, put on the clean measurements."""
+    size = float(np.exp(random.uniform(np.log(0.03), np.log(0.12))))
+    if outside == "spot_disturbance":
+        centre, width = random.uniform(25.0, 135.0), random.uniform(3.0, 6.0)
+        sweeps = [(test, k * _resonance(np.array(test.frequencies), centre, width, size)) for test, k in clean.sweeps]
+        return replace(clean, sweeps=tuple(sweeps))
+    if outside == "mislabelled_level":
+        return replace(clean, sweeps=_mislabelled(clean, random))
+    return _weakening_slip(clean, size, random)
+
+
+def _resonance(frequency: Array, centre: float, width: float, size: float) -> Array:
+    """1 + a narrow mode of the rig."""
+    return 1.0 + size / (1.0 + 1j * (frequency - centre) / width)
+
+
+def _mislabelled(clean: Undisturbed, random: Generator) -> tuple[tuple[SimulatedSweep, Array], ...]:
+    """One level of one sweep was run at another amplitude than its label says."""
+    which, level = int(random.integers(len(clean.sweeps))), int(random.integers(3))
+    test, stiffness = clean.sweeps[which]
+    factor = float(random.choice([0.5, 0.6, 1.6, 2.0]))
+    other = rig.dynamic_stiffness(
+        clean.truth,
+        test.direction,
+        np.array(test.frequencies),
+        np.full(len(test.frequencies), factor * test.amplitudes[level]),
+        steps_per_cycle=_STEPS,
+    )
+    wrong = stiffness.copy()
+    wrong[level] = other
+    return tuple((t, wrong if i == which else k) for i, (t, k) in enumerate(clean.sweeps))
+
+
+def _weakening_slip(clean: Undisturbed, size: float, random: Generator) -> Undisturbed:
+    """A slip whose force falls with speed: F = Fc sgn(v) / (1 + |v|/v0), in every test."""
+    test, stiffness = clean.sweeps[0]
+    middle = test.amplitudes[1]
+    force = size * float(np.abs(stiffness[1]).mean()) * middle
+    speed = 2.0 * np.pi * float(np.exp(random.uniform(np.log(10.0), np.log(60.0)))) * middle
+    angle = 2.0 * np.pi * (np.arange(512) + 0.5) / 512
+
+    def slip(velocity: Array) -> Array:
+        return force * np.sign(velocity) / (1.0 + np.abs(velocity) / speed)
+
+    sweeps = []
+    for swept, k in clean.sweeps:
+        x, omega = np.meshgrid(swept.amplitudes, 2.0 * np.pi * np.array(swept.frequencies), indexing="ij")
+        velocity = (x * omega)[..., None] * np.cos(angle)
+        quadrature = 2.0 * np.mean(slip(velocity) * np.cos(angle), axis=-1)
+        sweeps.append((swept, k + 1j * quadrature / x))
+    loops = []
+    for looped, rec in clean.loops:
+        velocity = np.gradient(rec.displacement, rec.time)
+        loops.append((looped, replace(rec, force=rec.force + slip(velocity))))
+    return replace(clean, sweeps=tuple(sweeps), loops=tuple(loops))
+
+
+def hideable() -> list[str]:
+    """Effects that the tests of a hidden campaign can show."""
+    return [name for name in LIBRARY if name not in BASE]

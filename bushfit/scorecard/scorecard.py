@@ -1,0 +1,242 @@
+"""The score card: the workflow judged on hidden campaigns, the truth opened afterwards.
+
+Campaigns are written to disk as files; the workflow reads the campaign, never the sealed truth. The same seed makes
+the same card.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bushfit.campaign.campaign import load_campaign
+from bushfit.diagnosis.record import Diagnosis, Settings
+from bushfit.diagnosis.workflow import diagnose
+from bushfit.fitting.data import Data
+from bushfit.report.folder import write_files
+from bushfit.scorecard.hidden import OUTSIDE, Sealed, hidden_campaign, hideable
+from bushfit.simulation import to_files
+
+#: A gain in chi-square from which an effect counts as plain.
+PLAIN = 200.0
+_SLOWEST = 2.0
+#: Shares of the kinds of campaigns in a card.
+_KINDS = {"single": 0.5, "clean": 0.2, "pair": 0.1, "outside": 0.1, "lacking": 0.1}
+
+
+@dataclass(frozen=True)
+class Task:
+    """One hidden campaign to make and to diagnose."""
+
+    kind: str
+    seed: int
+    hidden: tuple[str, ...]
+    outside: str = ""
+    without: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the workflow said of one campaign, and the truth.
+
+    Args:
+        task: what was hidden.
+        sealed: the truth.
+        verdict: of the workflow.
+        named: effects it named or that lead a set.
+        sets: all members of each set, leader first.
+        richer: effects that contain what was named as a limit.
+        gain: chi-square that the best single effect takes off, whether it was added or not.
+        heldout: gap on held-out data after, in units of noise.
+        covered: per hidden effect that was added: whether the 95 % interval of its amount holds the truth.
+        seconds: processor time of the diagnosis, whatever else the machine does.
+        error: what went wrong, or "".
+    """
+
+    task: Task
+    sealed: Sealed | None
+    verdict: str
+    named: tuple[str, ...]
+    sets: tuple[tuple[str, ...], ...]
+    richer: tuple[str, ...]
+    gain: float
+    heldout: float
+    covered: tuple[bool, ...]
+    seconds: float
+    error: str = ""
+
+    @property
+    def truth_in_sets(self) -> bool:
+        """Whether every hidden effect was named alone or in a set of at most three."""
+        small = [members for members in self.sets if len(members) <= 3]
+        return all(any(name in members for members in small) or name in self.richer for name in self.task.hidden)
+
+    @property
+    def single_wrong(self) -> bool:
+        """A confident name (verdict named) that is neither the truth nor said to be a limit of it."""
+        wrong = set(self.named) - set(self.task.hidden)
+        return self.verdict == "named" and bool(wrong) and not set(self.task.hidden) & set(self.richer)
+
+    @property
+    def exact(self) -> bool:
+        """Exactly the hidden effects named, each alone."""
+        return self.verdict == "named" and set(self.named) == set(self.task.hidden)
+
+
+def tasks(count: int, seed: int) -> list[Task]:
+    """A balanced card: every effect alone in turn, none, pairs, outside the list, and leave-one-out."""
+    random = np.random.default_rng(seed)
+    names = hideable()
+    made: list[Task] = []
+    for kind, share in _KINDS.items():
+        for number in range(max(1, round(share * count))):
+            own = int(random.integers(2**31))
+            single = names[number % len(names)]
+            match kind:
+                case "single":
+                    made.append(Task(kind, own, (single,)))
+                case "clean":
+                    made.append(Task(kind, own, ()))
+                case "pair":
+                    made.append(Task(kind, own, tuple(str(x) for x in random.choice(names, 2, replace=False))))
+                case "outside":
+                    made.append(Task(kind, own, (), OUTSIDE[number % len(OUTSIDE)]))
+                case _:
+                    made.append(Task(kind, own, (single,), without=(single,)))
+    return made
+
+
+def run(chosen: Sequence[Task], folder: Path, jobs: int, progress: Callable[[], None]) -> list[Outcome]:
+    """Make, diagnose and judge every task, on several cores; campaigns and truths stay in the folder."""
+    if jobs == 1:
+        return [_counted(work(task, folder), progress) for task in chosen]
+    with ProcessPoolExecutor(jobs) as pool:
+        futures = [pool.submit(work, task, folder) for task in chosen]
+        done = {future: _counted(future.result(), progress) for future in as_completed(futures)}
+    return [done[future] for future in futures]
+
+
+def _counted(outcome: Outcome, progress: Callable[[], None]) -> Outcome:
+    progress()
+    return outcome
+
+
+def work(task: Task, folder: Path) -> Outcome:
+    """One task: write the campaign, seal the truth apart, diagnose the files, open the truth."""
+    place = folder / f"{task.kind}_{task.seed}"
+    sealed_file = folder / "sealed" / f"{task.kind}_{task.seed}.json"
+    try:
+        simulated, sealed = hidden_campaign(task.seed, task.hidden, task.outside)
+        files = to_files(simulated)
+        del files["truth.json"]
+        write_files(place, files, force=True)
+        write_files(sealed_file.parent, {sealed_file.name: json.dumps(asdict(sealed)).encode()}, force=True)
+        started = time.process_time()
+        data = Data.of(load_campaign(place / "campaign.toml"))
+        diagnosis = diagnose(data, None, Settings(without=task.without))
+        seconds = time.process_time() - started
+        truth = Sealed(**json.loads(sealed_file.read_text()))
+    except Exception as wrong:  # one campaign that fails is one row of the card, and is shown there
+        return Outcome(task, None, "failed", (), (), (), 0.0, 0.0, (), 0.0, f"{type(wrong).__name__}: {wrong}")
+    return _outcome(task, truth, diagnosis, seconds)
+
+
+def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) -> Outcome:
+    result = diagnosis.result
+    added = tuple(f"{name}." for name in task.hidden if name in result.model.effects)
+    intervals = {name: result.interval(name) for name in truth.values if name.startswith(added)} if added else {}
+    covered = [ends[0] <= truth.values[name] <= ends[1] for name, ends in intervals.items() if ends is not None]
+    return Outcome(
+        task,
+        truth,
+        diagnosis.verdict,
+        tuple(effect.name for effect in diagnosis.effects),
+        tuple((effect.name, *effect.alternatives) for effect in diagnosis.effects),
+        tuple(name for effect in diagnosis.effects for name in effect.richer),
+        max((judged.gain or 0.0 for judged in diagnosis.candidates), default=0.0),
+        diagnosis.holdout.after,
+        tuple(covered),
+        seconds,
+    )
+
+
+@dataclass(frozen=True)
+class Row:
+    """One measure of the card: its figure as text, what it was counted over, and the target."""
+
+    measure: str
+    figure: str
+    over: int
+    target: str
+    met: bool | None
+
+
+def card(outcomes: Sequence[Outcome]) -> list[Row]:
+    """Every target of the workflow, measured."""
+    good = [outcome for outcome in outcomes if not outcome.error]
+    single = _kind(good, "single")
+    plain = [outcome for outcome in single if outcome.gain >= PLAIN]
+    named = [outcome for outcome in good if outcome.verdict == "named" and outcome.task.hidden]
+    covered = [hit for outcome in good if outcome.exact for hit in outcome.covered]
+    clean, outside, lacking = (_kind(good, kind) for kind in ("clean", "outside", "lacking"))
+    strange, hidden = [*outside, *lacking], [*single, *_kind(good, "pair"), *outside]
+    seconds = [outcome.seconds for outcome in good]
+    shares: list[tuple[str, Sequence[Outcome], Callable[[Outcome], bool], str, float, float]] = [
+        ("false alarm on clean campaigns", clean, lambda o: o.verdict != "consistent", "<= 1 %", 0.0, 0.01),
+        ("truth named alone or in a set of at most three", single, lambda o: o.truth_in_sets, ">= 97 %", 0.97, 1.0),
+        ("a single, confident, wrong name", hidden, lambda o: o.single_wrong, "<= 2 %", 0.0, 0.02),
+        ("single name where the effect is plain", plain, lambda o: o.exact, ">= 90 %", 0.9, 1.0),
+        ("two effects at once, both named", _kind(good, "pair"), lambda o: o.truth_in_sets, ">= 90 %", 0.9, 1.0),
+        (
+            "outside the list: no confident name",
+            strange,
+            lambda o: o.verdict != "named",
+            ">= 90 %",
+            0.9,
+            1.0,
+        ),
+        ("  of these a disturbance of the rig", outside, lambda o: o.verdict != "named", "", 0.0, 1.0),
+        ("  of these an effect the library lacks", lacking, lambda o: o.verdict != "named", "", 0.0, 1.0),
+        ("held-out gap after <= 1.1, where named", named, lambda o: o.heldout <= 1.1, "all", 1.0, 1.0),
+    ]
+    rows = [_share(name, [hit(o) for o in over], target, low, high) for name, over, hit, target, low, high in shares]
+    rows.append(_share("95 % interval covers the truth, where named", covered, "93 to 97 %", 0.93, 0.97))
+    sizes = [len(members) for outcome in good for members in outcome.sets]
+    members = f"{np.mean(sizes):.2f} / {max(sizes)}" if sizes else "no case"
+    rows.append(Row("size of the sets of names, mean / largest", members, len(sizes), "", None))
+    took = f"{np.median(seconds):.1f} s / {max(seconds):.1f} s" if seconds else "no case"
+    met = bool(max(seconds) <= _SLOWEST) if seconds else None
+    rows.append(Row("processor time of one diagnosis, median / longest", took, len(seconds), "<= 2 s", met))
+    return rows
+
+
+def _kind(outcomes: Sequence[Outcome], kind: str) -> list[Outcome]:
+    return [outcome for outcome in outcomes if outcome.task.kind == kind]
+
+
+def _share(measure: str, hits: Sequence[bool], target: str, low: float, high: float) -> Row:
+    if not hits:
+        return Row(measure, "no case", 0, target, None)
+    share = float(np.mean(hits))
+    return Row(measure, f"{100 * share:.1f} %", len(hits), target, low <= share <= high if target else None)
+
+
+def confusion(outcomes: Sequence[Outcome]) -> dict[str, Counter[str]]:
+    """Per hidden effect (or kind): how often which verdict with which names was given."""
+    table: dict[str, Counter[str]] = {}
+    for outcome in outcomes:
+        truth = " + ".join(outcome.task.hidden) or outcome.task.outside or "none"
+        if outcome.task.without:
+            truth = f"{truth} (library lacks it)"
+        said = outcome.verdict
+        if outcome.sets:
+            said += ": " + " + ".join("|".join(members) for members in outcome.sets)
+        table.setdefault(truth, Counter())[said] += 1
+    return dict(sorted(table.items()))

@@ -1,0 +1,168 @@
+"""Checked tables: what pydantic finds wrong in a TOML or JSON file, in the project's words.
+
+It knows no campaign and no model. A table is a frozen dataclass; where the keys of a field stand in the table itself
+and not under the field's own name, the field says so with `field(metadata=standing_in_table(keys))`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from difflib import get_close_matches
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, cast, get_args, get_type_hints
+
+from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, ValidationInfo
+from pydantic_core import ErrorDetails
+
+from bushfit.errors import BushfitError, CampaignError
+
+T = TypeVar("T")
+
+#: Known keys that an error lists at most.
+_MOST_LISTED = 12
+#: How alike a key has to be to one that is known to be suggested, from 0 to 1.
+_ALIKE = 0.5
+_UNKNOWN = "unexpected_keyword_argument"
+#: pydantic's names for what has the wrong shape, in the words of TOML.
+_SHAPES = {
+    "dataclass_type": "a table",
+    "dict_type": "a table",
+    "mapping_type": "a table",
+    "tuple_type": "a list",
+    "too_short": "at least one value",
+    "string_type": "a text in quotes",
+    "string_too_short": "a text that is not empty",
+    "string_pattern_mismatch": "one line without control characters",
+    "string_unicode": "text in Unicode",
+    "bool_type": "true or false",
+    "int_type": "a whole number",
+    "float_type": "a number",
+}
+_WORDS = {"None": "null", "True": "true", "False": "false"}
+#: In the metadata of a field: a function that gives the keys which stand in the table itself.
+_IN_TABLE = "keys in the table itself"
+
+Text = Annotated[str, Field(min_length=1)]
+#: What tables, plots, folders and the terminal are headed with: one line without control characters.
+Name = Annotated[str, Field(strict=True, min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]*$")]
+
+
+def unknown_key(key: str, known: Collection[str]) -> CampaignError:
+    """The error for a key that is none of the known ones."""
+    near = get_close_matches(key, known, n=1, cutoff=_ALIKE)
+    hint = f'did you mean "{near[0]}"?' if near else None
+    expected = "one of " + ", ".join([*known][:_MOST_LISTED]) + (", ..." if len(known) > _MOST_LISTED else "")
+    return CampaignError("unknown key", found=f'"{key}"', expected=expected, hint=hint)
+
+
+def converted(convert: Callable[[Any, ValidationInfo], Any]) -> BeforeValidator:
+    """A pydantic validator that calls convert(raw value, info); a BushfitError travels inside pydantic's."""
+
+    def run(raw: Any, info: ValidationInfo) -> Any:
+        try:
+            return convert(raw, info)
+        except BushfitError as error:
+            raise ValueError(error) from error
+
+    return BeforeValidator(run)
+
+
+def standing_in_table(keys: Callable[[], Iterable[str]]) -> Mapping[str, Any]:
+    """Metadata of a field whose keys, those that the function gives, stand in the table itself."""
+    return {_IN_TABLE: keys}
+
+
+@cache
+def _adapter(schema: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(schema)
+
+
+def check_tables(
+    tables: Mapping[str, Any],
+    file: Path,
+    schema: type[T],
+    place: str | None = None,
+    *,
+    kind: type[BushfitError] = CampaignError,
+) -> T:
+    """Parsed TOML as the dataclass `schema`, all quantities in SI; errors say that it stands in `file`, at `place`.
+
+    Raises:
+        kind: keys or values that are not understood.
+        UnitError: a quantity without a unit, or with one that does not fit.
+    """
+    try:
+        checked: T = _adapter(cast(Hashable, schema)).validate_python(tables)
+        return checked
+    except ValidationError as error:
+        # a mistyped key is missing and unknown: the latter says more
+        details = sorted(error.errors(include_url=False), key=lambda detail: detail["type"] != _UNKNOWN)
+        complaint = _complaint(details[0], schema, kind)
+    complaint.file = file
+    complaint.place = ", ".join(filter(None, (place, complaint.place)))
+    raise complaint  # outside of `except`: pydantic's error holds ours, and a ring of errors cannot be pickled
+
+
+def _complaint(detail: ErrorDetails, schema: type, kind: type[BushfitError]) -> BushfitError:
+    """One error of pydantic's as one of ours; tables of an array are counted from 1."""
+    location = detail["loc"]
+    place = _place(schema, location)
+    cause = detail.get("ctx", {}).get("error")
+    if isinstance(cause, ValueError) and isinstance(cause.args[0], BushfitError):
+        error = cause.args[0]
+        place = ".".join(part for part in (place, error.place) if part)
+    elif detail["type"] == _UNKNOWN:
+        error = unknown_key(str(location[-1]), known_keys(_table_at(schema, location[:-1])))
+    elif detail["type"] == "missing":
+        key = location[-1]
+        error = kind("a key is missing", expected=f"{key} = ..." if isinstance(key, str) else "a further value")
+    else:
+        found = _WORDS.get(str(detail["input"]), str(detail["input"]))
+        expected = _SHAPES.get(detail["type"], re.sub("^(Input|String) should (be|have) ", "", detail["msg"]))
+        error = kind("this value is not understood", found=found, expected=expected)
+    error.place = place
+    return error
+
+
+def _place(table: type, location: tuple[int | str, ...]) -> str:
+    """A place as the file has it, such as "simulate.loops #2.frequency"."""
+    words: list[str] = []
+    for key in location:
+        if isinstance(key, int):
+            words[-1] += f" #{key + 1}"
+        elif key not in _in_table(table):
+            words.append(key)
+        table = _table_at(table, (key,))
+    return ".".join(words)
+
+
+def known_keys(table: type) -> Sequence[str]:
+    """The keys that a table of the file may have."""
+    gathered = _in_table(table)
+    return [
+        key for entry in fields(table) for key in (gathered[entry.name]() if entry.name in gathered else [entry.name])
+    ]
+
+
+def _in_table(table: type) -> Mapping[str, Callable[[], Iterable[str]]]:
+    """Fields whose keys stand in the table itself, and what gives these keys."""
+    return {entry.name: entry.metadata[_IN_TABLE] for entry in fields(table) if _IN_TABLE in entry.metadata}
+
+
+def _table_at(table: type, location: tuple[int | str, ...]) -> type:
+    """The dataclass of the table at a place below another, or that nearest above it."""
+    for key in location:
+        if key in (hints := get_type_hints(table)):
+            inside = (part for part in _parts(hints[key]) if isinstance(part, type) and is_dataclass(part))
+            table = next(inside, table)
+    return table
+
+
+def _parts(hint: Any) -> Iterable[Any]:
+    """A type and all that it is made of."""
+    yield hint
+    for part in get_args(hint):
+        yield from _parts(part)

@@ -1,0 +1,122 @@
+"""The time-domain road against the closed form it shares no formula with."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from bushfit.effects import History
+from bushfit.geometry import Direction
+from bushfit.model import rig
+from bushfit.model.model import Model
+
+
+def test_the_rig_meets_the_closed_form_at_first_order(paper_model: Model) -> None:
+    """Gruenwald-Letnikov is first order in the step; a long run-in leaves no transient."""
+    frequency, amplitude = 20.0, 5e-4
+    exact = complex(paper_model.stiffness("axial", frequency, amplitude)[()])
+    steps = np.array([128, 256, 512, 1024, 2048])
+    errors = np.array(
+        [
+            rig.lock_in(
+                rig.record(paper_model, Direction.AXIAL, frequency, amplitude, cycles=1, run_in=60, steps_per_cycle=n),
+                frequency,
+            )
+            / exact
+            - 1.0
+            for n in steps
+        ]
+    )
+    orders = np.log2(np.abs(errors[:-1] / errors[1:]))
+    for count, error in zip(steps, np.abs(errors), strict=True):
+        print(f"{count} steps a cycle: {error:.2e} from the closed form")
+    print(f"order of the scheme: {np.round(orders, 3)}")
+    np.testing.assert_allclose(orders, 1.0, atol=0.1)
+    assert abs(errors[-1]) < 3e-4
+
+
+def test_extrapolated_to_no_step_and_no_transient_it_is_the_closed_form(paper_model: Model) -> None:
+    at = (Direction.RADIAL, 5.0, 2e-4)
+    values = [
+        rig.lock_in(rig.record(paper_model, *at, cycles=1, run_in=200, steps_per_cycle=n), at[1])
+        for n in (256, 512, 1024)
+    ]
+    first = [2.0 * fine - coarse for coarse, fine in pairwise(values)]
+    limit = (4.0 * first[1] - first[0]) / 3.0
+    gap = abs(limit / complex(paper_model.stiffness(*at)[()]) - 1.0)
+    print(f"extrapolated: {gap:.1e} from the closed form")
+    assert gap < 2e-6
+
+
+def test_fig_6_loop_peaks_at_458_newton(paper_model: Model) -> None:
+    loop = rig.record(paper_model, Direction.AXIAL, 0.1, 1e-3, cycles=1, run_in=3)
+    peak = loop.force.max()
+    print(f"Fig. 6: 1 mm at 0.1 Hz peaks at {peak:.2f} N, {100 * (peak / 458.0 - 1):+.2f} % from 458 N")
+    assert peak == pytest.approx(458.0, rel=1e-2)
+
+
+@pytest.mark.parametrize(("cycles", "error"), [(3, 2e-3), (6, 6e-4), (12, 5e-5)])
+def test_friction_settles_from_rest_as_it_should(paper_model: Model, cycles: int, error: float) -> None:
+    """First harmonic after so many cycles at e0/eps_half = 0.5."""
+    only = paper_model.with_values({"m": 0.0})
+    amplitude = 0.5 * only.values["eps_half"] / only.bushing.unit_strain(Direction.AXIAL)
+    at = (Direction.AXIAL, 1.0, amplitude)
+    measured = rig.lock_in(rig.record(only, *at, cycles=1, run_in=cycles - 1, steps_per_cycle=4096), 1.0)
+    gap = abs(measured / complex(only.stiffness(*at)[()]) - 1.0)
+    print(f"cycle {cycles}: {gap:.1e} from the steady state")
+    assert gap == pytest.approx(error, rel=0.5)
+
+
+def test_lock_in_drops_mean_and_overtones() -> None:
+    time = np.arange(4096) / 4096
+    phase = 2.0 * np.pi * 5.0 * time
+    displacement = 2.0 * np.cos(phase)
+    force = 7.0 + 6.0 * np.cos(phase + 0.3) + 4.0 * np.cos(3.0 * phase) + 1.0 * np.sin(2.0 * phase)
+    found = rig.lock_in(rig.Record(time, displacement, force), 5.0)
+    assert found == pytest.approx(3.0 * np.exp(0.3j), rel=1e-10)
+
+
+def test_waves() -> None:
+    phase = np.array([0.0, 0.125, 0.25, 0.5, 0.75, 1.0, 1.25])
+    np.testing.assert_allclose(rig.wave("triangle", phase), [0.0, 0.5, 1.0, 0.0, -1.0, 0.0, 1.0], atol=1e-12)
+    np.testing.assert_allclose(rig.wave("sine", phase), np.sin(2.0 * np.pi * phase), atol=1e-12)
+
+
+def test_record_keeps_the_last_cycles(paper_model: Model) -> None:
+    whole = rig.record(paper_model, Direction.AXIAL, 1.0, 1e-3, cycles=4, steps_per_cycle=64)
+    kept = rig.record(paper_model, Direction.AXIAL, 1.0, 1e-3, cycles=1, run_in=3, steps_per_cycle=64)
+    assert kept.time[0] == 0.0
+    np.testing.assert_allclose(kept.time[-1], 1.0)
+    np.testing.assert_allclose(kept.force, whole.force[3 * 64 :], rtol=1e-9, atol=1e-9)
+
+
+def test_a_triangle_is_not_a_sine(paper_model: Model) -> None:
+    """Sine and triangle of one amplitude meet at the peaks, where friction has gone as far, but not between them."""
+    sine, triangle = (
+        rig.record(paper_model, Direction.AXIAL, 0.1, 1e-3, cycles=1, run_in=4, waveform=waveform)
+        for waveform in ("sine", "triangle")
+    )
+    assert triangle.displacement.max() == pytest.approx(1e-3, rel=1e-9)
+    assert triangle.force.max() == pytest.approx(sine.force.max(), rel=1e-2)
+    middle = np.argmin(np.abs(sine.displacement - 5e-4))
+    assert abs(triangle.displacement[middle] - 5e-4) > 5e-5
+
+
+def test_any_history_has_memory(paper_model: Model) -> None:
+    """A smaller motion inside a larger one does not return to where it left: the springpot and friction remember."""
+    step = 1e-2
+    out = np.concatenate([np.linspace(0.0, 1e-3, 200), np.linspace(1e-3, 5e-4, 100), np.linspace(5e-4, 1e-3, 100)])
+    force = paper_model.force("axial", History(out, step, periodic=False, frequency=0.1))
+    assert force[199] != pytest.approx(force[-1], rel=1e-6)
+    shorter = paper_model.force("axial", History(out[:250], step, periodic=False, frequency=0.1))
+    np.testing.assert_allclose(force[:250], shorter, rtol=1e-9, atol=1e-9)  # causal
+
+
+def test_dynamic_stiffness_measures_points_one_by_one(paper_model: Model) -> None:
+    frequency, amplitude = np.array([5.0, 155.0]), np.array([1e-4, 5e-4])
+    found = rig.dynamic_stiffness(paper_model, Direction.AXIAL, frequency, amplitude)
+    gap = np.abs(found / paper_model.stiffness("axial", frequency, amplitude) - 1.0).max()
+    print(f"dynamic_stiffness with its defaults: {gap:.1e} from the closed form")
+    assert gap < 5e-4

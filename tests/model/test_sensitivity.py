@@ -1,0 +1,98 @@
+"""Derivatives: analytic for the paper's branches, differences for the rest, both against higher-order differences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bushfit.effects import BASE, History
+from bushfit.geometry import Bushing, Direction
+from bushfit.model.model import FIVE, Model
+from bushfit.model.sensitivity import differences, force_jacobian, stiffness_jacobian
+
+FREQUENCY = np.array([0.1, 5.0, 55.0, 155.0])
+AMPLITUDE = np.array([1e-3, 1e-4, 2e-4, 5e-4])
+
+
+def richardson(model: Model, name: str, respond: Callable[[Model], np.ndarray]) -> np.ndarray:
+    """Fourth-order difference over 1e-3 of the value."""
+    value, step = model.values[name], 1e-3 * model.values[name]
+    far, low, high, end = (respond(model.with_values({name: value + k * step})) for k in (-2, -1, 1, 2))
+    return (far - 8.0 * low + 8.0 * high - end) / (12.0 * step)
+
+
+models = st.builds(
+    lambda mu, m, alpha, sigma, eps: Model(
+        Bushing("any", 0.01, 0.018, 0.034),
+        BASE,
+        {"mu": mu, "m": m, "alpha": alpha, "sigma_fmax": sigma, "eps_half": eps},
+    ),
+    st.floats(2e5, 4e6),
+    st.floats(1e4, 1e6),
+    st.floats(0.05, 0.9),
+    st.floats(1e3, 1e5),
+    st.floats(1e-3, 1e-1),
+)
+
+
+@given(models, st.sampled_from(list(Direction)))
+def test_stiffness_slopes(model: Model, direction: Direction) -> None:
+    amplitude = AMPLITUDE * (100.0 if direction.is_rotation else 1.0)
+    found = stiffness_jacobian(model, direction, FREQUENCY, amplitude, FIVE)
+    scale = np.abs(model.stiffness(direction, FREQUENCY, amplitude))
+    for row, name in zip(found, FIVE, strict=True):
+        expected = richardson(model, name, lambda m: m.stiffness(direction, FREQUENCY, amplitude))
+        assert np.max(np.abs(row - expected) * model.values[name] / scale) < 1e-9
+
+
+@pytest.mark.parametrize("direction", ["axial", "radial"])
+def test_force_slopes_on_a_steady_loop(paper_model: Model, direction: Direction) -> None:
+    cycle = 1e-3 * np.sin(2.0 * np.pi * np.arange(256) / 256)
+    history = History.steady(cycle, 0.1)
+    found = force_jacobian(paper_model, direction, history, FIVE)
+    peak = np.max(np.abs(paper_model.force(direction, history)))
+    for row, name in zip(found, FIVE, strict=True):
+        expected = richardson(paper_model, name, lambda m: m.force(direction, history))
+        error = np.max(np.abs(row - expected)) * paper_model.values[name] / peak
+        print(f"{direction} dF/d{name}: {error:.1e} of the peak per relative change")
+        assert error < 1e-9
+
+
+def test_force_slopes_from_rest(paper_model: Model) -> None:
+    motion = 1e-3 * np.sin(2.0 * np.pi * np.arange(600) / 256)
+    history = History(motion, 10.0 / 256, periodic=False, frequency=0.1)
+    found = force_jacobian(paper_model, "axial", history, FIVE)
+    for row, name in zip(found, FIVE, strict=True):
+        expected = richardson(paper_model, name, lambda m: m.force("axial", history))
+        assert np.max(np.abs(row - expected)) * paper_model.values[name] < 1e-5 * 460.0
+
+
+def test_the_analytic_road_is_taken_and_agrees_with_the_differences(
+    paper_model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at = ("axial", FREQUENCY, AMPLITUDE)
+    by_differences = differences(paper_model, FIVE, lambda values: paper_model.stiffness(*at, values=values))
+    monkeypatch.setattr("bushfit.model.sensitivity.differences", None)
+    analytic = stiffness_jacobian(paper_model, *at, FIVE)
+    np.testing.assert_allclose(analytic, by_differences, rtol=1e-5, atol=1e-5 * np.abs(analytic).max(axis=1).min())
+
+
+def test_names_choose_rows_in_their_order(paper_model: Model) -> None:
+    every = stiffness_jacobian(paper_model, "axial", FREQUENCY, AMPLITUDE, FIVE)
+    some = stiffness_jacobian(paper_model, "axial", FREQUENCY, AMPLITUDE, ("eps_half", "mu"))
+    assert np.array_equal(some, every[[4, 0]])
+
+
+def test_one_sided_at_a_bound(paper_model: Model) -> None:
+    """alpha = 1 may not be exceeded; the neutral mass 0 may be left both ways or one."""
+    edge = paper_model.with_values({"alpha": 1.0})
+    at = ("axial", FREQUENCY, AMPLITUDE)
+    found = differences(edge, ["alpha"], lambda values: edge.stiffness(*at, values=values))
+    np.testing.assert_allclose(found, stiffness_jacobian(edge, *at, ["alpha"]), rtol=1e-4)
+    heavy = paper_model.with_effect("inertia")
+    slope = stiffness_jacobian(heavy, *at, ["inertia.mass"])[0]
+    np.testing.assert_allclose(slope, -((2.0 * np.pi * FREQUENCY) ** 2), rtol=1e-6, atol=1e-2)

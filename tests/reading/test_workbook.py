@@ -1,0 +1,140 @@
+"""Workbooks: the sheet that is meant, numbers as numbers, texts as texts, and what would fill the memory."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import openpyxl
+import pytest
+from dialects import HEADERS, NUMBERS, UNITS
+
+from bushfit.errors import MeasurementError
+from bushfit.geometry import Direction
+from bushfit.reading.layout import FileFormat
+from bushfit.reading.loops import read_loop
+from bushfit.reading.sweeps import read_sweep
+
+Sheets = dict[str, list[list[object]]]
+
+
+def table(kind: Any, language: str = "german", number: Callable[[Any], object] = float) -> list[list[object]]:
+    names = HEADERS[language][kind].split(", ")
+    headers: list[object] = [f"{name} [{unit}]" for name, unit in zip(names, UNITS[kind], strict=True)]
+    return [headers, *([number(cell) for cell in row] for row in NUMBERS[kind])]
+
+
+def with_comma(number: object) -> str:
+    return f"{number:,}".translate(str.maketrans(",.", ".,"))
+
+
+def workbook(sheets: Sheets, folder: Path) -> Path:
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for name, rows in sheets.items():
+        sheet = book.create_sheet(name)
+        for row in rows:
+            sheet.append(row)
+    book.save(folder / "test.xlsx")
+    return folder / "test.xlsx"
+
+
+def forces(file: Path, **stated: Any) -> Any:
+    return read_loop(file, Direction.AXIAL, written=FileFormat(**stated)).force
+
+
+FORCE = np.array([float(row[2]) for row in NUMBERS["loop"]])
+PREAMBLE: list[list[object]] = [["Maschine", "EL-7"], ["Datum", "01.02.2026"], ["Version", 1.234], []]
+SHEETS: dict[str, Sheets] = {
+    "one sheet": {"Loop": table("loop")},
+    "preamble": {"Loop": [*PREAMBLE, *table("loop")]},
+    "units row": {"Loop": [["Zeit", "Weg", "Kraft"], ["s", "mm", "N"], *table("loop")[1:]]},
+    "beside a sweep": {"Sweep": table("sweep"), "Loop": table("loop"), "Notes": [["nothing", "here"]]},
+    "texts with decimal commas": {"Loop": table("loop", number=with_comma)},
+    "texts with decimal points": {"Loop": table("loop", number=str)},
+    "numbers beside texts": {
+        "Loop": [table("loop")[0], *([float(t), float(x), with_comma(f)] for t, x, f in NUMBERS["loop"])]
+    },
+    "empty rows and remarks": {"Loop": [[], *table("loop")[:9], [], [None, None, None], *table("loop")[9:]]},
+}
+
+
+@pytest.mark.parametrize("case", SHEETS)
+def test_sheets_read_to_the_same_numbers(case: str, tmp_path: Path) -> None:
+    assert np.array_equal(forces(workbook(SHEETS[case], tmp_path)), FORCE)
+
+
+def test_a_sweep_and_a_loop_in_one_workbook(tmp_path: Path) -> None:
+    file = workbook({"Loop": table("loop", "french"), "Sweep": table("sweep", "spanish")}, tmp_path)
+    sweep = read_sweep(file, Direction.AXIAL)
+    assert np.array_equal(sweep.frequency, [float(row[0]) for row in NUMBERS["sweep"]])
+    assert np.array_equal(forces(file, sheet="Loop"), FORCE)
+
+
+SPOILED: dict[str, tuple[Sheets, dict[str, Any], list[str]]] = {
+    "two loops": ({"A": table("loop"), "B": table("loop")}, {}, ["more than one sheet", '"A", "B"', "sheet ="]),
+    "none": ({"A": [["x"]], "B": [["y"]]}, {}, ["no sheet", '"A", "B"']),
+    "no such sheet": ({"Loop": table("loop")}, {"sheet": "Lop"}, ["no such sheet", 'did you mean "Loop"']),
+    "empty": ({"Loop": []}, {}, ['sheet "Loop"', "only one column"]),
+    "text": (
+        {"Loop": [*table("loop")[:9], ["a", 1.0, 2.0], *table("loop")[9:]]},
+        {},
+        ['sheet "Loop", row 10, column "Zeit [s]"', '"a"'],
+    ),
+    "date": ({"Loop": [*table("loop"), [True, 1.0, 2.0]]}, {}, ["row 62", '"True"']),
+    "gap": ({"Loop": [*table("loop"), [1e6, None, 2.0]]}, {}, ["row 62", "empty"]),
+    "unclear": (
+        {"Loop": [table("loop")[0], *([float(t), float(x), "1.234"] for t, x, _ in NUMBERS["loop"])]},
+        {},
+        ["two ways", '"1.234"', "decimal ="],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", SPOILED)
+def test_spoiled_workbooks_have_one_clear_error(case: str, tmp_path: Path) -> None:
+    sheets, stated, words = SPOILED[case]
+    with pytest.raises(MeasurementError) as caught:
+        forces(workbook(sheets, tmp_path), **stated)
+    message = str(caught.value)
+    assert all(word in message for word in ["test.xlsx", *words]), message
+
+
+def archive(parts: dict[str, bytes]) -> bytes:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as packed:
+        for name, content in parts.items():
+            packed.writestr(name, content)
+    return file.getvalue()
+
+
+def spread(folder: Path) -> bytes:
+    """Two cells, as far apart as a sheet allows."""
+    book = openpyxl.Workbook()
+    book.active["A1"], book.active["XFD1048576"] = 1, 2
+    file = io.BytesIO()
+    book.save(file)
+    return file.getvalue()
+
+
+HOSTILE: dict[str, Callable[[Path], bytes]] = {
+    "another archive": lambda _: archive({"a.txt": b"x"}),
+    "cut off": lambda folder: workbook(SHEETS["one sheet"], folder).read_bytes()[:3000],
+    "old Office": lambda _: b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600),
+    "bomb": lambda _: archive({"xl/workbook.xml": b"", "xl/worksheets/sheet1.xml": bytes((1 << 30) + 1)}),
+    "spread": spread,
+    "no content": lambda _: archive({"xl/workbook.xml": b"<a>"}),
+}
+
+
+@pytest.mark.parametrize("case", HOSTILE)
+def test_hostile_workbooks_are_refused(case: str, tmp_path: Path) -> None:
+    file = tmp_path / "test.xlsx"
+    file.write_bytes(HOSTILE[case](tmp_path))
+    with pytest.raises(MeasurementError, match="workbook") as caught:
+        forces(file)
+    print(caught.value)

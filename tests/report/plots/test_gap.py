@@ -1,0 +1,223 @@
+"""The gap before and after: one scale, right signs and sizes, any set of tests, one column where nothing was added."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
+
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
+from bushfit.geometry import Direction
+from bushfit.model.model import Model
+from bushfit.report.plots import gap_figure, to_png
+
+Swept = Callable[..., SweepData]
+Looped = Callable[..., LoopData]
+
+
+@pytest.fixture
+def heavier(paper_model: Model) -> Callable[[float], Model]:
+    """The paper's model with a mass [kg] moving along."""
+
+    def model(mass: float) -> Model:
+        return Model(
+            paper_model.bushing, (*paper_model.effects, "inertia"), {**paper_model.values, "inertia.mass": mass}
+        )
+
+    return model
+
+
+@pytest.fixture
+def campaign(heavier: Callable[[float], Model], swept: Swept, looped: Looped) -> list[DataSet]:
+    """Two directions and two loops of a bushing with a mass that the paper's model lacks."""
+    truth = heavier(0.1)
+    return [swept(truth), swept(truth, Direction.RADIAL), looped(truth, 1e-3), looped(truth, 2e-3)]
+
+
+def maps(figure: Figure) -> list[Axes]:
+    return [axes for axes in figure.axes if cells(axes)]
+
+
+def cells(axes: Axes) -> list[PolyCollection]:
+    """The coloured cells of a map."""
+    return [found for found in axes.collections if type(found) is PolyCollection and found.get_array() is not None]
+
+
+def name(axes: Axes) -> str:
+    return " ".join(axes.get_ylabel().split())
+
+
+def names(figure: Figure) -> list[str]:
+    return [name(axes) for axes in figure.axes if name(axes)]
+
+
+def headings(figure: Figure) -> list[str]:
+    return [axes.get_title() for axes in figure.axes if axes.get_title()]
+
+
+def values(axes: Axes) -> Any:
+    (found,) = cells(axes)
+    return np.asarray(found.get_array())
+
+
+def test_rows_are_directions_and_parts_columns_before_and_after(
+    paper_model: Model, heavier: Callable[[float], Model], campaign: list[DataSet]
+) -> None:
+    figure = gap_figure(paper_model, heavier(0.1), campaign, "mount", "Inertia closes the gap.")
+    assert names(figure) == ["axial storage", "axial loss", "radial storage", "radial loss", "axial loops / noise"]
+    assert figure.get_suptitle() == "mount"
+    assert figure.subfigs[0].get_suptitle() == "Inertia closes the gap."
+    before, after = headings(figure)
+    assert before.startswith("before\ngap ")
+    assert after.startswith("after adding inertia\ngap ")
+    residuals = np.concatenate([data_set.residual(paper_model) for data_set in campaign])
+    assert f"gap {np.sqrt(np.mean(residuals**2)):.2f} x noise" in before
+    x_labels = [axes.get_xlabel() for axes in figure.axes if axes.get_xlabel()]
+    assert x_labels == [
+        *["frequency [Hz]"] * 4,
+        *["phase after the upper turn [deg]"] * 2,
+        "measured less model, in units of noise",
+    ]
+    assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == ["0.1 mm", "0.2 mm", "0.5 mm"]
+    bar = figure.axes[-1]
+    assert {text.get_text() for text in bar.texts} == {"measured\nbelow model", "measured\nabove model"}
+
+
+def test_one_symmetric_scale_for_all_maps(
+    paper_model: Model, heavier: Callable[[float], Model], campaign: list[DataSet]
+) -> None:
+    figure = gap_figure(paper_model, heavier(0.1), campaign, "mount", "")
+    coloured = [found for axes in maps(figure) for found in cells(axes)]
+    assert len(coloured) == 8
+    norm, cmap = coloured[0].norm, coloured[0].cmap
+    assert all(found.norm is norm and found.cmap == cmap for found in coloured)
+    np.testing.assert_allclose(norm.boundaries, -norm.boundaries[::-1])
+    np.testing.assert_allclose(cmap(norm([0.0, -0.9, 0.9])), 1.0)
+    below, above = cmap(norm([-4.0, 4.0]))
+    assert below[2] > below[0], "blue below"
+    assert above[0] > above[2], "red above"
+    share = np.mean(np.abs(np.concatenate([values(axes) for axes in maps(figure)])) > norm.vmax)
+    assert share <= 0.02
+
+
+def test_a_cell_is_measured_less_model_over_the_noise_of_the_mean(paper_model: Model, swept: Swept) -> None:
+    data_set = swept(paper_model)
+    stiffer = {k: value * (1.0 if k in ("alpha", "eps_half") else 1.2) for k, value in paper_model.values.items()}
+    harder = Model(paper_model.bushing, paper_model.effects, stiffer)
+    axes = maps(gap_figure(harder, paper_model, [data_set], "", ""))
+    storage = values(axes[0])
+    assert (storage < 0).all(), "the measurement lies below a model that is too stiff"
+    at = (data_set.amplitude == 2e-4) & (data_set.frequency == 55.0)
+    assert at.sum() == 3
+    expected = -data_set.deviation(harder)[at].real.mean()
+    noise = np.hypot(data_set.noise.random[data_set.name, 2e-4][0], data_set.noise.shared[0]) / np.sqrt(3.0)
+    assert storage[16 + 5] == pytest.approx(expected / noise)
+    right = np.concatenate([values(axes[1]), values(axes[3])])
+    assert 0.7 < np.std(right) < 1.3
+    assert sum(len(found.get_segments()) for found in axes[0].collections if hasattr(found, "get_segments")) >= 48
+
+
+def test_loops_are_means_in_units_of_their_noise(paper_model: Model, looped: Looped) -> None:
+    data_set = looped(paper_model, 1e-3)
+    figure = gap_figure(paper_model, paper_model, [data_set], "loop", "Nothing is missing.")
+    (axes,) = figure.axes
+    figure.draw_without_rendering()
+    assert not overlap(axes.title.get_window_extent(), axes.get_legend().get_window_extent())
+    assert name(axes) == "axial loops / noise"
+    assert headings(figure)[0].startswith("nothing added\n")
+    curve = axes.get_lines()[0]
+    assert len(curve.get_xdata()) == 36
+    assert 0.6 < np.std(curve.get_ydata()) < 1.5
+    assert axes.get_yscale() == "linear"
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["1 mm, 0.1 Hz"]
+
+
+def test_huge_gaps_of_loops_keep_what_is_small_readable(
+    paper_model: Model, heavier: Callable[[float], Model], looped: Looped
+) -> None:
+    values = {**paper_model.values, "mu": 2.0 * paper_model.values["mu"]}
+    wrong = Model(paper_model.bushing, paper_model.effects, values)
+    figure = gap_figure(wrong, paper_model, [looped(paper_model, 1e-3)], "loop", "")
+    first, second = figure.axes
+    assert first.get_yscale() == second.get_yscale() == "symlog"
+    assert first.get_ylim() == second.get_ylim()
+
+
+def test_same_model_makes_one_column(paper_model: Model, campaign: list[DataSet]) -> None:
+    twin = Model(paper_model.bushing, paper_model.effects, dict(paper_model.values))
+    figure = gap_figure(paper_model, twin, campaign, "mount", "Nothing is missing.")
+    assert len(maps(figure)) == 4
+    assert len(headings(figure)) == 1
+    assert headings(figure)[0].startswith("nothing added")
+
+
+def test_any_set_of_tests_is_drawn_and_nothing_lies_on_another(
+    paper_model: Model, heavier: Callable[[float], Model], swept: Swept, looped: Looped
+) -> None:
+    truth, torsion = heavier(0.1), Direction.TORSION
+    many = np.geomspace(1e-5, 1e-3, 14)
+    turns = np.radians([0.5, 1.0, 2.0])
+    sets: dict[str, list[DataSet]] = {
+        "sweep alone": [swept(truth)],
+        "one amplitude, one repeat": [swept(truth, amplitudes=np.array([2e-4]), repeats=1)],
+        "two frequencies": [swept(truth, frequencies=np.array([10.0, 100.0]))],
+        "decades": [swept(truth, frequencies=np.geomspace(0.01, 300.0, 40), amplitudes=many)],
+        "six loops": [looped(truth, (i + 1) * 5e-4) for i in range(6)],
+        "torsion": [swept(truth, torsion, amplitudes=turns), looped(truth, 0.05, direction=torsion)],
+        "missing points": [swept(truth, left_out=slice(40, 60)), swept(truth, Direction.RADIAL, repeats=1)],
+        "three directions": [
+            *(swept(truth, direction) for direction in (Direction.AXIAL, Direction.RADIAL)),
+            swept(truth, torsion, amplitudes=turns),
+            *(looped(truth, 1e-3, direction=direction) for direction in (Direction.AXIAL, Direction.RADIAL)),
+        ],
+    }
+    for words, data_sets in sets.items():
+        for after in (truth, paper_model):
+            figure = gap_figure(paper_model, after, data_sets, words, "A sentence that goes on and on. " * 8)
+            figure.draw_without_rendering()
+            boxes = [axes.get_tightbbox() for axes in figure.axes]
+            assert not any(overlap(a, b) for i, a in enumerate(boxes) for b in boxes[:i]), words
+            assert all(box.x0 >= 0 and box.x1 <= figure.bbox.x1 + 1 and box.y0 >= 0 for box in boxes), words
+    assert "not measured" in gap_figure(paper_model, truth, sets["missing points"], "", "").get_supxlabel()
+    assert "not measured" not in gap_figure(paper_model, truth, sets["sweep alone"], "", "").get_supxlabel()
+
+
+def overlap(one: Bbox, other: Bbox) -> bool:
+    common = Bbox.intersection(one, other)
+    return common is not None and common.width > 1.0 and common.height > 1.0
+
+
+def test_a_hole_stays_grey(paper_model: Model, swept: Swept) -> None:
+    frequencies = np.delete(np.arange(5.0, 156.0, 10.0), 7)
+    (storage, *_) = maps(gap_figure(paper_model, paper_model, [swept(paper_model, frequencies=frequencies)], "", ""))
+    (found,) = cells(storage)
+    edges = np.array([path.get_extents().intervalx for path in found.get_paths()])
+    assert not np.any((edges[:, 0] < 75.0) & (edges[:, 1] > 75.0))
+    np.testing.assert_allclose(np.ptp(edges, axis=1), 10.0)
+
+
+def test_same_figure_same_bytes(paper_model: Model, heavier: Callable[[float], Model], campaign: list[DataSet]) -> None:
+    pictures = {to_png(gap_figure(paper_model, heavier(0.1), campaign, "$ 衬套", "50 % _of_ $")) for _ in range(2)}
+    assert len(pictures) == 1
+
+
+@pytest.mark.parametrize("stiffer", [1.05, 1.3, 3.0, 20.0])
+def test_numbers_of_the_scale_stay_apart(paper_model: Model, swept: Swept, stiffer: float) -> None:
+    off = Model(
+        paper_model.bushing, paper_model.effects, {**paper_model.values, "mu": paper_model.values["mu"] * stiffer}
+    )
+    figure = gap_figure(off, paper_model, [swept(paper_model)], "", "")
+    figure.draw_without_rendering()
+    bar = figure.axes[-1]
+    labels = [label for label in bar.get_xticklabels() if label.get_text()]
+    print(stiffer, [label.get_text() for label in labels])
+    boxes = [label.get_window_extent() for label in labels]
+    assert all(right.x0 - left.x1 > 2.0 for left, right in pairwise(boxes))
+    assert labels[-1].get_text() == f"{bar.get_xticks()[-1]:g}", "where the scale ends"

@@ -1,0 +1,112 @@
+"""Results on disk: all or none, and never over others unasked."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from bushfit.campaign.naming import folder_name
+from bushfit.errors import OutputError
+from bushfit.report.folder import check_free, write_files
+
+FILES = {"a.csv": b"1\n", "b.json": b"{}\n"}
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in folder.iterdir()}
+
+
+def test_a_new_folder_is_made_with_its_parents(tmp_path: Path) -> None:
+    folder = tmp_path / "results" / "deep" / "x"
+    write_files(folder, FILES, force=False)
+    assert contents(folder) == FILES
+    assert [child.name for child in folder.parent.iterdir()] == ["x"]
+    umask = os.umask(0)
+    os.umask(umask)
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o777 & ~umask
+
+
+def test_standing_results_are_kept_and_the_remedy_is_named(tmp_path: Path) -> None:
+    write_files(tmp_path / "x", FILES, force=False)
+    with pytest.raises(OutputError) as caught:
+        write_files(tmp_path / "x", {"b.json": b"new", "c.csv": b"new"}, force=False)
+    assert "b.json" in str(caught.value)
+    assert "--force" in str(caught.value)
+    assert contents(tmp_path / "x") == FILES
+
+
+def test_force_replaces_its_own_files_only(tmp_path: Path) -> None:
+    write_files(tmp_path / "x", FILES, force=False)
+    (tmp_path / "x" / "mine.txt").write_text("kept")
+    write_files(tmp_path / "x", {"b.json": b"new"}, force=True)
+    assert contents(tmp_path / "x") == {"a.csv": b"1\n", "b.json": b"new", "mine.txt": b"kept"}
+    assert [child.name for child in tmp_path.iterdir()] == ["x"]
+
+
+def test_other_files_in_the_folder_do_not_hinder(tmp_path: Path) -> None:
+    (tmp_path / "x").mkdir()
+    (tmp_path / "x" / "mine.txt").write_text("kept")
+    write_files(tmp_path / "x", FILES, force=False)
+    assert set(contents(tmp_path / "x")) == {*FILES, "mine.txt"}
+
+
+def test_a_file_in_the_way(tmp_path: Path) -> None:
+    (tmp_path / "x").write_text("a file")
+    with pytest.raises(OutputError, match="not a folder"):
+        write_files(tmp_path / "x", FILES, force=True)
+    with pytest.raises(OutputError, match="cannot be written"):
+        write_files(tmp_path / "x" / "below", FILES, force=True)
+    assert (tmp_path / "x").read_text() == "a file"
+
+
+def test_a_folder_in_the_way(tmp_path: Path) -> None:
+    (tmp_path / "x" / "a.csv").mkdir(parents=True)
+    for force in (True, False):
+        with pytest.raises(OutputError, match="a folder stands where a file goes"):
+            write_files(tmp_path / "x", FILES, force=force)
+    assert list((tmp_path / "x").iterdir()) == [tmp_path / "x" / "a.csv"]
+
+
+def test_check_free_says_nothing_where_nothing_stands(tmp_path: Path) -> None:
+    check_free(tmp_path / "absent", ["a.csv"], force=False)
+    check_free(tmp_path, ["a.csv"], force=False)
+
+
+@pytest.mark.parametrize(
+    ("name", "folder"),
+    [
+        ("CMP 15 961", "CMP 15 961"),
+        ("../../etc", "_.._etc"),
+        ("", "campaign"),
+        ("...", "campaign"),
+        ("a/b\\c:d", "a_b_c_d"),
+        ("CON", "_CON"),
+        ("nul.txt", "_nul.txt"),
+        ("lpt1", "_lpt1"),
+        ("console", "console"),
+        ("a\ud800b", "a_b"),
+        ("line\nbreak", "line_break"),
+    ],
+)
+def test_folder_names_never_lead_out(name: str, folder: str) -> None:
+    assert folder_name(name).strip(".") == folder.strip(".")
+    assert not {"/", "\\"} & set(folder_name(name))
+    assert folder_name("x" * 500) == "x" * 60
+
+
+@given(st.text(max_size=300))
+@example("con")
+@example("Aux .txt")
+@example("../" * 50)
+def test_a_name_is_one_folder_on_every_system(name: str) -> None:
+    folder = folder_name(name)
+    assert (Path("base") / folder).parent == Path("base")
+    assert folder.strip(" .") == folder
+    assert 0 < len(folder.encode()) < 250
+    assert not set(folder) & set('/\\:*?"<>|\n')
+    assert folder.partition(".")[0].upper() not in {"CON", "PRN", "AUX", "NUL", "COM1", "LPT9"}

@@ -1,0 +1,198 @@
+"""A small score card: no false alarm, no confident wrong name, the truth sealed, the same seed the same card."""
+
+from __future__ import annotations
+
+import builtins
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bushfit.diagnosis.record import Diagnosis
+from bushfit.effects import BASE, LIBRARY
+from bushfit.scorecard.hidden import OUTSIDE, hideable
+from bushfit.scorecard.scorecard import Outcome, Task, card, confusion, run, tasks
+
+COUNT, SEED = 12, 5
+
+
+def quick(chosen: list[Task]) -> list[Task]:
+    """Without those that the rig takes long to make."""
+    return [task for task in chosen if "rig_compliance" not in task.hidden]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("card")
+
+
+@pytest.fixture(scope="module")
+def outcomes(folder: Path) -> list[Outcome]:
+    done: list[None] = []
+    found = run(quick(tasks(COUNT, SEED)), folder, 1, lambda: done.append(None))
+    assert len(done) == len(found)
+    return found
+
+
+def test_a_card_has_every_kind_and_the_same_seed_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+    large = tasks(300, 1)
+    kinds = {kind: sum(task.kind == kind for task in large) for kind in {task.kind for task in large}}
+    print(kinds)
+    assert kinds == {"single": 150, "clean": 60, "pair": 30, "outside": 30, "lacking": 30}
+    assert {task.hidden[0] for task in large if task.kind == "single"} == set(hideable()) == set(LIBRARY) - set(BASE)
+    assert {task.outside for task in large if task.kind == "outside"} == set(OUTSIDE)
+    assert all(task.without == task.hidden for task in large if task.kind == "lacking")
+    assert len({(task.kind, task.seed) for task in large}) == len(large)
+    assert large == tasks(300, 1) != tasks(300, 2)
+
+
+def test_no_false_alarm_and_no_confident_wrong_name(outcomes: list[Outcome]) -> None:
+    for outcome in outcomes:
+        truth = " + ".join(outcome.task.hidden) or outcome.task.outside or "none"
+        sets = " + ".join("|".join(members) for members in outcome.sets)
+        print(f"{outcome.task.kind:8} {truth:42} {outcome.verdict:12} {sets:40} {outcome.seconds:5.1f} s")
+    assert len(outcomes) >= 10
+    assert [outcome.error for outcome in outcomes if outcome.error] == []
+    assert [
+        outcome.task for outcome in outcomes if outcome.task.kind == "clean" and outcome.verdict != "consistent"
+    ] == []
+    assert [outcome.task for outcome in outcomes if outcome.single_wrong and outcome.task.kind != "lacking"] == []
+    single = [outcome for outcome in outcomes if outcome.task.kind == "single"]
+    assert all(outcome.gain > 100.0 for outcome in single)
+    assert sum(outcome.truth_in_sets for outcome in single) >= len(single) - 1
+
+
+def test_the_same_seed_gives_the_same_findings(outcomes: list[Outcome], tmp_path: Path) -> None:
+    first = [outcome for outcome in outcomes if outcome.task.kind in ("single", "clean")][:3]
+    again = run([outcome.task for outcome in first], tmp_path, 2, lambda: None)
+    for one, other in zip(first, again, strict=True):
+        assert replace(one, seconds=0.0) == replace(other, seconds=0.0)
+
+
+def test_truths_are_sealed_apart_from_the_campaigns(outcomes: list[Outcome], folder: Path) -> None:
+    for outcome in outcomes:
+        stem = f"{outcome.task.kind}_{outcome.task.seed}"
+        sealed = json.loads((folder / "sealed" / f"{stem}.json").read_text())
+        assert tuple(sealed["hidden"]) == outcome.task.hidden
+        names = {file.name for file in (folder / stem).iterdir()}
+        assert {"campaign.toml", "loop_axial_1.csv", "sweep_axial.csv"} <= names
+        assert not any("truth" in name or name.endswith(".json") for name in names)
+        text = (folder / stem / "campaign.toml").read_text()
+        assert not any(name in text for name in hideable())
+        assert "[simulate" not in text
+
+
+def test_the_workflow_never_opens_a_sealed_truth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every file opened while a diagnosis runs, written down."""
+    from bushfit.scorecard import scorecard
+
+    opened: list[str] = []
+    running = [False]
+    plain_diagnose, plain_load, plain_open = scorecard.diagnose, scorecard.load_campaign, io.open
+
+    def watched(call: Any) -> Any:
+        def inner(*arguments: Any) -> Any:
+            running[0] = True
+            try:
+                return call(*arguments)
+            finally:
+                running[0] = False
+
+        return inner
+
+    def spy(file: Any, *arguments: Any, **keywords: Any) -> Any:
+        if running[0]:
+            opened.append(str(file))
+        return plain_open(file, *arguments, **keywords)
+
+    monkeypatch.setattr(scorecard, "diagnose", watched(plain_diagnose))
+    monkeypatch.setattr(scorecard, "load_campaign", watched(plain_load))
+    monkeypatch.setattr(io, "open", spy)
+    monkeypatch.setattr(builtins, "open", spy)
+    outcome = scorecard.work(Task("single", 3, ("delay",)), tmp_path)
+    assert outcome.error == ""
+    assert any(name.endswith("sweep_axial.csv") for name in opened)
+    assert not any("sealed" in name or "truth" in name for name in opened)
+
+
+def test_a_diagnosis_is_the_same_without_the_sealed_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The truth put out of reach while the workflow works, and back for the judge."""
+    from bushfit.scorecard import scorecard
+
+    seen: list[Diagnosis] = []
+    plain = scorecard.diagnose
+
+    def blind(*arguments: Any) -> Diagnosis:
+        sealed, away = tmp_path / "sealed", tmp_path.with_name("away")
+        sealed.rename(away)
+        seen.append(plain(*arguments))
+        away.rename(sealed)
+        return seen[-1]
+
+    monkeypatch.setattr(scorecard, "diagnose", blind)
+    outcome = scorecard.work(Task("single", 3, ("delay",)), tmp_path)
+    assert [diagnosis.verdict for diagnosis in seen] == [outcome.verdict] == ["named"]
+    assert outcome.named == ("delay",)
+
+
+def test_an_effect_is_plain_whether_it_was_named_or_not(tmp_path: Path) -> None:
+    """What the library lacks is left unexplained: its best stand-in counts all the same."""
+    from bushfit.scorecard import scorecard
+
+    outcome = scorecard.work(Task("single", 3, ("delay",), without=("delay", "viscous", "maxwell")), tmp_path)
+    print(f"{outcome.verdict}, gain {outcome.gain:.0f}")
+    assert outcome.verdict != "named"
+    assert outcome.gain > 200.0
+
+
+def outcome_of(kind: str, hidden: tuple[str, ...], verdict: str, *sets: tuple[str, ...], **more: Any) -> Outcome:
+    named = tuple(members[0] for members in sets)
+    values = {"richer": (), "gain": 500.0, "heldout": 1.0, "covered": (), "seconds": 1.0} | more
+    without = hidden if kind == "lacking" else ()
+    return Outcome(Task(kind, 1, hidden, without=without), None, verdict, named, sets, **values)  # type: ignore[arg-type]
+
+
+def test_the_card_counts() -> None:
+    made = [
+        outcome_of("single", ("inertia",), "named", ("inertia",), covered=(True,)),
+        outcome_of("single", ("inertia",), "named", ("delay",)),
+        outcome_of("single", ("inertia",), "ambiguous", ("delay", "inertia", "viscous")),
+        outcome_of("single", ("inertia",), "ambiguous", ("delay", "inertia", "viscous", "maxwell"), gain=20.0),
+        outcome_of("clean", (), "consistent"),
+        outcome_of("clean", (), "ambiguous", ("delay", "viscous")),
+        outcome_of("pair", ("inertia", "delay"), "named", ("inertia",)),
+        outcome_of("lacking", ("inertia",), "named", ("delay",)),
+    ]
+    rows = {row.measure: row for row in card(made)}
+    figures = {measure: row.figure for measure, row in rows.items()}
+    print(figures)
+    assert figures["false alarm on clean campaigns"] == "50.0 %"
+    assert figures["truth named alone or in a set of at most three"] == "50.0 %"
+    assert figures["a single, confident, wrong name"] == "20.0 %"
+    assert figures["single name where the effect is plain"] == "33.3 %"
+    assert figures["two effects at once, both named"] == "0.0 %"
+    assert figures["outside the list: no confident name"] == "0.0 %"
+    assert figures["  of these a disturbance of the rig"] == "no case"
+    assert figures["95 % interval covers the truth, where named"] == "100.0 %"
+    assert rows["false alarm on clean campaigns"].met is False
+    assert rows["  of these a disturbance of the rig"].met is None
+    assert rows["processor time of one diagnosis, median / longest"].met is True
+
+
+def test_confusion_is_by_truth() -> None:
+    table = confusion(
+        [
+            outcome_of("single", ("inertia",), "named", ("inertia",)),
+            outcome_of("single", ("inertia",), "ambiguous", ("delay", "inertia")),
+            outcome_of("lacking", ("inertia",), "unexplained"),
+            outcome_of("clean", (), "consistent"),
+        ]
+    )
+    assert table == {
+        "inertia": {"named: inertia": 1, "ambiguous: delay|inertia": 1},
+        "inertia (library lacks it)": {"unexplained": 1},
+        "none": {"consistent": 1},
+    }
