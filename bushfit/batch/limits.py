@@ -38,11 +38,9 @@ from bushfit.campaign.schema import Share, parameter_value
 from bushfit.campaign.toml import read_toml
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
+from bushfit.reduction.scatter import scatter
 from bushfit.units import number, quantity
 from bushfit.validation import converted
-
-#: Standard deviations in a median absolute deviation, for a normal distribution.
-_MAD = 1.482602218505602
 
 
 class Verdict(IntEnum):
@@ -101,12 +99,6 @@ class Bounds:
         if scatter(values)[1] == 0.0:
             return "more than half of the bushings agree to the digit: the batch's own scatter is not judged"
         return None
-
-
-def scatter(values: Array) -> tuple[float, float]:
-    """Median, and standard deviation by the median absolute deviation: outliers hardly move either."""
-    middle = float(np.median(values))
-    return middle, _MAD * float(np.median(np.abs(values - middle)))
 
 
 _SIZES = ("min", "max", "nominal")

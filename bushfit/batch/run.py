@@ -17,7 +17,7 @@ import numpy as np
 
 from bushfit.batch import ledger, pool
 from bushfit.batch.junit import Report
-from bushfit.batch.limits import Judge, Limits, scatter
+from bushfit.batch.limits import Judge, Limits
 from bushfit.batch.manifest import Row
 from bushfit.batch.pool import Pool
 from bushfit.batch.quantities import (
@@ -34,6 +34,7 @@ from bushfit.batch.table import Table
 from bushfit.batch.work import Orders, given_up, work
 from bushfit.effects.contract import Array
 from bushfit.errors import OutputError
+from bushfit.reduction.scatter import scatter
 from bushfit.report.folder import check_free as check_writable
 from bushfit.report.folder import write_files
 

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.noise import FLOOR
-from bushfit.fitting.outliers import MEDIAN_TO_SIGMA, limit, stuck_rows, wild_rows
+from bushfit.fitting.outliers import limit, stuck_rows, wild_rows
 from bushfit.reading.measurement import Loop
+from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 
 #: Samples of the model's cycle; measured rows lie between them and are reached by linear interpolation.
 GRID = 1024

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.special import chdtrc
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.outliers import MEDIAN_TO_SIGMA
 from bushfit.reading.measurement import Sweep
+from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 
 #: No rig measures better than this, relative to the largest force or to |K|.
 FLOOR = 1e-4

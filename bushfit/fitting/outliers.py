@@ -11,6 +11,7 @@ from scipy.ndimage import median_filter
 from scipy.special import fdtri
 
 from bushfit.effects.contract import Array
+from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 
 #: Probability that noise alone makes one outlier among all rows of a test.
 _CHANCE = 0.01
@@ -24,8 +25,6 @@ _MOST_BENDS, _NOISY = 100_000, 1e-4
 _GROSS, _MOST_GROSS = 0.3, 0.1
 #: Degrees of freedom of a noise that is as good as known.
 _KNOWN = 1e6
-#: Scale of a normal distribution from the median of its absolute values.
-MEDIAN_TO_SIGMA = 1.4826
 
 
 def limit(rows: int, parts: int, freedom: float) -> float:

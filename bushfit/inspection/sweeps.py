@@ -13,6 +13,7 @@ from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.record import Looked
 from bushfit.reading.measurement import Sweep
+from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 from bushfit.units import number
 
 #: A point is wild beyond so many standard deviations from its repeats and this share of |K|.
@@ -146,7 +147,7 @@ def _blocks(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
     if len(found) < _FEWEST_BLOCKS:
         return
     gain = np.array([offset.real for *_, offset in found])
-    usual = 1.4826 * float(np.median(np.abs(gain[gain != 0.0]))) if np.any(gain) else 0.0
+    usual = MEDIAN_TO_SIGMA * float(np.median(np.abs(gain[gain != 0.0]))) if np.any(gain) else 0.0
     for (level, repeat, offset), own in zip(found, gain, strict=True):
         if abs(own) > max(_BLOCK_OFF * usual, _BLOCK_SHARE):
             yield (

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.reading.measurement import Complex, Floats
+from bushfit.reduction.scatter import MEDIAN_TO_SIGMA, scatter
 
 Integers = NDArray[np.intp]
 
@@ -134,7 +135,7 @@ def least_turn(values: Floats) -> float:
         starts = np.linspace(0, values.size - _BLOCK, min(_MOST_BLOCKS, values.size // _BLOCK)).astype(np.intp)
         blocks = values[starts[:, None] + np.arange(_BLOCK)]
     if blocks.shape[1] > _ORDER:
-        rough = np.median(np.abs(np.diff(blocks, _ORDER, axis=1)), axis=1) / (0.6745 * _DIFFERENCE_GAIN)
+        rough = np.median(np.abs(np.diff(blocks, _ORDER, axis=1)), axis=1) * (MEDIAN_TO_SIGMA / _DIFFERENCE_GAIN)
         least = max(least, _NOISE * float(np.quantile(rough, _QUIET)))
     return max(least, _CONVERTER * converter if converter < least else 0.0)
 
@@ -297,4 +298,4 @@ def _truncation(series: Complex, most: int) -> int:
 
 
 def _robust(values: Floats) -> float:
-    return 1.4826 * float(np.median(np.abs(values - np.median(values)))) if values.size else 0.0
+    return scatter(values)[1] if values.size else 0.0

@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bushfit.batch.limits import Judge, Limits, Verdict, judge, read_limits, scatter
+from bushfit.batch.limits import Judge, Limits, Verdict, judge, read_limits
 from bushfit.batch.quantities import at_point, parameter_quantities
 from bushfit.errors import BushfitError
+from bushfit.reduction.scatter import scatter
 
 
 @pytest.mark.parametrize(

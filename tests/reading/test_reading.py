@@ -17,7 +17,7 @@ from bushfit.errors import BushfitError, MeasurementError
 from bushfit.geometry import Direction
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep, rebuild_time
-from bushfit.reading.parallel import BLOCK
+from bushfit.reading.parallel import CHUNK
 from bushfit.reading.sweeps import read_sweep
 
 TIME = np.arange(40) * 0.1
@@ -185,9 +185,9 @@ def test_a_large_file_reads_like_a_small_one(lead: str, tmp_path: Path) -> None:
         loop_from(text.rsplit(",", 1)[0] + ",abc\n", tmp_path)
 
 
-@pytest.mark.parametrize("row", [BLOCK - 1, BLOCK, BLOCK + 1])
+@pytest.mark.parametrize("row", [CHUNK - 1, CHUNK, CHUNK + 1])
 def test_time_that_stands_still_is_found_wherever_blocks_meet(row: int, tmp_path: Path) -> None:
-    rows = [f"{i - (i == row)},{i % 7}.5,{i % 7}.25" for i in range(BLOCK + 9)]
+    rows = [f"{i - (i == row)},{i % 7}.5,{i % 7}.25" for i in range(CHUNK + 9)]
     text = "\n".join(["time [s],displacement [mm],force [kN]", *rows])
     with pytest.raises(MeasurementError, match=rf'line {row + 2}, column "time \[s\]"'):
         loop_from(text, tmp_path)

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from bushfit.effects.contract import Array
+from bushfit.reduction.scatter import scatter
 from bushfit.report.plots.style import DOT, FRAME, GREY, INK, POINT, ROW, SMALL, dress, explain, fonts, new_figure
 from bushfit.units import number
 
@@ -114,8 +115,8 @@ def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
 def _reach(values: Array, allowed: Sequence[float], ends: Array | None) -> tuple[float, float]:
     """Lowest and highest value to show: all but the far out, the limits, and a usual 95 % interval, below which no
     difference means anything."""
-    middle = float(np.median(values))
-    spread = _FURTHEST * 1.4826 * float(np.median(np.abs(values - middle)))
+    middle, sigma = scatter(values)
+    spread = _FURTHEST * sigma
     limits = [limit for limit in allowed if math.isfinite(limit)]
     near = values[np.abs(values - middle) <= spread] if spread > 0.0 else values
     half = np.ptp(ends, axis=0) / 2.0 if ends is not None else np.empty(0)
