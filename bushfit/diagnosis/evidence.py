@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import DataSet, SweepData
+from bushfit.fitting.data_set import DataSet
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.solve import Bounds, Solution
 from bushfit.model.model import Model
@@ -74,29 +73,26 @@ class Evidence:
         return columns - (columns @ self._span) @ self._span.T
 
     @cached_property
-    def slices(self) -> list[slice]:
+    def place(self) -> Mapping[DataSet, slice]:
         """Where each data set's residuals stand."""
-        ends = np.cumsum([data_set.size for data_set in self.data_sets])
-        return [slice(int(end - data_set.size), int(end)) for end, data_set in zip(ends, self.data_sets, strict=True)]
+        ends = np.cumsum([data_set.size for data_set in self.data_sets]).tolist()
+        return {data_set: slice(end - data_set.size, end) for end, data_set in zip(ends, self.data_sets, strict=True)}
 
     @cached_property
     def blocks(self) -> list[Array]:
-        """Indices of the residuals of each block and part (gain, phase) of the sweeps, which share an error."""
-        groups = []
-        for data_set, place in zip(self.data_sets, self.slices, strict=True):
-            if not isinstance(data_set, SweepData):
-                continue
-            count = data_set.frequency.size
-            edges = [*data_set.block_starts.tolist(), count]
-            for part in (place.start, place.start + count):
-                groups += [part + np.arange(a, b) for a, b in pairwise(edges)]
-        return groups
+        """Indices of the residuals that share an error of the rig, a group each."""
+        return [place.start + block for data_set, place in self.place.items() for block in data_set.blocks]
 
     @property
     def shared_freedom(self) -> int:
         """Degrees of freedom behind the errors that blocks share; 0 where these are not measured."""
-        sweeps = [data_set for data_set in self.data_sets if isinstance(data_set, SweepData)]
-        return sweeps[0].noise.freedom if sweeps else 0
+        return max(data_set.shared_freedom for data_set in self.data_sets)
+
+    def embedded(self, values: Array, data_set: DataSet) -> Array:
+        """Residuals of one data set among those of all, 0 elsewhere, (n,)."""
+        row = np.zeros(self.residual.size)
+        row[self.place[data_set]] = values
+        return row
 
 
 def fit(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Evidence:

@@ -6,14 +6,14 @@ a part is one Gauss-Newton step from the full fit, which is exact where the mode
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import LoopData, SweepData
+from bushfit.fitting.data_sets import DataSet, SweepData, parted
 
 #: Parts without which some parameter's variance would grow by more than this say nothing about a prediction.
 _MOST_GROWTH = 100.0
@@ -82,32 +82,32 @@ def _predicted(evidence: Evidence, chosen: Array) -> Array | None:
 
 def _parts(evidence: Evidence) -> Iterator[tuple[str, Array]]:
     """Name and rows of each part: levels, the top third of the frequencies, directions, loops."""
-    pairs = list(zip(evidence.data_sets, evidence.slices, strict=True))
-    sweeps = [(data_set, place) for data_set, place in pairs if isinstance(data_set, SweepData)]
-    loops = [(data_set, place) for data_set, place in pairs if isinstance(data_set, LoopData)]
-    ranks = [np.unique(data_set.amplitude, return_inverse=True)[1] for data_set, _ in sweeps]
+    loops, sweeps = parted(evidence.data_sets)
+    ranks = [np.unique(sweep.amplitude, return_inverse=True)[1] for sweep in sweeps]
     for rank in range(max((int(r.max()) + 1 for r in ranks), default=0)):
-        picked = [(place, np.tile(r == rank, 2)) for (_, place), r in zip(sweeps, ranks, strict=True)]
-        yield f"amplitude level {rank + 1}", _rows(evidence, picked)
+        yield f"amplitude level {rank + 1}", _points(evidence, zip(sweeps, [r == rank for r in ranks], strict=True))
     if sweeps:
-        top = np.quantile(np.concatenate([data_set.frequency for data_set, _ in sweeps]), 2.0 / 3.0)
-        yield (
-            "top third of the frequencies",
-            _rows(evidence, [(place, np.tile(data_set.frequency > top, 2)) for data_set, place in sweeps]),
-        )
-    for direction in dict.fromkeys(data_set.direction for data_set, _ in pairs):
-        whole = [
-            (place, np.ones(data_set.size, dtype=bool)) for data_set, place in pairs if data_set.direction is direction
-        ]
-        if len(whole) < len(pairs):
-            yield f"{direction} direction", _rows(evidence, whole)
-    if len(loops) > 1:
-        for data_set, place in loops:
-            yield f"loop {data_set.loop.name}", _rows(evidence, [(place, np.ones(data_set.size, dtype=bool))])
+        top = np.quantile(np.concatenate([sweep.frequency for sweep in sweeps]), 2.0 / 3.0)
+        yield "top third of the frequencies", _points(evidence, ((sweep, sweep.frequency > top) for sweep in sweeps))
+    for direction in dict.fromkeys(data_set.direction for data_set in evidence.data_sets):
+        whole = [data_set for data_set in evidence.data_sets if data_set.direction is direction]
+        if len(whole) < len(evidence.data_sets):
+            yield f"{direction} direction", _whole(evidence, whole)
+    for loop in loops if len(loops) > 1 else ():
+        yield f"loop {loop.name}", _whole(evidence, [loop])
 
 
-def _rows(evidence: Evidence, picked: Sequence[tuple[slice, Array]]) -> Array:
+def _points(evidence: Evidence, picked: Iterable[tuple[SweepData, Array]]) -> Array:
+    """Residuals of some points of the sweeps, (n,) bool."""
     chosen = np.zeros(evidence.residual.size, dtype=bool)
-    for place, rows in picked:
-        chosen[place] = rows
+    for sweep, points in picked:
+        chosen[evidence.place[sweep]] = np.tile(points, sweep.parts)
+    return chosen
+
+
+def _whole(evidence: Evidence, data_sets: Sequence[DataSet]) -> Array:
+    """All residuals of some data sets, (n,) bool."""
+    chosen = np.zeros(evidence.residual.size, dtype=bool)
+    for data_set in data_sets:
+        chosen[evidence.place[data_set]] = True
     return chosen

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.record import Where
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import LoopData, SweepData
+from bushfit.fitting.data_sets import parted
+from bushfit.fitting.sweep_data import Level
 from bushfit.units import number
 
 #: Smooth misfit: Legendre polynomials up to this degree in ln f, harmonics of a loop up to this number.
@@ -23,67 +23,16 @@ _LEAST = 1e-3
 _PARTS = ("storage", "loss")
 
 
-@dataclass(frozen=True, eq=False)
-class _Level:
-    """Mean misfit of one amplitude of one sweep over its repeats: measured over model less 1, complex, (n,)."""
-
-    data_set: SweepData
-    amplitude: float
-    frequency: Array
-    misfit: Array
-    noise: tuple[float, float]
-
-
 def contrasts(evidence: Evidence) -> Array:
     """Whitened columns of all that is smooth: per level and part a polynomial in ln f, per loop its harmonics."""
-    rows = []
-    for data_set, place in zip(evidence.data_sets, evidence.slices, strict=True):
-        if isinstance(data_set, LoopData):
-            rows += [_row(evidence, place, column) for column in _loop_columns(data_set)]
-            continue
-        for level in np.unique(data_set.amplitude):
-            chosen = data_set.amplitude == level
-            basis = _polynomials(data_set.frequency[chosen])
-            for column in basis.T:
-                values = np.zeros(chosen.size, dtype=complex)
-                values[chosen] = column
-                rows += [_row(evidence, place, data_set.whiten(unit * values)) for unit in (1.0, 1.0j)]
-    return np.array(rows)
-
-
-def _row(evidence: Evidence, place: slice, values: Array) -> Array:
-    row = np.zeros(evidence.residual.size)
-    row[place] = values
-    return row
-
-
-def _loop_columns(data_set: LoopData) -> Iterator[Array]:
-    scale = np.sqrt(data_set.drive.weight) / data_set.drive.noise * data_set.drive.half_range
-    angle = 2.0 * np.pi * data_set.drive.phase
-    yield scale
-    for order in range(1, _HARMONICS + 1):
-        yield scale * np.cos(order * angle)
-        yield scale * np.sin(order * angle)
-
-
-def _polynomials(frequency: Array) -> Array:
-    x = np.log(frequency)
-    distinct = np.unique(x).size
-    unit = 2.0 * (x - x.min()) / max(float(np.ptp(x)), 1e-300) - 1.0
-    return np.polynomial.legendre.legvander(unit, min(_DEGREE, distinct - 1))
+    return np.array(
+        [evidence.embedded(row, data_set) for data_set in evidence.data_sets for row in data_set.contrasts()]
+    )
 
 
 def largest_smooth_misfit(evidence: Evidence) -> float:
     """Largest smooth misfit anywhere, relative to |K| or to half a loop's force range."""
-    sizes = [float(np.abs(_smooth(level)).max()) for level in _levels(evidence)]
-    for data_set, place in zip(evidence.data_sets, evidence.slices, strict=True):
-        if isinstance(data_set, LoopData):
-            columns = np.array(list(_loop_columns(data_set)))
-            fitted = np.linalg.lstsq(columns.T, evidence.residual[place], rcond=None)[0] @ columns
-            weighty = data_set.drive.weight > 0.0
-            scale = data_set.drive.noise / (data_set.drive.half_range * np.sqrt(data_set.drive.weight[weighty]))
-            sizes.append(float(np.abs(fitted[weighty] * scale).max()))
-    return max(sizes, default=0.0)
+    return max(data_set.smooth_misfit(evidence.model) for data_set in evidence.data_sets)
 
 
 def locate(evidence: Evidence) -> tuple[Where, ...]:
@@ -93,38 +42,13 @@ def locate(evidence: Evidence) -> tuple[Where, ...]:
     return tuple(sorted(worth, key=lambda where: -where.excess)[:_MOST_LINES])
 
 
-def _levels(evidence: Evidence) -> list[_Level]:
-    levels = []
-    for data_set in evidence.data_sets:
-        if not isinstance(data_set, SweepData):
-            continue
-        ratio = data_set.measured / data_set.stiffness(evidence.model) - 1.0
-        for amplitude in np.unique(data_set.amplitude):
-            chosen = data_set.amplitude == amplitude
-            frequency, place = np.unique(data_set.frequency[chosen], return_inverse=True)
-            counts = np.bincount(place)
-            values = ratio[chosen]
-            mean = (np.bincount(place, values.real) + 1j * np.bincount(place, values.imag)) / counts
-            repeats = float(np.median(counts))
-            random = data_set.noise.random[data_set.sweep.name, float(amplitude)]
-            gain, phase = (
-                float(np.sqrt((r**2 + s**2) / repeats)) for r, s in zip(random, data_set.noise.shared, strict=True)
-            )
-            levels.append(_Level(data_set, float(amplitude), frequency, mean, (gain, phase)))
-    return levels
-
-
-def _smooth(level: _Level) -> Array:
-    basis = _polynomials(level.frequency)
-    return basis @ np.linalg.lstsq(basis.astype(complex), level.misfit, rcond=None)[0]
-
-
 def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
-    levels = _levels(evidence)
-    for direction in dict.fromkeys(level.data_set.direction for level in levels):
-        mine = [level for level in levels if level.data_set.direction is direction]
+    _, sweeps = parted(evidence.data_sets)
+    levels = [level for sweep in sweeps for level in sweep.levels(evidence.model)]
+    for direction in dict.fromkeys(level.direction for level in levels):
+        mine = [level for level in levels if level.direction is direction]
         for part, name in enumerate(_PARTS):
-            pieces = [(np.real if part == 0 else np.imag)(_smooth(level)) for level in mine]
+            pieces = [(np.real if part == 0 else np.imag)(level.smooth) for level in mine]
             sizes = [piece / level.noise[part] for piece, level in zip(pieces, mine, strict=True)]
             excess = float(np.sqrt(np.mean(np.square(np.concatenate(sizes)))))
             strongest = max(float(np.abs(size).max()) for size in sizes)
@@ -143,7 +67,7 @@ def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
             )
 
 
-def _band(levels: Sequence[_Level], sizes: Sequence[Array], strongest: float) -> tuple[float, float]:
+def _band(levels: Sequence[Level], sizes: Sequence[Array], strongest: float) -> tuple[float, float]:
     strong = [level.frequency[np.abs(size) > 0.5 * strongest] for level, size in zip(levels, sizes, strict=True)]
     together = np.concatenate(strong)
     return float(together.min()), float(together.max())
@@ -152,7 +76,7 @@ def _band(levels: Sequence[_Level], sizes: Sequence[Array], strongest: float) ->
 def _read_sweep(
     part: str,
     direction: object,
-    levels: Sequence[_Level],
+    levels: Sequence[Level],
     pieces: Sequence[Array],
     touched: Sequence[int],
     band: tuple[float, float],
@@ -162,7 +86,7 @@ def _read_sweep(
     worst = max(touched, key=lambda i: float(np.abs(pieces[i]).max()))
     largest = pieces[worst]
     at = int(np.argmax(np.abs(largest)))
-    unit, factor = levels[0].data_set.direction.display.displacement
+    unit, factor = levels[0].direction.display.displacement
     size = f"{number(100 * abs(largest[at]), 2)} % of |K| {'above' if largest[at] > 0 else 'below'} the model"
     if len(touched) == len(levels):
         level = "at every amplitude"
@@ -200,12 +124,11 @@ def _over_amplitude(pieces: Sequence[Array]) -> str:
 
 
 def _loop_regions(evidence: Evidence) -> Iterator[Where]:
-    for data_set, place in zip(evidence.data_sets, evidence.slices, strict=True):
-        if not isinstance(data_set, LoopData):
-            continue
-        columns = np.array(list(_loop_columns(data_set)))
+    loops, _ = parted(evidence.data_sets)
+    for data_set in loops:
+        columns = data_set.contrasts()
         unit = columns / np.linalg.norm(columns, axis=1)[:, None]
-        amounts = -(unit @ evidence.residual[place])
+        amounts = -(unit @ evidence.residual[evidence.place[data_set]])
         sizes = np.concatenate(([abs(amounts[0])], np.hypot(amounts[1::2], amounts[2::2])))
         order = int(np.argmax(sizes))
         share = np.sqrt(2.0) * sizes[order] / np.sqrt(data_set.size) * data_set.drive.noise / data_set.drive.half_range

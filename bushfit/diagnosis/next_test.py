@@ -10,7 +10,7 @@ import numpy as np
 
 from bushfit.effects import effect_named
 from bushfit.effects.contract import Array, Level
-from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 
@@ -66,7 +66,7 @@ def deciding_test(models: Sequence[Model], data_sets: Sequence[DataSet]) -> str:
     """
     if len(models) < 2:
         return ""
-    swept = {data_set.direction for data_set in data_sets if data_set.kind == "sweep"}
+    swept = {sweep.direction for sweep in parted(data_sets)[1]}
     menu = [entry for entry in MENU if entry.direction not in swept]
     scored = [(_distance(entry, models, data_sets) / entry.effort, entry.words) for entry in menu]
     best, words = max(scored)

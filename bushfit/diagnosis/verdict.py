@@ -51,8 +51,8 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
     if fault and fault.worth > worth + SAME:
         return _finish(search, "unexplained", _fault_words(fault), base, (), fault=fault)
     if fault and fault.worth > worth - SAME:
-        leaders = [replace(_named(step), alternatives=(f"fault: {fault.place.words}",)) for step in steps]
-        words = f"{' and '.join(step.name for step in steps)}, or a fault of the measurement: {fault.place.words}"
+        leaders = [replace(_named(step), alternatives=(f"fault: {fault.suspect.words}",)) for step in steps]
+        words = f"{' and '.join(step.name for step in steps)}, or a fault of the measurement: {fault.suspect.words}"
         return _finish(search, "ambiguous", f"these tests cannot tell {words}", base, leaders, fault=fault)
     names = [_named(step) for step in steps]
     held = hold_out(base, final)
@@ -109,7 +109,7 @@ def _worst_fault(search: Search, evidence: Evidence) -> Fault | None:
 
 
 def _fault_words(fault: Fault) -> str:
-    return f"{fault.place.words} stands out from all other tests: measure it again before looking for physics"
+    return f"{fault.suspect.words} stands out from all other tests: measure it again before looking for physics"
 
 
 def _listed(names: Sequence[Named]) -> str:
@@ -149,7 +149,7 @@ def _finish(
 ) -> Diagnosis:
     base = search.base
     if fault and not next_test:
-        next_test = f"measure again: {fault.place.words}"
+        next_test = f"measure again: {fault.suspect.words}"
     elif not next_test and effects:
         next_test = confirming_test(effects[0].name)
     where = locate(base)
@@ -173,12 +173,12 @@ def _finish(
 
 
 def _fault_where(fault: Fault) -> Where:
-    place = fault.place
-    kind = "loop" if place.kind == "loop" else "sweep"
+    suspect = fault.suspect
+    kind = "loop" if suspect.kind == "loop" else "sweep"
     component = "force" if kind == "loop" else "storage"
     excess = float(np.sqrt(fault.gain / max(fault.columns, 1)))
-    reading = f"{place.words} departs by {number(100 * fault.size, 2)} % from what all other tests say"
-    return Where(place.direction, kind, place.frequency, place.amplitude, component, excess, reading)
+    reading = f"{suspect.words} departs by {number(100 * fault.size, 2)} % from what all other tests say"
+    return Where(suspect.direction, kind, suspect.frequency, suspect.amplitude, component, excess, reading)
 
 
 def _candidates(search: Search, kept: set[str]) -> list[Judged]:

@@ -11,7 +11,7 @@ from bushfit.diagnosis.verdict import judge
 from bushfit.effects import BASE, effect_named
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import DataSet, SweepData
+from bushfit.fitting.data_set import DataSet
 from bushfit.fitting.robust import estimate, outliers_at, told
 from bushfit.fitting.starts import start_values
 from bushfit.model.model import Model
@@ -51,7 +51,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     if data.robust:
         names = [name for name in model.parameters if name not in held]
         robust = estimate(model, data_sets, names, data.bounds, robust=True)
-        outliers, data_sets = robust.outliers, [_standing(data_set) for data_set in robust.data_sets]
+        outliers, data_sets = robust.outliers, [data_set.standing() for data_set in robust.data_sets]
     search = Search.begin(fit(model, data_sets, held, data.bounds), settings, start, held, data.bounds)
     grown, added = search.grow()
     found = judge(search, *search.reconsider(grown, added))
@@ -59,10 +59,6 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
         outliers = outliers_at(found.after.model, found.after.data_sets)
     notes = (*found.notes, *told(outliers, robust=data.robust))
     return replace(found, notes=notes, result=replace(found.result, outliers=outliers))
-
-
-def _standing(data_set: DataSet) -> DataSet:
-    return data_set.standing() if isinstance(data_set, SweepData) else data_set
 
 
 def _adopted(model: Model, name: str) -> Model:

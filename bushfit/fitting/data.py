@@ -16,7 +16,7 @@ from bushfit.fitting.solve import Bounds
 from bushfit.geometry import Direction
 from bushfit.model.result import Outlier
 
-_Term = TypeVar("_Term", LoopData, SweepData)
+_Kind = TypeVar("_Kind", LoopData, SweepData)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,22 +33,22 @@ class Data:
         settings = campaign.fit.parameters
         return cls(
             campaign,
-            tuple(loop_data(campaign.loops, without_wild=campaign.fit.loss != "linear")),
+            tuple(loop_data(campaign.loops, without_outliers=campaign.fit.loss != "linear")),
             tuple(sweep_data(campaign.sweeps, campaign.fit.residuals)),
             {name: (setting.min, setting.max) for name, setting in settings.items()},
         )
 
     @property
     def robust(self) -> bool:
-        """Whether wild points are left out."""
+        """Whether outliers are left out."""
         return self.campaign.fit.loss != "linear"
 
     def without(self, outliers: Sequence[Outlier]) -> Data:
-        """The same data, those points of the sweeps without weight; wild rows of loops have none where `robust`."""
+        """The same data, those points of the sweeps without weight; outliers of loops have none where `robust`."""
         sweeps = []
         for data_set in self.sweeps:
             rows = [outlier.row - 1 for outlier in outliers if outlier.test == data_set.name]
-            sweeps.append(data_set.weighted(np.where(np.isin(data_set.rows, rows), 0.0, 1.0)) if rows else data_set)
+            sweeps.append(data_set.without(np.flatnonzero(np.isin(data_set.rows, rows))))
         return replace(self, sweeps=tuple(sweeps))
 
     @property
@@ -63,8 +63,9 @@ class Data:
         return tuple(name for name in names if name not in settings or settings[name].vary)
 
     def chosen(self, directions: Sequence[Direction] | None) -> list[DataSet]:
-        """Terms of the given directions; by default the axial loops and sweeps, as in the paper, and where a kind has
-        none that is axial all of it.
+        """Data sets of the given directions; by default the axial loops and sweeps, as in the paper.
+
+        Of a kind of test that has none that is axial, all are taken.
 
         Raises:
             FitError: there is none.
@@ -89,7 +90,7 @@ class Data:
             )
         return chosen
 
-    def static_terms(self) -> list[DataSet]:
+    def static_loops(self) -> list[DataSet]:
         """The loops `fit-static` uses: the axial ones, or all where none is axial.
 
         Raises:
@@ -137,6 +138,6 @@ class Data:
         )
 
 
-def _axial(data_sets: Sequence[_Term]) -> Sequence[_Term]:
+def _axial(data_sets: Sequence[_Kind]) -> Sequence[_Kind]:
     """The axial ones, or all where none is."""
     return [data_set for data_set in data_sets if data_set.direction is Direction.AXIAL] or data_sets

@@ -20,7 +20,7 @@ from bushfit.fitting.clock import fundamental
 from bushfit.fitting.harmonics import (
     GRID,
     MOST_ROWS,
-    WildRows,
+    OutlierRows,
     basis,
     harmonics,
     series,
@@ -65,7 +65,7 @@ class Drive:
         datum: mean of the measured force where the motion lies off zero, else None. Whether a sensor's zero or
             a preload put it there is not known, so such a loop counts from its own middle.
         notes: sentences on what of the record was left out, and on a time that does not go with its rows.
-        wild: by column, rows of the loop that are faults of the record, and how far they lie off [noise].
+        outliers: by column, rows of the loop that are faults of the record, and how far they lie off [noise].
         first_row: row of the whole record that the loop begins with.
     """
 
@@ -81,7 +81,7 @@ class Drive:
     half_range: float
     datum: float | None = None
     notes: tuple[str, ...] = ()
-    wild: Mapping[str, WildRows] = field(default_factory=dict)
+    outliers: Mapping[str, OutlierRows] = field(default_factory=dict)
     first_row: int = 0
 
     @property
@@ -139,12 +139,12 @@ class Drive:
         return {}
 
 
-def drive_of(loop: Loop, *, without_wild: bool = False) -> Drive:
+def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
     """Find the cycles of a loop and clear its displacement of noise; wild rows of either column do not disturb that.
 
     Args:
         loop: the measured loop.
-        without_wild: whether rows whose force is wild carry no weight; else they count like any other.
+        without_outliers: whether rows whose force is wild carry no weight; else they count like any other.
 
     Raises:
         FitError: the displacement is not one whole cycle or more of a periodic motion, rows are missing, or the loop
@@ -156,8 +156,8 @@ def drive_of(loop: Loop, *, without_wild: bool = False) -> Drive:
     thin = thin if loop is whole else thinned(loop)
     frequency, cycles = fundamental(loop, *thin)
     _check_no_hole(loop, thin[0], frequency)
-    motion, force_mean, force_noise, wild = harmonics(loop, frequency, cycles)
-    rows = wild["force"].rows
+    motion, force_mean, force_noise, outliers = harmonics(loop, frequency, cycles)
+    rows = outliers["force"].rows
     sound = np.delete(loop.force, rows) if rows.size else loop.force
     ends = np.array(by_chunks(lambda part: (sound[part].min(), sound[part].max()), sound.size))
     half_motion, half_force = np.ptp(series(motion, np.arange(GRID) / GRID)) / 2.0, float(np.ptp(ends)) / 2.0
@@ -165,18 +165,31 @@ def drive_of(loop: Loop, *, without_wild: bool = False) -> Drive:
     from_rest = first == 0 and _from_rest(loop, frequency, half_motion, half_force, noise)
     clock, force = (loop.time - loop.time[0] if loop.time[0] else loop.time), loop.force
     if force.size > MOST_ROWS:
-        if without_wild and rows.size:
+        if without_outliers and rows.size:
             clock, force = np.delete(clock, rows), sound
         phase, force, weight = _binned(clock, force, frequency, cycles, each_cycle=from_rest)
     else:
         phase, weight = clock * frequency, np.ones(force.size)
-        weight[rows] = 0.0 if without_wild else 1.0
+        weight[rows] = 0.0 if without_outliers else 1.0
     noise = max(noise, FLOOR * half_force)
     off_zero = not from_rest and abs(motion[0]) > _CENTRED * half_motion
     datum = force_mean if off_zero else None
     notes = tuple(filter(None, (cut, wrong_clock(loop, motion))))
     drive = Drive(
-        loop, frequency, cycles, from_rest, phase, force, weight, noise, motion, half_force, datum, notes, wild, first
+        loop,
+        frequency,
+        cycles,
+        from_rest,
+        phase,
+        force,
+        weight,
+        noise,
+        motion,
+        half_force,
+        datum,
+        notes,
+        outliers,
+        first,
     )
     drive = replace(drive, weight=np.where(_at_reversal(drive), 0.0, weight))
     _check_loses_energy(drive)

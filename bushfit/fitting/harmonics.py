@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.noise import FLOOR
-from bushfit.fitting.outliers import limit, stuck_rows, wild_rows
+from bushfit.fitting.outliers import limit, outlier_rows, stuck_rows
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 
@@ -36,14 +36,14 @@ _ALIKE = 1.02
 _FAR = 3.0
 
 
-class WildRows(NamedTuple):
+class OutlierRows(NamedTuple):
     """Rows that are faults of the record, (k,), and how far each lies off its column's harmonics [noise], (k,)."""
 
     rows: Array
     off: Array
 
 
-NONE_WILD = WildRows(np.empty(0, dtype=np.intp), np.empty(0))
+NO_OUTLIERS = OutlierRows(np.empty(0, dtype=np.intp), np.empty(0))
 
 
 class Harmonics(NamedTuple):
@@ -52,7 +52,7 @@ class Harmonics(NamedTuple):
     motion: Array
     force_mean: float
     force_noise: float
-    wild: Mapping[str, WildRows]
+    outliers: Mapping[str, OutlierRows]
 
 
 def series(coefficients: Array, phase: Array) -> Array:
@@ -81,13 +81,15 @@ def harmonics(loop: Loop, frequency: float, cycles: float) -> Harmonics:
     number = order(loop.time.size / max(cycles, 1.0), _HARMONICS)
     columns_of = basis(phase, number)
     solution = solve(columns_of, values)
-    kept, wild = [], {}
+    kept, outliers = [], {}
     for which, (name, column) in enumerate(columns.items()):
         solution[:, which], sound = _sound(columns_of, values[:, which], solution[:, which])
         kept.append(sound)
         left = values[:, which] - columns_of @ solution[:, which]
         few = column.size <= ENOUGH_ROWS
-        wild[name] = _wild(loop, frequency, column, solution[:, which], left) if few or not sound.all() else NONE_WILD
+        outliers[name] = (
+            _outliers_of(loop, frequency, column, solution[:, which], left) if few or not sound.all() else NO_OUTLIERS
+        )
     left = values - columns_of @ solution
     of_motion, of_force = kept
     freedom = [max(int(np.count_nonzero(sound)) - 2 * number - 1, 1) for sound in kept]
@@ -103,7 +105,7 @@ def harmonics(loop: Loop, frequency: float, cycles: float) -> Harmonics:
     alike = third < _FAR * motion_noise
     if alike and np.std((values[:, 0] - series(triangle, phase))[of_motion]) < _ALIKE * motion_noise:
         motion = triangle
-    return Harmonics(motion, float(solution[0, 1]), force_noise, wild)
+    return Harmonics(motion, float(solution[0, 1]), force_noise, outliers)
 
 
 def order(rows_per_cycle: float, most: int) -> int:
@@ -164,17 +166,17 @@ def _near(columns: Array, values: Array, solution: Array, stuck: Array) -> Array
     """Rows that are neither stuck nor wild by these harmonics, (n,)."""
     left = values - columns @ solution
     found = ~stuck
-    found[wild_rows(left, values, reach(solution, left, values.size))] = False
+    found[outlier_rows(left, values, reach(solution, left, values.size))] = False
     return found
 
 
-def _wild(loop: Loop, frequency: float, column: Array, solution: Array, left: Array) -> WildRows:
+def _outliers_of(loop: Loop, frequency: float, column: Array, solution: Array, left: Array) -> OutlierRows:
     """The wild rows of a whole column, of which `left` is what the harmonics leave of some rows."""
     grid = np.arange(GRID + 1) / GRID
     cycle = basis(grid, solution.size // 2) @ solution
     left_of_all = column - np.interp((loop.time - loop.time[0]) * frequency % 1.0, grid, cycle)
-    rows = np.union1d(wild_rows(left_of_all, column, reach(solution, left, column.size)), stuck_rows(column))
-    return WildRows(rows, np.abs(left_of_all[rows]) / max(_spread(left), FLOOR * _swing(solution)))
+    rows = np.union1d(outlier_rows(left_of_all, column, reach(solution, left, column.size)), stuck_rows(column))
+    return OutlierRows(rows, np.abs(left_of_all[rows]) / max(_spread(left), FLOOR * _swing(solution)))
 
 
 def reach(solution: Array, left: Array, rows: int) -> float:

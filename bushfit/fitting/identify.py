@@ -14,7 +14,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.assess import measured_range
-from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, parted
 from bushfit.fitting.drive import Drive
 from bushfit.fitting.solve import Coordinates, jacobian
 from bushfit.model.model import Model
@@ -150,7 +150,7 @@ def _percent(error: float) -> str:
 def _reasons(model: Model, data_sets: Sequence[DataSet], involved: Sequence[str]) -> Iterator[str]:
     reach = measured_range(model, data_sets)
     (slow, fast), (small, large) = reach.frequency, reach.strain
-    loops = [data_set for data_set in data_sets if isinstance(data_set, LoopData)]
+    loops, _ = parted(data_sets)
     if set(involved) & set(_FRICTION) and "eps_half" in model.values:
         ratio = large / model.values["eps_half"]
         span = f"{small / model.values['eps_half']:.2g} to {ratio:.2g} of eps_half"
@@ -233,8 +233,7 @@ def _next(model: Model, data_sets: Sequence[DataSet], known: _Information) -> li
 
 def _further(model: Model, data_sets: Sequence[DataSet]) -> Iterator[tuple[str, list[DataSet]]]:
     """Tests a lab could add, each as the data sets it would make, with the campaign's own noise."""
-    loops = [data_set for data_set in data_sets if isinstance(data_set, LoopData)]
-    sweeps = [data_set for data_set in data_sets if isinstance(data_set, SweepData)]
+    loops, sweeps = parted(data_sets)
     yield "every test once more", list(data_sets)
     if loops:
         largest = max(

@@ -1,43 +1,34 @@
-"""Residuals in units of noise of one measured loop: force against time, the measured displacement driving the model."""
+"""One measured loop with its noise: force against time, the measured displacement driving the model."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, wraps
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 
 from bushfit.effects.contract import Array, Values
+from bushfit.fitting.data_set import Suspect, kept
 from bushfit.fitting.drive import Drive
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
+from bushfit.model.result import Outlier
 from bushfit.model.sensitivity import force_jacobian
 from bushfit.reading.measurement import Loop, Source
 
-
-def kept(answer: Callable[..., Array]) -> Callable[..., Array]:
-    """Keeps what a data set answered to the last model: residuals, derivatives and quality ask for the same again."""
-    place = f"_last{answer.__name__}"
-
-    @wraps(answer)
-    def asked(data_set: Any, model: Model, *rest: Any) -> Array:
-        last = data_set.__dict__.get(place)
-        if last is None or last[0] is not model or last[1] != rest:
-            last = data_set.__dict__[place] = (model, rest, answer(data_set, model, *rest))
-            last[2].flags.writeable = False
-        return last[2]
-
-    return asked
+#: Harmonics of a loop that count as smooth misfit: beyond the fifth, physics makes next to nothing.
+_SMOOTH_HARMONICS = 5
 
 
 @dataclass(frozen=True, eq=False)
 class LoopData:
-    """Force against time, with the measured displacement driving the model."""
+    """Force over the rows of a loop; see `DataSet` for its answers."""
 
     drive: Drive
     kind: Literal["loop"] = "loop"
+    parts: Literal[1] = 1
 
     @property
     def name(self) -> str:
@@ -49,7 +40,6 @@ class LoopData:
 
     @cached_property
     def counted(self) -> int:
-        """Residuals that carry weight."""
         return int(np.count_nonzero(self.drive.weight))
 
     @property
@@ -65,8 +55,12 @@ class LoopData:
         return self.loop.source
 
     @property
+    def notes(self) -> Sequence[str]:
+        return self.drive.notes
+
+    @property
     def frequency(self) -> Array:
-        """[Hz], (1,)"""
+        """[Hz], (1,)."""
         return np.array([self.drive.frequency])
 
     @property
@@ -84,8 +78,16 @@ class LoopData:
         """Standard deviation of one row, relative to half the force range."""
         return self.drive.noise / self.drive.half_range
 
+    @property
+    def blocks(self) -> Sequence[Array]:
+        return ()
+
+    @property
+    def shared_freedom(self) -> int:
+        return 0
+
     def force(self, model: Model, values: Values | None = None) -> Array:
-        """Model force at the rows [N or N m]."""
+        """Model force at the rows [N or N m], (..., n)."""
         return self._force(model) if values is None else self._force_of(model, values)
 
     @kept
@@ -98,11 +100,9 @@ class LoopData:
         return self.drive.at_rows(self.drive.from_datum(force)) + (self.drive.datum or 0.0)
 
     def residual(self, model: Model, values: Values | None = None) -> Array:
-        """(..., n)"""
         return (self.force(model, values) - self.drive.force) * self._per_noise
 
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        """(len(names), n)"""
         return self._jacobian(model, tuple(names))
 
     @kept
@@ -112,35 +112,78 @@ class LoopData:
         return self.drive.at_rows(self.drive.from_datum(slopes)) * self._per_noise
 
     def noise_free(self, model: Model) -> LoopData:
-        """The same test as the model would have it, without noise."""
         force = self.force(model)
         return replace(self, drive=replace(self.drive, force=force, half_range=float(np.ptp(force)) / 2.0))
 
     def change(self, one: Model, other: Model) -> float:
-        """Largest difference between two models, relative to half the force range."""
         return float(np.max(np.abs(self.force(one) - self.force(other)))) / self.drive.half_range
 
     def relative(self, model: Model) -> Array:
-        """Difference relative to half the force range, for NRMSE, where the rows carry weight."""
         return ((self.force(model) - self.drive.force) / self.drive.half_range)[self.drive.weight > 0.0]
 
     def distance(self, model: Model) -> Array:
-        """How far each row lies off the model, in units of noise, (n,)."""
         return np.abs(self.residual(model))
 
     def shown(self, model: Model) -> Array:
-        """As `residual`, and of rows without weight how far one row lies off, in units of noise, (n,)."""
         off = (self.force(model) - self.drive.force) / self.drive.noise
         return np.where(self.drive.weight > 0.0, self.residual(model), off)
 
     def weighted(self, weight: Array) -> LoopData:
-        """The same test with the weight of each row, (n,), times a share."""
         return replace(self, drive=replace(self.drive, weight=self.drive.weight * weight))
 
+    def without(self, points: Array) -> LoopData:
+        """The same: rows of a loop that are left out have no weight from the start, see `drive_of`."""
+        return self
+
+    def standing(self) -> LoopData:
+        """The whole loop: its rows without weight are needed to keep time."""
+        return self
+
+    def outlying(self, model: Model) -> Array:
+        """Rows of the record, from 0, whose force stands out from the loop's own harmonics; no model is asked."""
+        return self.drive.outliers["force"].rows
+
+    def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
+        file = str(self.source.file) if self.source else None
+        for column, (rows, distance) in self.drive.outliers.items():
+            for row, off in zip(rows.tolist(), distance.tolist(), strict=True):
+                yield Outlier(self.name, file, row + self.drive.first_row + 1, column, off)
+
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
-        """Per estimated variance of the noise, what reacts to the whitened residuals by `influence`, (k, n), times the
-        whitened derivative of their covariance by that variance, times its standard error: (k, n)."""
         return {} if self.loop.noise is not None else {self.name: np.sqrt(2.0 / self.counted) * influence}
+
+    def contrasts(self) -> Array:
+        """A constant force, and the cosine and sine of each harmonic, as whitened residuals, (11, n)."""
+        scale = self._per_noise * self.drive.half_range
+        angle = 2.0 * np.pi * self.drive.phase
+        columns = [scale]
+        for order in range(1, _SMOOTH_HARMONICS + 1):
+            columns += [scale * np.cos(order * angle), scale * np.sin(order * angle)]
+        return np.array(columns)
+
+    def smooth_misfit(self, model: Model) -> float:
+        columns = self.contrasts()
+        fitted = np.linalg.lstsq(columns.T, self.residual(model), rcond=None)[0] @ columns
+        weighty = self.drive.weight > 0.0
+        scale = self.drive.noise / (self.drive.half_range * np.sqrt(self.drive.weight[weighty]))
+        return float(np.abs(fitted[weighty] * scale).max())
+
+    def suspects(self, residual: Array) -> Iterator[Suspect]:
+        """The loop as a whole, wrong in gain or offset."""
+        columns = [self.drive.force * self._per_noise, self.drive.half_range * self._per_noise]
+        ends = (self.drive.frequency,) * 2, (self.drive.amplitude,) * 2
+        yield Suspect(f"the loop {self.name}", "loop", columns, self.direction, *ends)
+
+    def columns(self) -> dict[str, Any]:
+        unit, factor = self.direction.display.displacement
+        return {
+            "time [s]": self.drive.phase / self.drive.frequency,
+            "frequency [Hz]": self.drive.frequency,
+            f"amplitude [{unit}]": self.drive.amplitude * factor,
+        }
+
+    def components(self, residual: Array) -> dict[str, Array]:
+        return {"force": residual}
 
     @cached_property
     def _per_noise(self) -> Array:

@@ -46,7 +46,7 @@ def from_neighbours(values: Array, rows: Array, window: int = WINDOW) -> Array:
     return values[rows] - np.median(around, axis=1)
 
 
-def wild_rows(left: Array, recorded: Array, reach: float) -> Array:
+def outlier_rows(left: Array, recorded: Array, reach: float) -> Array:
     """Rows farther than `reach` off a curve that are as far off their neighbours, or where the channel is stuck.
 
     Args:

@@ -12,7 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import Stage, covariance, measured_range, misfit, quality
 from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
+from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.identify import left_open
 from bushfit.fitting.plausible import implausible, unfitted
 from bushfit.fitting.profile import profile95
@@ -91,7 +91,7 @@ def fit_static(data: Data, springpot: Result | None = None) -> Result:
     Raises:
         FitError: no loop, or data that cannot support the fit.
     """
-    data_sets = data.static_terms()
+    data_sets = data.static_loops()
     held, known = _springpot(data, springpot)
     found = _solve(data, data_sets, BASE if held else ("elastic", "friction"), held)
     notes = [] if held else [_without_springpot(data, found.solution, data_sets)]
@@ -122,7 +122,7 @@ def fit_two_step(data: Data) -> TwoStep:
     Raises:
         FitError: a test is missing, or the passes do not settle.
     """
-    loops, sweep = data.static_terms(), data.smallest_sweep
+    loops, sweep = data.static_loops(), data.smallest_sweep
     springpot: dict[str, float] = {}
     passes: list[Mapping[str, float]] = []
     asked: list[Array] = []
@@ -255,12 +255,7 @@ def cautions(
     that does not fit."""
     names, at_bound = solution.coordinates.names, solution.at_bound
     return [
-        *(
-            f"{data_set.name}: {note}"
-            for data_set in data_sets
-            if isinstance(data_set, LoopData)
-            for note in data_set.drive.notes
-        ),
+        *(f"{data_set.name}: {note}" for data_set in data_sets for note in data_set.notes),
         *(_stopped(solution) if solution.stopped else []),
         *(_at_edge(name, end, bounds) for name, end in at_bound.items()),
         *left_open(model, data_sets, [name for name in names if name not in at_bound], covariance),
@@ -281,5 +276,6 @@ def _at_edge(name: str, end: End, bounds: Bounds) -> str:
 
 def _assumed(data_sets: Sequence[DataSet]) -> list[str]:
     """What was assumed of the noise because nothing was repeated."""
-    noises = {id(data_set.noise): data_set.noise for data_set in data_sets if isinstance(data_set, SweepData)}
+    _, sweeps = parted(data_sets)
+    noises = {id(sweep.noise): sweep.noise for sweep in sweeps}
     return [f"noise of the sweeps: {noise.describe()}" for noise in noises.values() if noise.origin == "assumed"]

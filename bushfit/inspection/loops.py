@@ -76,7 +76,7 @@ def _changing(drive: Drive, names: tuple[str, str]) -> Iterator[str]:
     units = loop.direction.display
     phase = (loop.time - loop.time[0]) * drive.frequency
     numbers = sorted({*range(min(count, _ENDS)), *range(max(count - _ENDS, 0), count)})
-    wild = drive.wild["force"].rows
+    wild = drive.outliers["force"].rows
     parts = [np.setdiff1d(np.flatnonzero((phase >= n) & (phase < n + 1)), wild) for n in numbers]
     rows = min(part.size for part in parts)
     order = int(np.clip(rows // 5, 1, _HARMONICS))

@@ -85,7 +85,7 @@ def sweeps_table(model: Model, data_sets: Sequence[SweepData]) -> pd.DataFrame:
                     "direction": str(data_set.direction),
                     "frequency [Hz]": data_set.frequency,
                     f"amplitude [{length}]": data_set.amplitude * length_factor,
-                    "repeat": data_set.sweep.repeat[data_set.order],
+                    "repeat": data_set.repeat,
                     f"stiffness [{stiffness}]": np.abs(data_set.measured) * factor,
                     "loss factor [-]": loss_factor(data_set.measured),
                     f"model stiffness [{stiffness}]": np.abs(modelled) * factor,
@@ -105,21 +105,10 @@ def gap_table(before: Model, after: Model, data_sets: Sequence[DataSet]) -> pd.D
     frames = []
     for data_set in data_sets:
         columns: dict[str, Any] = {"test": data_set.name, "kind": data_set.kind, "direction": str(data_set.direction)}
-        length, factor = data_set.direction.display.displacement
-        first, second = (data_set.residual(model) for model in (before, after))
-        if data_set.kind == "loop":
-            columns |= {"time [s]": data_set.drive.phase / data_set.drive.frequency}
-            columns |= {
-                "frequency [Hz]": data_set.drive.frequency,
-                f"amplitude [{length}]": data_set.drive.amplitude * factor,
-            }
-            columns |= {"force before [noise]": first, "force after [noise]": second}
-        else:
-            columns |= {"frequency [Hz]": data_set.frequency, f"amplitude [{length}]": data_set.amplitude * factor}
-            columns |= {"repeat": data_set.sweep.repeat[data_set.order]}
-            for name, values in (("before", first), ("after", second)):
-                storage, loss = np.split(values, 2)
-                columns |= {f"storage {name} [noise]": storage, f"loss {name} [noise]": loss}
+        columns |= data_set.columns()
+        for name, model in (("before", before), ("after", after)):
+            parts = data_set.components(data_set.residual(model))
+            columns |= {f"{part} {name} [noise]": values for part, values in parts.items()}
         frames.append(pd.DataFrame(columns))
     return pd.concat(frames, ignore_index=True)
 

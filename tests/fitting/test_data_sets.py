@@ -36,7 +36,7 @@ def data_set(paper_model: Model) -> SweepData:
 
 def covariance_of(data_set: SweepData) -> np.ndarray:
     """Covariance of all gain, then all phase deviations, in the data set's order: random and shared by block."""
-    repeat = data_set.sweep.repeat[data_set.order]
+    repeat = data_set.repeat
     same = (data_set.amplitude[:, None] == data_set.amplitude) & (repeat[:, None] == repeat)
     random = np.array([data_set.noise.random["sweep", float(x)] for x in data_set.amplitude])
     halves = [np.diag(random[:, part] ** 2) + data_set.noise.shared[part] ** 2 * same for part in (0, 1)]

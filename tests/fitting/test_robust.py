@@ -115,7 +115,7 @@ def test_a_wild_displacement_does_not_disturb_the_motion(
         print(f"{kind}: frequency {drive.frequency:.8f} Hz, amplitude {drive.amplitude / clean.amplitude - 1:+.1e}")
         assert drive.frequency == pytest.approx(clean.frequency, rel=1e-4)
         assert drive.amplitude == pytest.approx(clean.amplitude, rel=1e-3)
-        assert kind == "stuck" or drive.wild["displacement"].rows.size > 0.8 * SHARE * loop.force.size
+        assert kind == "stuck" or drive.outliers["displacement"].rows.size > 0.8 * SHARE * loop.force.size
 
 
 def test_clean_tests_have_no_outliers_and_the_same_answer(
@@ -273,4 +273,4 @@ def test_a_loop_of_few_rows_keeps_its_corners(paper_model: Model) -> None:
     noise = np.random.default_rng(0).standard_normal((2, 120)) * 1e-3
     loop = Loop("l", Direction.AXIAL, phase / 0.1, triangle + 1e-3 * noise[0], 460.0 * (1e3 * triangle + noise[1]))
     shifted = replace(loop, force=np.roll(loop.force, -1))
-    assert all(found.rows.size == 0 for found in drive_of(shifted).wild.values())
+    assert all(found.rows.size == 0 for found in drive_of(shifted).outliers.values())

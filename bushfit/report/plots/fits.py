@@ -108,7 +108,7 @@ def loops_figure(model: Model, data_sets: Sequence[LoopData], title: str) -> Fig
             mark_wild(loop_panel, length * data_set.drive.displacement(phase), force * wild_force)
         phase_panel.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
         loops_legend(phase_panel, mine, Line2D([], [], color=INK, lw=0.8))
-    note = _WILD if any(data_set.drive.wild["force"].rows.size for data_set in data_sets) else ""
+    note = _WILD if any(data_set.drive.outliers["force"].rows.size for data_set in data_sets) else ""
     explain(figure, "Left: measured force over the motion cleared of noise; black: model.", _RESIDUALS, _MEANS, note)
     return figure
 
@@ -142,6 +142,6 @@ def _drawn_rows(data_set: LoopData) -> Array:
     phase = data_set.drive.phase
     drawn = (phase < 2.0) | (phase > phase[-1] - 2.0)
     if phase.size == data_set.loop.force.size:
-        drawn[data_set.drive.wild["force"].rows] = False
+        drawn[data_set.drive.outliers["force"].rows] = False
     rows = np.flatnonzero(drawn)
     return rows[:: max(1, -(-rows.size // _MOST_ROWS))]

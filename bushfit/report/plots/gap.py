@@ -16,7 +16,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
+from bushfit.fitting.data_sets import DataSet, LoopData, parted
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.report.plots.fits import loops_legend
@@ -79,8 +79,8 @@ def gap_figure(before: Model, after: Model, data_sets: Sequence[DataSet], title:
         title: names the bushing.
         summary: the finding in a sentence or two.
     """
-    sweeps = by_direction([data_set for data_set in data_sets if isinstance(data_set, SweepData)])
-    loops = by_direction([data_set for data_set in data_sets if isinstance(data_set, LoopData)])
+    every_loop, every_sweep = parted(data_sets)
+    loops, sweeps = by_direction(every_loop), by_direction(every_sweep)
     sides = [side_of(model, name, data_sets, sweeps, loops) for model, name in columns(before, after, data_sets)]
     rows = [(direction, part) for direction in sweeps for part in ("storage", "loss")]
     heights = [_map_height(sides[0].maps[direction]) for direction, _ in rows] + [_LOOPS] * len(loops)

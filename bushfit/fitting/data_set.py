@@ -1,0 +1,192 @@
+"""What loops and sweeps are asked alike: residuals in units of noise, their derivatives, and what looks odd in them.
+
+A data set is one measured test with its noise. Fits, quality figures, pictures and the diagnosis ask it the questions
+of `DataSet` and need not know which kind of test it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import wraps
+from typing import Any, Protocol, Self
+
+from bushfit.effects.contract import Array, Values
+from bushfit.geometry import Direction
+from bushfit.model.model import Kind, Model
+from bushfit.model.result import Outlier
+from bushfit.reading.measurement import Source
+
+
+@dataclass(frozen=True, eq=False)
+class Suspect:
+    """Points of the tests that a fault of the rig would move together.
+
+    Args:
+        words: where, for the user: what to measure again.
+        kind: one of SUSPECT_KINDS.
+        columns: whitened residuals that a unit deviation of each kind makes, (n,) each.
+        direction: of the first test touched.
+        frequency: lowest and highest [Hz].
+        amplitude: lowest and highest, zero-to-peak [m or rad].
+        looked: how many places of this kind were looked at, where more than are listed.
+    """
+
+    words: str
+    kind: str
+    columns: Sequence[Array]
+    direction: Direction
+    frequency: tuple[float, float]
+    amplitude: tuple[float, float]
+    looked: int = 0
+
+
+#: Kinds of suspects, in the order in which they are listed.
+SUSPECT_KINDS = ("frequency", "level", "repeat", "row", "loop")
+
+
+class DataSet(Protocol):
+    """One measured test with its noise: what every loop and every sweep answers.
+
+    A whitened residual is model less measured in units of noise; residuals are independent with unit variance where
+    the model is right. Of n points a loop has n residuals, a sweep 2 n: all gains, then all phases.
+    """
+
+    @property
+    def kind(self) -> Kind:
+        """Whether it is a loop or a sweep."""
+
+    @property
+    def parts(self) -> int:
+        """Numbers that make up a point: 1 for a force, 2 for a complex stiffness."""
+
+    @property
+    def name(self) -> str:
+        """Of the test."""
+
+    @property
+    def direction(self) -> Direction:
+        """Of the test."""
+
+    @property
+    def source(self) -> Source | None:
+        """The file it came from; None where it came from none."""
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """What is odd about the record, for the user."""
+
+    @property
+    def size(self) -> int:
+        """Number of residuals."""
+
+    @property
+    def counted(self) -> int:
+        """Number of residuals that carry weight."""
+
+    @property
+    def frequency(self) -> Array:
+        """Of the operating points [Hz], (n,); a loop has one."""
+
+    @property
+    def amplitude(self) -> Array:
+        """Of the operating points, zero-to-peak [m or rad], (n,); a loop has one."""
+
+    @property
+    def measured(self) -> Array:
+        """Complex stiffness at the operating points [N/m or N m/rad], (n,)."""
+
+    @property
+    def relative_noise(self) -> float:
+        """Standard deviation of one point, relative to |K| or to half a loop's force range."""
+
+    @property
+    def blocks(self) -> Sequence[Array]:
+        """Indices of the residuals that share an error of the rig, a group each."""
+
+    @property
+    def shared_freedom(self) -> int:
+        """Degrees of freedom behind the errors that blocks share; 0 where these are not measured."""
+
+    def residual(self, model: Model, values: Values | None = None) -> Array:
+        """Whitened residuals, (..., size); `values` in place of the model's own add leading axes."""
+
+    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
+        """Derivatives of the whitened residuals by fit coordinate, (len(names), size)."""
+
+    def relative(self, model: Model) -> Array:
+        """Misfit of the points that carry weight, relative to |K| or to half a loop's force range, for NRMSE."""
+
+    def distance(self, model: Model) -> Array:
+        """How far each point lies off the model, in units of noise, (n,)."""
+
+    def shown(self, model: Model) -> Array:
+        """As `residual`, and of points without weight how far one lies off, in units of noise, (size,)."""
+
+    def change(self, one: Model, other: Model) -> float:
+        """Largest difference between two models, relative to |K| or to half a loop's force range."""
+
+    def noise_free(self, model: Model) -> Self:
+        """The same test as the model would have it, without noise."""
+
+    def weighted(self, weight: Array) -> Self:
+        """The same test with the weight of each point, (n,), times a share."""
+
+    def without(self, points: Array) -> Self:
+        """The same test with no weight on some of its points, by number."""
+
+    def standing(self) -> Self:
+        """The part of the test that carries weight."""
+
+    def outlying(self, model: Model) -> Array:
+        """Numbers of the points that are outliers: far off the model and off their neighbours alike."""
+
+    def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
+        """Outliers by file and row."""
+
+    def unsure(self, influence: Array) -> Mapping[Hashable, Array]:
+        """How an estimator reacts to each variance of the noise that was itself estimated.
+
+        Args:
+            influence: what the estimator takes of each whitened residual, (k, size).
+
+        Returns:
+            Per variance, (k, size): the influence times the whitened derivative of the residuals' covariance by that
+            variance, times its standard error.
+        """
+
+    def contrasts(self) -> Array:
+        """Whitened residuals of all that is smooth, (c, size): slow in frequency, or low harmonics of a loop."""
+
+    def smooth_misfit(self, model: Model) -> float:
+        """Largest smooth misfit, relative to |K| or to half a loop's force range."""
+
+    def suspects(self, residual: Array) -> Iterator[Suspect]:
+        """Points that a fault of the rig may have moved together, given the whitened residuals, (size,)."""
+
+    def columns(self) -> Mapping[str, Any]:
+        """What names each residual's point in a table: columns by header."""
+
+    def components(self, residual: Array) -> Mapping[str, Array]:
+        """Whitened residuals by what they are residuals of: storage and loss, or force."""
+
+
+def kept(answer: Callable[..., Array]) -> Callable[..., Array]:
+    """Keeps what a data set answered to the last model: residuals, derivatives and quality ask for the same again."""
+    place = f"_last{answer.__name__}"
+
+    @wraps(answer)
+    def asked(data_set: Any, model: Model, *rest: Any) -> Array:
+        last = data_set.__dict__.get(place)
+        if last is None or last[0] is not model or last[1] != rest:
+            last = data_set.__dict__[place] = (model, rest, answer(data_set, model, *rest))
+            last[2].flags.writeable = False
+        return last[2]
+
+    return asked
+
+
+def shown_amplitude(direction: Direction, amplitude: float) -> str:
+    """An amplitude [m or rad] as engineers read it: "0.1 mm"."""
+    unit, factor = direction.display.displacement
+    return f"{amplitude * factor:.4g} {unit}"

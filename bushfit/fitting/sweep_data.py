@@ -1,0 +1,380 @@
+"""One measured sweep with its noise: dynamic stiffness over frequency and amplitude."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Any, Literal
+
+import numpy as np
+
+from bushfit.effects.contract import Array, Values
+from bushfit.fitting.data_set import Suspect, kept, shown_amplitude
+from bushfit.fitting.noise import SweepNoise
+from bushfit.fitting.sweep_outliers import outlying_points
+from bushfit.fitting.whitening import Whitening
+from bushfit.geometry import Direction
+from bushfit.model.model import Model
+from bushfit.model.result import Outlier
+from bushfit.model.sensitivity import stiffness_jacobian
+from bushfit.reading.measurement import Source, Sweep
+
+Residuals = Literal["complex", "magnitude_loss_factor"]
+
+#: Degree in ln f of the Legendre polynomials that count as smooth misfit.
+_SMOOTH_DEGREE = 3
+#: A single point is a suspect beyond so many standard deviations: noise makes one in 16,000.
+_FAR = 4.0
+#: Single points of a sweep that are suspects at most, the farthest first: more are no single faults.
+_MOST_ROWS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """Mean misfit of one amplitude of a sweep over its repeats.
+
+    Args:
+        direction: of the sweep.
+        amplitude: zero-to-peak [m or rad].
+        frequency: [Hz], (n,), each once.
+        misfit: measured over model less 1, complex, (n,).
+        noise: standard deviation of the gain and the phase of one of these means.
+    """
+
+    direction: Direction
+    amplitude: float
+    frequency: Array
+    misfit: Array
+    noise: tuple[float, float]
+
+    @cached_property
+    def smooth(self) -> Array:
+        """The part of the misfit that is a polynomial in ln f, complex, (n,)."""
+        basis = _polynomials(self.frequency)
+        return basis @ np.linalg.lstsq(basis.astype(complex), self.misfit, rcond=None)[0]
+
+
+@dataclass(frozen=True, eq=False)
+class SweepData:
+    """Dynamic stiffness of a sweep, as relative complex residual or as magnitude and loss factor; see `DataSet`.
+
+    Points stand sorted by block (amplitude, repeat), then frequency. The residual (K - K_meas)/K_meas has the gain
+    error in its real and the phase error in its imaginary part.
+
+    Args:
+        sweep: as measured.
+        noise: of the campaign's sweeps.
+        residuals: what the residual is made of.
+        weight: share of its weight that each point has, (n,) in `order`; all for None.
+        part: rows of the whole sweep, (n,), where this is a part of it.
+    """
+
+    sweep: Sweep
+    noise: SweepNoise
+    residuals: Residuals = "complex"
+    weight: Array | None = None
+    part: Array | None = None
+    kind: Literal["sweep"] = "sweep"
+    parts: Literal[2] = 2
+
+    @property
+    def name(self) -> str:
+        return self.sweep.name
+
+    @property
+    def size(self) -> int:
+        return 2 * int(self.sweep.frequency.size)
+
+    @property
+    def counted(self) -> int:
+        return 2 * int(np.count_nonzero(self.weights))
+
+    @property
+    def direction(self) -> Direction:
+        return self.sweep.direction
+
+    @property
+    def source(self) -> Source | None:
+        return self.sweep.source
+
+    @property
+    def notes(self) -> Sequence[str]:
+        return ()
+
+    @property
+    def relative_noise(self) -> float:
+        """Standard deviation of one point, relative to |K|, root mean square over levels."""
+        return float(np.sqrt(np.mean(np.square(list(self.noise.random.values())))))
+
+    @property
+    def shared_freedom(self) -> int:
+        return self.noise.freedom
+
+    @property
+    def blocks(self) -> list[Array]:
+        count = self.frequency.size
+        edges = [*self.block_starts.tolist(), count]
+        return [part + np.arange(first, last) for part in (0, count) for first, last in pairwise(edges)]
+
+    def at_amplitudes(self, amplitudes: Sequence[float]) -> SweepData:
+        """The part of the sweep at some of its levels, with the same noise."""
+        return self._part(np.isin(self.sweep.amplitude, amplitudes))
+
+    def standing(self) -> SweepData:
+        kept_rows = np.empty(self.frequency.size, dtype=bool)
+        kept_rows[self.order] = self.weights > 0.0
+        return self if kept_rows.all() else self._part(kept_rows)
+
+    def _part(self, rows: Array) -> SweepData:
+        sweep = replace(
+            self.sweep,
+            frequency=self.sweep.frequency[rows],
+            amplitude=self.sweep.amplitude[rows],
+            stiffness=self.sweep.stiffness[rows],
+            repeat=self.sweep.repeat[rows],
+            reached=self.sweep.amplitude_reached[rows],
+        )
+        weight = None if self.weight is None else self.weight[rows[self.order]]
+        return replace(self, sweep=sweep, weight=weight, part=self._whole[rows])
+
+    def weighted(self, weight: Array) -> SweepData:
+        return replace(self, weight=self.weights * weight)
+
+    def without(self, points: Array) -> SweepData:
+        return self.weighted(np.isin(np.arange(self.frequency.size), points, invert=True)) if points.size else self
+
+    def noise_free(self, model: Model) -> SweepData:
+        stiffness = np.empty_like(self.sweep.stiffness)
+        stiffness[self.order] = self.stiffness(model)
+        return replace(self, sweep=replace(self.sweep, stiffness=stiffness))
+
+    @cached_property
+    def order(self) -> Array:
+        """Rows of the sweep sorted by block (amplitude, repeat), then frequency."""
+        return np.lexsort((self.sweep.frequency, self.sweep.repeat, self.sweep.amplitude))
+
+    @property
+    def rows(self) -> Array:
+        """Row of the whole sweep at which each point stands, from 0, (n,) in `order`."""
+        return self._whole[self.order]
+
+    @property
+    def _whole(self) -> Array:
+        return np.arange(self.sweep.frequency.size) if self.part is None else self.part
+
+    @cached_property
+    def frequency(self) -> Array:
+        """[Hz], (n,)."""
+        return self.sweep.frequency[self.order]
+
+    @cached_property
+    def amplitude(self) -> Array:
+        """Of the level, zero-to-peak [m or rad], (n,)."""
+        return self.sweep.amplitude[self.order]
+
+    @cached_property
+    def repeat(self) -> Array:
+        """Number of the repeat, (n,)."""
+        return self.sweep.repeat[self.order]
+
+    @cached_property
+    def measured(self) -> Array:
+        """Complex stiffness [N/m or N m/rad], (n,)."""
+        return self.sweep.stiffness[self.order]
+
+    @cached_property
+    def block_starts(self) -> Array:
+        """Index of the first point of each block."""
+        label = np.stack((self.amplitude, self.repeat.astype(float)))
+        return np.concatenate(([0], 1 + np.flatnonzero(np.any(np.diff(label), axis=0))))
+
+    def stiffness(self, model: Model, values: Values | None = None) -> Array:
+        """Model stiffness at the points, (..., n); what repeats is computed once."""
+        return self._stiffness(model) if values is None else self._stiffness_of(model, values)
+
+    @kept
+    def _stiffness(self, model: Model) -> Array:
+        return self._stiffness_of(model, model.values)
+
+    def _stiffness_of(self, model: Model, values: Values) -> Array:
+        frequency, amplitude, place = self._distinct
+        return model.stiffness(self.sweep.direction, frequency, amplitude, values=values)[..., place]
+
+    @cached_property
+    def _distinct(self) -> tuple[Array, Array, Array]:
+        """Frequency and reached amplitude of the distinct operating points, and the place of each point among them."""
+        points = self.frequency + 1j * self.sweep.amplitude_reached[self.order]
+        distinct, place = np.unique(points, return_inverse=True)
+        return distinct.real, distinct.imag, place
+
+    def relative(self, model: Model) -> Array:
+        return np.abs(self.stiffness(model) / self.measured - 1.0)[self.weights > 0.0]
+
+    def distance(self, model: Model) -> Array:
+        """How far each point lies off the model less what its block shares, in units of noise: one number for gain and
+        phase, their root mean square, (n,)."""
+        return self.apart(self.deviation(model)) / np.sqrt(2.0)
+
+    def change(self, one: Model, other: Model) -> float:
+        return float(np.max(np.abs((self.stiffness(one) - self.stiffness(other)) / self.measured)))
+
+    def apart(self, deviation: Array, *, shared: bool = True) -> Array:
+        """Length of deviations, (n,), in units of the random noise, less the likeliest error that a block shares."""
+        return np.hypot(*self._whitening.own(deviation, shared=shared))
+
+    def shown(self, model: Model) -> Array:
+        deviation = self.deviation(model)
+        own = self._whitening.own(deviation).ravel()
+        return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), own)
+
+    def deviation(self, model: Model, values: Values | None = None) -> Array:
+        """Residual before whitening: gain in the real, phase (or loss factor) in the imaginary part, (..., n)."""
+        return self._deviation(self.stiffness(model, values))
+
+    def residual(self, model: Model, values: Values | None = None) -> Array:
+        return self._residual(model) if values is None else self.whiten(self.deviation(model, values))
+
+    @kept
+    def _residual(self, model: Model) -> Array:
+        return self.whiten(self.deviation(model))
+
+    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
+        return self._jacobian(model, tuple(names))
+
+    @kept
+    def _jacobian(self, model: Model, names: tuple[str, ...]) -> Array:
+        frequency, amplitude, place = self._distinct
+        slopes = stiffness_jacobian(model, self.sweep.direction, frequency, amplitude, names)[:, place]
+        if self.residuals == "complex":
+            return self.whiten(slopes / self.measured)
+        stiffness = self.stiffness(model)
+        relative = slopes / stiffness
+        gain = np.abs(stiffness / self.measured) * relative.real
+        loss = relative.imag * (np.abs(stiffness) / stiffness.real) ** 2
+        return self.whiten(gain + 1j * loss * self._loss_scale)
+
+    def _deviation(self, stiffness: Array) -> Array:
+        if self.residuals == "complex":
+            return stiffness / self.measured - 1.0
+        gain = np.abs(stiffness / self.measured) - 1.0
+        loss = stiffness.imag / stiffness.real - self.measured.imag / self.measured.real
+        return gain + 1j * loss * self._loss_scale
+
+    @cached_property
+    def _loss_scale(self) -> Array:
+        """Phase per loss factor, 1/(1 + eta^2)."""
+        return (self.measured.real / np.abs(self.measured)) ** 2
+
+    def whiten(self, deviation: Array) -> Array:
+        """Deviations in units of noise, shared block errors taken out: complex (..., n) -> (..., 2 n)."""
+        return self._whitening.whiten(deviation)
+
+    def unsure(self, influence: Array) -> dict[Hashable, Array]:
+        return self._whitening.unsure(influence)
+
+    @cached_property
+    def _whitening(self) -> Whitening:
+        counts = np.diff(self.block_starts, append=self.frequency.size)
+        levels = [self.noise.random[self.name, float(x)] for x in self.amplitude[self.block_starts]]
+        return Whitening(self.block_starts, np.repeat(np.array(levels).T, counts, axis=1), self.noise, self.weights)
+
+    @cached_property
+    def weights(self) -> Array:
+        """Share of its weight that each point has, (n,)."""
+        return np.ones(self.frequency.size) if self.weight is None else self.weight
+
+    def outlying(self, model: Model) -> Array:
+        return outlying_points(self, model)
+
+    def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
+        if not points.size:
+            return
+        file = str(self.source.file) if self.source else None
+        distance = self.distance(model)[points].tolist()
+        for row, off in sorted(zip((self.rows[points] + 1).tolist(), distance, strict=True)):
+            yield Outlier(self.name, file, row, "stiffness", off)
+
+    def levels(self, model: Model) -> list[Level]:
+        """Mean misfit of each amplitude over its repeats."""
+        ratio, levels = self.measured / self.stiffness(model) - 1.0, []
+        for amplitude in np.unique(self.amplitude):
+            chosen = self.amplitude == amplitude
+            frequency, place = np.unique(self.frequency[chosen], return_inverse=True)
+            counts, values = np.bincount(place), ratio[chosen]
+            mean = (np.bincount(place, values.real) + 1j * np.bincount(place, values.imag)) / counts
+            random = self.noise.random[self.name, float(amplitude)]
+            repeats = float(np.median(counts))
+            gain, phase = np.sqrt((np.square(random) + np.square(self.noise.shared)) / repeats).tolist()
+            levels.append(Level(self.direction, float(amplitude), frequency, mean, (gain, phase)))
+        return levels
+
+    def contrasts(self) -> Array:
+        """Gain and phase of each level as polynomials in ln f, as whitened residuals, (c, 2 n)."""
+        rows = []
+        for level in np.unique(self.amplitude):
+            chosen = self.amplitude == level
+            for column in _polynomials(self.frequency[chosen]).T:
+                values = np.zeros(chosen.size, dtype=complex)
+                values[chosen] = column
+                rows += [self.whiten(unit * values) for unit in (1.0, 1.0j)]
+        return np.array(rows)
+
+    def smooth_misfit(self, model: Model) -> float:
+        return max(float(np.abs(level.smooth).max()) for level in self.levels(model))
+
+    def suspects(self, residual: Array) -> Iterator[Suspect]:
+        """One amplitude wrong as a whole, one repeat of one, and single points that lie far out."""
+        levels = np.unique(self.amplitude)
+        for level in levels if levels.size > 1 else ():
+            words = f"the {self.direction} level {shown_amplitude(self.direction, level)}"
+            yield self._suspect(words, "level", self.amplitude == level)
+        for level in levels:
+            numbers = np.unique(self.repeat[self.amplitude == level])
+            for number in numbers if numbers.size > 2 else ():
+                words = f"repeat {number} of the {self.direction} level {shown_amplitude(self.direction, level)}"
+                yield self._suspect(words, "repeat", (self.amplitude == level) & (self.repeat == number))
+        count = self.frequency.size
+        distance = np.maximum(np.abs(residual[:count]), np.abs(residual[count:]))
+        farthest = np.argsort(-distance, kind="stable")[:_MOST_ROWS]
+        for row in farthest[distance[farthest] > _FAR]:
+            words = (
+                f"the point at {self.frequency[row]:.4g} Hz, {shown_amplitude(self.direction, self.amplitude[row])}, "
+                f"repeat {self.repeat[row]}, {self.direction}"
+            )
+            yield replace(self._suspect(words, "row", np.arange(count) == row), looked=count)
+
+    def _suspect(self, words: str, kind: str, chosen: Array) -> Suspect:
+        frequency, amplitude = self.frequency[chosen], self.amplitude[chosen]
+        return Suspect(
+            words,
+            kind,
+            self.moved_together(chosen),
+            self.direction,
+            (float(frequency.min()), float(frequency.max())),
+            (float(amplitude.min()), float(amplitude.max())),
+        )
+
+    def moved_together(self, chosen: Array) -> list[Array]:
+        """Whitened residuals of some points, (n,) bool, off by one unit of gain, and off by one of phase."""
+        return [self.whiten(unit * chosen.astype(complex)) for unit in (1.0, 1.0j)]
+
+    def columns(self) -> dict[str, Any]:
+        unit, factor = self.direction.display.displacement
+        return {
+            "frequency [Hz]": self.frequency,
+            f"amplitude [{unit}]": self.amplitude * factor,
+            "repeat": self.repeat,
+        }
+
+    def components(self, residual: Array) -> dict[str, Array]:
+        storage, loss = np.split(residual, 2)
+        return {"storage": storage, "loss": loss}
+
+
+def _polynomials(frequency: Array) -> Array:
+    """Legendre polynomials in ln f over the range of these frequencies, (n, degree + 1)."""
+    x = np.log(frequency)
+    unit = 2.0 * (x - x.min()) / max(float(np.ptp(x)), 1e-300) - 1.0
+    return np.polynomial.legendre.legvander(unit, min(_SMOOTH_DEGREE, np.unique(x).size - 1))
