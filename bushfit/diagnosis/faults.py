@@ -1,6 +1,7 @@
-"""Faults of the measurement: what one frequency, level, repeat, loop or row alone shows is no physics.
+"""Faults of the measurement: one frequency, level, repeat, loop or row that disagrees with all the others.
 
-Each suspect place may deviate freely in gain and phase; what that takes off chi-square competes with the effects.
+What a single place of the tests shows alone is no physics. Each suspect may deviate freely in gain and phase; what that
+takes off chi-square competes with the effects.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _FEWEST_FREQUENCIES = 5
 
 @dataclass(frozen=True, eq=False)
 class Fault:
-    """A place that may be at fault.
+    """A suspect, and what speaks against it.
 
     Args:
         suspect: where.
@@ -63,9 +64,9 @@ def faults(evidence: Evidence, level: float) -> tuple[list[Fault], float]:
             size,
             gain,
             size * evidence.penalty + 2.0 * float(np.log(max(suspect.looked, looked[suspect.kind]))),
-            float(np.abs(answer).max()),
+            float(np.abs(amount).max()),
         )
-        for suspect, size, gain, answer in zip(suspects, test.sizes, test.gains(), test.answers(), strict=True)
+        for suspect, size, gain, amount in zip(suspects, test.sizes, test.gains(), test.amounts(), strict=True)
     ]
     return found, test.largest_by_chance(level)
 

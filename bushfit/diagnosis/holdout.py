@@ -1,7 +1,11 @@
-"""Held-out data: does what was added also close the gap where it was not fitted?
+"""Hold-out: does what was added also close the gap where it was not fitted?
 
-An amplitude level, the top third of the frequencies, a direction and a loop are held out in turn. Refitting without
-a part is one Gauss-Newton step from the full fit, which is exact where the model is linear over that step.
+An amplitude level, the top third of the frequencies, a direction and a loop are held out in turn, and predicted from
+the rest.
+
+Notes:
+    Refitting without a part is one Gauss-Newton step from the full fit, which is exact where the model is linear over
+    that step.
 """
 
 from __future__ import annotations
@@ -15,12 +19,19 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import DataSet, SweepData, parted
 
-#: Parts without which some parameter's variance would grow by more than this say nothing about a prediction.
+#: A part without which some parameter's variance would grow by more than this factor is not held out: what is left does
+#: not determine that parameter, so a prediction would say nothing.
 _MOST_GROWTH = 100.0
-#: A gap of at most this many units of noise, or shrunk to less than this share, is closed.
-_CLOSED, _SHRUNK = 1.2, 0.5
-#: No part may get worse by more than this factor.
-_WORSE = 1.1
+#: Condition number of the remaining information beyond which its inverse is rounding.
+_SINGULAR = 1e14
+#: Held-out gap, in units of noise, that counts as closed: noise and its own estimate make 1.1.
+_CLOSED = 1.2
+#: Share of the held-out gap before, below which the gap after counts as closed too.
+_SHRUNK = 0.5
+#: Factor by which the gap of a single part may grow: chance makes about a tenth.
+_MOST_WORSENED = 1.1
+#: Share of all sweep points, the highest frequencies, that is one part.
+_TOP = 1.0 / 3.0
 
 
 @dataclass(frozen=True)
@@ -44,7 +55,7 @@ class HoldOut:
     def passed(self) -> bool:
         """Whether the gap shrinks where it was not fitted, and nowhere grows."""
         closed = self.after <= max(_CLOSED, _SHRUNK * self.before)
-        return closed and all(part.after <= max(_WORSE * part.before, _CLOSED) for part in self.parts)
+        return closed and all(part.after <= max(_MOST_WORSENED * part.before, _CLOSED) for part in self.parts)
 
 
 def hold_out(before: Evidence, after: Evidence) -> HoldOut:
@@ -71,7 +82,7 @@ def _predicted(evidence: Evidence, chosen: Array) -> Array | None:
     rest, full = jacobian[:, ~chosen] @ jacobian[:, ~chosen].T, jacobian @ jacobian.T
     moving = np.diag(full) > 0.0
     rest, full = rest[np.ix_(moving, moving)], full[np.ix_(moving, moving)]
-    if np.linalg.cond(rest) > 1e14:
+    if np.linalg.cond(rest) > _SINGULAR:
         return None
     inverse = np.linalg.inv(rest)
     if np.any(np.diag(inverse) > _MOST_GROWTH * np.diag(np.linalg.inv(full))):
@@ -87,7 +98,7 @@ def _parts(evidence: Evidence) -> Iterator[tuple[str, Array]]:
     for rank in range(max((int(r.max()) + 1 for r in ranks), default=0)):
         yield f"amplitude level {rank + 1}", _points(evidence, zip(sweeps, [r == rank for r in ranks], strict=True))
     if sweeps:
-        top = np.quantile(np.concatenate([sweep.frequency for sweep in sweeps]), 2.0 / 3.0)
+        top = np.quantile(np.concatenate([sweep.frequency for sweep in sweeps]), 1.0 - _TOP)
         yield "top third of the frequencies", _points(evidence, ((sweep, sweep.frequency > top) for sweep in sweeps))
     for direction in dict.fromkeys(data_set.direction for data_set in evidence.data_sets):
         whole = [data_set for data_set in evidence.data_sets if data_set.direction is direction]

@@ -13,14 +13,26 @@ from bushfit.fitting.data_sets import parted
 from bushfit.fitting.sweep_data import Level
 from bushfit.units import number
 
-#: Smooth misfit: Legendre polynomials up to this degree in ln f, harmonics of a loop up to this number.
-_DEGREE, _HARMONICS = 3, 5
-#: A region is worth a line when its smooth misfit is this many times what noise makes of it.
+#: Smooth misfit, in units of the noise of its root mean square, from which a region is worth a line.
 _WORTH_A_LINE = 2.5
+#: Regions listed at most, the worst first: more is nothing that a reader takes in.
 _MOST_LINES = 6
-#: And no line for what is smaller than this, relative to |K| or to half a loop's force range.
+#: Smooth misfit, relative to |K| or to half a loop's force range, below which a region has no line whatever the noise.
 _LEAST = 1e-3
+#: Share of the strongest misfit from which a level, or a frequency, belongs to the region.
+_STRONG = 0.5
+#: Share of a misfit's sum of squares that a flat line may leave for it to be called flat.
+_FLAT = 0.2
+#: Share of the largest mean by which the means of the levels must differ to be said to rise or fall with amplitude.
+_CHANGES = 0.5
 _PARTS = ("storage", "loss")
+#: What the harmonics of a loop's misfit mean, by order.
+_HARMONICS = {
+    0: "a constant force",
+    1: "its first harmonic (slope or area)",
+    2: "its second harmonic (one way stiffer than the other)",
+    3: "its third harmonic (a bend at the ends)",
+}
 
 
 def contrasts(evidence: Evidence) -> Array:
@@ -43,6 +55,7 @@ def locate(evidence: Evidence) -> tuple[Where, ...]:
 
 
 def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
+    """Per direction, where the storage and the loss stiffness of its sweeps depart smoothly from the model."""
     _, sweeps = parted(evidence.data_sets)
     levels = [level for sweep in sweeps for level in sweep.levels(evidence.model)]
     for direction in dict.fromkeys(level.direction for level in levels):
@@ -52,7 +65,7 @@ def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
             sizes = [piece / level.noise[part] for piece, level in zip(pieces, mine, strict=True)]
             excess = float(np.sqrt(np.mean(np.square(np.concatenate(sizes)))))
             strongest = max(float(np.abs(size).max()) for size in sizes)
-            touched = [i for i, size in enumerate(sizes) if np.abs(size).max() > 0.5 * strongest]
+            touched = [i for i, size in enumerate(sizes) if np.abs(size).max() > _STRONG * strongest]
             band = _band([mine[i] for i in touched], [sizes[i] for i in touched], strongest)
             if max(float(np.abs(piece).max()) for piece in pieces) < _LEAST:
                 continue
@@ -68,7 +81,8 @@ def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
 
 
 def _band(levels: Sequence[Level], sizes: Sequence[Array], strongest: float) -> tuple[float, float]:
-    strong = [level.frequency[np.abs(size) > 0.5 * strongest] for level, size in zip(levels, sizes, strict=True)]
+    """Lowest and highest frequency at which some level departs strongly [Hz]."""
+    strong = [level.frequency[np.abs(size) > _STRONG * strongest] for level, size in zip(levels, sizes, strict=True)]
     together = np.concatenate(strong)
     return float(together.min()), float(together.max())
 
@@ -113,17 +127,18 @@ def _trend(frequency: Array, misfit: Array) -> str:
         left[words] = float(rest @ rest)
     flat = "much the same at every frequency"
     best = min(left, key=lambda words: left[words])
-    return flat if left[flat] < 0.2 * float(misfit @ misfit) else best
+    return flat if left[flat] < _FLAT * float(misfit @ misfit) else best
 
 
 def _over_amplitude(pieces: Sequence[Array]) -> str:
     means = [float(np.mean(piece)) for piece in pieces]
-    if len(means) < 2 or np.ptp(means) < 0.5 * max(abs(mean) for mean in means):
+    if len(means) < 2 or np.ptp(means) < _CHANGES * max(abs(mean) for mean in means):
         return ""
     return ", rising with amplitude" if means[-1] > means[0] else ", falling with amplitude"
 
 
 def _loop_regions(evidence: Evidence) -> Iterator[Where]:
+    """Per loop, the harmonic in which its force departs most from the model."""
     loops, _ = parted(evidence.data_sets)
     for data_set in loops:
         columns = data_set.contrasts()
@@ -132,13 +147,7 @@ def _loop_regions(evidence: Evidence) -> Iterator[Where]:
         sizes = np.concatenate(([abs(amounts[0])], np.hypot(amounts[1::2], amounts[2::2])))
         order = int(np.argmax(sizes))
         share = np.sqrt(2.0) * sizes[order] / np.sqrt(data_set.size) * data_set.drive.noise / data_set.drive.half_range
-        names = {
-            0: "a constant force",
-            1: "its first harmonic (slope or area)",
-            2: "its second harmonic (one way stiffer than the other)",
-            3: "its third harmonic (a bend at the ends)",
-        }
-        words = names.get(order, f"harmonic {order}")
+        words = _HARMONICS.get(order, f"harmonic {order}")
         unit_name, factor = data_set.direction.display.displacement
         amplitude = data_set.drive.amplitude
         if share < _LEAST:

@@ -14,7 +14,7 @@ from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 
-#: Relative noise of one point of a test that does not exist yet.
+#: Relative noise of one point of a test that does not exist yet: that of a good servo-hydraulic rig.
 _NOISE = 5e-3
 
 

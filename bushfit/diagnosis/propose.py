@@ -1,6 +1,8 @@
-"""Which effect is missing: every effect of the library proposes itself with evidence.
+"""Which effects might be missing: every effect of the library, ranked by a score test before any refit.
 
-A score test ranks them all: residuals projected on the candidate's sensitivity beside the model's own parameters.
+Notes:
+    The score is what the effect would take off chi-square if everything were linear: the residuals projected on the
+    effect's sensitivity, less what the model's own parameters can absorb of it.
 """
 
 from __future__ import annotations
@@ -18,19 +20,21 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import DataSet
 from bushfit.model.model import Model
 
-#: Values tried of a shape parameter.
+#: Values tried of a shape parameter (a time, a gap, a frequency), spread evenly in its logarithm.
 _PROBES = 5
-#: Amount at which a sensitivity is taken, relative to the typical one.
+#: Amount at which a sensitivity is taken, relative to the typical one: small enough to be a derivative, large enough to
+#: keep ten digits of the difference.
 _STEP = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """One effect's claim before any refit.
+    """What one effect promises before any refit.
 
     Args:
         name: the effect.
-        model: the model with the effect in its best shape, at no amount yet, but what has a logarithm as suggested.
+        model: the model with the effect in its best shape and at no amount; an amount that is fitted in its logarithm
+            stands where the score suggests.
         score: what it would take off chi-square if everything were linear.
         column: its sensitivity, whitened, (n,).
         sense: +1 where only positive amounts are physical, 0 where both signs are.
@@ -51,8 +55,8 @@ def proposals(evidence: Evidence, excluded: Collection[str]) -> list[Proposal]:
     probed = [_probed(evidence, effect) for effect in asked]
     ends = np.cumsum([0, *(len(columns) for _, columns in probed)])
     every = np.concatenate([np.empty((0, evidence.residual.size)), *(columns for _, columns in probed)])
-    questions = ScoreTest(evidence, every, list(np.arange(len(every))[:, None]), SENSITIVITY_LEFT)
-    amounts, gains, sizes = np.ravel(questions.answers()), np.array(questions.gains()), questions.sizes
+    test = ScoreTest(evidence, every, list(np.arange(len(every))[:, None]), SENSITIVITY_LEFT)
+    amounts, gains, sizes = np.ravel(test.amounts()), np.array(test.gains()), test.sizes
     found = []
     for effect, (shapes, columns), first, last in zip(asked, probed, ends[:-1], ends[1:], strict=True):
         amount = _amount(effect)
@@ -93,6 +97,7 @@ def _probed(evidence: Evidence, effect: Effect) -> tuple[list[dict[str, float]],
 
 
 def _probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> Array:
+    """Values of a shape parameter that these tests could show, by what it is measured against."""
     frequencies = np.concatenate([data_set.frequency for data_set in data_sets])
     match parameter.scale:
         case "period":

@@ -1,10 +1,12 @@
-"""How large a gain noise alone makes: a parametric bootstrap in the space of the questions asked.
+"""Score tests: what a pattern in the residuals would take off chi-square, and how much noise alone would.
 
-A question is a group of columns in residual space that one answer would use together: a candidate's sensitivity, a
-fault's pattern, smooth contrasts. Noise is drawn as the campaign has it: independent residuals, and blocks whose
-shared variance was itself estimated from a few repeats, which makes the tails of what acts on whole blocks heavier.
-Only the columns' inner products enter, so thousands of draws cost one small matrix product; the underlying draws
-depend on their number alone and are kept.
+Notes:
+    A pattern is a group of columns, whitened residuals that are free to move together: a candidate's sensitivity, a
+    fault's gain and phase, smooth contrasts. How far the best pattern gets by chance comes from a parametric
+    bootstrap: noise is drawn as the campaign has it, independent residuals, and blocks whose shared variance was
+    itself estimated from a few repeats, which makes the tails of what acts on whole blocks heavier. Only the columns'
+    inner products enter, so thousands of draws cost one small matrix product. The underlying draws depend on their
+    number alone and are kept.
 """
 
 from __future__ import annotations
@@ -18,21 +20,27 @@ import numpy as np
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.effects.contract import Array
 
+#: Draws of noise: the 0.5 % that a threshold leaves are then known within a fifth.
 DRAWS = 4000
+#: Of all draws, so that a campaign has the same thresholds at every run.
 _SEED = 20260101
-#: Share of a unit column that must be left beside the model's own parameters: of a candidate's sensitivity, and of a
-#: pattern, of which what little remains would be the curvature of the model and the grid of the computation.
-SENSITIVITY_LEFT, PATTERN_LEFT = 1e-4, 0.1
+#: Share of a candidate's unit sensitivity that the model's own parameters must leave for it to count as visible.
+SENSITIVITY_LEFT = 1e-4
+#: The same share of a fault's or a smooth pattern: of these, the little that is left below it would be the curvature of
+#: the model and the grid of the computation.
+PATTERN_LEFT = 0.1
+#: Variance, relative to the largest, below which a direction of the draws is rounding.
+_ROUNDING = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class ScoreTest:
-    """Groups of columns, asked of one fitted model.
+    """Patterns held against the residuals of one fitted model.
 
     Args:
         evidence: the fitted model.
-        columns: whitened residuals that a unit of each answer would make, (c, n).
-        groups: indices of the columns that each question uses together.
+        columns: whitened residuals that a unit of each amount would make, (c, n).
+        groups: indices of the columns of each pattern.
         least: share of a unit column that must be left beside the model's own parameters.
     """
 
@@ -53,7 +61,7 @@ class ScoreTest:
 
     @cached_property
     def _roots(self) -> list[Array]:
-        """Per question a matrix that makes its columns orthonormal, those all but absorbed dropped, (k, r)."""
+        """Per pattern a matrix that makes its columns orthonormal, those all but absorbed dropped, (k, r)."""
         gram = self._left @ self._left.T
         roots = []
         for group in self.groups:
@@ -64,27 +72,27 @@ class ScoreTest:
 
     @property
     def sizes(self) -> list[int]:
-        """Number of columns of each question that are visible."""
+        """Number of columns of each pattern that are visible."""
         return [root.shape[1] for root in self._roots]
 
     def gains(self) -> list[float]:
-        """What each question would take off chi-square."""
+        """What each pattern would take off chi-square."""
         amounts = self._left @ self.evidence.residual
         pairs = zip(self.groups, self._roots, strict=True)
         return [float(np.sum(np.square(amounts[group] @ root))) for group, root in pairs]
 
-    def answers(self) -> list[Array]:
-        """Least-squares amounts of each question's columns, in their own units; 0 for what is not visible."""
+    def amounts(self) -> list[Array]:
+        """Least-squares amounts of each pattern's columns, in their own units; 0 for what is not visible."""
         amounts = self._left @ self.evidence.residual
         pairs = zip(self.groups, self._roots, strict=True)
         return [-(root @ (root.T @ amounts[group])) / self._lengths[group] for group, root in pairs]
 
     def largest_by_chance(self, level: float, senses: Sequence[int] | None = None) -> float:
-        """The gain that the best question exceeds by chance with probability 1 - level.
+        """The gain that the best pattern exceeds by chance with probability 1 - level.
 
         Args:
             level: probability, such as 0.995.
-            senses: per question +1 where only positive answers are physical, 0 where both signs are.
+            senses: per pattern +1 where only positive amounts are physical, 0 where both signs are.
         """
         drawn = _draw(self.evidence, self._left)
         best = np.zeros(DRAWS)
@@ -114,7 +122,7 @@ def _draw(evidence: Evidence, rows: Array) -> Array:
         amounts += (shared @ _normals(shared.shape[1], 0)) * scale
     size, vectors = np.linalg.eigh(rest)
     root = vectors * np.sqrt(np.maximum(size, 0.0))
-    kept = size > 1e-10 * max(float(size.max()), 1e-300)
+    kept = size > _ROUNDING * max(float(size.max()), 1e-300)
     return amounts + root[:, kept] @ _normals(int(kept.sum()), 1)
 
 

@@ -1,6 +1,6 @@
-"""The workflow: detect, name, add, refit, hold out, and say what is certain and what is not.
+"""The search for missing effects: add the best candidate, look again, and try every rival in its place.
 
-Nowhere does it ask for an effect by name: effects propose themselves with evidence, and evidence decides.
+No effect is asked for by name: effects propose themselves with evidence, and evidence decides.
 """
 
 from __future__ import annotations
@@ -20,22 +20,30 @@ from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.solve import Bounds
 
-#: Probability with which noise alone stays below the threshold of the best candidate.
-_LEVEL = 0.995
-#: Candidates within this of the best by BIC are one set; a rival must stay this far by chi-square to be excluded.
-SAME, APART = 6.0, 10.0
-#: A richer rival that meets a simpler model's prediction this closely contains it.
+#: Probability with which noise alone stays below the threshold of the best candidate: one false alarm in 200.
+_CHANCE_LEVEL = 0.995
+#: Difference in BIC within which candidates are one set: odds of 20 to 1, "strong" after Kass and Raftery (1995).
+SAME = 6.0
+#: Chi-square that a rival must stay away from the model's noise-free prediction to be excluded: three standard errors.
+APART = 10.0
+#: Chi-square within which a richer rival meets a simpler model's noise-free prediction: then it contains the simpler.
 _CONTAINS = 1.0
+#: Times that an added effect is exchanged or dropped before the search ends; chosen: more only go round in circles.
 _MOST_SWAPS = 4
-#: Reduced chi-square beyond which the values of the model as it came are no place to start from.
+#: A swap counts where it improves BIC by more than this, which is above rounding.
+_LEAST_IMPROVEMENT = 1e-6
+#: Reduced chi-square beyond which a model has bent its parameters too far for a refit to start from its values.
 _BENT = 1.5
-#: Candidates that are refitted in each round at most, the best scores first, and the share of the best that they need.
-_REFITTED, _PROMISING = 6, 0.1
+#: Candidates that are refitted in each round at most, the best scores first; chosen for time: the truth ranks third
+#: at worst on the score card.
+_MOST_REFITTED = 6
+#: Share of the best score that a candidate needs to be refitted.
+_LEAST_SCORE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One effect of the model.
+    """One effect that was added, and what came near it.
 
     Args:
         name: the effect.
@@ -54,7 +62,13 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """A refitted model, every effect's claim on it, and the best claims refitted, best by BIC first."""
+    """A fitted model, what every missing effect promises it, and the best of these refitted.
+
+    Args:
+        evidence: the fitted model.
+        proposed: every effect that it lacks, the best score first.
+        tried: the most promising refitted with all parameters, the best by BIC first.
+    """
 
     evidence: Evidence
     proposed: tuple[Proposal, ...]
@@ -62,7 +76,7 @@ class Round:
 
     @cached_property
     def critical(self) -> float:
-        """The gain that noise alone exceeds with probability 1 - _LEVEL."""
+        """The gain that noise alone exceeds with probability 1 - _CHANCE_LEVEL."""
         return critical_gain(self.evidence, self.proposed)
 
     @property
@@ -99,7 +113,7 @@ class Search:
     def begin(
         cls, base: Evidence, settings: Settings, start: Mapping[str, float], held: Sequence[str], bounds: Bounds
     ) -> Search:
-        """Ask every effect of the library, and refit the best."""
+        """A search that has scored every effect of the library once, and refitted the best."""
         search = cls(settings, start, tuple(held), bounds)
         search._round(base, ())
         return search
@@ -115,17 +129,17 @@ class Search:
         return self.first.evidence
 
     def _round(self, evidence: Evidence, added: Sequence[str], known: Sequence[Candidate] = ()) -> Round:
-        """Ask every effect that is not there, and refit the best but those known already.
+        """Score every effect that the model lacks, and refit the best of those not known already.
 
-        A model that lacks something large has bent its own parameters to make up for it; the way back is long, and
-        shorter from the start values read off the data.
+        A model that lacks something large has bent its own parameters to make up for it: then the refits start from
+        the values read off the data, which is the shorter way.
         """
         key = frozenset(added)
         if key not in self.rounds:
             proposed = tuple(proposals(evidence, (*self.settings.without, *added)))
-            least = max(evidence.penalty / 2.0, _PROMISING * max((claim.score for claim in proposed), default=0.0))
+            least = max(evidence.penalty / 2.0, _LEAST_SCORE * max((claim.score for claim in proposed), default=0.0))
             fitted = {candidate.name for candidate in known}
-            best = [claim for claim in proposed[:_REFITTED] if claim.score > least and claim.name not in fitted]
+            best = [claim for claim in proposed[:_MOST_REFITTED] if claim.score > least and claim.name not in fitted]
             start = self.start if not added and evidence.reduced > _BENT else {}
             tried = race(evidence, best, known, start, self.held, self.bounds)
             self.rounds[key] = Round(evidence, proposed, tuple(tried))
@@ -159,7 +173,7 @@ class Search:
                 others = [other for other in names if other != name]
                 place = self._place(current, name, others)
                 best, reduced = place.best, place.evidence
-                if swaps_left and best and best.name != name and best.evidence.bic < current.bic - 1e-6:
+                if swaps_left and best and best.name != name and best.evidence.bic < current.bic - _LEAST_IMPROVEMENT:
                     names[names.index(name)] = best.name
                     current, swapped = best.evidence, True
                     break
@@ -216,10 +230,10 @@ class Search:
 
 
 def critical_gain(evidence: Evidence, proposed: Sequence[Proposal]) -> float:
-    """The gain that the best of all candidates makes of noise alone, with probability 1 - _LEVEL."""
+    """The gain that the best of all candidates makes of noise alone, with probability 1 - _CHANCE_LEVEL."""
     columns = np.array([proposal.column for proposal in proposed])
-    questions = ScoreTest(evidence, columns, [np.array([i]) for i in range(len(proposed))], SENSITIVITY_LEFT)
-    return questions.largest_by_chance(_LEVEL, [proposal.sense for proposal in proposed])
+    test = ScoreTest(evidence, columns, [np.array([i]) for i in range(len(proposed))], SENSITIVITY_LEFT)
+    return test.largest_by_chance(_CHANCE_LEVEL, [proposal.sense for proposal in proposed])
 
 
 def footprint(before: Evidence, after: Evidence) -> float:

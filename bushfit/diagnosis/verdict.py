@@ -16,14 +16,16 @@ from bushfit.diagnosis.record import Diagnosis, Judged, Named, Verdict, Where
 from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.search import SAME, Search, Step
 from bushfit.fitting.assess import Stage, covariance, measured_range, quality
+from bushfit.fitting.data_sets import parted
 from bushfit.fitting.procedures import cautions
 from bushfit.fitting.solve import Bounds
 from bushfit.model.result import Result
 from bushfit.units import number
 
-#: Probability with which noise alone stays below the thresholds of a remainder and of a fault.
-_LEVEL = 0.998
-#: A remainder that leaves less than this share of the held-out gap counts as partly closed.
+#: Probability with which noise alone stays below the thresholds of a remainder and of a fault: both are asked of every
+#: clean campaign, and one false alarm in 250 is what the score card's 1 % leaves room for.
+_CHANCE_LEVEL = 0.998
+#: Share of the held-out gap that may be left for the verdict `partly`.
 _PARTLY = 0.5
 
 
@@ -92,7 +94,7 @@ def find_remainder(search: Search, evidence: Evidence) -> Remainder | None:
     columns = contrasts(evidence)
     smooth = ScoreTest(evidence, columns, [np.arange(len(columns))], PATTERN_LEFT)
     if (
-        smooth.gains()[0] > smooth.largest_by_chance(_LEVEL)
+        smooth.gains()[0] > smooth.largest_by_chance(_CHANCE_LEVEL)
         and largest_smooth_misfit(evidence) > search.settings.tolerance
     ):
         return Remainder("a real gap stays that no known effect closes", None)
@@ -101,7 +103,7 @@ def find_remainder(search: Search, evidence: Evidence) -> Remainder | None:
 
 def _worst_fault(search: Search, evidence: Evidence) -> Fault | None:
     """The worthiest fault, where it is more than chance, more than its price and larger than the tolerance."""
-    found, chance = faults(evidence, _LEVEL)
+    found, chance = faults(evidence, _CHANCE_LEVEL)
     worst = max(found, key=lambda fault: fault.worth, default=None)
     if worst is None or worst.worth < SAME or worst.size < search.settings.tolerance:
         return None
@@ -233,8 +235,8 @@ def _notes(search: Search, after: Evidence) -> tuple[str, ...]:
     notes = []
     if blind:
         notes.append(f"not identifiable from these tests: {', '.join(blind)}")
-    noise = next((data_set.noise for data_set in after.data_sets if hasattr(data_set, "noise")), None)
-    if noise is not None and noise.origin == "assumed":
+    _, sweeps = parted(after.data_sets)
+    if sweeps and sweeps[0].noise.origin == "assumed":
         notes.append(
             "nothing was repeated at three frequencies or more: "
             "errors shared by a block are assumed, 0.5 % gain and 0.25 deg phase"

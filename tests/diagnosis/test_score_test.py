@@ -51,7 +51,7 @@ def test_gains_are_those_of_a_linear_refit(clean: Evidence) -> None:
         answer = np.linalg.lstsq(rows.T, evidence.residual, rcond=None)[0]
         return float(np.sum((evidence.residual - answer @ rows) ** 2)), -answer
 
-    for group, gain, answer in zip(groups, questions.gains(), questions.answers(), strict=True):
+    for group, gain, answer in zip(groups, questions.gains(), questions.amounts(), strict=True):
         chi_square, refitted = left(np.vstack((own, columns[group])))
         expected = left(own)[0] - chi_square
         print(f"{group.size} columns: gain {gain:.6f}, refit {expected:.6f}")
