@@ -1,6 +1,6 @@
-"""Hidden campaigns: random bushings with a hidden effect, measured by the time-domain rig, the truth sealed apart.
+"""Hidden campaigns: random bushings with a hidden effect, measured by the time-domain rig, the truth kept apart.
 
-The frequency faces that fits use never make these data. Sizes are random, from hardly visible to plain, where visible
+The closed forms that fits use never make these data. Sizes are random, from hardly visible to plain, where visible
 means what is left of the effect after the plain model has absorbed what it can.
 """
 
@@ -21,22 +21,41 @@ from bushfit.fitting.data_sets import DataSet, loop_data, sweep_data
 from bushfit.geometry import Bushing, Direction
 from bushfit.model import rig
 from bushfit.model.model import Model
+from bushfit.reading.measurement import Loop, Sweep
 from bushfit.simulation import Simulated, Undisturbed, measure, undisturbed
 
-#: What the library does not have.
+#: Disturbances that the library does not have.
 OUTSIDE = ("spot_disturbance", "mislabelled_level", "velocity_weakening_slip")
-#: Sizes of what stays visible, relative to |K| or half a loop's force range.
+#: Least and largest size of what stays visible, relative to |K| or half a loop's force range: hardly seen to plain.
 _VISIBLE = (0.015, 0.12)
+#: Least and largest scatter of a sweep point, relative to |K|: good rigs.
 _NOISE = (0.003, 0.006)
+#: Least and largest scatter of a loop's force, relative to half its range.
 _FORCE_NOISE = (0.002, 0.004)
-_SHARED = (0.004, float(np.radians(0.2)))
+#: Scatter of a loop's displacement, relative to its amplitude.
+_DISPLACEMENT_NOISE = 2e-4
+#: Gain error that a block shares, relative to |K|, where it shares one.
+_SHARED_GAIN = 0.004
+#: Phase error that it then shares [rad].
+_SHARED_PHASE = float(np.radians(0.2))
+#: Frequencies of every sweep [Hz], the paper's.
 _FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
+#: Levels of a sweep, relative to the largest, as in the paper.
+_LEVELS = np.array([0.2, 0.4, 1.0])
+#: Bushings tried until one shows the effect at a size in range; chosen: the worst effect needs a dozen.
 _TRIES = 30
 #: Time steps of a cycle: their error is a tenth of the noise.
 _STEPS = 1024
-#: No effect is larger than this many times its typical size.
+#: Times its typical size that an effect has at most.
 _LARGEST = 30.0
+#: Loss factor that a bushing has at most, hidden effect and all.
 _MOST_LOSS = 1.0
+#: Steps in which the amount of an effect is brought near the wanted visible size.
+_SIZING_STEPS = 4
+#: Logarithm of the ratio to the wanted size at which it is near enough: 15 %.
+_NEAR = 0.15
+#: Size of a disturbance from outside the library, least and largest, relative to |K|.
+_OUTSIDE_SIZE = (0.03, 0.12)
 
 
 @dataclass(frozen=True)
@@ -108,11 +127,10 @@ def _plan(plain: Model, random: Generator, seed: int) -> SimulateSettings:
     """Two directions at three levels of like strain, two loops, three repeats."""
     bushing = plain.bushing
     top = random.uniform(0.03, 0.06)
-    levels = np.array([0.2, 0.4, 1.0])
     sweeps = []
     for direction in (Direction.AXIAL, Direction.RADIAL):
         largest = float(f"{top / bushing.unit_strain(direction):.2g}")
-        sweeps.append(SimulatedSweep(direction, tuple(float(x) for x in levels * largest), _FREQUENCIES))
+        sweeps.append(SimulatedSweep(direction, tuple(float(x) for x in _LEVELS * largest), _FREQUENCIES))
     largest = max(sweeps[0].amplitudes)
     shared = random.random() < 0.5
     return SimulateSettings(
@@ -120,9 +138,9 @@ def _plan(plain: Model, random: Generator, seed: int) -> SimulateSettings:
         repeats=3,
         noise=random.uniform(*_NOISE),
         force_noise=random.uniform(*_FORCE_NOISE),
-        displacement_noise=2e-4,
-        gain_error=_SHARED[0] if shared else 0.0,
-        phase_error=_SHARED[1] if shared else 0.0,
+        displacement_noise=_DISPLACEMENT_NOISE,
+        gain_error=_SHARED_GAIN if shared else 0.0,
+        phase_error=_SHARED_PHASE if shared else 0.0,
         loops=tuple(SimulatedLoop(Direction.AXIAL, factor * largest, 0.1, cycles=3) for factor in (1.0, 2.0)),
         sweeps=tuple(sweeps),
     )
@@ -159,7 +177,7 @@ def _sized(
     if amount.bounds[0] < 0.0 and random.random() < 0.5:
         value = -value
     size = 0.0
-    for _ in range(4):
+    for _ in range(_SIZING_STEPS):
         if not (amount.bounds[0] <= value <= amount.bounds[1] and abs(value) <= _LARGEST * amount.typical):
             return None, 0.0
         model = plain.with_effect(effect.name, {**values, name: value})
@@ -169,7 +187,7 @@ def _sized(
         size = _visible(plain, model, plan)
         if size <= 0.0:
             return None, 0.0
-        if abs(np.log(size / wanted)) < 0.15:
+        if abs(np.log(size / wanted)) < _NEAR:
             break
         value *= float(np.clip(wanted / size, 0.1, 10.0))
     if not 0.7 * _VISIBLE[0] < size < 2.0 * _VISIBLE[1]:
@@ -203,15 +221,13 @@ def _plausible(model: Model, plan: SimulateSettings) -> bool:
 
 def _visible(plain: Model, model: Model, plan: SimulateSettings) -> float:
     """Largest misfit of a plain model fitted to what the model itself predicts, relative."""
-    data_sets = _terms(model, plan)
+    data_sets = _noise_free_data(model, plan)
     before = fit(plain, data_sets, (), {})
     return footprint(before, replace(before, solution=replace(before.solution, model=model)))
 
 
-def _terms(model: Model, plan: SimulateSettings) -> list[DataSet]:
+def _noise_free_data(model: Model, plan: SimulateSettings) -> list[DataSet]:
     """The plan's tests as the model's own closed form has them: used for the choice of a size, never as data."""
-    from bushfit.reading.measurement import Loop, Sweep
-
     sweeps = []
     for number, swept in enumerate(plan.sweeps):
         frequency, amplitude = (x.ravel() for x in np.meshgrid(swept.frequencies, swept.amplitudes))
@@ -229,7 +245,7 @@ def _terms(model: Model, plan: SimulateSettings) -> list[DataSet]:
 
 def _disturbed(clean: Undisturbed, outside: str, random: Generator) -> Undisturbed:
     """What the library does not have, put on the clean measurements."""
-    size = float(np.exp(random.uniform(np.log(0.03), np.log(0.12))))
+    size = float(np.exp(random.uniform(*np.log(_OUTSIDE_SIZE))))
     if outside == "spot_disturbance":
         centre, width = random.uniform(25.0, 135.0), random.uniform(3.0, 6.0)
         sweeps = [(test, k * _resonance(np.array(test.frequencies), centre, width, size)) for test, k in clean.sweeps]

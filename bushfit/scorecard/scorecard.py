@@ -1,7 +1,7 @@
-"""The score card: the workflow judged on hidden campaigns, the truth opened afterwards.
+"""The score card: how often `diagnose` is right on campaigns whose hidden effect it is not told.
 
-Campaigns are written to disk as files; the workflow reads the campaign, never the sealed truth. The same seed makes
-the same card.
+Campaigns are written to disk as files; the workflow reads the campaign, never the sealed truth, which is opened
+afterwards. The same seed makes the same card.
 """
 
 from __future__ import annotations
@@ -24,9 +24,14 @@ from bushfit.report.folder import write_files
 from bushfit.scorecard.hidden import OUTSIDE, Sealed, hidden_campaign, hideable
 from bushfit.simulation import to_files
 
-#: A gain in chi-square from which an effect counts as plain.
+#: Gain in chi-square from which an effect counts as plain: ten times what chance makes.
 PLAIN = 200.0
+#: Processor time that a diagnosis may take [s]: what an engineer at a terminal waits without a second thought.
 _SLOWEST = 2.0
+#: Names in a set at most, for the truth in it to count as named.
+_LARGEST_SET = 3
+#: Held-out gap at most, in units of noise, for a named effect to count as confirmed.
+_CONFIRMED = 1.1
 #: Shares of the kinds of campaigns in a card.
 _KINDS = {"single": 0.5, "clean": 0.2, "pair": 0.1, "outside": 0.1, "lacking": 0.1}
 
@@ -75,7 +80,7 @@ class Outcome:
     @property
     def truth_in_sets(self) -> bool:
         """Whether every hidden effect was named alone or in a set of at most three."""
-        small = [members for members in self.sets if len(members) <= 3]
+        small = [members for members in self.sets if len(members) <= _LARGEST_SET]
         return all(any(name in members for members in small) or name in self.richer for name in self.task.hidden)
 
     @property
@@ -204,7 +209,7 @@ def card(outcomes: Sequence[Outcome]) -> list[Row]:
         ),
         ("  of these a disturbance of the rig", outside, lambda o: o.verdict != "named", "", 0.0, 1.0),
         ("  of these an effect the library lacks", lacking, lambda o: o.verdict != "named", "", 0.0, 1.0),
-        ("held-out gap after <= 1.1, where named", named, lambda o: o.heldout <= 1.1, "all", 1.0, 1.0),
+        ("held-out gap after <= 1.1, where named", named, lambda o: o.heldout <= _CONFIRMED, "all", 1.0, 1.0),
     ]
     rows = [_share(name, [hit(o) for o in over], target, low, high) for name, over, hit, target, low, high in shares]
     rows.append(_share("95 % interval covers the truth, where named", covered, "93 to 97 %", 0.93, 0.97))
