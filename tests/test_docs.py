@@ -140,7 +140,7 @@ def test_names_that_are_not_there_are_noticed() -> None:
     assert not is_there("fitting.date.Data")
 
 
-def test_the_steps_before_a_merge_are_written_once_more_and_alike(root: Path) -> None:
+def test_the_steps_before_a_merge_are_the_same_wherever_they_stand(root: Path) -> None:
     """.ci/run, the page on the code, and the hooks, which leave out what is slow."""
     merged = re.findall(r"^step (?!python )(.+)$", (root / ".ci/run").read_text(encoding="utf-8"), re.MULTILINE)
     shown = blocks(root / "bushfit/README.md", "sh")[0].splitlines()
@@ -151,7 +151,7 @@ def test_the_steps_before_a_merge_are_written_once_more_and_alike(root: Path) ->
     assert all(repository["repo"] == "local" for repository in hooks)
 
 
-def test_the_workbook_of_the_loop_holds_every_fifth_row_of_the_paper_s(root: Path) -> None:
+def test_the_workbook_of_the_loop_holds_every_fifth_row_of_its_csv(root: Path) -> None:
     kept, book = (
         read_loop(root / "data" / file, Direction.AXIAL)
         for file in ("cmp_15961/loop_axial_1.csv", "cmp_15961_workbook/loop_axial.xlsx")
@@ -161,7 +161,7 @@ def test_the_workbook_of_the_loop_holds_every_fifth_row_of_the_paper_s(root: Pat
 
 
 @pytest.mark.parametrize("direction", [Direction.AXIAL, Direction.RADIAL])
-def test_the_workbooks_of_the_sweeps_hold_those_of_the_paper(root: Path, direction: Direction) -> None:
+def test_the_workbooks_of_the_sweeps_hold_their_csv(root: Path, direction: Direction) -> None:
     kept, book = (
         read_sweep(root / "data" / file, direction)
         for file in (f"cmp_15961/sweep_{direction}.csv", f"cmp_15961_workbook/sweep_{direction}.xlsx")

@@ -119,7 +119,7 @@ def test_links_lead_somewhere(page: str) -> None:
 def test_files_that_a_page_names_are_there(page: str) -> None:
     """Where it says from the top folder where they are; patterns aside."""
     text = (ROOT / page).read_text(encoding="utf-8")
-    named = re.findall(r"`((?:bushfit|configs|data|tests)/[\w/.]*)`", text)
+    named = re.findall(r"`((?:configs|data|tests)/[\w/.]*|bushfit/[\w/]*(?:/|\.\w+))`", text)
     assert [name for name in named if not (ROOT / name).exists()] == []
 
 
