@@ -1,13 +1,15 @@
-"""Stale documentation fails: the README's effects, commands and campaign keys, and data it says can be made again."""
+"""Stale documentation fails: commands, keys, effects, recipes, the map of the code, and data that can be made again."""
 
 from __future__ import annotations
 
+import importlib
 import io
 import json
 import re
 import shlex
 import tomllib
 from dataclasses import fields, is_dataclass
+from functools import reduce
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
@@ -23,32 +25,28 @@ from bushfit.batch.manifest import ManifestFile
 from bushfit.campaign.campaign import load_campaign
 from bushfit.campaign.schema import CampaignFile
 from bushfit.cli import cli
-from bushfit.effects import LIBRARY, Effect, qualified
+from bushfit.effects.__main__ import PAGE, renewed
+from bushfit.geometry import Direction
+from bushfit.reading.loops import read_loop
+from bushfit.reading.sweeps import read_sweep
 from bushfit.simulation import model_of, simulate, to_files
 
 
-@pytest.fixture(scope="module")
-def readme(root: Path) -> str:
-    return (root / "README.md").read_text(encoding="utf-8")
+def blocks(page: Path, language: str) -> list[str]:
+    """The fenced blocks of a page that are in that language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
 
 
-def row(effect: Effect) -> str:
-    """The row of an effect in the README's table."""
-    parameters = "; ".join(
-        f"`{qualified(effect, p)}` " + ("" if p.unit == "1" else f"[{p.unit}] ") + p.meaning for p in effect.parameters
-    )
-    return f"| `{effect.name}` | {effect.level} | {effect.sentence} | `{effect.equation}` | {parameters} |"
+def test_the_tables_of_effects_are_the_library() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    assert renewed(page) == page, "run: python -m bushfit.effects"
 
 
-def test_the_table_of_effects_is_the_library(readme: str) -> None:
-    shown = [line for line in readme.splitlines() if re.match(r"\| `\w+` \| (material|component|instrument) \|", line)]
-    assert shown == [row(effect) for effect in LIBRARY.values()]
-
-
-def test_every_command_is_shown(readme: str) -> None:
+def test_every_command_is_in_the_table_and_has_an_example(root: Path) -> None:
+    readme = (root / "README.md").read_text(encoding="utf-8")
     names = cli.list_commands(click.Context(cli))
     assert [name for name in names if f"| `bushfit {name} " not in readme] == []
-    assert [name for name in names if not re.search(rf"^(\$ )?bushfit {name} ", readme, re.MULTILINE)] == []
+    assert [name for name in names if not re.search(rf"^\$ bushfit {name} ", readme, re.MULTILINE)] == []
 
 
 def keys(table: type) -> set[str]:
@@ -72,24 +70,23 @@ def keys_written(table: Any) -> set[str]:
     return set().union(*(keys_written(entry) for entry in table)) if isinstance(table, list) else set()
 
 
-def test_the_campaign_reference_is_valid_and_has_every_key(readme: str) -> None:
-    blocks = re.findall(r"^```toml\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
-    reference = tomllib.loads(max(blocks, key=len))
+def test_the_campaign_reference_is_valid_and_has_every_key(root: Path) -> None:
+    reference = tomllib.loads((root / "configs/reference.toml").read_text(encoding="utf-8"))
     TypeAdapter(CampaignFile).validate_python(reference)
-    assert keys(CampaignFile) - keys_written(reference) <= {"parameters"}
+    assert keys(CampaignFile) - keys_written(reference) <= {"parameters"}  # [fit.mu] and the like stand for them
 
 
-def test_manifest_and_limits_are_valid_and_have_every_key(readme: str) -> None:
-    blocks = [tomllib.loads(block) for block in re.findall(r"^```toml\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)]
-    for schema, mark in ((ManifestFile, "bushings"), (Limits, "parameters")):
-        (block,) = (block for block in blocks if mark in block and "bushing" not in block)
+def test_manifest_and_limits_are_valid_and_have_every_key(root: Path) -> None:
+    page = root / "bushfit/batch/README.md"
+    manifest, limits = (tomllib.loads(block) for block in blocks(page, "toml"))
+    for schema, block in ((ManifestFile, manifest), (Limits, limits)):
         TypeAdapter(schema).validate_python(block)
-        assert [key for key in keys(schema) if not re.search(rf"\b{key}\b", readme)] == []
+        text = page.read_text(encoding="utf-8")
+        assert [key for key in keys(schema) if not re.search(rf"\b{key}\b", text)] == []
 
 
-def test_recipes_for_ci_are_valid_and_run_what_there_is(readme: str) -> None:
-    recipes = [yaml.safe_load(block) for block in re.findall(r"^```yaml\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)]
-    github, gitlab = recipes
+def test_recipes_for_ci_are_valid_and_run_what_there_is(root: Path) -> None:
+    github, gitlab = (yaml.safe_load(block) for block in blocks(root / "bushfit/batch/README.md", "yaml"))
     steps = [step["run"] for step in github["jobs"]["fit"]["steps"] if "run" in step]
     batch = cli.get_command(click.Context(cli), "batch")
     assert batch is not None
@@ -100,9 +97,77 @@ def test_recipes_for_ci_are_valid_and_run_what_there_is(readme: str) -> None:
         batch.make_context("batch", arguments)
 
 
-def test_json_keys_of_a_model_are_listed(readme: str, root: Path) -> None:
+def test_json_keys_of_a_model_are_listed(root: Path) -> None:
+    page = (root / "bushfit/report/README.md").read_text(encoding="utf-8")
     document = json.loads((root / "data/arm_bushing/truth.json").read_text(encoding="utf-8"))
-    assert [key for key in document if key != "schema" and f"`{key}`" not in readme] == []
+    assert [key for key in document if key != "schema" and f"`{key}`" not in page] == []
+
+
+def test_the_map_of_the_code_is_the_code(root: Path) -> None:
+    """Every module and folder of the package, in the order in which they may import."""
+    (tree,) = (block for block in blocks(root / "bushfit/README.md", "text") if block.startswith("bushfit/\n"))
+    shown = re.findall(r"^  (\w+(?:/|\.py)) +\S", tree, re.MULTILINE)
+    settings = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))
+    layers = settings["tool"]["importlinter"]["contracts"][0]["layers"]
+    assert [entry.rstrip("/").removesuffix(".py") for entry in shown] == " | ".join(layers).split(" | ")
+    assert [entry for entry in shown if not (root / "bushfit" / entry).exists()] == []
+
+
+def test_what_the_page_on_the_code_names_is_there(root: Path) -> None:
+    text = (root / "bushfit/README.md").read_text(encoding="utf-8")
+    paths = re.findall(r"`([\w/]+(?:\.py|/))`", text)
+    assert [path for path in paths if not any((place / path).exists() for place in (root / "bushfit", root))] == []
+    names = re.findall(r"`([a-z]\w*(?:\.\w+)+)`", re.sub(r"`[\w/]+\.(?:py|json)`", "", text))
+    assert len(names) > 30
+    assert [name for name in names if not is_there(name)] == []
+
+
+def is_there(name: str) -> bool:
+    """Whether a dotted name below bushfit leads to a module, or to what a module holds."""
+    parts = name.split(".")
+    for count in range(len(parts), 0, -1):
+        try:
+            module = importlib.import_module(".".join(["bushfit", *parts[:count]]))
+        except ModuleNotFoundError:
+            continue
+        return reduce(lambda thing, part: getattr(thing, part, None), parts[count:], module) is not None
+    return False
+
+
+def test_names_that_are_not_there_are_noticed() -> None:
+    assert is_there("fitting.data.Data.of")
+    assert not is_there("fitting.data.Data.off")
+    assert not is_there("fitting.date.Data")
+
+
+def test_the_steps_before_a_merge_are_the_same_wherever_they_stand(root: Path) -> None:
+    """.ci/run, the page on the code, and the hooks, which leave out what is slow."""
+    merged = re.findall(r"^step (?!python )(.+)$", (root / ".ci/run").read_text(encoding="utf-8"), re.MULTILINE)
+    shown = blocks(root / "bushfit/README.md", "sh")[0].splitlines()
+    hooks = yaml.safe_load((root / ".pre-commit-config.yaml").read_text(encoding="utf-8"))["repos"]
+    entries = [hook["entry"] for repository in hooks for hook in repository["hooks"]]
+    assert shown == merged
+    assert entries == [step for step in merged if not step.startswith("pytest")]
+    assert all(repository["repo"] == "local" for repository in hooks)
+
+
+def test_the_workbook_of_the_loop_holds_every_fifth_row_of_its_csv(root: Path) -> None:
+    kept, book = (
+        read_loop(root / "data" / file, Direction.AXIAL)
+        for file in ("cmp_15961/loop_axial_1.csv", "cmp_15961_workbook/loop_axial.xlsx")
+    )
+    for name in ("time", "displacement", "force"):
+        np.testing.assert_allclose(getattr(book, name), getattr(kept, name)[::5], rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("direction", [Direction.AXIAL, Direction.RADIAL])
+def test_the_workbooks_of_the_sweeps_hold_their_csv(root: Path, direction: Direction) -> None:
+    kept, book = (
+        read_sweep(root / "data" / file, direction)
+        for file in (f"cmp_15961/sweep_{direction}.csv", f"cmp_15961_workbook/sweep_{direction}.xlsx")
+    )
+    for name in ("frequency", "amplitude", "stiffness", "repeat"):
+        np.testing.assert_allclose(getattr(book, name), getattr(kept, name), rtol=1e-5)
 
 
 def test_the_second_bushing_can_be_made_again(root: Path) -> None:

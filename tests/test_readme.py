@@ -1,4 +1,4 @@
-"""Stale documentation fails: every `$ bushfit ...` of the README runs, in order, in a copy of what it needs."""
+"""Stale documentation fails: every `$ bushfit ...` of every page runs, and every link leads somewhere."""
 
 from __future__ import annotations
 
@@ -7,11 +7,21 @@ import shlex
 import shutil
 import subprocess
 import sys
+from itertools import chain
 from pathlib import Path
 
+import pytest
+
+ROOT = Path(__file__).parents[1]
+#: Every page of the repository.
+PAGES = sorted(
+    page.relative_to(ROOT).as_posix()
+    for page in chain(
+        ROOT.glob("*.md"), *(ROOT.glob(f"{top}/**/*.md") for top in ("bushfit", "configs", "data", "tests"))
+    )
+)
 CONSOLE = re.compile(r"^```console\n(.*?)^```", re.MULTILINE | re.DOTALL)
-
-
+COMMAND = re.compile(r"(?:\S+/)?bushfit\b")
 #: Numbers of the README and of a run agree within this: other processors round otherwise.
 TOLERANCE = 0.03
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
@@ -58,15 +68,20 @@ def status(command: str) -> int:
     return int(told[1]) if told else 0
 
 
-def test_every_command_of_the_readme_runs_and_says_what_is_shown(root: Path, tmp_path: Path) -> None:
-    text = (root / "README.md").read_text(encoding="utf-8")
-    runs = [(command, shown) for command, shown in examples(text) if re.match(r"(?:\S+/)?bushfit\b", command)]
-    assert runs, "the README shows no `$ bushfit ...` in a ```console block"
+def shown_commands(page: str) -> list[tuple[str, list[str]]]:
+    """The `$ bushfit ...` of a page, each with the output shown."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    return [(command, shown) for command, shown in examples(text) if COMMAND.match(command)]
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if shown_commands(page)])
+def test_every_command_of_a_page_runs_and_says_what_is_shown(page: str, tmp_path: Path) -> None:
+    """In order, in a folder that holds the data and campaigns and nothing that another page has made."""
     for name in ("data", "configs"):
-        shutil.copytree(root / name, tmp_path / name)
+        shutil.copytree(ROOT / name, tmp_path / name)
     program = str(Path(sys.executable).with_name("bushfit"))
     stale = []
-    for command, shown in runs:
+    for command, shown in shown_commands(page):
         done = subprocess.run(
             [program, *shlex.split(command, comments=True)[1:]],
             cwd=tmp_path,
@@ -78,11 +93,39 @@ def test_every_command_of_the_readme_runs_and_says_what_is_shown(root: Path, tmp
         print(f"$ {command} -> {done.returncode}")
         assert done.returncode == status(command), f"$ {command}\n{done.stderr}"
         stale += [f"$ {command}\n{line}" for line in shown if not says(line, done.stdout + done.stderr)]
-    assert not stale, "the README shows what its commands do not say:\n" + "\n".join(stale)
+    assert not stale, f"{page} shows what its commands do not say:\n" + "\n".join(stale)
 
 
-def test_links_of_the_readme_lead_somewhere(root: Path) -> None:
+def anchors(page: Path) -> set[str]:
+    """The anchors that a page's headings have where it is shown."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_somewhere(page: str) -> None:
+    links = re.findall(
+        r"\]\((?!https?://|mailto:)([^)#\s]*)(?:#([^)\s]+))?\)", (ROOT / page).read_text(encoding="utf-8")
+    )
+    lost = []
+    for target, anchor in links:
+        place = (ROOT / page).parent / target if target else ROOT / page
+        if not place.exists() or (anchor and anchor not in anchors(place)):
+            lost.append(f"{target}#{anchor}")
+    assert lost == []
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_files_that_a_page_names_are_there(page: str) -> None:
+    """Where it says from the top folder where they are; patterns aside."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    named = re.findall(r"`((?:configs|data|tests)/[\w/.]*|bushfit/[\w/]*(?:/|\.\w+))`", text)
+    assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+def test_the_readme_is_short(root: Path) -> None:
+    """At most 400 lines, and none that holds several; tables, pictures and output shown are as wide as they are."""
     text = (root / "README.md").read_text(encoding="utf-8")
-    targets = re.findall(r"\]\((?!https?://|#|mailto:)([^)#\s]+)", text)
-    missing = [target for target in targets if not (root / target).exists()]
-    assert missing == []
+    prose = re.sub(r"^```.*?^```|^(?:\||!\[).*?$", "", text, flags=re.MULTILINE | re.DOTALL)
+    assert len(text.splitlines()) <= 400
+    assert [line for line in prose.splitlines() if len(line) > 130] == []
