@@ -202,6 +202,7 @@ def _with_noise(clean: Array, plan: SimulateSettings, random: Generator) -> Arra
 
 def to_files(simulated: Simulated) -> dict[str, bytes]:
     """The campaign as files: CSVs, `campaign.toml` that names them, and `truth.json`, the model behind them."""
+    from bushfit.model.file import to_document
     from bushfit.model.result import Result
     from bushfit.reading.csvfile import raw_loop_table, raw_sweep_table, to_csv
 
@@ -209,7 +210,7 @@ def to_files(simulated: Simulated) -> dict[str, bytes]:
     files |= {f"{sweep.name}.csv": to_csv(raw_sweep_table(sweep)) for sweep in simulated.sweeps}
     files["campaign.toml"] = _campaign_toml(simulated).encode()
     truth = Result(simulated.truth, warnings=("simulated: the values a rig simulation was given, not a fit",))
-    files["truth.json"] = (json.dumps(truth.to_document(), indent=1) + "\n").encode()
+    files["truth.json"] = (json.dumps(to_document(truth), indent=1) + "\n").encode()
     return files
 
 

@@ -34,6 +34,7 @@ _SHAPES = {
     "tuple_type": "a list",
     "too_short": "at least one value",
     "string_type": "a text in quotes",
+    "path_type": "a text in quotes",
     "string_too_short": "a text that is not empty",
     "string_pattern_mismatch": "one line without control characters",
     "string_unicode": "text in Unicode",
@@ -45,6 +46,12 @@ _WORDS = {"None": "null", "True": "true", "False": "false"}
 #: In the metadata of a field: a function that gives the keys which stand in the table itself.
 _IN_TABLE = "keys in the table itself"
 
+#: A finite number; neither a text nor true is one.
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+#: A whole number; neither a text, nor true, nor 3.0 is one.
+WholeNumber = Annotated[int, Field(strict=True)]
+#: True or false; neither a text nor a number is one.
+Flag = Annotated[bool, Field(strict=True)]
 Text = Annotated[str, Field(min_length=1)]
 #: What tables, plots, folders and the terminal are headed with: one line without control characters.
 Name = Annotated[str, Field(strict=True, min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]*$")]
@@ -82,7 +89,7 @@ def _adapter(schema: Any) -> TypeAdapter[Any]:
 
 def check_tables(
     tables: Mapping[str, Any],
-    file: Path,
+    file: Path | None,
     schema: type[T],
     place: str | None = None,
     *,

@@ -164,43 +164,6 @@ class Model:
             lines.append(f"  {name} = {self.values[name] * factor:.6g} {unit}".removesuffix(" -"))
         return "\n".join(lines)
 
-    def to_document(self) -> dict[str, Any]:
-        """The model as JSON-ready data: bushing, effects, parameters with value and unit."""
-        return {
-            "bushing": {
-                "name": self.bushing.name,
-                "inner_radius_m": self.bushing.inner_radius,
-                "outer_radius_m": self.bushing.outer_radius,
-                "length_m": self.bushing.length,
-            },
-            "effects": [effect.name for effect in self.records],
-            "parameters": {
-                name: {"value": float(self.values[name]), "unit": parameter.unit}
-                for name, parameter in self.parameters.items()
-            },
-        }
-
-    @classmethod
-    def from_document(cls, document: Mapping[str, Any]) -> Model:
-        """The model of `to_document`.
-
-        Raises:
-            ModelError: a key that is missing, or holds something else than expected.
-        """
-        try:
-            shape = document["bushing"]
-            bushing = Bushing(
-                str(shape["name"]),
-                *(float(shape[key]) for key in ("inner_radius_m", "outer_radius_m", "length_m")),
-            )
-            values = {str(name): float(entry["value"]) for name, entry in document["parameters"].items()}
-            effects = tuple(str(name) for name in document["effects"])
-        except KeyError as missing:
-            raise ModelError("a key is missing", place=str(missing.args[0])) from None
-        except (TypeError, ValueError, AttributeError) as wrong:
-            raise ModelError("a key holds the wrong kind of value", found=str(wrong)) from None
-        return cls(bushing, effects, values)
-
     def stiffness(
         self,
         direction: Direction | str,
