@@ -1,7 +1,7 @@
-"""Simulated campaigns: what a rig would write for a known model, by the time-domain road only.
+"""Simulated campaigns: the loops and sweeps that a rig would write for a known model.
 
-Loops and sweeps come from `rig`, which steps Eqs. (3) and (5) through time; the closed form that the fits use
-is not involved. Noise is added as a rig has it: from point to point, and shared by a block.
+They come from `rig`, which steps Eqs. (3) and (5) through time; the closed form that the fits use is not involved.
+Noise is added as a rig has it: from point to point, and shared by a block (one repeat of one level).
 """
 
 from __future__ import annotations
@@ -27,22 +27,30 @@ from bushfit.reading.measurement import Loop, Sweep
 if TYPE_CHECKING:
     from numpy.random import Generator
 
-#: The paper's tests: one loop of 1 mm at 0.1 Hz, and 5 to 155 Hz at three amplitudes in two directions.
+#: The paper's loop: 1 mm at 0.1 Hz.
 PAPER_LOOPS = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=3),)
+#: The paper's sweeps: 5 to 155 Hz at 0.1, 0.2 and 0.5 mm, in two directions.
 PAPER_SWEEPS = tuple(
     SimulatedSweep(direction, (1e-4, 2e-4, 5e-4), tuple(float(f) for f in range(5, 156, 10)))
     for direction in (Direction.AXIAL, Direction.RADIAL)
 )
+#: Rows of a simulated loop in a cycle; chosen: its curve is smooth.
 _ROWS_PER_CYCLE = 1000
+#: Time steps of a simulated loop between two rows; the error of the time steps falls in proportion to them.
 _STEPS_PER_ROW = 2
-#: A loop is recorded once it has settled, unless settling is what there is to see.
+#: Cycles before a loop is recorded, so that it has settled; none where an effect's settling is what there is to see.
 _RUN_IN_CYCLES = 40
 
 
 @dataclass(frozen=True, eq=False)
 class Undisturbed:
-    """What a rig without error writes: each loop with its record, each sweep with its stiffness over levels and
-    frequencies."""
+    """What a rig without error writes.
+
+    Args:
+        truth: the model on the rig.
+        loops: each planned loop and its record.
+        sweeps: each planned sweep and its complex stiffness, (levels, frequencies).
+    """
 
     truth: Model
     loops: tuple[tuple[SimulatedLoop, rig.Record], ...]
@@ -107,7 +115,7 @@ def simulate(truth: Model, plan: SimulateSettings) -> Simulated:
     return measure(undisturbed(truth, plan), plan)
 
 
-def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 2048) -> Undisturbed:
+def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = rig.STEPS_PER_CYCLE) -> Undisturbed:
     """What the rig would write if it measured without error: the slow part of a simulation.
 
     Args:
@@ -124,7 +132,7 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
 
 
 def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
-    """The same tests as measured with the plan's noise, repeats and seed: quick, for many seeds."""
+    """What the rig writes with the plan's noise, repeats and seed; quick, so that many seeds can be drawn."""
     random = np.random.default_rng(plan.seed)
     loops = tuple(_loop(test, force, number, plan, random) for number, (test, force) in enumerate(clean.loops, start=1))
     names = _names([f"sweep_{test.direction}" for test, _ in clean.sweeps])
@@ -135,10 +143,12 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
 
 
 def _names(stems: Sequence[str]) -> list[str]:
+    """The stems, numbered where one is not alone."""
     return [stem if stems.count(stem) == 1 else f"{stem}_{number}" for number, stem in enumerate(stems, start=1)]
 
 
 def _clean_loop(truth: Model, test: SimulatedLoop) -> rig.Record:
+    """The record of a loop without noise, `_ROWS_PER_CYCLE` rows a cycle."""
     measured = rig.record(
         truth,
         test.direction,
