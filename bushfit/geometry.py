@@ -139,11 +139,6 @@ class Bushing:
         """ln(b/a), with full precision for thin bushings too."""
         return math.log1p((self.outer_radius - self.inner_radius) / self.inner_radius)
 
-    @property
-    def rubber_volume(self) -> float:
-        """Volume of rubber [m^3]."""
-        return math.pi * (self.outer_radius**2 - self.inner_radius**2) * self.length
-
     def unit_strain(self, direction: Direction) -> float:
         """Equivalent strain per unit displacement [1/m], or per unit rotation [1/rad]."""
         return _DEFINITIONS[direction].unit_strain(self)
