@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 #: Characters of a quoted value at most: four lines of a terminal.
@@ -52,6 +54,16 @@ class BushfitError(Exception):
     def __reduce__(self) -> tuple[object, ...]:
         state = {key: getattr(self, key) for key in ("file", "place", "found", "expected", "hint")}
         return _rebuild, (type(self), self.problem, state)
+
+
+@contextmanager
+def naming(file: Path | None) -> Iterator[None]:
+    """Names the file in an error that is raised within, by what knows its content but not where it stands."""
+    try:
+        yield
+    except BushfitError as error:
+        error.file = file
+        raise
 
 
 def _printable(text: str) -> str:

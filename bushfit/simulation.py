@@ -18,7 +18,7 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
-from bushfit.errors import CampaignError, ModelError
+from bushfit.errors import CampaignError, naming
 from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.model import FIVE, Model
@@ -98,11 +98,8 @@ def model_of(campaign: Campaign) -> Model:
         )
     effects = campaign.simulate.effects
     values |= {f"{effect}.{name}": value for effect, table in effects.items() for name, value in table.items()}
-    try:
+    with naming(campaign.path):
         return Model(campaign.bushing, (*BASE, *effects), values)
-    except ModelError as error:
-        error.file = campaign.path
-        raise
 
 
 def simulate(truth: Model, plan: SimulateSettings) -> Simulated:

@@ -11,7 +11,7 @@ from typing import Any
 from bushfit.campaign.naming import folder_name
 from bushfit.campaign.schema import CampaignFile, FitSettings, LoopFile, PredictSettings, SimulateSettings, SweepFile
 from bushfit.campaign.toml import read_toml
-from bushfit.errors import CampaignError, ModelError
+from bushfit.errors import CampaignError, naming
 from bushfit.geometry import Bushing
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
@@ -65,11 +65,8 @@ def load_campaign(path: str | Path) -> Campaign:
             expected="[[loops]] or [[sweeps]] tables, or a [simulate] table",
             hint='add [[loops]] with file = "..." and direction = "axial"',
         )
-    try:
+    with naming(path):
         bushing = Bushing(**vars(content.bushing))
-    except ModelError as error:
-        error.file = path
-        raise
     return Campaign(
         content.name or bushing.name,
         path,

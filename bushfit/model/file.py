@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from bushfit import __version__
-from bushfit.errors import BushfitError, ModelError
+from bushfit.errors import ModelError, naming
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
@@ -57,7 +57,10 @@ class ParameterTable:
 
 @dataclass(frozen=True)
 class CovarianceTable:
-    """covariance: a matrix with a row and a column for each name, and others of its size."""
+    """covariance: a matrix with a row and a column for each name, and others of its size.
+
+    What makes a matrix no covariance is refused here.
+    """
 
     names: tuple[str, ...]
     matrix: Matrix
@@ -89,6 +92,17 @@ class FitTable:
     def __post_init__(self) -> None:
         if self.strain and not self.frequency_Hz:
             raise ValueError(ModelError("a key is missing", place="frequency_Hz", expected="frequency_Hz = ..."))
+
+    @property
+    def quality(self) -> Quality:
+        return Quality(self.nrmse, self.reduced_chi_square, self.points, self.noise)
+
+    @property
+    def measured(self) -> Range | None:
+        """The operating conditions; None where an older file does not say them."""
+        if self.frequency_Hz is None or self.strain is None:
+            return None
+        return Range(self.frequency_Hz, self.strain, self.directions)
 
 
 @dataclass(frozen=True)
@@ -145,14 +159,16 @@ def from_document(document: object, file: Path | None = None) -> Result:
             hint="use a file written by bushfit fit-static, fit-dynamic, fit or diagnose",
         )
     tables = check_tables(document, file, ModelFile, kind=ModelError)
-    try:
+    with naming(file):
         return _result(tables)
-    except BushfitError as error:
-        error.file = file
-        raise
 
 
 def _result(tables: ModelFile) -> Result:
+    """The result of checked tables.
+
+    Raises:
+        ModelError: values that are no model, or a covariance of other parameters.
+    """
     shape, entries, fit = tables.bushing, tables.parameters, tables.fit
     model = Model(
         Bushing(shape.name, shape.inner_radius_m, shape.outer_radius_m, shape.length_m),
@@ -163,10 +179,8 @@ def _result(tables: ModelFile) -> Result:
         model,
         fitted=tuple(name for name, entry in entries.items() if entry.vary),
         covariance=_covariance(tables.covariance, model.parameters.keys()) if tables.covariance else Covariance(),
-        quality=Quality(fit.nrmse, fit.reduced_chi_square, fit.points, fit.noise) if fit else None,
-        measured=Range(fit.frequency_Hz, fit.strain, fit.directions)
-        if fit and fit.frequency_Hz and fit.strain
-        else None,
+        quality=fit.quality if fit else None,
+        measured=fit.measured if fit else None,
         warnings=tables.warnings,
         inputs=tables.provenance.inputs,
         outliers=tables.outliers,
