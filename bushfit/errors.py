@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-#: What was found is quoted up to here.
+#: Characters of a quoted value at most: four lines of a terminal.
 _LONGEST_QUOTE = 300
+#: Characters that could steer a terminal or break a line, and halves of surrogate pairs.
 _CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 
@@ -53,13 +56,23 @@ class BushfitError(Exception):
         return _rebuild, (type(self), self.problem, state)
 
 
+@contextmanager
+def naming(file: Path | None) -> Iterator[None]:
+    """Names the file in an error that is raised within, by what knows its content but not where it stands."""
+    try:
+        yield
+    except BushfitError as error:
+        error.file = file
+        raise
+
+
 def _printable(text: str) -> str:
-    """What a file holds may not steer the terminal that shows it."""
+    """A text with its control characters written as escapes, so that no file can steer the terminal that shows it."""
     return _CONTROL.sub(lambda character: character[0].encode("unicode_escape").decode(), text)
 
 
 def _rebuild(kind: type[BushfitError], problem: str, state: dict[str, str | None]) -> BushfitError:
-    """Pickle support: errors travel between the processes of a batch."""
+    """An error from its parts, for pickle: errors travel between the processes of a batch."""
     return kind(problem, **state)
 
 

@@ -1,4 +1,4 @@
-"""Bushing geometry: equivalent strain and stiffness per direction (Eqs. 7, 8, 10, 11, 12).
+"""The bushing and the directions in which it is tested: equivalent strain and stiffness (Eqs. 7, 8, 10, 11, 12).
 
 Source: Garcia Tarrago, Kari, Vinolas, Gil-Negrete, Polymer Testing 26 (2007) 629-638.
 """
@@ -6,20 +6,28 @@ Source: Garcia Tarrago, Kari, Vinolas, Gil-Negrete, Polymer Testing 26 (2007) 62
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 from scipy.special import ive, kve
 
 from bushfit.errors import ModelError
 
-#: Inner over outer radius, and length over outer radius, for which Eqs. 11 and 12 were checked.
+#: Inner over outer radius for which the radial formula was checked against 60-digit arithmetic.
 RADIUS_RATIO_RANGE = (0.1, 0.97)
+#: Length over outer radius for which the radial formula was checked against 60-digit arithmetic.
 SLENDERNESS_RANGE = (0.05, 100.0)
-#: 1.8 mm over 18 mm is not quite 0.1 in binary.
+#: Relative width by which the two ranges are widened: 1.8 mm over 18 mm is not quite 0.1 in binary.
 _ROUNDING = 1e-9
+#: q = (b^2 - a^2)/(b^2 + a^2) up to which ln(b/a) - q is summed as a series; above it, the two no longer cancel.
+_LARGEST_Q_OF_SERIES = 0.5
+#: Terms of that series; at the largest q, the first one left out is 1e-17 of the sum.
+_SERIES_TERMS = 30
+#: Bushings whose radial factors are kept: a fit asks for those of one bushing thousands of times.
+_CACHED_BUSHINGS = 256
 
 
 class Unit(NamedTuple):
@@ -55,19 +63,23 @@ class Motion:
 
 
 TRANSLATION = Motion(
-    ("displacement", "force"), "m", "N", "N/m", Display(Unit("mm", 1e3), Unit("N", 1.0), Unit("N/mm", 1e-3))
+    words=("displacement", "force"),
+    displacement_unit="m",
+    force_unit="N",
+    stiffness_unit="N/m",
+    display=Display(Unit("mm", 1e3), Unit("N", 1.0), Unit("N/mm", 1e-3)),
 )
 ROTATION = Motion(
-    ("rotation", "moment"),
-    "rad",
-    "N*m",
-    "N*m/rad",
-    Display(Unit("deg", math.degrees(1.0)), Unit("N m", 1.0), Unit("N m/rad", 1.0)),
+    words=("rotation", "moment"),
+    displacement_unit="rad",
+    force_unit="N*m",
+    stiffness_unit="N*m/rad",
+    display=Display(Unit("deg", math.degrees(1.0)), Unit("N m", 1.0), Unit("N m/rad", 1.0)),
 )
 
 
 class Direction(StrEnum):
-    """Direction of a test: its name in files, and the kind of motion that it is."""
+    """Direction of a test: its name in files, and its kind of motion."""
 
     AXIAL = "axial"
     RADIAL = "radial"
@@ -76,7 +88,7 @@ class Direction(StrEnum):
     @property
     def motion(self) -> Motion:
         """Translation or rotation."""
-        return _MOTIONS[self]
+        return _DEFINITIONS[self].motion
 
     @property
     def is_rotation(self) -> bool:
@@ -87,9 +99,6 @@ class Direction(StrEnum):
     def display(self) -> Display:
         """The units in which engineers read its displacement, force and stiffness."""
         return self.motion.display
-
-
-_MOTIONS = {Direction.AXIAL: TRANSLATION, Direction.RADIAL: TRANSLATION, Direction.TORSION: ROTATION}
 
 
 @dataclass(frozen=True)
@@ -126,96 +135,119 @@ class Bushing:
             )
 
     @cached_property
-    def _log_ratio(self) -> float:
+    def log_ratio(self) -> float:
         """ln(b/a), with full precision for thin bushings too."""
         return math.log1p((self.outer_radius - self.inner_radius) / self.inner_radius)
 
-    @property
-    def rubber_volume(self) -> float:
-        """Volume of rubber [m^3]."""
-        return math.pi * (self.outer_radius**2 - self.inner_radius**2) * self.length
-
     def unit_strain(self, direction: Direction) -> float:
-        """Equivalent strain per unit displacement [1/m], or per unit rotation [1/rad] in torsion.
-
-        axial    e/d = 1 / sqrt(2 (b^2 - a^2) ln(b/a))                                   (7)
-        radial   e/d = sqrt((a^2 + b^2) / ((b^4 - a^4) ln(b/a) - (a^2 - b^2)^2))         (8)
-        torsion  e/theta = a b / (b^2 - a^2), from k theta^2/2 = V mu (2 e)^2/2
-        """
-        a, b = self.inner_radius, self.outer_radius
-        area = (b - a) * (b + a)
-        match direction:
-            case Direction.AXIAL:
-                return 1.0 / math.sqrt(2.0 * area * self._log_ratio)
-            case Direction.RADIAL:
-                # (b^4 - a^4) ln(b/a) - (b^2 - a^2)^2 = (b^2 - a^2) (b^2 + a^2) (ln(b/a) - q)
-                return 1.0 / math.sqrt(area * self._log_ratio_less_q)
-            case Direction.TORSION:
-                return a * b / area
+        """Equivalent strain per unit displacement [1/m], or per unit rotation [1/rad]."""
+        return _DEFINITIONS[direction].unit_strain(self)
 
     def stiffness_per_modulus(self, direction: Direction) -> float:
-        """Stiffness per unit equivalent shear modulus: [m], or [m^3/rad] in torsion.
+        """Stiffness per unit equivalent shear modulus: [m], or [m^3/rad] of a rotation."""
+        return _DEFINITIONS[direction].stiffness_per_modulus(self)
 
-        axial    k/mu = 2 pi L / ln(b/a)                                                 (10)
-        radial   k/mu = 10 pi L / (7/2 ln(b/a) - 3/2 q + D), q = (b^2 - a^2)/(b^2 + a^2) (11, 12)
-        torsion  k/mu = 4 pi L a^2 b^2 / (b^2 - a^2)
-        """
-        a, b, length = self.inner_radius, self.outer_radius, self.length
-        match direction:
-            case Direction.AXIAL:
-                return 2.0 * math.pi * length / self._log_ratio
-            case Direction.RADIAL:
-                return 10.0 * math.pi * length / self._radial_denominator
-            case Direction.TORSION:
-                return 4.0 * math.pi * length * (a * b) ** 2 / ((b - a) * (b + a))
 
-    @cached_property
-    def _log_ratio_less_q(self) -> float:
-        """ln(b/a) - q with q = (b^2 - a^2)/(b^2 + a^2); a series where the two cancel.
+def _axial_strain(tube: Bushing) -> float:
+    """e/d = 1 / sqrt(2 (b^2 - a^2) ln(b/a)) (Eq. 7)."""
+    return 1.0 / math.sqrt(2.0 * _area(tube) * tube.log_ratio)
 
-        ln(b/a) = atanh(q), so the difference is q^3/3 + q^5/5 + ...
-        """
-        q = self._q
-        if q > 0.5:
-            return self._log_ratio - q
-        return math.fsum(q ** (2 * j + 3) / (2 * j + 3) for j in range(30))
 
-    @property
-    def _q(self) -> float:
-        a, b = self.inner_radius, self.outer_radius
-        return (b - a) * (b + a) / (a * a + b * b)
+def _axial_stiffness(tube: Bushing) -> float:
+    """k/mu = 2 pi L / ln(b/a) (Eq. 10)."""
+    return 2.0 * math.pi * tube.length / tube.log_ratio
 
-    @cached_property
-    def _radial_denominator(self) -> float:
-        """7/2 ln(b/a) - 3/2 q + D of Eq. 11, with D of Eq. 12.
 
-        Every Bessel product is written with the scaled functions, and the common factor
-        exp(alpha (b - a)) is divided out of numerator and denominator, so short bushings neither
-        over- nor underflow. Agrees with 60-digit arithmetic to 1e-9, and to 1e-7 for tubes that are
-        both long and thin, over the checked range.
-        """
-        a, b = self.inner_radius, self.outer_radius
-        if not (_within(a / b, RADIUS_RATIO_RANGE) and _within(self.length / b, SLENDERNESS_RANGE)):
-            raise ModelError(
-                "the radial formula (Eqs. 11, 12) was not checked for this shape",
-                place="inner_radius, outer_radius, length",
-                found=f"inner/outer = {a / b:.3g}, length/outer = {self.length / b:.3g}",
-                expected="inner/outer 0.1 to 0.97 and length/outer 0.05 to 100",
-                hint="check the units of the geometry; the axial direction has no such limit",
-            )
-        alpha = math.sqrt(60.0) / self.length
-        inner, outer = alpha * a, alpha * b
-        once, twice = math.exp(inner - outer), math.exp(2.0 * (inner - outer))
-        (i0a, i0b), (i1a, i1b) = ive(0, [inner, outer]), ive(1, [inner, outer])
-        (k0a, k0b), (k1a, k1b) = kve(0, [inner, outer]), kve(1, [inner, outer])
-        numerator = (
-            4.0 * (b**2 + a**2) * once
-            - outer * (b**2 + 3.0 * a**2) * (i1b * k0a + i0a * k1b * twice)
-            - inner * (3.0 * b**2 + a**2) * (i1a * k0b * twice + i0b * k1a)
+@lru_cache(maxsize=_CACHED_BUSHINGS)
+def _radial_strain(tube: Bushing) -> float:
+    """e/d = sqrt((a^2 + b^2) / ((b^4 - a^4) ln(b/a) - (a^2 - b^2)^2)) (Eq. 8).
+
+    Notes: with q = (b^2 - a^2)/(b^2 + a^2) this is 1 / sqrt((b^2 - a^2) (ln(b/a) - q)). Where ln(b/a) and q cancel, the
+    difference is summed as q^3/3 + q^5/5 + ..., because ln(b/a) = atanh(q).
+    """
+    q = _q(tube)
+    if q > _LARGEST_Q_OF_SERIES:
+        difference = tube.log_ratio - q
+    else:
+        difference = math.fsum(q ** (2 * j + 3) / (2 * j + 3) for j in range(_SERIES_TERMS))
+    return 1.0 / math.sqrt(_area(tube) * difference)
+
+
+@lru_cache(maxsize=_CACHED_BUSHINGS)
+def _radial_stiffness(tube: Bushing) -> float:
+    """k/mu = 10 pi L / (7/2 ln(b/a) - 3/2 q + D), with q = (b^2 - a^2)/(b^2 + a^2) and D of Eq. 12 (Eq. 11).
+
+    Raises:
+        ModelError: a shape for which the formula was not checked.
+
+    Notes: every Bessel product of D is written with the scaled functions, and the common factor exp(alpha (b - a)) is
+    divided out of numerator and denominator, so short bushings neither over- nor underflow. Agrees with 60-digit
+    arithmetic to 1e-9, and to 1e-7 for tubes that are both long and thin, over the checked range.
+    """
+    a, b, length = tube.inner_radius, tube.outer_radius, tube.length
+    if not (_within(a / b, RADIUS_RATIO_RANGE) and _within(length / b, SLENDERNESS_RANGE)):
+        raise ModelError(
+            "the radial formula (Eqs. 11, 12) was not checked for this shape",
+            place="inner_radius, outer_radius, length",
+            found=f"inner/outer = {a / b:.3g}, length/outer = {length / b:.3g}",
+            expected="inner/outer 0.1 to 0.97 and length/outer 0.05 to 100",
+            hint="check the units of the geometry; the axial direction has no such limit",
         )
-        denominator = inner * outer * (b**2 + a**2) * (i1b * k1a - i1a * k1b * twice)
-        return 3.5 * self._log_ratio - 1.5 * self._q + float(numerator / denominator)
+    alpha = math.sqrt(60.0) / length
+    inner, outer = alpha * a, alpha * b
+    once, twice = math.exp(inner - outer), math.exp(2.0 * (inner - outer))
+    (i0a, i0b), (i1a, i1b) = ive(0, [inner, outer]), ive(1, [inner, outer])
+    (k0a, k0b), (k1a, k1b) = kve(0, [inner, outer]), kve(1, [inner, outer])
+    numerator = (
+        4.0 * (b**2 + a**2) * once
+        - outer * (b**2 + 3.0 * a**2) * (i1b * k0a + i0a * k1b * twice)
+        - inner * (3.0 * b**2 + a**2) * (i1a * k0b * twice + i0b * k1a)
+    )
+    denominator = inner * outer * (b**2 + a**2) * (i1b * k1a - i1a * k1b * twice)
+    return 10.0 * math.pi * length / (3.5 * tube.log_ratio - 1.5 * _q(tube) + float(numerator / denominator))
+
+
+def _torsion_strain(tube: Bushing) -> float:
+    """e/theta = a b / (b^2 - a^2), from the energy: k theta^2/2 = V mu (2 e)^2/2."""
+    return tube.inner_radius * tube.outer_radius / _area(tube)
+
+
+def _torsion_stiffness(tube: Bushing) -> float:
+    """k/mu = 4 pi L a^2 b^2 / (b^2 - a^2)."""
+    return 4.0 * math.pi * tube.length * (tube.inner_radius * tube.outer_radius) ** 2 / _area(tube)
+
+
+def _area(tube: Bushing) -> float:
+    """b^2 - a^2 [m^2], with full precision for thin bushings too."""
+    return (tube.outer_radius - tube.inner_radius) * (tube.outer_radius + tube.inner_radius)
+
+
+def _q(tube: Bushing) -> float:
+    """(b^2 - a^2)/(b^2 + a^2)."""
+    return _area(tube) / (tube.inner_radius * tube.inner_radius + tube.outer_radius * tube.outer_radius)
 
 
 def _within(value: float, limits: tuple[float, float]) -> bool:
     return limits[0] * (1.0 - _ROUNDING) <= value <= limits[1] * (1.0 + _ROUNDING)
+
+
+class _Definition(NamedTuple):
+    """What a direction is: its kind of motion, and a bushing's two formulas for it.
+
+    Args:
+        motion: translation or rotation.
+        unit_strain: equivalent strain per unit displacement [1/m], or per unit rotation [1/rad].
+        stiffness_per_modulus: stiffness per unit equivalent shear modulus: [m], or [m^3/rad] of a rotation.
+    """
+
+    motion: Motion
+    unit_strain: Callable[[Bushing], float]
+    stiffness_per_modulus: Callable[[Bushing], float]
+
+
+#: A new direction is a name in `Direction` and an entry here.
+_DEFINITIONS = {
+    Direction.AXIAL: _Definition(TRANSLATION, _axial_strain, _axial_stiffness),
+    Direction.RADIAL: _Definition(TRANSLATION, _radial_strain, _radial_stiffness),
+    Direction.TORSION: _Definition(ROTATION, _torsion_strain, _torsion_stiffness),
+}

@@ -1,7 +1,7 @@
-"""Simulated campaigns: what a rig would write for a known model, by the time-domain road only.
+"""Simulated campaigns: the loops and sweeps that a rig would write for a known model.
 
-Loops and sweeps come from `rig`, which steps Eqs. (3) and (5) through time; the closed form that the fits use
-is not involved. Noise is added as a rig has it: from point to point, and shared by a block.
+They come from `rig`, which steps Eqs. (3) and (5) through time; the closed form that the fits use is not involved.
+Noise is added as a rig has it: from point to point, and shared by a block (one repeat of one level).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
-from bushfit.errors import CampaignError, ModelError
+from bushfit.errors import CampaignError, naming
 from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.model import FIVE, Model
@@ -27,22 +27,30 @@ from bushfit.reading.measurement import Loop, Sweep
 if TYPE_CHECKING:
     from numpy.random import Generator
 
-#: The paper's tests: one loop of 1 mm at 0.1 Hz, and 5 to 155 Hz at three amplitudes in two directions.
+#: The paper's loop: 1 mm at 0.1 Hz.
 PAPER_LOOPS = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=3),)
+#: The paper's sweeps: 5 to 155 Hz at 0.1, 0.2 and 0.5 mm, in two directions.
 PAPER_SWEEPS = tuple(
     SimulatedSweep(direction, (1e-4, 2e-4, 5e-4), tuple(float(f) for f in range(5, 156, 10)))
     for direction in (Direction.AXIAL, Direction.RADIAL)
 )
+#: Rows of a simulated loop in a cycle; chosen: its curve is smooth.
 _ROWS_PER_CYCLE = 1000
+#: Time steps of a simulated loop between two rows; the error of the time steps falls in proportion to them.
 _STEPS_PER_ROW = 2
-#: A loop is recorded once it has settled, unless settling is what there is to see.
+#: Cycles before a loop is recorded, so that it has settled; none where an effect's settling is what there is to see.
 _RUN_IN_CYCLES = 40
 
 
 @dataclass(frozen=True, eq=False)
 class Undisturbed:
-    """What a rig without error writes: each loop with its record, each sweep with its stiffness over levels and
-    frequencies."""
+    """What a rig without error writes.
+
+    Args:
+        truth: the model on the rig.
+        loops: each planned loop and its record.
+        sweeps: each planned sweep and its complex stiffness, (levels, frequencies).
+    """
 
     truth: Model
     loops: tuple[tuple[SimulatedLoop, rig.Record], ...]
@@ -90,11 +98,8 @@ def model_of(campaign: Campaign) -> Model:
         )
     effects = campaign.simulate.effects
     values |= {f"{effect}.{name}": value for effect, table in effects.items() for name, value in table.items()}
-    try:
+    with naming(campaign.path):
         return Model(campaign.bushing, (*BASE, *effects), values)
-    except ModelError as error:
-        error.file = campaign.path
-        raise
 
 
 def simulate(truth: Model, plan: SimulateSettings) -> Simulated:
@@ -107,7 +112,7 @@ def simulate(truth: Model, plan: SimulateSettings) -> Simulated:
     return measure(undisturbed(truth, plan), plan)
 
 
-def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 2048) -> Undisturbed:
+def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = rig.STEPS_PER_CYCLE) -> Undisturbed:
     """What the rig would write if it measured without error: the slow part of a simulation.
 
     Args:
@@ -124,7 +129,7 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
 
 
 def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
-    """The same tests as measured with the plan's noise, repeats and seed: quick, for many seeds."""
+    """What the rig writes with the plan's noise, repeats and seed; quick, so that many seeds can be drawn."""
     random = np.random.default_rng(plan.seed)
     loops = tuple(_loop(test, force, number, plan, random) for number, (test, force) in enumerate(clean.loops, start=1))
     names = _names([f"sweep_{test.direction}" for test, _ in clean.sweeps])
@@ -135,10 +140,12 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
 
 
 def _names(stems: Sequence[str]) -> list[str]:
+    """The stems, numbered where one is not alone."""
     return [stem if stems.count(stem) == 1 else f"{stem}_{number}" for number, stem in enumerate(stems, start=1)]
 
 
 def _clean_loop(truth: Model, test: SimulatedLoop) -> rig.Record:
+    """The record of a loop without noise, `_ROWS_PER_CYCLE` rows a cycle."""
     measured = rig.record(
         truth,
         test.direction,
@@ -202,6 +209,7 @@ def _with_noise(clean: Array, plan: SimulateSettings, random: Generator) -> Arra
 
 def to_files(simulated: Simulated) -> dict[str, bytes]:
     """The campaign as files: CSVs, `campaign.toml` that names them, and `truth.json`, the model behind them."""
+    from bushfit.model.file import to_document
     from bushfit.model.result import Result
     from bushfit.reading.csvfile import raw_loop_table, raw_sweep_table, to_csv
 
@@ -209,7 +217,7 @@ def to_files(simulated: Simulated) -> dict[str, bytes]:
     files |= {f"{sweep.name}.csv": to_csv(raw_sweep_table(sweep)) for sweep in simulated.sweeps}
     files["campaign.toml"] = _campaign_toml(simulated).encode()
     truth = Result(simulated.truth, warnings=("simulated: the values a rig simulation was given, not a fit",))
-    files["truth.json"] = (json.dumps(truth.to_document(), indent=1) + "\n").encode()
+    files["truth.json"] = (json.dumps(to_document(truth), indent=1) + "\n").encode()
     return files
 
 

@@ -1,7 +1,7 @@
-"""Units, with pint behind one door: texts such as "10 mm" and headers such as "force [kN]" become SI.
+"""Units: texts such as "10 mm" and headers such as "force [kN]" become SI, and SI becomes what people read.
 
-An expected unit is written in SI: "m", "rad", "N*m/rad", "1" for a ratio. Unlike in pint, an angle is no plain
-number here: "deg" fits "rad" but not "1", and "rad/s" is not "Hz".
+An expected unit is written in SI: "m", "rad", "N*m/rad", "1" for a ratio. Only this module uses pint. Unlike in pint,
+an angle is no plain number here: "deg" fits "rad" but not "1", and "rad/s" is not "Hz".
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from bushfit.errors import UnitError
 if TYPE_CHECKING:
     import pint
 
-#: What an expected unit measures, and units a user would write for it.
+#: By expected SI unit: what it measures, and a unit that a user would write for it.
 _KINDS = {
     "m": ("a length", "mm"),
     "rad": ("an angle", "deg"),
@@ -33,19 +33,33 @@ _KINDS = {
     "Pa": ("a stress", "MPa"),
     "1": ("a ratio", "%"),
 }
-#: What people write for an SI unit, and the factor from SI to it; that of the springpot's constant is the paper's.
+#: By SI unit: the unit in which people write it, and the factor from SI to it; MPa*s^alpha is the paper's.
 _WRITTEN = {
-    **{"m": ("mm", 1e3), "m/N": ("mm/kN", 1e6), "N/m": ("N/mm", 1e-3), "1": ("-", 1.0)},
+    "m": ("mm", 1e3),
+    "m/N": ("mm/kN", 1e6),
+    "N/m": ("N/mm", 1e-3),
+    "1": ("-", 1.0),
     "Pa*s^alpha": ("MPa*s^alpha", 1e-6),
 }
-#: Numbers from the first to the second are written without an exponent.
-_PLAIN = (1e-4, 1e7)
+#: Times below this many seconds are written in milliseconds.
+_LEAST_IN_SECONDS = 0.1
+#: Stresses take a prefix from this many of the larger unit on: 0.2 MPa, not 200 kPa.
+_LEAST_STRESS = 0.1
+#: Forces take a prefix from this many of the larger unit on: 9000 N, but 12 kN.
+_LEAST_FORCE = 10.0
+#: Numbers from this size on are written without an exponent: 0.0001, but 9e-5.
+_LEAST_PLAIN = 1e-4
+#: Numbers below this size are written without an exponent: 9999999, but 1e7.
+_LARGEST_PLAIN = 1e7
+#: A decimal number with a decimal point, and perhaps a power of ten.
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+#: One unit and perhaps its power, such as kN, mm^2, s**-1 or m⁻¹.
 _FACTOR = r"(?:[^\W\d_]+|%|°|1)(?:(?:\^|\*\*)-?[1-9]|⁻?[¹²³])?"
 #: The products and quotients of units that are handed on to pint, which would otherwise evaluate any arithmetic.
 _UNIT = re.compile(rf"{_FACTOR}(?:(?:\s*[*/·⋅]\s*|\s+){_FACTOR})*")
-_LONGEST = 40
-#: Words of other languages and signs, by lower case; pint takes a capital Grad for a billion radians.
+#: Characters of a unit at most: longer texts are no units, and pint takes its time with them.
+_LONGEST_UNIT = 40
+#: Words of other languages and signs for units, in lower case.
 _SPELLINGS = {
     word: unit
     for unit, words in {
@@ -60,8 +74,8 @@ _SPELLINGS = {
     }.items()
     for word in words.split()
 }
-#: Everyday units by SI base, as pint has them: a run that meets no other is spared pint, which takes longer to load
-#: than a fit takes.
+#: Everyday units, as pint has them: factor to SI, and SI base. A run that meets no other does not load pint, which
+#: takes longer than a fit.
 _EVERYDAY = {
     unit: (scale, base)
     for base, scales in {
@@ -78,14 +92,30 @@ _EVERYDAY = {
     }.items()
     for unit, scale in scales.items()
 }
-#: Words that only some spellings of are known, and capitals that pint takes for other units.
-_EXACT = {"Grad": "deg", "GRAD": "deg", "DEG": "deg", "Deg": "deg", "MM": "mm", "KN": "kN", "SEC": "s", "Sec": "s"}
-_EXACT |= {"RPM": "rpm", "Inch": "inch", "INCH": "inch", "Mpa": "MPa", "MPA": "MPa", "LBF": "lbf", "Lbf": "lbf"}
-#: Words that mean one thing to some and another to others, and what says it clearly.
+#: Units whose capitals matter, by the spelling of users: pint takes Grad for a billion radians.
+_EXACT = {
+    spelling: unit
+    for unit, spellings in {
+        "deg": "Grad GRAD DEG Deg",
+        "mm": "MM",
+        "kN": "KN",
+        "s": "SEC Sec",
+        "rpm": "RPM",
+        "inch": "Inch INCH",
+        "MPa": "Mpa MPA",
+        "lbf": "LBF Lbf",
+    }.items()
+    for spelling in spellings.split()
+}
+#: Units that mean one thing to some users and another to others, and what says it clearly.
 _UNCLEAR = {"grad": '"deg" or "gon"', "mil": '"thou" (0.001 inch) or "mrad"', "mils": '"thou" (0.001 inch) or "mrad"'}
+#: The letters of one unit.
 _WORD = re.compile(r"[^\W\d_]+|[º˚]")
+#: Between a unit and a power without its sign: mm2.
 _POWER = re.compile(r"(?<=[^\W\d_])(?=[23](?!\d))")
+#: A point or hyphen that stands for a product: N.m, N-m.
 _JOINT = re.compile(r"(?<=[^\W\d_])[.-](?=[^\W\d_])")
+#: A header's name, and its unit in brackets.
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*")
 
 
@@ -161,8 +191,8 @@ def for_people(unit: str, factor: float, size: float) -> tuple[str, float]:
     unit, factor = _WRITTEN.get(unit, (unit, factor))
     number = abs(size) * factor
     if unit == "s":
-        return ("ms", 1e3) if number < 0.1 else (unit, factor)
-    least = 0.1 if unit.startswith("Pa") else 10.0  # 0.2 MPa, but 9000 N
+        return ("ms", 1e3) if number < _LEAST_IN_SECONDS else (unit, factor)
+    least = _LEAST_STRESS if unit.startswith("Pa") else _LEAST_FORCE
     for prefix, power in (("M", 1e6), ("k", 1e3)):
         if unit.startswith(("P", "N")) and number >= least * power:
             return prefix + unit, factor / power
@@ -178,10 +208,9 @@ def number(value: float, digits: int, sign: str = "") -> str:
         sign: "+" to have it said of positive numbers too.
     """
     rounded = float(f"{value:.{digits}g}")
-    least, most = _PLAIN
     if rounded == 0.0 or not math.isfinite(rounded):
         return f"{rounded + 0.0:{sign}g}"  # no -0
-    if least <= abs(rounded) < most:
+    if _LEAST_PLAIN <= abs(rounded) < _LARGEST_PLAIN:
         text = f"{rounded:{sign}.{_decimals(rounded, digits)}f}"
         return text.rstrip("0").rstrip(".") if "." in text else text
     mantissa, _, power = f"{rounded:{sign}.{digits - 1}e}".partition("e")
@@ -189,7 +218,7 @@ def number(value: float, digits: int, sign: str = "") -> str:
 
 
 def alike(values: Sequence[float], digits: int, least: int = 0) -> list[str]:
-    """Numbers that stand together, all down to the decimal at which the first has so many digits: 1.4530, 1.4488.
+    """Numbers that stand together, all with the decimals that the first needs for so many digits: 1.4530, 1.4488.
 
     Args:
         values: at least one; the first sets the decimals.
@@ -197,13 +226,13 @@ def alike(values: Sequence[float], digits: int, least: int = 0) -> list[str]:
         least: digits that the others have at least; with 0, what is too small to show is 0.
     """
     first = float(f"{values[0]:.{digits}g}")
-    if not _PLAIN[0] <= abs(first) < _PLAIN[1]:
+    if not _LEAST_PLAIN <= abs(first) < _LARGEST_PLAIN:
         return [number(value, digits) for value in values]
     place = digits - 1 - math.floor(math.log10(abs(first)))
 
     def text(value: float) -> str:
         rounded = round(value, place) + 0.0 if math.isfinite(value) else value  # no -0
-        if abs(value) >= _PLAIN[1] or not math.isfinite(value):
+        if abs(value) >= _LARGEST_PLAIN or not math.isfinite(value):
             return number(value, digits)
         if value and least and abs(rounded) < 10.0 ** (least - 1 - place):
             return number(value, least)
@@ -238,7 +267,7 @@ def _kind(expected: str) -> tuple[str, str]:
 
 
 def _si(number: float, scale: float) -> float:
-    """The product without the last digit's dust: 18 mm are 0.018 m."""
+    """number * scale to 15 digits: 18 mm are 0.018 m, and not 0.018000000000000002 m."""
     return float(f"{number * scale:.15g}")
 
 
@@ -264,7 +293,11 @@ def _split_quantity(value: object, expected: str) -> tuple[float, str]:
 
 @lru_cache(maxsize=256)
 def _resolve(text: str) -> tuple[float, str]:
-    """Scale and SI base unit of a unit; angles keep their radian."""
+    """Factor to SI and SI base of a unit; angles keep their radian.
+
+    Raises:
+        UnitError: an unknown unit.
+    """
     text = text.strip().rstrip(".")
     if text in ("", "-"):
         text = "1"
@@ -274,12 +307,13 @@ def _resolve(text: str) -> tuple[float, str]:
 
 
 def _by_pint(text: str) -> tuple[float, str]:
+    """As `_resolve`, by pint, which sees nothing but words, powers, products and quotients."""
     unknown = UnitError(
-        "unknown unit", found=f'"{text[:_LONGEST]}"', expected="a unit such as mm, N, kN/mm, deg, Hz or %"
+        "unknown unit", found=f'"{text[:_LONGEST_UNIT]}"', expected="a unit such as mm, N, kN/mm, deg, Hz or %"
     )
-    if len(text) <= _LONGEST:
+    if len(text) <= _LONGEST_UNIT:
         text = _POWER.sub("^", _JOINT.sub("*", _WORD.sub(_usual, text)))
-    if len(text) > _LONGEST or not _UNIT.fullmatch(text):
+    if len(text) > _LONGEST_UNIT or not _UNIT.fullmatch(text):
         raise unknown
     for word in _WORD.findall(text):
         if word in _UNCLEAR:

@@ -1,7 +1,7 @@
-"""Checked tables: what pydantic finds wrong in a TOML or JSON file, in the project's words.
+"""Checks a parsed TOML or JSON file against dataclasses with pydantic, whose errors become the project's own.
 
-It knows no campaign and no model. A table is a frozen dataclass; where the keys of a field stand in the table itself
-and not under the field's own name, the field says so with `field(metadata=standing_in_table(keys))`.
+It knows no campaign and no model. A table of the file is a frozen dataclass. Where the keys of a field stand in the
+table itself and not under the field's own name, the field says so with `field(metadata=standing_in_table(keys))`.
 """
 
 from __future__ import annotations
@@ -21,10 +21,11 @@ from bushfit.errors import BushfitError, CampaignError
 
 T = TypeVar("T")
 
-#: Known keys that an error lists at most.
+#: Known keys that an error lists at most: one line of them.
 _MOST_LISTED = 12
-#: How alike a key has to be to one that is known to be suggested, from 0 to 1.
-_ALIKE = 0.5
+#: Similarity of difflib's, from 0 to 1, from which a known key is suggested for one that is not; chosen.
+_LEAST_SIMILARITY = 0.5
+#: pydantic's name for an error about a key that the table does not have.
 _UNKNOWN = "unexpected_keyword_argument"
 #: pydantic's names for what has the wrong shape, in the words of TOML.
 _SHAPES = {
@@ -34,6 +35,7 @@ _SHAPES = {
     "tuple_type": "a list",
     "too_short": "at least one value",
     "string_type": "a text in quotes",
+    "path_type": "a text in quotes",
     "string_too_short": "a text that is not empty",
     "string_pattern_mismatch": "one line without control characters",
     "string_unicode": "text in Unicode",
@@ -41,10 +43,18 @@ _SHAPES = {
     "int_type": "a whole number",
     "float_type": "a number",
 }
+#: Values of Python's as TOML and JSON write them.
 _WORDS = {"None": "null", "True": "true", "False": "false"}
-#: In the metadata of a field: a function that gives the keys which stand in the table itself.
+#: Key in the metadata of a field, for a function that gives the keys which stand in the table itself.
 _IN_TABLE = "keys in the table itself"
 
+#: A finite number; neither a text nor true is one.
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+#: A whole number; neither a text, nor true, nor 3.0 is one.
+WholeNumber = Annotated[int, Field(strict=True)]
+#: True or false; neither a text nor a number is one.
+Flag = Annotated[bool, Field(strict=True)]
+#: A text that is not empty.
 Text = Annotated[str, Field(min_length=1)]
 #: What tables, plots, folders and the terminal are headed with: one line without control characters.
 Name = Annotated[str, Field(strict=True, min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]*$")]
@@ -52,14 +62,14 @@ Name = Annotated[str, Field(strict=True, min_length=1, max_length=200, pattern=r
 
 def unknown_key(key: str, known: Collection[str]) -> CampaignError:
     """The error for a key that is none of the known ones."""
-    near = get_close_matches(key, known, n=1, cutoff=_ALIKE)
+    near = get_close_matches(key, known, n=1, cutoff=_LEAST_SIMILARITY)
     hint = f'did you mean "{near[0]}"?' if near else None
     expected = "one of " + ", ".join([*known][:_MOST_LISTED]) + (", ..." if len(known) > _MOST_LISTED else "")
     return CampaignError("unknown key", found=f'"{key}"', expected=expected, hint=hint)
 
 
 def converted(convert: Callable[[Any, ValidationInfo], Any]) -> BeforeValidator:
-    """A pydantic validator that calls convert(raw value, info); a BushfitError travels inside pydantic's."""
+    """A pydantic validator that calls convert(raw value, info); what it raises keeps its words."""
 
     def run(raw: Any, info: ValidationInfo) -> Any:
         try:
@@ -77,18 +87,26 @@ def standing_in_table(keys: Callable[[], Iterable[str]]) -> Mapping[str, Any]:
 
 @cache
 def _adapter(schema: Any) -> TypeAdapter[Any]:
+    """pydantic's validator of a schema, built once, because that takes longer than most checks."""
     return TypeAdapter(schema)
 
 
 def check_tables(
     tables: Mapping[str, Any],
-    file: Path,
+    file: Path | None,
     schema: type[T],
     place: str | None = None,
     *,
     kind: type[BushfitError] = CampaignError,
 ) -> T:
-    """Parsed TOML as the dataclass `schema`, all quantities in SI; errors say that it stands in `file`, at `place`.
+    """A parsed TOML or JSON file as the dataclass `schema`, all quantities in SI.
+
+    Args:
+        tables: the parsed file.
+        file: where the tables stand, for errors.
+        schema: a dataclass that pydantic can check.
+        place: where in the file they stand, for errors; None for a whole file.
+        kind: class of the errors.
 
     Raises:
         kind: keys or values that are not understood.
@@ -107,7 +125,7 @@ def check_tables(
 
 
 def _complaint(detail: ErrorDetails, schema: type, kind: type[BushfitError]) -> BushfitError:
-    """One error of pydantic's as one of ours; tables of an array are counted from 1."""
+    """One of pydantic's errors in the project's words, with its place in the file."""
     location = detail["loc"]
     place = _place(schema, location)
     cause = detail.get("ctx", {}).get("error")
@@ -128,7 +146,7 @@ def _complaint(detail: ErrorDetails, schema: type, kind: type[BushfitError]) -> 
 
 
 def _place(table: type, location: tuple[int | str, ...]) -> str:
-    """A place as the file has it, such as "simulate.loops #2.frequency"."""
+    """A place as the file has it, such as "simulate.loops #2.frequency"; tables of an array are counted from 1."""
     words: list[str] = []
     for key in location:
         if isinstance(key, int):
@@ -148,12 +166,12 @@ def known_keys(table: type) -> Sequence[str]:
 
 
 def _in_table(table: type) -> Mapping[str, Callable[[], Iterable[str]]]:
-    """Fields whose keys stand in the table itself, and what gives these keys."""
+    """The fields whose keys stand in the table itself, each with the function that gives these keys."""
     return {entry.name: entry.metadata[_IN_TABLE] for entry in fields(table) if _IN_TABLE in entry.metadata}
 
 
 def _table_at(table: type, location: tuple[int | str, ...]) -> type:
-    """The dataclass of the table at a place below another, or that nearest above it."""
+    """The dataclass of the table at a place below another; the one nearest above where the place is no table."""
     for key in location:
         if key in (hints := get_type_hints(table)):
             inside = (part for part in _parts(hints[key]) if isinstance(part, type) and is_dataclass(part))

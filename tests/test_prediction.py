@@ -14,8 +14,9 @@ from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
+from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
-from bushfit.model.result import Covariance, Range, Result
+from bushfit.model.result import Range, Result
 from bushfit.prediction import PAPER_AMPLITUDES, PAPER_FREQUENCIES, caveats, default_grid, predict
 from bushfit.reading.measurement import Sweep
 from bushfit.report.tables import prediction_table

@@ -18,7 +18,8 @@ from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.effects.contract import Parameter
 from bushfit.errors import BatchError, BushfitError
 from bushfit.fitting.data import Data
-from bushfit.model.result import Result, load_result
+from bushfit.model.file import load_result
+from bushfit.model.result import Result
 from bushfit.prediction import Band, predict
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Campaign files: TOML -> Campaign, in SI, with every measurement read."""
+"""A campaign: one bushing, its tests and settings, read from a TOML file and the measurements that it names."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from bushfit.campaign.naming import folder_name
 from bushfit.campaign.schema import CampaignFile, FitSettings, LoopFile, PredictSettings, SimulateSettings, SweepFile
 from bushfit.campaign.toml import read_toml
-from bushfit.errors import CampaignError, ModelError
+from bushfit.errors import CampaignError, naming
 from bushfit.geometry import Bushing
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
@@ -21,7 +21,7 @@ from bushfit.reading.sweeps import read_sweep
 
 @dataclass(frozen=True, eq=False)
 class Campaign:
-    """One bushing, its tests, and what to do with them.
+    """One bushing, its tests in SI, and the settings of what to do with them.
 
     Args:
         name: of the campaign; default the name of the bushing.
@@ -43,7 +43,7 @@ class Campaign:
 
     @property
     def slug(self) -> str:
-        """The name as that of one folder; it never leads out of the folder it is put in."""
+        """The name of the campaign's folder of results."""
         return folder_name(self.name)
 
 
@@ -65,11 +65,8 @@ def load_campaign(path: str | Path) -> Campaign:
             expected="[[loops]] or [[sweeps]] tables, or a [simulate] table",
             hint='add [[loops]] with file = "..." and direction = "axial"',
         )
-    try:
+    with naming(path):
         bushing = Bushing(**vars(content.bushing))
-    except ModelError as error:
-        error.file = path
-        raise
     return Campaign(
         content.name or bushing.name,
         path,
@@ -83,7 +80,13 @@ def load_campaign(path: str | Path) -> Campaign:
 
 
 def reader_keywords(campaign: Path, tests: Sequence[LoopFile | SweepFile]) -> Iterator[dict[str, Any]]:
-    """The reader's keywords for each file; it is named by its stem, or as the campaign lists it where stems agree."""
+    """The keywords of `read_loop` or `read_sweep` for each file of a campaign.
+
+    A test is named by the stem of its file; where two files have one stem, by the file as the campaign lists it.
+
+    Raises:
+        CampaignError: a file that is listed twice.
+    """
     stems = [Path(test.file).stem for test in tests]
     seen = set()
     for test, stem in zip(tests, stems, strict=True):

@@ -1,18 +1,18 @@
-"""Names of folders: any text as a name that every operating system takes, and that leads nowhere else."""
+"""Names of folders: any text as the name of one folder that every operating system takes."""
 
 from __future__ import annotations
 
 import re
 
-#: Characters that some system keeps for itself, and halves of surrogate pairs.
+#: Characters that some operating system does not allow in a name, and halves of surrogate pairs.
 _UNSAFE_IN_FOLDERS = re.compile(r'[\x00-\x1f\x7f\ud800-\udfff/\\:*?"<>|]+')
 #: Names that Windows keeps for devices, with any ending.
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
-#: Characters of a name: with the folders above it, a path stays within what Windows takes.
+#: Characters of a name at most: with the folders above it, a path stays below the 260 that Windows takes.
 _LONGEST_FOLDER = 60
 
 
 def folder_name(name: str) -> str:
-    """A name as that of one folder: it never leads out of the folder it is put in, and is never empty."""
+    """A text as the name of one folder; it is never empty, and never leads out of the folder that it is put in."""
     safe = _UNSAFE_IN_FOLDERS.sub("_", name)[:_LONGEST_FOLDER].strip(" .") or "campaign"
     return f"_{safe}" if _DEVICES.fullmatch(safe) else safe

@@ -17,33 +17,44 @@ from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConven
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Waveform
 from bushfit.units import quantity
-from bushfit.validation import Name, Text, converted, known_keys, standing_in_table, unknown_key
+from bushfit.validation import Flag, Name, Text, converted, known_keys, standing_in_table, unknown_key
 
+#: What a sweep's residuals compare: real and imaginary part, or |K| and loss factor.
 Residuals = Literal["complex", "magnitude_loss_factor"]
+#: What is summed over the residuals: their squares, or soft_l1 with outliers left out.
 Loss = Literal["linear", "soft_l1"]
 
+#: Steps of a range of frequencies at most: more than any sweep has, and quick to predict.
 _LARGEST_GRID = 100_000
+#: Size of a plain number at most: no parameter comes near it, and its square is still finite.
 _LARGEST_NUMBER = 1e100
-#: One error of a list is enough: a hundred thousand would fill the memory.
+#: Relative width by which a range of frequencies is widened, so that rounding does not drop its last step.
+_ROUNDING = 1e-9
+#: Repeats or cycles at most: more than any rig runs.
+_LARGEST_COUNT = 1_000_000
+#: Ends the check of a list at its first error: those of a hundred thousand would fill the memory.
 _FIRST_ERROR = Field(fail_fast=True)
+#: The second to the power of alpha, at the end of the unit of m.
 _S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
 
 
 def _si(*units: str) -> BeforeValidator:
+    """A validator that takes a text with any of these units, and gives SI."""
     return converted(lambda raw, _: quantity(raw, *units))
 
 
 def _displacement(raw: object, info: ValidationInfo) -> float:
-    """A displacement [m], or a rotation [rad] in a table with direction = "torsion"."""
+    """A displacement [m], or a rotation [rad] in a table whose direction is a rotation."""
     return quantity(raw, info.data.get("direction", Direction.AXIAL).motion.displacement_unit)
 
 
 def _speed(raw: object, info: ValidationInfo) -> float:
+    """A speed [m/s], or [rad/s] in a table whose direction is a rotation."""
     return quantity(raw, info.data.get("direction", Direction.AXIAL).motion.displacement_unit + "/s")
 
 
 def _frequencies(raw: object, _: ValidationInfo) -> object:
-    """Frequencies [Hz] from a list, or from { start, stop, step } with both ends."""
+    """A list of frequencies as texts; { start, stop, step } becomes one, with both ends."""
     if not isinstance(raw, dict):
         return raw
     expected = '{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }, or a list such as ["5 Hz", "15 Hz"]'
@@ -52,7 +63,7 @@ def _frequencies(raw: object, _: ValidationInfo) -> object:
     start, stop, step = (quantity(raw[key], "Hz") for key in ("start", "stop", "step"))
     if not (0.0 < start <= stop and step > 0.0 and (stop - start) / step < _LARGEST_GRID):
         raise CampaignError("this is no range of frequencies", found=str(raw), expected="0 < start <= stop, step > 0")
-    count = int((stop - start) / step * (1.0 + 1e-9)) + 1
+    count = int((stop - start) / step * (1.0 + _ROUNDING)) + 1
     return [f"{value!r} Hz" for value in (start + step * np.arange(count)).tolist()]
 
 
@@ -89,11 +100,12 @@ def parameter_value(place: str, name: str, raw: object) -> float:
 
 
 def _parameters(raw: object, _: ValidationInfo) -> object:
+    """Values by parameter, in SI."""
     return {name: parameter_value(name, name, value) for name, value in raw.items()} if isinstance(raw, dict) else raw
 
 
 def _effects(raw: object, _: ValidationInfo) -> object:
-    """Parameters by effect, in SI."""
+    """Values by effect and parameter, in SI."""
     if not isinstance(raw, dict):
         return raw
     return {
@@ -105,7 +117,7 @@ def _effects(raw: object, _: ValidationInfo) -> object:
 
 
 def _parameter_settings(raw: object, _: ValidationInfo) -> object:
-    """Tables of value, min, max and vary, by parameter, with the first three in SI."""
+    """Tables of value, min, max and vary by parameter, with the first three in SI."""
     if not isinstance(raw, dict):
         return raw
     settings = {}
@@ -123,7 +135,7 @@ def _parameter_settings(raw: object, _: ValidationInfo) -> object:
 
 
 def _fit_table(raw: object, _: ValidationInfo) -> object:
-    """Gather [fit.mu], [fit."inertia.mass"] and the like under one key."""
+    """[fit] with its tables by parameter, such as [fit.mu] or [fit."inertia.mass"], under the key "parameters"."""
     if not isinstance(raw, dict):
         return raw
     if "parameters" in raw:
@@ -133,6 +145,8 @@ def _fit_table(raw: object, _: ValidationInfo) -> object:
 
 
 def _roles(known: Collection[str]) -> BeforeValidator:
+    """A validator that refuses other keys than these roles of columns."""
+
     def check_keys(raw: object, _: ValidationInfo) -> object:
         for role in raw if isinstance(raw, dict) else ():
             if role not in known:
@@ -148,7 +162,7 @@ Frequency = Annotated[float, _si("Hz"), Field(gt=0)]
 Frequencies = Annotated[tuple[Frequency, ...], _FIRST_ERROR, converted(_frequencies), Field(min_length=1)]
 Displacement = Annotated[float, converted(_displacement), Field(gt=0)]
 Share = Annotated[float, _si("1"), Field(ge=0, lt=1)]
-Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
+Count = Annotated[int, Field(strict=True, ge=1, le=_LARGEST_COUNT)]
 
 
 @dataclass(frozen=True)
@@ -205,13 +219,19 @@ class ParameterSetting:
     value: float | None = None
     min: float | None = None
     max: float | None = None
-    vary: Annotated[bool, Field(strict=True)] = True
+    vary: Flag = True
 
 
 @dataclass(frozen=True)
 class FitSettings:
-    """[fit]: settings by parameter; amplitudes [m or rad] that fit-dynamic uses, none for the smallest; residuals; and
-    the loss: squares, or soft_l1 with wild points left out."""
+    """[fit]: how the model is fitted.
+
+    Args:
+        dynamic_amplitudes: [m or rad] that fit-dynamic uses; none for the smallest.
+        residuals: what a sweep's residuals compare.
+        loss: what is summed over the residuals.
+        parameters: start value and bounds by parameter.
+    """
 
     dynamic_amplitudes: Annotated[tuple[Annotated[float, _si("m", "rad"), Field(gt=0)], ...], _FIRST_ERROR] = ()
     residuals: Residuals = "complex"
@@ -262,7 +282,7 @@ class SimulateSettings:
         repeats: of each sweep.
         noise: standard deviation of a sweep point's real and imaginary part, relative to |K|.
         force_noise, displacement_noise: standard deviation of a loop's samples, relative to the amplitude.
-        gain_error: standard deviation of the gain of a block (one repeat of one sweep).
+        gain_error: standard deviation of the gain of a block (one repeat of one level).
         phase_error: standard deviation of the phase of a block [rad].
         loops, sweeps: the tests; empty for the rig's own choice.
     """

@@ -1,4 +1,4 @@
-"""TOML files of the user's: parsed, and checked against a schema."""
+"""Reads a TOML file that a user wrote, and checks it against a schema."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from bushfit.validation import check_tables
 
 T = TypeVar("T")
 
+#: Size of a campaign file at most [bytes]: thousands of tests.
 _LARGEST_BYTES = 1_000_000
-#: A key of many parts costs the parser the square of their number.
+#: A key of more than 16 parts, such as a.b.c; parsing one takes time in proportion to the square of their number.
 _DEEP_KEY = re.compile(rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}""")
 
 
@@ -25,7 +26,7 @@ def read_toml(path: Path, schema: type[T], *, what: str = "a campaign file", lar
         path: the file.
         schema: a pydantic dataclass, or one of its tables; unknown keys are refused.
         what: the file in words, for errors.
-        largest: refuse more bytes than this.
+        largest: size of the file at most [bytes].
 
     Raises:
         CampaignError: the file is missing, too large, no TOML, or has keys or values that are not understood.

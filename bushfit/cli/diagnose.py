@@ -63,7 +63,7 @@ def command(
     """
     from bushfit.diagnosis.record import Settings
     from bushfit.jobs.diagnose import Diagnose
-    from bushfit.model.result import load_result
+    from bushfit.model.file import load_result
 
     settings = Settings(max_effects, _share(tolerance), adopt, without)
     job = Diagnose(settings, load_result(model).model if model else None)

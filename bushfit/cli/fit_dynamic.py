@@ -36,7 +36,7 @@ def command(campaign: Path, static: Path | None, loss: str | None, max_nrmse: fl
     Writes dynamic.json, which `bushfit predict` takes as it is, sweeps.csv and sweeps.png.
     """
     from bushfit.jobs.fits import FitDynamic
-    from bushfit.model.result import load_result
+    from bushfit.model.file import load_result
 
     job = FitDynamic(load_result(static) if static else None)
     perform(options, campaign, job, tell_fit, max_nrmse, loss)

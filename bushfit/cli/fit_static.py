@@ -36,7 +36,7 @@ def command(campaign: Path, dynamic: Path | None, loss: str | None, max_nrmse: f
     Writes static.json, loops.csv and loops.png.
     """
     from bushfit.jobs.fits import FitStatic
-    from bushfit.model.result import load_result
+    from bushfit.model.file import load_result
 
     job = FitStatic(load_result(dynamic) if dynamic else None)
     perform(options, campaign, job, tell_fit, max_nrmse, loss)

@@ -52,7 +52,7 @@ def command(
     from bushfit.cli.grids import parse_grid
     from bushfit.geometry import Direction
     from bushfit.jobs.predict import Predict
-    from bushfit.model.result import load_result
+    from bushfit.model.file import load_result
 
     result = load_result(model)
     loaded = load_campaign(campaign) if campaign else None

@@ -49,6 +49,7 @@ def command(campaign: Path, loss: str | None, max_nrmse: float | None, options: 
     from bushfit.jobs.diagnose import Diagnose
     from bushfit.jobs.fits import Fit, FitStatic, tests_of
     from bushfit.jobs.predict import Predict
+    from bushfit.model.file import to_document
     from bushfit.report.artifacts import artifact_names, diagnosis_files, loop_files, sweep_files
     from bushfit.report.folder import to_json
 
@@ -79,7 +80,7 @@ def command(campaign: Path, loss: str | None, max_nrmse: float | None, options: 
     predicted = Predict().run(final, loaded)
     tell_predictions(options, predicted)
     marked = data.without(final.outliers)
-    documents = {**{name: result.to_document() for name, result in results.items()}, "diagnosis": diagnosed.document}
+    documents = {**{name: to_document(result) for name, result in results.items()}, "diagnosis": diagnosed.document}
     files = {
         **{f"{name}.json": to_json(document) for name, document in documents.items()},
         **loop_files(final.model, marked.loops, options.formats),

@@ -45,6 +45,7 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
 
     Writes campaign.toml, the CSV files it names, and truth.json, the model behind them.
     """
+    from bushfit.model.file import model_document
     from bushfit.simulation import simulate, to_files
 
     truth, plan = _task(source)
@@ -55,13 +56,13 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
     folder = options.folder(f"simulated {_slug(truth)}")
     options.console.print(truth.equation(), markup=False)
     options.write(folder, files)
-    options.tell({"truth": truth.to_document(), "files": sorted(files)})
+    options.tell({"truth": model_document(truth), "files": sorted(files)})
 
 
 def _task(source: Path) -> tuple[Model, SimulateSettings]:
     from bushfit.campaign.campaign import load_campaign
     from bushfit.campaign.schema import SimulateSettings
-    from bushfit.model.result import load_result
+    from bushfit.model.file import load_result
     from bushfit.simulation import model_of
 
     if source.suffix.lower() == ".json":

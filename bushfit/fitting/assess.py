@@ -11,8 +11,9 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.solve import Coordinates, jacobian, residual
 from bushfit.geometry import Direction
+from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
-from bushfit.model.result import Covariance, Quality, Range
+from bushfit.model.result import Quality, Range
 from bushfit.units import number
 
 #: Reduced chi-square beyond which noise alone is no explanation, in standard deviations.

@@ -17,8 +17,8 @@ from bushfit.fitting.assess import measured_range
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, parted
 from bushfit.fitting.drive import Drive
 from bushfit.fitting.solve import Coordinates, jacobian
+from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model
-from bushfit.model.result import Z95, Covariance
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.units import modulus
 

@@ -20,8 +20,9 @@ from bushfit.fitting.robust import Estimate, estimate, told
 from bushfit.fitting.solve import Bounds, Coordinates, Solution
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction
+from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
-from bushfit.model.result import Covariance, End, Result
+from bushfit.model.result import End, Result
 
 STATIC = ("mu", "sigma_fmax", "eps_half")
 DYNAMIC = ("m", "alpha")

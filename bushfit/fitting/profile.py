@@ -16,8 +16,8 @@ from bushfit.errors import FitError
 from bushfit.fitting.assess import linear_errors, quality
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.solve import Bounds, Coordinates, Solution, solve, walls
+from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model
-from bushfit.model.result import Z95, Covariance
 
 #: Longest step of the search, in coordinates, which are of order one.
 _STEP = 0.5

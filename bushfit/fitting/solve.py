@@ -18,8 +18,9 @@ from bushfit.effects import BASE, Parameter
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.data_sets import DataSet
+from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
-from bushfit.model.result import Z95, End
+from bushfit.model.result import End
 
 if TYPE_CHECKING:
     import lmfit

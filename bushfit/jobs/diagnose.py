@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
+from bushfit.model.file import to_document
 from bushfit.report.artifacts import artifact_names, diagnosis_files
 from bushfit.report.folder import to_json
 
@@ -37,7 +38,7 @@ class Diagnosed:
     def files(self, formats: Collection[str]) -> dict[str, bytes]:
         return {
             "diagnosis.json": to_json(self.document),
-            "model.json": to_json(self.result.to_document()),
+            "model.json": to_json(to_document(self.result)),
             **diagnosis_files(self.diagnosis, self.name, formats),
         }
 

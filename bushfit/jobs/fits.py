@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from bushfit.effects import BASE
 from bushfit.errors import FitError
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, given_static
+from bushfit.model.file import to_document
 from bushfit.report.artifacts import artifact_names, loop_files, sweep_files
 from bushfit.report.folder import to_json
 
@@ -42,7 +43,7 @@ class Fitted:
 
     @cached_property
     def document(self) -> Mapping[str, Any]:
-        return self.result.to_document()
+        return to_document(self.result)
 
     def files(self, formats: Collection[str]) -> dict[str, bytes]:
         model, data = self.result.model, self.data.without(self.result.outliers)

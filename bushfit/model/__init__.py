@@ -1,1 +1,1 @@
-"""The model: its stiffness, its derivatives, its steps through time, and what a fit found of it."""
+"""The model of a bushing: its response, its derivatives, the virtual rig, and the result of a fit with its file."""

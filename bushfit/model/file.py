@@ -1,31 +1,44 @@
-"""Model files: JSON -> a document in which every key that is read has the kind of value that it should."""
+"""Model files: a result as JSON in the schema bushfit/model/1, and back.
+
+The dataclasses below are the keys that are read, and pydantic checks them all at once; other keys are left alone.
+"""
 
 from __future__ import annotations
 
+import importlib.metadata
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Set
+from dataclasses import asdict, dataclass, field
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Any, NoReturn
 
-from pydantic import Field
+import numpy as np
 
-from bushfit.errors import ModelError
-from bushfit.geometry import Direction
+from bushfit import __version__
+from bushfit.errors import ModelError, naming
+from bushfit.geometry import Bushing, Direction
+from bushfit.model.covariance import Covariance
+from bushfit.model.model import Model
+from bushfit.model.result import End, Outlier, Quality, Range, Result
 from bushfit.reading.files import read_utf8
-from bushfit.validation import Name, check_tables
+from bushfit.reading.measurement import Source
+from bushfit.validation import Flag, Name, Number, WholeNumber, check_tables
 
-#: A hundred times what a model with every effect of the library takes.
+#: What the key "schema" of a model file has to say.
+SCHEMA = "bushfit/model/1"
+#: Size of a model file at most [bytes]: a hundred times what a model with every effect of the library takes.
 _LARGEST_BYTES = 10_000_000
+#: Packages that the numbers rest on; a model file records their versions.
+_PACKAGES = ("numpy", "scipy", "lmfit")
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Text = Annotated[str, Field(strict=True)]
 Matrix = tuple[tuple[Number, ...], ...]
-Interval = tuple[Number, Number]
 
 
 @dataclass(frozen=True)
-class BushingEntry:
+class BushingTable:
+    """bushing: name and geometry."""
+
     name: Name
     inner_radius_m: Number
     outer_radius_m: Number
@@ -33,87 +46,229 @@ class BushingEntry:
 
 
 @dataclass(frozen=True)
-class ParameterEntry:
+class ParameterTable:
+    """parameters.<name>: the value [SI], and what the fit says of it."""
+
     value: Number
-    vary: Annotated[bool, Field(strict=True)] = False
+    vary: Flag = False
+    profile95: tuple[Number | None, Number | None] | None = None
+    at_bound: End | None = None
 
 
 @dataclass(frozen=True)
-class CovarianceEntry:
-    names: tuple[Text, ...]
+class CovarianceTable:
+    """covariance: a matrix with a row and a column for each name, and others of its size.
+
+    What makes a matrix no covariance is refused here.
+    """
+
+    names: tuple[str, ...]
     matrix: Matrix
     spread: tuple[Matrix, ...] = ()
 
     def __post_init__(self) -> None:
         size = len(self.names)
         for matrix in (self.matrix, *self.spread):
-            if len(matrix) != size or any(len(row) != size for row in matrix):
-                rows = f"{len(matrix)} rows of {' or '.join(sorted({str(len(row)) for row in matrix})) or 'no'} numbers"
-                raise ValueError(ModelError("no covariance of its names", found=rows, expected=f"{size} x {size}"))
+            widths = {len(row) for row in matrix}
+            if len(matrix) != size or widths - {size}:
+                found = f"{len(matrix)} rows of {' or '.join(sorted(map(str, widths))) or 'no'} numbers"
+                raise ValueError(ModelError("no covariance of its names", found=found, expected=f"{size} x {size}"))
         if any(self.matrix[i][i] < 0.0 for i in range(size)):
             raise ValueError(ModelError("a variance below zero", place="matrix", expected="squares on the diagonal"))
 
 
 @dataclass(frozen=True)
-class FitEntry:
+class FitTable:
+    """fit: how well the model meets its tests, and their operating conditions, which older files do not say."""
+
     nrmse: Number
     reduced_chi_square: Number
-    points: Annotated[int, Field(strict=True)]
+    points: WholeNumber
     noise: Number
-    frequency_Hz: Interval | None = None  # noqa: N815
-    strain: Interval | None = None
+    frequency_Hz: tuple[Number, Number] | None = None  # noqa: N815
+    strain: tuple[Number, Number] | None = None
     directions: tuple[Direction, ...] = ()
 
+    def __post_init__(self) -> None:
+        if self.strain and not self.frequency_Hz:
+            raise ValueError(ModelError("a key is missing", place="frequency_Hz", expected="frequency_Hz = ..."))
+
+    @property
+    def quality(self) -> Quality:
+        return Quality(self.nrmse, self.reduced_chi_square, self.points, self.noise)
+
+    @property
+    def measured(self) -> Range | None:
+        """The operating conditions; None where an older file does not say them."""
+        if self.frequency_Hz is None or self.strain is None:
+            return None
+        return Range(self.frequency_Hz, self.strain, self.directions)
+
 
 @dataclass(frozen=True)
-class InputEntry:
-    file: Text
-    sha256: Text
+class ProvenanceTable:
+    """provenance: the files behind the model."""
 
-
-@dataclass(frozen=True)
-class ProvenanceEntry:
-    inputs: tuple[InputEntry, ...] = ()
+    inputs: tuple[Source, ...] = ()
 
 
 @dataclass(frozen=True)
 class ModelFile:
-    """What is read of a model file; other keys are left alone."""
+    """A whole model file."""
 
-    bushing: BushingEntry
-    effects: tuple[Text, ...]
-    parameters: Mapping[str, ParameterEntry]
-    covariance: CovarianceEntry | None = None
-    fit: FitEntry | None = None
-    warnings: tuple[Text, ...] = ()
-    provenance: ProvenanceEntry | None = None
+    bushing: BushingTable
+    effects: tuple[str, ...]
+    parameters: Mapping[str, ParameterTable]
+    covariance: CovarianceTable | None = None
+    fit: FitTable | None = None
+    warnings: tuple[str, ...] = ()
+    outliers: tuple[Outlier, ...] = ()
+    provenance: ProvenanceTable = field(default_factory=ProvenanceTable)
 
 
-def read_model_file(file: Path, schema: str) -> dict[str, Any]:
-    """The document of a model file.
+def load_result(file: Path) -> Result:
+    """Read a model file.
 
     Raises:
         ModelError: a file that is missing or too large, is no JSON, names another schema, or has a key that is missing,
-            given twice, or of the wrong kind.
+            given twice, or of the wrong kind; it names the file.
     """
     data = read_utf8(file, ModelError, largest=_LARGEST_BYTES, hint="bushfit fit writes a model.json")
-    document = _parse(data.decode("utf-8-sig"), file)
+    return from_document(_parse(data.decode("utf-8-sig"), file), file)
+
+
+def from_document(document: object, file: Path | None = None) -> Result:
+    """The result that a parsed model file holds.
+
+    Args:
+        document: parsed JSON, such as `to_document` gives.
+        file: where it stands, for errors.
+
+    Raises:
+        ModelError: another schema, a key that is missing or of the wrong kind, or values that are no model.
+    """
     if not isinstance(document, dict):
         raise ModelError("not a model", file=file, found=_kind(document), expected="a JSON object { ... }")
-    if document.get("schema") != schema:
+    if document.get("schema") != SCHEMA:
         raise ModelError(
             "not a model this version reads",
             file=file,
             place="schema",
             found=repr(document.get("schema")),
-            expected=schema,
+            expected=SCHEMA,
             hint="use a file written by bushfit fit-static, fit-dynamic, fit or diagnose",
         )
-    check_tables(document, file, ModelFile, kind=ModelError)
-    return document
+    tables = check_tables(document, file, ModelFile, kind=ModelError)
+    with naming(file):
+        return _result(tables)
+
+
+def _result(tables: ModelFile) -> Result:
+    """The result of checked tables.
+
+    Raises:
+        ModelError: values that are no model, or a covariance of other parameters.
+    """
+    shape, entries, fit = tables.bushing, tables.parameters, tables.fit
+    model = Model(
+        Bushing(shape.name, shape.inner_radius_m, shape.outer_radius_m, shape.length_m),
+        tables.effects,
+        {name: entry.value for name, entry in entries.items()},
+    )
+    return Result(
+        model,
+        fitted=tuple(name for name, entry in entries.items() if entry.vary),
+        covariance=_covariance(tables.covariance, model.parameters.keys()) if tables.covariance else Covariance(),
+        quality=fit.quality if fit else None,
+        measured=fit.measured if fit else None,
+        warnings=tables.warnings,
+        inputs=tables.provenance.inputs,
+        outliers=tables.outliers,
+        profile={name: entry.profile95 for name, entry in entries.items() if entry.profile95},
+        at_bound={name: entry.at_bound for name, entry in entries.items() if entry.at_bound},
+    )
+
+
+def _covariance(table: CovarianceTable, parameters: Set[str]) -> Covariance:
+    if not set(table.names) <= parameters:
+        raise ModelError("the covariance does not belong to the parameters", place="covariance")
+    size = len(table.names)
+    matrix, *spread = (np.reshape(part, (size, size)) for part in (table.matrix, *table.spread))
+    return Covariance(table.names, matrix, tuple(spread))
+
+
+def to_document(result: Result) -> dict[str, Any]:
+    """The result as JSON-ready data in the schema bushfit/model/1."""
+    model, covariance = model_document(result.model), result.covariance
+    return {
+        "schema": SCHEMA,
+        **model,
+        "parameters": {name: entry | _uncertainty(result, name) for name, entry in model["parameters"].items()},
+        "covariance": {
+            "names": list(covariance.names),
+            "matrix": covariance.matrix.tolist(),
+            "spread": [part.tolist() for part in covariance.spread],
+        },
+        "fit": _fit(result.quality, result.measured) if result.quality and result.measured else None,
+        "warnings": list(result.warnings),
+        "outliers": [asdict(outlier) for outlier in result.outliers],
+        "provenance": {
+            "bushfit": __version__,
+            "inputs": [{"file": str(source.file), "sha256": source.sha256} for source in result.inputs],
+            "packages": dict(_versions()),
+        },
+    }
+
+
+def model_document(model: Model) -> dict[str, Any]:
+    """The model as JSON-ready data: bushing, effects, parameters with value and unit."""
+    bushing = model.bushing
+    return {
+        "bushing": {
+            "name": bushing.name,
+            "inner_radius_m": bushing.inner_radius,
+            "outer_radius_m": bushing.outer_radius,
+            "length_m": bushing.length,
+        },
+        "effects": [effect.name for effect in model.records],
+        "parameters": {
+            name: {"value": float(model.values[name]), "unit": parameter.unit}
+            for name, parameter in model.parameters.items()
+        },
+    }
+
+
+def _uncertainty(result: Result, name: str) -> dict[str, Any]:
+    """What a fit says of a parameter beside its value."""
+    interval = result.interval(name)
+    entry: dict[str, Any] = {
+        "stderr": result.covariance.stderr(name),
+        "ci95": None if interval is None else list(interval),
+    }
+    if name in result.profile:
+        entry["profile95"] = list(result.profile[name])
+    if name in result.at_bound:
+        entry["at_bound"] = result.at_bound[name]
+    return entry | {"vary": name in result.fitted}
+
+
+def _fit(quality: Quality, measured: Range) -> dict[str, Any]:
+    return {
+        **asdict(quality),
+        "frequency_Hz": list(measured.frequency),
+        "strain": list(measured.strain),
+        "directions": [str(direction) for direction in measured.directions],
+    }
+
+
+@cache
+def _versions() -> dict[str, str]:
+    """Versions of the packages; reading them takes as long as a tenth of a fit."""
+    return {name: importlib.metadata.version(name) for name in _PACKAGES}
 
 
 def _parse(text: str, file: Path) -> Any:
+    """The parsed JSON of a model file; every way in which it can be wrong is one ModelError."""
     place, found = None, "brackets in brackets, too deep"
     try:
         return json.loads(text, object_pairs_hook=_without_doubles, parse_constant=_no_number)

@@ -1,4 +1,4 @@
-"""Model: a bushing, an ordered list of effects, and their values."""
+"""The model of a bushing: its geometry, the effects that its response is made of, and their values."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Direction
 from bushfit.units import for_people
 
+#: What records a response: a sweep or a loop, which may have force chains of their own.
 Kind = Literal["sweep", "loop"]
 
 #: Names of the paper's five parameters.
@@ -37,7 +38,13 @@ FIVE = tuple(parameter.name for name in BASE for parameter in effect_named(name)
 
 @dataclass(frozen=True)
 class _Structure:
-    """What follows from the names of a model's effects, whatever its values."""
+    """The effects of a model by kind, and their parameters; the same for all models with these effects.
+
+    Args:
+        records: all effects, from the rubber outward.
+        parameters: by name in files and reports.
+        branches, modifiers, layers: the effects of each kind, in that order.
+    """
 
     records: tuple[Effect, ...]
     parameters: Mapping[str, Parameter]
@@ -48,6 +55,11 @@ class _Structure:
     @classmethod
     @lru_cache(maxsize=256)
     def of(cls, names: tuple[str, ...]) -> _Structure:
+        """The structure of a model with these effects, in any order; kept, because a fit makes thousands of models.
+
+        Raises:
+            ModelError: an unknown effect, or one named twice.
+        """
         doubles = {name for name in names if names.count(name) > 1}
         if doubles:
             raise ModelError("an effect is listed twice", found=", ".join(sorted(doubles)))
@@ -66,7 +78,7 @@ class _Structure:
 
 @dataclass(frozen=True)
 class Model:
-    """A bushing, the effects its response is made of, and one value per parameter.
+    """A bushing, the effects that its response is made of, and one value per parameter; it does not change.
 
     Args:
         bushing: geometry.
@@ -91,18 +103,7 @@ class Model:
                 raise ModelError("a parameter has no value", place=name, expected=f"a number [{known[name].unit}]")
             if name not in known:
                 raise ModelError("unknown parameter", place=name, expected="one of " + ", ".join(known))
-            value, parameter = self.values[name], known[name]
-            low, high = parameter.bounds
-            if parameter.neutral is not None:
-                low, high = min(low, parameter.neutral), max(high, parameter.neutral)
-            if not low <= value <= high:
-                unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-                raise ModelError(
-                    "impossible value",
-                    place=name,
-                    found=f"{value:g}{unit}",
-                    expected=f"{low:g} to {high:g}{unit} ({parameter.meaning})",
-                )
+            _check(name, self.values[name], known[name])
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Model, (self.bushing, self.effects, dict(self.values))
@@ -113,7 +114,7 @@ class Model:
 
     @property
     def records(self) -> tuple[Effect, ...]:
-        """The effects' records, from the rubber outward: by level, and within one as the library lists them."""
+        """The effects from the rubber outward: by level, and within a level in the order of the library."""
         return self._structure.records
 
     @property
@@ -123,7 +124,7 @@ class Model:
 
     @property
     def only_branches(self) -> bool:
-        """Whether neither modifiers nor layers stand between the branches and the response."""
+        """Whether the response is the plain sum of the branches, without modifiers and layers."""
         return len(self._structure.branches) == len(self.records)
 
     def with_values(self, values: Mapping[str, float]) -> Model:
@@ -132,7 +133,7 @@ class Model:
 
     @classmethod
     def started(cls, bushing: Bushing, effects: Sequence[str], values: Mapping[str, float]) -> Model:
-        """A model with the values given, and neutral or typical ones where none is given."""
+        """A model with the values given; other parameters have their neutral value, or a typical one."""
         defaults = {
             qualified(effect, parameter): parameter.typical if parameter.neutral is None else parameter.neutral
             for effect in map(effect_named, effects)
@@ -141,11 +142,11 @@ class Model:
         return cls(bushing, tuple(effects), {name: values.get(name, default) for name, default in defaults.items()})
 
     def with_effect(self, name: str, values: Mapping[str, float] | None = None) -> Model:
-        """The model with one effect more, at the given values or at its neutral and typical ones."""
+        """The model with one effect more; parameters of it without a value start as in `started`."""
         return Model.started(self.bushing, (*self.effects, name), {**self.values, **(values or {})})
 
     def without(self, level: Level) -> Model:
-        """The model less every effect of that level."""
+        """The model without the effects of a level."""
         kept = [effect for effect in self.records if effect.level is not level]
         names = {qualified(effect, parameter) for effect in kept for parameter in effect.parameters}
         return Model(
@@ -155,7 +156,7 @@ class Model:
         )
 
     def equation(self) -> str:
-        """The model as text: its first-harmonic stiffness, the rubber inside, layers and modifiers named."""
+        """The model as text: the formula of its first-harmonic stiffness, other effects, and values in common units."""
         branches = " + ".join(effect.equation for effect in self._structure.branches)
         lines = [f"K = k ({branches}), k the stiffness of this shape per modulus"]
         lines += [f"  {effect.name}: {effect.equation}" for effect in self.records if not isinstance(effect, Branch)]
@@ -163,43 +164,6 @@ class Model:
             unit, factor = for_people(parameter.unit, 1.0, self.values[name])
             lines.append(f"  {name} = {self.values[name] * factor:.6g} {unit}".removesuffix(" -"))
         return "\n".join(lines)
-
-    def to_document(self) -> dict[str, Any]:
-        """The model as JSON-ready data: bushing, effects, parameters with value and unit."""
-        return {
-            "bushing": {
-                "name": self.bushing.name,
-                "inner_radius_m": self.bushing.inner_radius,
-                "outer_radius_m": self.bushing.outer_radius,
-                "length_m": self.bushing.length,
-            },
-            "effects": [effect.name for effect in self.records],
-            "parameters": {
-                name: {"value": float(self.values[name]), "unit": parameter.unit}
-                for name, parameter in self.parameters.items()
-            },
-        }
-
-    @classmethod
-    def from_document(cls, document: Mapping[str, Any]) -> Model:
-        """The model of `to_document`.
-
-        Raises:
-            ModelError: a key that is missing, or holds something else than expected.
-        """
-        try:
-            shape = document["bushing"]
-            bushing = Bushing(
-                str(shape["name"]),
-                *(float(shape[key]) for key in ("inner_radius_m", "outer_radius_m", "length_m")),
-            )
-            values = {str(name): float(entry["value"]) for name, entry in document["parameters"].items()}
-            effects = tuple(str(name) for name in document["effects"])
-        except KeyError as missing:
-            raise ModelError("a key is missing", place=str(missing.args[0])) from None
-        except (TypeError, ValueError, AttributeError) as wrong:
-            raise ModelError("a key holds the wrong kind of value", found=str(wrong)) from None
-        return cls(bushing, effects, values)
 
     def stiffness(
         self,
@@ -210,20 +174,22 @@ class Model:
         kind: Kind = "sweep",
         values: Values | None = None,
     ) -> Array:
-        """Complex dynamic stiffness of the steady first harmonic (Eqs. 6 to 12).
-
-        k = G mu^(omega, e0), with G of Eqs. 10, 11 and e0 of Eqs. 7, 8, inside whatever layers the model has.
+        """Complex dynamic stiffness of the steady first harmonic.
 
         Args:
             direction: of the test, or its name: axial, radial or torsion.
             frequency: [Hz], broadcast with amplitude.
             amplitude: zero-to-peak displacement [m] or rotation [rad].
-            kind: whether a loop or a sweep recorded it; only instrument effects care.
+            kind: whether a loop or a sweep records it; only effects of the instrument tell them apart.
             values: parameter values in place of the model's own; arrays whose last axis has length 1 add
                 leading axes to the result.
 
         Returns:
             [N/m] or [N m/rad].
+
+        Notes:
+            The rubber has k = G mu^(omega, e0), with G of Eqs. 10, 11, 12 and e0 of Eqs. 7, 8 (Eqs. 6 to 12); the
+            layers of the model stand around it.
         """
         omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
         amplitude = np.asarray(amplitude, dtype=float)
@@ -246,12 +212,23 @@ class Model:
         kind: Kind = "sweep",
         values: Values | None = None,
     ) -> Array:
-        """Force over a displacement history [N or N m], from rest or on the steady cycle."""
+        """Force over a displacement history [N or N m], from rest or on the steady cycle.
+
+        Args:
+            direction: of the test, or its name.
+            displacement: [m or rad], (..., n).
+            kind, values: as of `stiffness`.
+
+        Returns:
+            (..., n).
+        """
         setting = Setting(self.bushing, Direction(direction), kind)
         respond = self._stack_force(setting, self.values if values is None else values, self._structure.layers)
         return respond(displacement)
 
     def _stack_stiffness(self, setting: Setting, values: Values) -> Callable[[Array, Array], Array]:
+        """The stiffness outside all layers, as a function of omega [rad/s] and amplitude [m or rad]."""
+
         def rubber(omega: Array, amplitude: Array) -> Array:
             strain = amplitude * self.bushing.unit_strain(setting.direction)
             base = self._adjusted(setting, values, omega, amplitude, strain)
@@ -280,6 +257,7 @@ class Model:
         return below(len(layers))
 
     def _stack_force(self, setting: Setting, values: Values, layers: Sequence[Layer]) -> ForceBelow:
+        """The force outside these layers, as a function of the displacement history."""
         per_displacement = self.bushing.unit_strain(setting.direction)
         factor = self.bushing.stiffness_per_modulus(setting.direction) / (2.0 * per_displacement)
 
@@ -297,11 +275,12 @@ class Model:
         return reduce(wrap, layers, cast(ForceBelow, rubber))
 
     def _branch_stiffness(self, setting: Setting, values: Values, omega: Array, strain: Array, base: Values) -> Array:
+        """Complex stiffness of the rubber, with the paper's parameters as in `base`."""
         moduli = (branch.modulus(seen_by(branch, values, base), omega, strain) for branch in self._structure.branches)
         return np.atleast_1d(self.bushing.stiffness_per_modulus(setting.direction) * sum(moduli))
 
     def _adjusted(self, setting: Setting, values: Values, omega: Array, amplitude: Array, strain: Array) -> Values:
-        """The paper's parameters as the modifiers leave them at an operating condition."""
+        """All values, with the paper's parameters as the modifiers leave them at an operating condition."""
         if not self._structure.modifiers:
             return values
         stiffness = partial(self._branch_stiffness, setting, values, omega, strain)
@@ -311,8 +290,29 @@ class Model:
         return base
 
 
+def _check(name: str, value: float, parameter: Parameter) -> None:
+    """Refuse a value outside the bounds of its parameter; the neutral value is always allowed."""
+    low, high = parameter.bounds
+    if parameter.neutral is not None:
+        low, high = min(low, parameter.neutral), max(high, parameter.neutral)
+    if not low <= value <= high:
+        unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+        raise ModelError(
+            "impossible value",
+            place=name,
+            found=f"{value:g}{unit}",
+            expected=f"{low:g} to {high:g}{unit} ({parameter.meaning})",
+        )
+
+
 def seen_by(effect: Effect, values: Values, base: Values) -> Values:
-    """What an effect sees: all values as modifiers left them, and its own by their short names."""
+    """The values that an effect reads: `base` by their full names, and its own of `values` by their short names.
+
+    Args:
+        effect: who reads.
+        values: of all parameters.
+        base: the same, with the paper's parameters as the modifiers left them.
+    """
     if effect.name in BASE:
         return base
     return {**base, **{parameter.name: values[qualified(effect, parameter)] for parameter in effect.parameters}}

@@ -1,8 +1,8 @@
-"""The virtual test rig: the time-domain road, from a displacement history to a measured stiffness.
+"""The virtual test rig: it imposes a motion on a model, records the force, and evaluates both as a real rig does.
 
-It steps Eqs. (3) and (5) through time from rest, with the full memory of the springpot and the turning points
-of the friction, and evaluates force and displacement as a rig's controller does, by lock-in. It shares no
-formula with the closed form of the steady state, so each checks the other.
+It steps Eqs. (3) and (5) through time from rest, with the full memory of the springpot and the turning points of the
+friction, and evaluates force and displacement by lock-in. It shares no formula with the closed form of the steady
+state, so each checks the other.
 """
 
 from __future__ import annotations
@@ -16,6 +16,9 @@ from bushfit.effects.history import History
 from bushfit.geometry import Direction
 from bushfit.model.model import Kind, Model
 
+#: Time steps in a cycle, where none are asked for: within 0.03 % of the closed form at 20 Hz.
+STEPS_PER_CYCLE = 2048
+
 
 @dataclass(frozen=True)
 class Record:
@@ -27,7 +30,7 @@ class Record:
 
 
 def wave(waveform: str, phase: Array) -> Array:
-    """Unit sine or triangle of a phase [cycles], starting upward from zero."""
+    """Sine or triangle of amplitude 1 at a phase [cycles], starting upward from zero; any shape."""
     if waveform == "sine":
         return np.sin(2.0 * np.pi * phase)
     return 2.0 / np.pi * np.arcsin(np.clip(np.sin(2.0 * np.pi * phase), -1.0, 1.0))
@@ -41,7 +44,7 @@ def record(
     *,
     cycles: int,
     run_in: int = 0,
-    steps_per_cycle: int = 2048,
+    steps_per_cycle: int = STEPS_PER_CYCLE,
     waveform: str = "sine",
     kind: Kind = "sweep",
 ) -> Record:
@@ -54,9 +57,12 @@ def record(
         amplitude: zero-to-peak [m or rad].
         cycles: cycles that are kept.
         run_in: cycles before them that are not recorded.
-        steps_per_cycle: the Gruenwald-Letnikov sum is first order in 1/steps_per_cycle.
+        steps_per_cycle: time steps; the springpot's error falls in proportion to them.
         waveform: sine or triangle.
-        kind: which of the rig's force chains records it.
+        kind: whether a loop or a sweep is recorded; only effects of the instrument tell them apart.
+
+    Notes:
+        The springpot is a Gruenwald-Letnikov sum, which is first order in the time step.
     """
     step = 1.0 / (frequency * steps_per_cycle)
     count = (run_in + cycles) * steps_per_cycle + 1
@@ -69,7 +75,16 @@ def record(
 
 
 def first_harmonic(time: Array, signal: Array, frequency: float) -> complex:
-    """Complex amplitude c of the least-squares fit signal ~ mean + Re(c exp(i omega t))."""
+    """Complex amplitude of a signal at a frequency [Hz], by least squares.
+
+    Args:
+        time: [s], (n,).
+        signal: (n,), of any unit.
+        frequency: [Hz].
+
+    Notes:
+        It is c of signal ~ mean + Re(c exp(i omega t)).
+    """
     phase = 2.0 * np.pi * frequency * time
     basis = np.stack([np.ones_like(phase), np.cos(phase), -np.sin(phase)], axis=1)
     _, real, imag = np.linalg.lstsq(basis, signal, rcond=None)[0]
@@ -77,7 +92,7 @@ def first_harmonic(time: Array, signal: Array, frequency: float) -> complex:
 
 
 def lock_in(measured: Record, frequency: float) -> complex:
-    """Complex dynamic stiffness K = F~/X~ at the excitation frequency, overtones dropped (Eq. 9)."""
+    """Complex dynamic stiffness of a record at its frequency [Hz], overtones dropped: [N/m or N m/rad] (Eq. 9)."""
     force = first_harmonic(measured.time, measured.force, frequency)
     return force / first_harmonic(measured.time, measured.displacement, frequency)
 
@@ -89,16 +104,22 @@ def dynamic_stiffness(
     amplitude: Array,
     *,
     run_in: int = 10,
-    steps_per_cycle: int = 2048,
+    steps_per_cycle: int = STEPS_PER_CYCLE,
 ) -> Array:
-    """Stepped sine: one settled cycle per operating point, evaluated by lock-in; complex (n,) [N/m or N m/rad]."""
+    """Complex dynamic stiffness by stepped sine, one settled cycle per operating point: (n,) [N/m or N m/rad].
+
+    Args:
+        model: what is on the rig.
+        direction: direction of the test.
+        frequency: [Hz], (n,).
+        amplitude: zero-to-peak [m or rad], (n,).
+        run_in: cycles before the one that is evaluated.
+        steps_per_cycle: as of `record`.
+    """
     points = zip(np.atleast_1d(frequency), np.atleast_1d(amplitude), strict=True)
     return np.array(
         [
-            lock_in(
-                record(model, direction, f, x, cycles=1, run_in=run_in, steps_per_cycle=steps_per_cycle),
-                f,
-            )
+            lock_in(record(model, direction, f, x, cycles=1, run_in=run_in, steps_per_cycle=steps_per_cycle), f)
             for f, x in points
         ]
     )

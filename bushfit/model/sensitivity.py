@@ -1,9 +1,9 @@
 """Derivatives of a model's response with respect to its parameters.
 
-Where branches stand alone their slopes add up: the paper's three bring their own, the others are differenced one by
-one. Modifiers and layers mix everything, so there the whole response is differenced: all in one call, with the values
-laid along a leading axis. The differences are one-sided: good to a millionth, which a fit's steps and errors never
-notice, at half the price of central ones.
+In a model of branches alone the derivatives add up: the paper's three branches bring analytic ones, the others are
+differenced one by one. Modifiers and layers mix everything, so with them the whole response is differenced, all
+parameters in one call, with the values along a leading axis. The differences are one-sided: half the price of central
+ones, and good to a millionth, which is more than the steps and errors of a fit need.
 """
 
 from __future__ import annotations
@@ -20,18 +20,29 @@ from bushfit.effects.history import History
 from bushfit.geometry import Direction
 from bushfit.model.model import Kind, Model, seen_by
 
-#: Step of the differences, relative to the value (log parameters) or to the typical size (linear ones).
-_STEP = 1e-6
+#: Step of the differences, relative to the value (log parameters) or to the typical size (linear ones);
+#: chosen: the differences are good to about a millionth.
+_RELATIVE_STEP = 1e-6
 
-#: From a branch to its analytic slopes at a test, where it has them, and to its response for any values.
+#: Gives the analytic derivatives of a branch at a test by its parameters' short names; None where it has none.
 Slopes = Callable[[Branch], dict[str, Array] | None]
+#: Gives the response of a branch at a test for any values.
 Response = Callable[[Branch, Values], Array]
 
 
 def stiffness_jacobian(
     model: Model, direction: Direction, frequency: Array, amplitude: Array, names: Sequence[str], kind: Kind = "sweep"
 ) -> Array:
-    """dK/dp of the complex dynamic stiffness, (len(names), n)."""
+    """Derivatives of the complex dynamic stiffness by parameters: (k, n) [N/m or N m/rad per unit of the parameter].
+
+    Args:
+        model: at whose values they are taken.
+        direction: of the test.
+        frequency: [Hz], (n,).
+        amplitude: zero-to-peak [m or rad], (n,).
+        names: of the k parameters.
+        kind: what records the response.
+    """
     if not model.only_branches:
         return differences(
             model, names, lambda values: model.stiffness(direction, frequency, amplitude, kind=kind, values=values)
@@ -53,7 +64,15 @@ def stiffness_jacobian(
 def force_jacobian(
     model: Model, direction: Direction, displacement: History, names: Sequence[str], kind: Kind = "loop"
 ) -> Array:
-    """dF/dp along a displacement history, (len(names), n)."""
+    """Derivatives of the force by parameters along a displacement history: (k, n) [N or N m per unit].
+
+    Args:
+        model: at whose values they are taken.
+        direction: of the test.
+        displacement: [m or rad], (n,).
+        names: of the k parameters.
+        kind: what records the response.
+    """
     if not model.only_branches:
         return differences(model, names, lambda values: model.force(direction, displacement, kind=kind, values=values))
     per_displacement = model.bushing.unit_strain(direction)
@@ -73,7 +92,7 @@ def force_jacobian(
 def _summed(
     model: Model, names: Sequence[str], slopes: Slopes, response: Response, size: int, kind: type[float] | type[complex]
 ) -> Array:
-    """Slopes of all branches together, (len(names), size)."""
+    """Sum of the derivatives of all branches by parameters, (len(names), size)."""
     total = np.zeros((len(names), size), dtype=kind)
     row = {name: i for i, name in enumerate(names)}
     for branch in model.records:
@@ -94,7 +113,13 @@ def _summed(
 
 
 def differences(model: Model, names: Sequence[str], respond: Callable[[Values], Array]) -> Array:
-    """One-sided differences of any response, away from the bounds, from one broadcast call: (len(names), ...)."""
+    """Derivatives of any response by parameters, as one-sided differences away from the bounds: (k, n).
+
+    Args:
+        model: at whose values they are taken.
+        names: of the k parameters.
+        respond: gives the response, (..., n), for values with leading axes; it is called once.
+    """
     count = len(names)
     stacked: dict[str, Value] = dict(model.values)
     steps = np.empty((count, 1))
@@ -108,5 +133,6 @@ def differences(model: Model, names: Sequence[str], respond: Callable[[Values], 
 
 
 def _step(parameter: Parameter, value: float) -> float:
-    step = _STEP * (abs(value) if parameter.log and value else parameter.typical)
+    """Step of a difference [unit of the parameter], downward where a step up would leave the bounds."""
+    step = _RELATIVE_STEP * (abs(value) if parameter.log and value else parameter.typical)
     return step if value + step <= parameter.bounds[1] else -step

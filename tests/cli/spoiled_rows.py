@@ -176,6 +176,8 @@ IN_MODEL = [
     ("value of 400 digits", entry("parameters", "mu", "value", value=10**400), "model.json, parameters.mu.value: this value is not understood", "a number"),
     ("vary is a text", entry("parameters", "mu", "vary", value="yes"), "model.json, parameters.mu.vary: this value is not understood", "true or false"),
     ("unknown parameter", entry("parameters", "nu", value={"value": 0.5}), "model.json, nu: unknown parameter", "one of mu, m, alpha, sigma_fmax, eps_half"),
+    ("at another bound", entry("parameters", "mu", "at_bound", value="middle"), "model.json, parameters.mu.at_bound: this value is not understood", "'min' or 'max'"),
+    ("profile of one end", entry("parameters", "mu", "profile95", value=[1.0e6]), "model.json, parameters.mu.profile95 #2: a key is missing", "a further value"),
     ("covariance is a text", entry("covariance", value="none"), "model.json, covariance: this value is not understood", "a table"),
     ("covariance without matrix", without("covariance", "matrix"), "model.json, covariance.matrix: a key is missing", "matrix = ..."),
     ("covariance of another size", entry("covariance", "matrix", value=[[1.0, 2.0]]), "model.json, covariance: no covariance of its names", "1 x 1"),
@@ -186,7 +188,11 @@ IN_MODEL = [
     ("fit without noise", without("fit", "noise"), "model.json, fit.noise: a key is missing", "noise = ..."),
     ("range of one end", entry("fit", "strain", value=[0.1]), "model.json, fit.strain #2: a key is missing", "a further value"),
     ("range of texts", entry("fit", "strain", value=["a", "b"]), "model.json, fit.strain #1: this value is not understood", "a number"),
+    ("range of strains alone", without("fit", "frequency_Hz"), "model.json, fit.frequency_Hz: a key is missing", "frequency_Hz = ..."),
+    ("row of an outlier in quotes", entry("outliers", value=[{"test": "a", "file": None, "row": "7", "column": "force", "distance": 9}]), "model.json, outliers #1.row: this value is not understood", "a whole number"),
+    ("outliers without distance", entry("outliers", value=[{"test": "a", "file": None, "row": 7, "column": "force"}]), "model.json, outliers #1.distance: a key is missing", "distance = ..."),
     ("warnings is a text", entry("warnings", value="none"), "model.json, warnings: this value is not understood", "a list"),
+    ("file of an input is a number", entry("provenance", "inputs", value=[{"file": 3, "sha256": "0"}]), "model.json, provenance.inputs #1.file: this value is not understood", "a text in quotes"),
     ("inputs without checksum", entry("provenance", "inputs", value=[{"file": "a.csv"}]), "model.json, provenance.inputs #1.sha256: a key is missing", "sha256 = ..."),
 ]
 #: (name, content of the model file, what the error says ...)

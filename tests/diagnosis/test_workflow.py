@@ -22,6 +22,7 @@ from bushfit.errors import BushfitError
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction
+from bushfit.model.file import to_document
 from bushfit.model.model import Model
 from bushfit.simulation import measure, undisturbed
 
@@ -287,7 +288,7 @@ def test_what_stays_open_of_the_final_model_goes_with_it(measured: Measured) -> 
     campaign = measured({}, SHARED)
     result = asked(no_sweeps(campaign)).result
     print(*result.warnings, sep="\n")
-    assert any("cannot be told from one another" in line for line in result.to_document()["warnings"])
+    assert any("cannot be told from one another" in line for line in to_document(result)["warnings"])
     assert asked(campaign).result.warnings == ()
 
 

@@ -12,7 +12,9 @@ import pytest
 
 from bushfit.effects import BASE, LIBRARY, Effect, History, Level, Modifier, Parameter, qualified
 from bushfit.geometry import Bushing, Direction
+from bushfit.model.file import from_document, to_document
 from bushfit.model.model import Model
+from bushfit.model.result import Result
 from bushfit.model.rig import lock_in, record
 from bushfit.model.sensitivity import force_jacobian, stiffness_jacobian
 
@@ -280,7 +282,10 @@ def test_any_three_compose(rng: np.random.Generator) -> None:
 def test_a_model_survives_files_and_processes(effect: Effect, rng: np.random.Generator) -> None:
     plain = random_model(rng)
     model = sized(plain, effect.name, Direction.AXIAL, 2e-4, rng)
-    for copy in (pickle.loads(pickle.dumps(model)), Model.from_document(json.loads(json.dumps(model.to_document())))):
+    for copy in (
+        pickle.loads(pickle.dumps(model)),
+        from_document(json.loads(json.dumps(to_document(Result(model))))).model,
+    ):
         assert copy.effects == tuple(e.name for e in model.records)
         assert copy.values == model.values
         assert np.array_equal(copy.stiffness("axial", 50.0, 1e-4), model.stiffness("axial", 50.0, 1e-4))

@@ -15,6 +15,7 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
+from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
 
@@ -45,7 +46,7 @@ def test_good_data_make_it_the_symmetric_interval(rig: Callable[..., Campaign], 
     result = fit_joint(data, profile=lambda *done: told.append(done))
     assert told == [(name, 4 - place) for place, name in enumerate(FIVE)]
     assert fit_joint(data).profile == {}
-    assert fit_joint(data).to_document()["covariance"] == result.to_document()["covariance"]
+    assert to_document(fit_joint(data))["covariance"] == to_document(result)["covariance"]
     for name in FIVE:
         symmetric, profile = result.interval(name), result.profile[name]
         assert symmetric is not None
@@ -133,10 +134,10 @@ def test_a_singular_campaign_has_open_ends(
 
 def test_profiles_are_kept_in_the_document(rig: Callable[..., Campaign], paper_model: Model) -> None:
     result = profiled(rig(paper_model, plan(1e-3), 2))
-    again = Result.from_document(result.to_document())
+    again = from_document(to_document(result))
     assert again.profile == result.profile
     open_end = replace(result, profile={"mu": (1.0, None)})
-    assert Result.from_document(open_end.to_document()).profile == {"mu": (1.0, None)}
+    assert from_document(to_document(open_end)).profile == {"mu": (1.0, None)}
 
 
 def test_a_single_parameter_has_no_profile(rig: Callable[..., Campaign], paper_model: Model) -> None:

@@ -17,6 +17,7 @@ from bushfit.fitting.outliers import limit
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, fit_two_step
 from bushfit.fitting.robust import told
 from bushfit.geometry import Direction
+from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Outlier, Result
 from bushfit.reading.measurement import Loop, Sweep
@@ -171,7 +172,7 @@ def test_outliers_are_listed_by_file_and_row_and_told(
     assert [(entry.test, entry.row) for entry in linear.outliers] == [place[:2] for place in places]
     assert any("--loss soft_l1" in line and "rows 5, 71" in line for line in linear.warnings)
     assert any("left out of the fit" in line and "row 124" in line for line in soft.warnings)
-    assert Result.from_document(soft.to_document()).outliers == soft.outliers
+    assert from_document(to_document(soft)).outliers == soft.outliers
 
 
 def test_without_repeats_a_wild_point_is_found(rig: Rig, paper_noise: SimulateSettings, paper_model: Model) -> None:

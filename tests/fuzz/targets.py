@@ -12,7 +12,7 @@ from pathlib import Path
 from bushfit.campaign.campaign import load_campaign
 from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
-from bushfit.model.result import load_result
+from bushfit.model.file import load_result, to_document
 from bushfit.reading.loops import read_loop
 from bushfit.reading.sweeps import read_sweep
 
@@ -40,7 +40,7 @@ def model(folder: Path, data: bytes) -> None:
     file = folder / "model.json"
     file.write_bytes(data)
     with clear_errors():
-        load_result(file).to_document()
+        to_document(load_result(file))
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from targets import CORPUS, TARGETS, ready
 
 from bushfit.campaign.campaign import load_campaign
 from bushfit.errors import BushfitError
-from bushfit.model.result import load_result
+from bushfit.model.file import load_result
 
 each_target = pytest.mark.parametrize("name", TARGETS)
 

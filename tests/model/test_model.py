@@ -16,7 +16,9 @@ import pytest
 from bushfit.effects import BASE, History
 from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Direction
+from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
+from bushfit.model.result import Result
 
 
 def test_the_whole_reference_table(paper_model: Model, root: Path) -> None:
@@ -86,11 +88,11 @@ def test_limits_at_rest_and_at_standstill(paper_model: Model) -> None:
 
 
 def test_json_there_and_back(paper_model: Model) -> None:
-    document = json.loads(json.dumps(paper_model.to_document()))
-    assert document["parameters"]["mu"] == {"value": 1.09e6, "unit": "Pa"}
+    document = json.loads(json.dumps(to_document(Result(paper_model))))
+    assert document["parameters"]["mu"].items() >= {"value": 1.09e6, "unit": "Pa"}.items()
     assert document["effects"] == list(BASE)
     assert document["bushing"]["outer_radius_m"] == 0.018
-    back = Model.from_document(document)
+    back = from_document(document).model
     assert back == paper_model
 
 
@@ -192,7 +194,7 @@ def _with(*path: str, value: object) -> Any:
     ],
 )
 def test_a_damaged_document_is_a_model_error(paper_model: Model, damage: Any) -> None:
-    document = json.loads(json.dumps(paper_model.to_document()))
+    document = json.loads(json.dumps(to_document(Result(paper_model))))
     damage(document)
     with pytest.raises(ModelError):
-        Model.from_document(document)
+        from_document(document)

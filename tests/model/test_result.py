@@ -16,8 +16,10 @@ from bushfit.campaign.campaign import load_campaign
 from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
+from bushfit.model.covariance import Z95, Covariance
+from bushfit.model.file import SCHEMA, from_document, load_result, model_document, to_document
 from bushfit.model.model import FIVE, Model
-from bushfit.model.result import SCHEMA, Z95, Covariance, Result, load_result
+from bushfit.model.result import Result
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +29,7 @@ def result(root: Path) -> Result:
 
 @pytest.fixture
 def document(result: Result) -> dict[str, Any]:
-    return json.loads(json.dumps(result.to_document(), allow_nan=False))  # type: ignore[no-any-return]
+    return json.loads(json.dumps(to_document(result), allow_nan=False))  # type: ignore[no-any-return]
 
 
 def test_schema_of_the_interface(document: dict[str, Any]) -> None:
@@ -56,7 +58,7 @@ def test_schema_of_the_interface(document: dict[str, Any]) -> None:
 
 
 def test_there_and_back(result: Result, document: dict[str, Any]) -> None:
-    back = Result.from_document(document)
+    back = from_document(document)
     assert back.model == result.model
     assert back.fitted == result.fitted
     assert back.quality == result.quality
@@ -64,7 +66,7 @@ def test_there_and_back(result: Result, document: dict[str, Any]) -> None:
     assert back.warnings == result.warnings
     np.testing.assert_array_equal(back.covariance.matrix, result.covariance.matrix)
     np.testing.assert_array_equal(back.covariance.spread, result.covariance.spread)
-    again = back.to_document()
+    again = to_document(back)
     assert {**again, "provenance": None} == {**document, "provenance": None}
 
 
@@ -72,14 +74,14 @@ def test_a_file_that_does_not_say_which_directions_were_fitted_is_read(
     result: Result, document: dict[str, Any]
 ) -> None:
     del document["fit"]["directions"]
-    back = Result.from_document(document)
+    back = from_document(document)
     assert result.measured is not None
     assert back.measured == replace(result.measured, directions=())
 
 
 def test_a_model_alone_is_a_result(paper_model: Model, tmp_path: Path) -> None:
     file = tmp_path / "m.json"
-    file.write_text(json.dumps({"schema": SCHEMA, **paper_model.to_document()}))
+    file.write_text(json.dumps({"schema": SCHEMA, **model_document(paper_model)}))
     result = load_result(file)
     assert result.model == paper_model
     assert result.quality is None
@@ -103,7 +105,7 @@ def test_intervals_stay_within_what_is_possible(paper_model: Model) -> None:
     for name in FIVE:
         low, high = open_ended.interval(name) or (0.0, 0.0)
         assert (low, high) == paper_model.parameters[name].bounds
-    json.dumps(open_ended.to_document(), allow_nan=False)
+    json.dumps(to_document(open_ended), allow_nan=False)
 
 
 def test_covariance_root(result: Result) -> None:
@@ -161,7 +163,16 @@ DAMAGES: dict[str, Change] = {
     "fit is a list": lambda d: d.update(fit=[1, 2]),
     "fit lacks a number": lambda d: d["fit"].pop("nrmse"),
     "unknown direction": lambda d: d["fit"].update(directions=["sideways"]),
+    "a range without frequencies": lambda d: d["fit"].pop("frequency_Hz"),
     "range of three": lambda d: d["fit"].update(strain=[1, 2, 3]),
+    "at another bound": lambda d: d["parameters"]["mu"].update(at_bound="middle"),
+    "profile of one end": lambda d: d["parameters"]["mu"].update(profile95=[1.0]),
+    "profile of texts": lambda d: d["parameters"]["mu"].update(profile95=["1", "2"]),
+    "outlier without row": lambda d: d.update(outliers=[{"test": "a", "file": None, "column": "force", "distance": 9}]),
+    "outlier at half a row": lambda d: d.update(
+        outliers=[{"test": "a", "file": None, "row": 1.5, "column": "force", "distance": 9}]
+    ),
+    "outliers is null": lambda d: d.update(outliers=None),
     "provenance is text": lambda d: d.update(provenance="here"),
     "warnings is a number": lambda d: d.update(warnings=3),
 }

@@ -1,4 +1,4 @@
-"""The time-domain road against the closed form it shares no formula with."""
+"""The rig's steps through time against the closed form, with which they share no formula."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ def test_force_slopes_from_rest(paper_model: Model) -> None:
         assert np.max(np.abs(row - expected)) * paper_model.values[name] < 1e-5 * 460.0
 
 
-def test_the_analytic_road_is_taken_and_agrees_with_the_differences(
+def test_analytic_derivatives_are_used_and_agree_with_the_differences(
     paper_model: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     at = ("axial", FREQUENCY, AMPLITUDE)

@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, ScalarFormatter
 
 from bushfit.effects.contract import Array
-from bushfit.model.result import Z95
+from bushfit.model.covariance import Z95
 
 #: Inches: a figure's width, a panel's height, what title and explanation take.
 WIDTH, ROW, FRAME = (cm / 2.54 for cm in (16.0, 5.4, 2.0))

@@ -16,8 +16,9 @@ from matplotlib.transforms import Bbox
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import LoopData, SweepData
 from bushfit.geometry import Direction
+from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
-from bushfit.model.result import Covariance, Range, Result
+from bushfit.model.result import Range, Result
 from bushfit.prediction import Prediction, predict
 from bushfit.report.artifacts import prediction_files
 from bushfit.report.plots import fine_grid, loops_figure, prediction_figure, sweeps_figure, to_png

@@ -1,0 +1,98 @@
+"""The covariance of fitted parameters, and the widths of the intervals that follow from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy.special import stdtrit
+
+from bushfit.effects.contract import Array
+
+#: Half width of a 95 % interval [standard deviations] of a normal quantity whose standard deviation is known.
+Z95 = 1.959963984540054
+#: Degrees of freedom at most: from here on, Student's t is the normal distribution to a millionth.
+_MOST_FREEDOM = 1e6
+#: Degrees of freedom at least: Student's t with fewer has no variance, and its interval says next to nothing.
+_LEAST_FREEDOM = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Covariance:
+    """Covariance matrix of parameter values in their SI units, and how well it is known itself.
+
+    Args:
+        names: of the k parameters.
+        matrix: (k, k).
+        spread: for each variance behind the matrix that was itself estimated, how far the matrix moves when that
+            variance moves by its own standard error, (k, k) each.
+    """
+
+    names: tuple[str, ...] = ()
+    matrix: Array = field(default_factory=lambda: np.empty((0, 0)))
+    spread: tuple[Array, ...] = ()
+
+    def stderr(self, name: str) -> float | None:
+        """Standard error of a parameter; None where it was held at an exact value."""
+        if name not in self.names:
+            return None
+        i = self.names.index(name)
+        return float(np.sqrt(self.matrix[i, i]))
+
+    @cached_property
+    def root(self) -> Array:
+        """A matrix B with B B^T the covariance, (k, k).
+
+        Notes: |B^T slope| is the standard error of a quantity with these slopes. Unlike sqrt(slope^T C slope), it is
+        never the root of a negative number, however ill-conditioned the covariance C is.
+        """
+        return _root(self.matrix)
+
+    @cached_property
+    def _spread_roots(self) -> list[Array]:
+        return [_root(part) for part in self.spread]
+
+    def half_width(self, slopes: Array) -> Array:
+        """Half width of the 95 % intervals of n quantities, (n,).
+
+        Args:
+            slopes: of each quantity by each parameter, (k, n).
+
+        Notes: Student's t with the effective degrees of freedom of Satterthwaite (1946): 2 v^2 over the variance of v,
+        where v is the quantity's variance, and the variance of v is the sum of squares of what each spread adds to v.
+        """
+        variance = np.sum(np.square(self.root.T @ slopes), axis=0)
+        moved = [np.sum(np.square(root.T @ slopes), axis=0) for root in self._spread_roots]
+        unsure = np.sqrt(np.sum(np.square(moved), axis=0)) if moved else np.zeros_like(variance)
+        least = np.sqrt(2.0 / _MOST_FREEDOM)
+        share = np.divide(unsure, variance, out=np.zeros_like(variance), where=variance > 0.0)
+        freedom = np.maximum(2.0 / np.square(np.maximum(share, least)), _LEAST_FREEDOM)
+        return stdtrit(freedom, 0.975) * np.sqrt(variance)
+
+    def correlations(self) -> list[tuple[str, str, float]]:
+        """Two names and their correlation for every pair of parameters, the most correlated first."""
+        sigma = np.sqrt(np.diag(self.matrix))
+        pairs = [
+            (self.names[i], self.names[j], float(self.matrix[i, j] / (sigma[i] * sigma[j])))
+            for i in range(len(self.names))
+            for j in range(i + 1, len(self.names))
+            if sigma[i] * sigma[j] > 0.0
+        ]
+        return sorted(pairs, key=lambda pair: -abs(pair[2]))
+
+    def restricted(self, names: Sequence[str]) -> Covariance:
+        """The covariance of some of the parameters, in the order that they have here."""
+        kept = [i for i, name in enumerate(self.names) if name in names]
+        square = np.ix_(kept, kept)
+        names = tuple(self.names[i] for i in kept)
+        return Covariance(names, self.matrix[square], tuple(part[square] for part in self.spread))
+
+
+def _root(matrix: Array) -> Array:
+    """A matrix B with B B^T the given covariance, from the eigenvectors of the correlation matrix."""
+    sigma = np.sqrt(np.diag(matrix))
+    safe = np.where(sigma > 0.0, sigma, 1.0)
+    values, vectors = np.linalg.eigh(matrix / np.outer(safe, safe))
+    return sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
