@@ -86,7 +86,9 @@ def test_sizes_and_gains_of_a_fault(measured: Measured, fitted: Callable[..., ob
     quiet, chance = faults(clean, 0.998)  # type: ignore[arg-type]
     loud, _ = faults(found, 0.998)  # type: ignore[arg-type]
     best = max(loud, key=lambda fault: fault.worth)
-    print(f"{best.suspect.words}: {100 * best.size:.1f} %, gain {best.gain:.0f}; clean {max(f.gain for f in quiet):.1f}")
+    print(
+        f"{best.suspect.words}: {100 * best.size:.1f} %, gain {best.gain:.0f}; clean {max(f.gain for f in quiet):.1f}"
+    )
     assert max(fault.gain for fault in quiet) < chance < best.gain
     assert best.suspect.kind == "level"
     assert best.size == pytest.approx(0.05, abs=0.015)
