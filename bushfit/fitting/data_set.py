@@ -6,16 +6,17 @@ of `DataSet` and need not know which kind of test it is.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
-from typing import Any, Protocol, Self
+from typing import Any, ClassVar, Self
 
 from bushfit.effects.contract import Array, Values
 from bushfit.geometry import Direction
 from bushfit.model.model import Kind, Model
 from bushfit.model.result import Outlier
-from bushfit.reading.measurement import Source
+from bushfit.reading.measurement import Loop, Source, Sweep
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,105 +46,134 @@ class Suspect:
 SUSPECT_KINDS = ("frequency", "level", "repeat", "row", "loop")
 
 
-class DataSet(Protocol):
+class DataSet(ABC):
     """One measured test with its noise: what every loop and every sweep answers.
 
     A whitened residual is model less measured in units of noise; residuals are independent with unit variance where
     the model is right. Of n points a loop has n residuals, a sweep 2 n: all gains, then all phases.
+
+    Args:
+        kind: whether it is a loop or a sweep.
+        parts: numbers that make up a point: 1 for a force, 2 for a complex stiffness.
     """
 
-    @property
-    def kind(self) -> Kind:
-        """Whether it is a loop or a sweep."""
+    kind: ClassVar[Kind]
+    parts: ClassVar[int]
 
     @property
-    def parts(self) -> int:
-        """Numbers that make up a point: 1 for a force, 2 for a complex stiffness."""
+    @abstractmethod
+    def test(self) -> Loop | Sweep:
+        """What was measured."""
 
     @property
     def name(self) -> str:
         """Of the test."""
+        return self.test.name
 
     @property
     def direction(self) -> Direction:
         """Of the test."""
+        return self.test.direction
 
     @property
     def source(self) -> Source | None:
         """The file it came from; None where it came from none."""
+        return self.test.source
 
     @property
     def notes(self) -> Sequence[str]:
         """What is odd about the record, for the user."""
+        return ()
 
     @property
+    @abstractmethod
     def size(self) -> int:
         """Number of residuals."""
 
     @property
+    @abstractmethod
     def counted(self) -> int:
         """Number of residuals that carry weight."""
 
     @property
+    @abstractmethod
     def frequency(self) -> Array:
         """Of the operating points [Hz], (n,); a loop has one."""
 
     @property
+    @abstractmethod
     def amplitude(self) -> Array:
         """Of the operating points, zero-to-peak [m or rad], (n,); a loop has one."""
 
     @property
+    @abstractmethod
     def measured(self) -> Array:
         """Complex stiffness at the operating points [N/m or N m/rad], (n,)."""
 
     @property
+    @abstractmethod
     def relative_noise(self) -> float:
         """Standard deviation of one point, relative to |K| or to half a loop's force range."""
 
     @property
     def blocks(self) -> Sequence[Array]:
         """Indices of the residuals that share an error of the rig, a group each."""
+        return ()
 
     @property
     def shared_freedom(self) -> int:
         """Degrees of freedom behind the errors that blocks share; 0 where these are not measured."""
+        return 0
 
+    @abstractmethod
     def residual(self, model: Model, values: Values | None = None) -> Array:
         """Whitened residuals, (..., size); `values` in place of the model's own add leading axes."""
 
+    @abstractmethod
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
         """Derivatives of the whitened residuals by fit coordinate, (len(names), size)."""
 
+    @abstractmethod
     def relative(self, model: Model) -> Array:
         """Misfit of the points that carry weight, relative to |K| or to half a loop's force range, for NRMSE."""
 
+    @abstractmethod
     def distance(self, model: Model) -> Array:
         """How far each point lies off the model, in units of noise, (n,)."""
 
+    @abstractmethod
     def shown(self, model: Model) -> Array:
         """As `residual`, and of points without weight how far one lies off, in units of noise, (size,)."""
 
+    @abstractmethod
     def change(self, one: Model, other: Model) -> float:
         """Largest difference between two models, relative to |K| or to half a loop's force range."""
 
+    @abstractmethod
     def noise_free(self, model: Model) -> Self:
         """The same test as the model would have it, without noise."""
 
+    @abstractmethod
     def weighted(self, weight: Array) -> Self:
         """The same test with the weight of each point, (n,), times a share."""
 
-    def without(self, points: Array) -> Self:
+    def without(self, points: Array) -> Self:  # noqa: ARG002
         """The same test with no weight on some of its points, by number."""
+        return self
 
     def standing(self) -> Self:
         """The part of the test that carries weight."""
+        return self
 
+    @abstractmethod
     def outlying(self, model: Model) -> Array:
         """Numbers of the points that are outliers: far off the model and off their neighbours alike."""
 
+    @abstractmethod
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
         """Outliers by file and row."""
 
+    @abstractmethod
     def unsure(self, influence: Array) -> Mapping[Hashable, Array]:
         """How an estimator reacts to each variance of the noise that was itself estimated.
 
@@ -155,18 +185,23 @@ class DataSet(Protocol):
             variance, times its standard error.
         """
 
+    @abstractmethod
     def contrasts(self) -> Array:
         """Whitened residuals of all that is smooth, (c, size): slow in frequency, or low harmonics of a loop."""
 
+    @abstractmethod
     def smooth_misfit(self, model: Model) -> float:
         """Largest smooth misfit, relative to |K| or to half a loop's force range."""
 
+    @abstractmethod
     def suspects(self, residual: Array) -> Iterator[Suspect]:
         """Points that a fault of the rig may have moved together, given the whitened residuals, (size,)."""
 
+    @abstractmethod
     def columns(self) -> Mapping[str, Any]:
         """What names each residual's point in a table: columns by header."""
 
+    @abstractmethod
     def components(self, residual: Array) -> Mapping[str, Array]:
         """Whitened residuals by what they are residuals of: storage and loss, or force."""
 

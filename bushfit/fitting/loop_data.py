@@ -5,34 +5,32 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Self
 
 import numpy as np
 
 from bushfit.effects.contract import Array, Values
-from bushfit.fitting.data_set import Suspect, kept
+from bushfit.fitting.data_set import DataSet, Suspect, kept
 from bushfit.fitting.drive import Drive
-from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.model.sensitivity import force_jacobian
-from bushfit.reading.measurement import Loop, Source
+from bushfit.reading.measurement import Loop
 
 #: Harmonics of a loop that count as smooth misfit: beyond the fifth, physics makes next to nothing.
 _SMOOTH_HARMONICS = 5
 
 
 @dataclass(frozen=True, eq=False)
-class LoopData:
-    """Force over the rows of a loop; see `DataSet` for its answers."""
+class LoopData(DataSet):
+    """Force over the rows of a loop; see `DataSet` for its answers.
+
+    Rows that are left out carry no weight from the start, see `drive_of`, and stay: the others need them to keep time.
+    """
 
     drive: Drive
-    kind: Literal["loop"] = "loop"
-    parts: Literal[1] = 1
-
-    @property
-    def name(self) -> str:
-        return self.loop.name
+    kind = "loop"
+    parts = 1
 
     @property
     def size(self) -> int:
@@ -43,16 +41,8 @@ class LoopData:
         return int(np.count_nonzero(self.drive.weight))
 
     @property
-    def loop(self) -> Loop:
+    def test(self) -> Loop:
         return self.drive.loop
-
-    @property
-    def direction(self) -> Direction:
-        return self.loop.direction
-
-    @property
-    def source(self) -> Source | None:
-        return self.loop.source
 
     @property
     def notes(self) -> Sequence[str]:
@@ -78,14 +68,6 @@ class LoopData:
         """Standard deviation of one row, relative to half the force range."""
         return self.drive.noise / self.drive.half_range
 
-    @property
-    def blocks(self) -> Sequence[Array]:
-        return ()
-
-    @property
-    def shared_freedom(self) -> int:
-        return 0
-
     def force(self, model: Model, values: Values | None = None) -> Array:
         """Model force at the rows [N or N m], (..., n)."""
         return self._force(model) if values is None else self._force_of(model, values)
@@ -96,7 +78,7 @@ class LoopData:
 
     def _force_of(self, model: Model, values: Values) -> Array:
         history = self.drive.history(_settles(model))
-        force = model.force(self.loop.direction, history, kind="loop", values=values)
+        force = model.force(self.direction, history, kind="loop", values=values)
         return self.drive.at_rows(self.drive.from_datum(force)) + (self.drive.datum or 0.0)
 
     def residual(self, model: Model, values: Values | None = None) -> Array:
@@ -108,10 +90,10 @@ class LoopData:
     @kept
     def _jacobian(self, model: Model, names: tuple[str, ...]) -> Array:
         history = self.drive.history(_settles(model))
-        slopes = force_jacobian(model, self.loop.direction, history, names)
+        slopes = force_jacobian(model, self.direction, history, names)
         return self.drive.at_rows(self.drive.from_datum(slopes)) * self._per_noise
 
-    def noise_free(self, model: Model) -> LoopData:
+    def noise_free(self, model: Model) -> Self:
         force = self.force(model)
         return replace(self, drive=replace(self.drive, force=force, half_range=float(np.ptp(force)) / 2.0))
 
@@ -128,16 +110,8 @@ class LoopData:
         off = (self.force(model) - self.drive.force) / self.drive.noise
         return np.where(self.drive.weight > 0.0, self.residual(model), off)
 
-    def weighted(self, weight: Array) -> LoopData:
+    def weighted(self, weight: Array) -> Self:
         return replace(self, drive=replace(self.drive, weight=self.drive.weight * weight))
-
-    def without(self, points: Array) -> LoopData:
-        """The same: rows of a loop that are left out have no weight from the start, see `drive_of`."""
-        return self
-
-    def standing(self) -> LoopData:
-        """The whole loop: its rows without weight are needed to keep time."""
-        return self
 
     def outlying(self, model: Model) -> Array:
         """Rows of the record, from 0, whose force stands out from the loop's own harmonics; no model is asked."""
@@ -150,7 +124,7 @@ class LoopData:
                 yield Outlier(self.name, file, row + self.drive.first_row + 1, column, off)
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
-        return {} if self.loop.noise is not None else {self.name: np.sqrt(2.0 / self.counted) * influence}
+        return {} if self.test.noise is not None else {self.name: np.sqrt(2.0 / self.counted) * influence}
 
     def contrasts(self) -> Array:
         """A constant force, and the cosine and sine of each harmonic, as whitened residuals, (11, n)."""

@@ -6,12 +6,12 @@ from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 
 from bushfit.effects.contract import Array, Values
-from bushfit.fitting.data_set import Suspect, kept, shown_amplitude
+from bushfit.fitting.data_set import DataSet, Suspect, kept, shown_amplitude
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.sweep_outliers import outlying_points
 from bushfit.fitting.whitening import Whitening
@@ -19,7 +19,7 @@ from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.model.sensitivity import stiffness_jacobian
-from bushfit.reading.measurement import Source, Sweep
+from bushfit.reading.measurement import Sweep
 
 Residuals = Literal["complex", "magnitude_loss_factor"]
 
@@ -57,7 +57,7 @@ class Level:
 
 
 @dataclass(frozen=True, eq=False)
-class SweepData:
+class SweepData(DataSet):
     """Dynamic stiffness of a sweep, as relative complex residual or as magnitude and loss factor; see `DataSet`.
 
     Points stand sorted by block (amplitude, repeat), then frequency. The residual (K - K_meas)/K_meas has the gain
@@ -76,12 +76,12 @@ class SweepData:
     residuals: Residuals = "complex"
     weight: Array | None = None
     part: Array | None = None
-    kind: Literal["sweep"] = "sweep"
-    parts: Literal[2] = 2
+    kind = "sweep"
+    parts = 2
 
     @property
-    def name(self) -> str:
-        return self.sweep.name
+    def test(self) -> Sweep:
+        return self.sweep
 
     @property
     def size(self) -> int:
@@ -90,18 +90,6 @@ class SweepData:
     @property
     def counted(self) -> int:
         return 2 * int(np.count_nonzero(self.weights))
-
-    @property
-    def direction(self) -> Direction:
-        return self.sweep.direction
-
-    @property
-    def source(self) -> Source | None:
-        return self.sweep.source
-
-    @property
-    def notes(self) -> Sequence[str]:
-        return ()
 
     @property
     def relative_noise(self) -> float:
@@ -118,16 +106,16 @@ class SweepData:
         edges = [*self.block_starts.tolist(), count]
         return [part + np.arange(first, last) for part in (0, count) for first, last in pairwise(edges)]
 
-    def at_amplitudes(self, amplitudes: Sequence[float]) -> SweepData:
+    def at_amplitudes(self, amplitudes: Sequence[float]) -> Self:
         """The part of the sweep at some of its levels, with the same noise."""
         return self._part(np.isin(self.sweep.amplitude, amplitudes))
 
-    def standing(self) -> SweepData:
+    def standing(self) -> Self:
         kept_rows = np.empty(self.frequency.size, dtype=bool)
         kept_rows[self.order] = self.weights > 0.0
         return self if kept_rows.all() else self._part(kept_rows)
 
-    def _part(self, rows: Array) -> SweepData:
+    def _part(self, rows: Array) -> Self:
         sweep = replace(
             self.sweep,
             frequency=self.sweep.frequency[rows],
@@ -139,13 +127,13 @@ class SweepData:
         weight = None if self.weight is None else self.weight[rows[self.order]]
         return replace(self, sweep=sweep, weight=weight, part=self._whole[rows])
 
-    def weighted(self, weight: Array) -> SweepData:
+    def weighted(self, weight: Array) -> Self:
         return replace(self, weight=self.weights * weight)
 
-    def without(self, points: Array) -> SweepData:
+    def without(self, points: Array) -> Self:
         return self.weighted(np.isin(np.arange(self.frequency.size), points, invert=True)) if points.size else self
 
-    def noise_free(self, model: Model) -> SweepData:
+    def noise_free(self, model: Model) -> Self:
         stiffness = np.empty_like(self.sweep.stiffness)
         stiffness[self.order] = self.stiffness(model)
         return replace(self, sweep=replace(self.sweep, stiffness=stiffness))
@@ -200,7 +188,7 @@ class SweepData:
 
     def _stiffness_of(self, model: Model, values: Values) -> Array:
         frequency, amplitude, place = self._distinct
-        return model.stiffness(self.sweep.direction, frequency, amplitude, values=values)[..., place]
+        return model.stiffness(self.direction, frequency, amplitude, values=values)[..., place]
 
     @cached_property
     def _distinct(self) -> tuple[Array, Array, Array]:
@@ -246,7 +234,7 @@ class SweepData:
     @kept
     def _jacobian(self, model: Model, names: tuple[str, ...]) -> Array:
         frequency, amplitude, place = self._distinct
-        slopes = stiffness_jacobian(model, self.sweep.direction, frequency, amplitude, names)[:, place]
+        slopes = stiffness_jacobian(model, self.direction, frequency, amplitude, names)[:, place]
         if self.residuals == "complex":
             return self.whiten(slopes / self.measured)
         stiffness = self.stiffness(model)

@@ -55,7 +55,7 @@ def loops_table(model: Model, data_sets: Sequence[LoopData]) -> pd.DataFrame:
         frames.append(
             pd.DataFrame(
                 {
-                    "loop": data_set.loop.name,
+                    "loop": data_set.test.name,
                     "direction": str(data_set.direction),
                     "time [s]": drive.phase / drive.frequency,
                     f"displacement [{length}]": drive.displacement(drive.phase) * length_factor,

@@ -118,7 +118,7 @@ def loops_legend(axes: Axes, data_sets: Sequence[LoopData], model: Line2D | None
     unit, length = data_sets[0].direction.display.displacement
     labels = [f"{length * data_set.amplitude[0]:.3g} {unit}, {data_set.frequency[0]:.3g} Hz" for data_set in data_sets]
     if len(set(labels)) < len(labels):
-        names = [data_set.loop.name.replace("$", r"\$") for data_set in data_sets]
+        names = [data_set.test.name.replace("$", r"\$") for data_set in data_sets]
         labels = [f"{label}\n{name}" for label, name in zip(labels, names, strict=True)]
     handles = [style.handle(False) for style in styles(len(data_sets), "loop")]
     if model:
@@ -141,7 +141,7 @@ def _drawn_rows(data_set: LoopData) -> Array:
     """Rows of the first and last two cycles, thinned to what an eye can tell apart; wild ones are drawn as crosses."""
     phase = data_set.drive.phase
     drawn = (phase < 2.0) | (phase > phase[-1] - 2.0)
-    if phase.size == data_set.loop.force.size:
+    if phase.size == data_set.test.force.size:
         drawn[data_set.drive.outliers["force"].rows] = False
     rows = np.flatnonzero(drawn)
     return rows[:: max(1, -(-rows.size // _MOST_ROWS))]

@@ -76,7 +76,7 @@ def means(data_sets: Sequence[SweepData]) -> Points:
 
 def wild_points(data_set: LoopData) -> tuple[Array, Array]:
     """Phase [cycles] and force [N or N m] of a loop's rows that are faults of the record, (k,) each."""
-    loop, rows = data_set.loop, data_set.drive.outliers["force"].rows
+    loop, rows = data_set.test, data_set.drive.outliers["force"].rows
     return (loop.time[rows] - loop.time[0]) * data_set.drive.frequency, loop.force[rows]
 
 

@@ -197,7 +197,7 @@ def test_loops_show_model_and_residuals(paper_model: Model, looped: Looped) -> N
 @pytest.mark.parametrize("run_in", [0, 5])
 def test_long_loops_are_drawn_thin(paper_model: Model, run_in: int, looped: Looped) -> None:
     data_set = looped(paper_model, 1e-3, cycles=40, run_in=run_in)
-    assert data_set.loop.force.size > 40_000
+    assert data_set.test.force.size > 40_000
     figure = loops_figure(paper_model, [data_set], "long")
     assert max(len(line.get_xdata()) for axes in figure.axes for line in (*lines(axes), *points(axes))) <= 1600
     model_line = lines(figure.axes[0])[0]
