@@ -9,6 +9,8 @@ from typing import Literal
 
 import numpy as np
 
+from bushfit.reading.measurement import Floats
+
 Kind = Literal["loop", "sweep"]
 
 _PHASE = np.linspace(0.0, 4.0 * np.pi, 60)
@@ -24,6 +26,13 @@ NUMBERS: dict[Kind, list[list[Decimal]]] = {
         for f in (5, 15, 25, 35, 45, 55)
     ],
 }
+
+
+def expected(kind: Kind) -> list[Floats]:
+    """The columns of a kind of test, each (n,), in the units of its file."""
+    return [np.array([float(cell) for cell in column]) for column in zip(*NUMBERS[kind], strict=True)]
+
+
 HEADERS: dict[str, dict[Kind, str]] = {
     "english": {
         "loop": "time, displacement, force",
