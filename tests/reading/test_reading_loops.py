@@ -1,49 +1,20 @@
-"""CSV files: every way to write a table reads the same, and every kind of damage has its one error."""
+"""Loops from files: every way to write a table reads the same, and every kind of damage has its one error."""
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
+from texts import LOOP, LOOP_ROWS, TIME, loop_from, with_line
 
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.geometry import Direction
-from bushfit.reading.loops import read_loop
-from bushfit.reading.measurement import Loop, Sweep, rebuild_time
 from bushfit.reading.parallel import CHUNK
-from bushfit.reading.sweeps import read_sweep
-
-TIME = np.arange(40) * 0.1
-LOOP_ROWS = [f"{t:.1f},{np.sin(3 * t):.4f},{100 * np.sin(3 * t + 0.1):.3f}" for t in TIME]
-LOOP = "\n".join(["time [s],displacement [mm],force [N]", *LOOP_ROWS]) + "\n"
-SWEEP_HEADER = "frequency [Hz],amplitude [mm],stiffness [N/mm],loss factor [-]"
-SWEEP_ROWS = [f"{f},{a},{500 + f},0.1" for a in (0.1, 0.2) for f in (5, 15, 25, 35)]
-SWEEP = "\n".join([SWEEP_HEADER, *SWEEP_ROWS]) + "\n"
-
-
-def loop_from(text: str | bytes, folder: Path, **options: Any) -> Loop:
-    file = folder / "loop.csv"
-    file.write_bytes(text.encode() if isinstance(text, str) else text)
-    return read_loop(file, options.pop("direction", Direction.AXIAL), **options)
-
-
-def sweep_from(text: str, folder: Path, **options: Any) -> Sweep:
-    file = folder / "sweep.csv"
-    file.write_text(text)
-    return read_sweep(file, options.pop("direction", Direction.AXIAL), **options)
-
-
-def with_line(text: str, number: int, line: str) -> str:
-    lines = text.splitlines()
-    lines[number - 1] = line
-    return "\n".join(lines)
 
 
 @pytest.mark.parametrize(
@@ -105,67 +76,6 @@ def test_torsion_counts_in_rad(tmp_path: Path) -> None:
     assert loop.displacement.max() == pytest.approx(np.radians(1.0), rel=1e-2)
 
 
-@pytest.mark.parametrize("waveform", ["sine", "triangle"])
-@pytest.mark.parametrize("noise", [0.0, 1e-3])
-def test_time_rebuilt_from_frequency(waveform: Any, noise: float) -> None:
-    time = np.sort(np.random.default_rng(1).uniform(0.0, 30.0, 3000))
-    sine = np.sin(2 * np.pi * 0.1 * (time - time[0]))
-    displacement = sine if waveform == "sine" else 2 / np.pi * np.arcsin(sine)
-    displacement += noise * np.random.default_rng(2).standard_normal(time.size)
-    rebuilt = rebuild_time(displacement, frequency=0.1, waveform=waveform)
-    assert np.all(np.diff(rebuilt) > 0)
-    np.testing.assert_allclose(rebuilt, time - time[0], atol=0.02 if noise == 0 else 0.2)
-
-
-def test_time_rebuilt_from_rate(tmp_path: Path) -> None:
-    text = "\n".join(["displacement [mm],force [N]", *(f"{x},{x}" for x in [0, 1, 2, 2, 1, 0, -1, -2, -1, 0])])
-    loop = loop_from(text, tmp_path, rate=1e-3)
-    assert loop.time[-1] == pytest.approx(8.0)
-    assert np.all(np.diff(loop.time) > 0)
-
-
-@given(arrays(float, st.integers(2, 60), elements=st.integers(-5, 5).map(float)).filter(lambda x: np.ptp(x) > 0))
-def test_rebuilt_time_always_increases(displacement: Any) -> None:
-    for waveform in ("sine", "triangle"):
-        assert np.all(np.diff(rebuild_time(displacement, frequency=1.0, waveform=waveform)) > 0)
-
-
-@pytest.mark.parametrize(
-    ("columns", "second"),
-    [
-        ("stiffness [N/mm],loss factor [-]", "{k},{eta}"),
-        ("stiffness [kN/m],tan_delta", "{k},{eta}"),
-        ("Stiffness [N/mm],Loss-Factor [%]", "{k},{eta_percent}"),
-        ("dynamic_stiffness_N/mm,phase_deg", "{k},{phase}"),
-        ("storage stiffness [N/mm],loss stiffness [N/mm]", "{real},{imaginary}"),
-    ],
-)
-def test_sweeps_in_every_pair(columns: str, second: str, tmp_path: Path) -> None:
-    stiffness = np.array([600.0, 610.0, 620.0, 630.0]) * np.exp(0.1j)
-    rows = [
-        f"{5 + 10 * i},0.1,"
-        + second.format(
-            k=abs(k), eta=k.imag / k.real, eta_percent=100 * k.imag / k.real,
-            phase=np.degrees(np.angle(k)), real=k.real, imaginary=k.imag,
-        )
-        for i, k in enumerate(stiffness)
-    ]  # fmt: skip
-    sweep = sweep_from("\n".join([f"frequency [Hz],amplitude [mm],{columns}", *rows]), tmp_path)
-    np.testing.assert_allclose(sweep.stiffness, stiffness * 1e3, rtol=1e-12)
-    np.testing.assert_allclose(sweep.frequency, [5, 15, 25, 35])
-
-
-def test_repeats_are_numbered(tmp_path: Path) -> None:
-    doubled = "\n".join([SWEEP_HEADER, *SWEEP_ROWS, *SWEEP_ROWS])
-    assert sweep_from(doubled, tmp_path).repeat.tolist() == [1] * 8 + [2] * 8
-    stated = "\n".join([SWEEP_HEADER + ",repeat", *(f"{row},3" for row in SWEEP_ROWS)])
-    assert set(sweep_from(stated, tmp_path).repeat) == {3}
-
-
-def test_peak_to_peak_is_halved(tmp_path: Path) -> None:
-    assert sweep_from(SWEEP, tmp_path, amplitude="peak-to-peak").amplitude[0] == pytest.approx(0.05e-3)
-
-
 @pytest.mark.parametrize("lead", ["", "# rig 3\n\n", 'Operator "A"\n', "\ufeff", "Prüfstand 3\n"])
 def test_a_large_file_reads_like_a_small_one(lead: str, tmp_path: Path) -> None:
     """5 MB, which pandas reads on all cores; an error late in the file still has its line."""
@@ -194,6 +104,8 @@ def test_time_that_stands_still_is_found_wherever_blocks_meet(row: int, tmp_path
 
 
 NEVER = [f"{i},{i},7" for i in range(20)]
+
+
 BAD_LOOPS: list[tuple[str, str | bytes, list[str]]] = [
     ("empty", "", ["empty"]),
     ("blank", " \n\r\n", ["empty"]),
@@ -248,90 +160,6 @@ def test_spoiled_loops_have_one_clear_error(text: str | bytes, words: list[str],
         loop_from(text, tmp_path)
     message = str(caught.value)
     assert all(word in message for word in ["loop.csv", *words]), message
-
-
-#: |K|, loss factor, phase, K' and K'' of the same stiffness, rounded as files are.
-ALL_PAIRS = "\n".join(
-    [
-        f"{SWEEP_HEADER},phase [deg],K' [N/mm],K'' [N/mm]",
-        *(
-            f"{5 + 10 * i},0.1,{abs(k):.1f},{k.imag / k.real:.3f},"
-            f"{np.degrees(np.angle(k)):.1f},{k.real:.0f},{k.imag:.0f}"
-            for i, k in enumerate(np.array([600.0, 610.0, 620.0, 630.0]) * np.exp(0.11j))
-        ),
-    ]
-)
-
-
-def test_columns_that_say_the_same_may_be_rounded_or_count_a_phase_the_other_way(tmp_path: Path) -> None:
-    stiffness = sweep_from(ALL_PAIRS, tmp_path).stiffness
-    np.testing.assert_allclose(stiffness, 1e3 * np.array([600.0, 610.0, 620.0, 630.0]) * np.exp(0.11j), rtol=1e-3)
-    assert np.array_equal(sweep_from(ALL_PAIRS.replace(",6.", ",-6."), tmp_path).stiffness, stiffness)
-
-
-def test_noise_about_no_loss_is_no_loss_the_other_way(tmp_path: Path) -> None:
-    assert np.median(sweep_from(SWEEP.replace("0.1\n", "-0.002\n"), tmp_path).stiffness.imag) < 0.0
-
-
-BAD_SWEEPS = [
-    ("no pair", SWEEP.replace("loss factor [-]", "x"), ["line 1", "no pair", "storage stiffness"]),
-    ("frequency unit", SWEEP.replace("[Hz]", "[rad/s]"), ["line 1", "does not fit", "a frequency"]),
-    ("phase unit", SWEEP.replace("loss factor [-]", "phase"), ["line 1", "the phase has no unit", "phase [deg]"]),
-    ("decibel", SWEEP.replace("[-]", "[dB]"), ["line 1", "unknown unit", "dB"]),
-    ("frequency", with_line(SWEEP, 3, "-15,0.1,600,0.1"), ["line 3", "frequency is not positive", '"-15"']),
-    ("amplitude", with_line(SWEEP, 3, "15,0,600,0.1"), ["line 3", "amplitude is not positive", '"0"']),
-    ("stiffness", with_line(SWEEP, 3, "15,0.1,-600,0.1"), ["line 3", "stiffness is not positive", '"-600"']),
-    ("negative loss", with_line(SWEEP, 3, "15,0.1,600,-0.9"), ["line 3", "loss factor", "-0.5 to 5", '"-0.9"']),
-    ("percent as ratio", with_line(SWEEP, 3, "15,0.1,600,11"), ["line 3", "%", '"11"']),
-    ("phase over 90", with_line(SWEEP.replace("loss factor [-]", "phase [deg]"), 3, "15,0.1,600,95"), ["line 3", "95"]),
-    (
-        "tiny storage",
-        with_line(
-            SWEEP.replace("loss factor [-]", "loss stiffness [N/mm]").replace(
-                "stiffness [N/mm],l", "storage stiffness [N/mm],l"
-            ),
-            3,
-            "15,0.1,1e-320,600",
-        ),
-        ["line 3", "loss"],
-    ),
-    (
-        "phase the other way",
-        SWEEP.replace("loss factor [-]", "phase [deg]").replace("0.1\n", "-6.5\n"),
-        ["the loss counts the other way", '"phase [deg]"', "8 of 8 rows", "turn the sign"],
-    ),
-    ("ratio as percent", SWEEP.replace("[-]", "[%]"), ['"loss factor [%]"', "0.1 % at most", "0.5 %", '"[-]"']),
-    (
-        "pairs that contradict",
-        with_line(ALL_PAIRS, 4, ALL_PAIRS.splitlines()[3].replace(",6.", ",9.")),
-        ["line 4", "contradict", '"phase [deg]"', '"loss factor [-]"'],
-    ),
-    ("another stiffness", ALL_PAIRS.replace("K' [N/mm]", "K' [kN/mm]"), ["line 2", "contradict", "K' [kN/mm]"]),
-    ("repeat", SWEEP.replace("0.1\n", "0.1,1.5\n").replace("[-]", "[-],repeat"), ["line 2", "no repeat", '"1.5"']),
-    ("few rows", "\n".join(SWEEP.splitlines()[:3]), ["too few rows", "2", "3"]),
-]
-
-
-@pytest.mark.parametrize(("text", "words"), [case[1:] for case in BAD_SWEEPS], ids=[case[0] for case in BAD_SWEEPS])
-def test_spoiled_sweeps_have_one_clear_error(text: str, words: list[str], tmp_path: Path) -> None:
-    with pytest.raises(BushfitError) as caught:
-        sweep_from(text, tmp_path)
-    message = str(caught.value)
-    assert all(word in message for word in ["sweep.csv", *words]), message
-
-
-def test_missing_column_of_the_campaign_suggests_the_nearest(tmp_path: Path) -> None:
-    with pytest.raises(MeasurementError, match=r'no column "forse"[\s\S]*did you mean "force \[N\]"'):
-        loop_from(LOOP, tmp_path, columns={"force": "forse"})
-
-
-@pytest.mark.parametrize(
-    ("name", "words"), [("", "a folder"), ("lop.csv", 'did you mean "loop.csv"'), ("a/b", "no such")]
-)
-def test_what_is_no_file(name: str, words: str, tmp_path: Path) -> None:
-    (tmp_path / "loop.csv").touch()
-    with pytest.raises(MeasurementError, match=words):
-        read_loop(tmp_path / name, Direction.AXIAL)
 
 
 @given(st.binary(max_size=300) | st.text(alphabet='timeforcdsplan[]mN,;"\t\n\r#._0123-e', max_size=300).map(str.encode))
