@@ -14,7 +14,6 @@ from bushfit.campaign.schema import FitSettings, ParameterSetting, SimulatedLoop
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import STATIC, fit_dynamic, fit_joint, fit_static, fit_two_step
-from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
@@ -125,26 +124,6 @@ def test_two_step_errors_are_those_of_300_campaigns(
     np.testing.assert_allclose(ratio, 1.0, atol=0.12)
     chance = 3.0 * (1.0 - correlation[1] ** 2) / np.sqrt(300)  # of a correlation over so many campaigns
     assert np.all(np.abs(correlation[0] - correlation[1]) <= chance + 0.02)
-
-
-def test_100_random_starts_end_at_one_minimum(measured: Data) -> None:
-    """Two decades per parameter: a tenth to ten times the answer, alpha over its own range."""
-    best = fit_joint(measured)
-    data_sets, names, rng = measured.chosen(None), list(FIVE), np.random.default_rng(1)
-    ends, costs, evaluations = [], [], []
-    for _ in range(100):
-        factor = dict(zip(names, 10.0 ** rng.uniform(-1.0, 1.0, 5), strict=True))
-        start = {name: best.model.values[name] * factor[name] for name in names}
-        start["alpha"] = np.clip(10.0 ** rng.uniform(-2.0, 0.0), *best.model.parameters["alpha"].bounds)
-        solution = solve(best.model.with_values(start), data_sets, names)
-        ends.append([solution.model.values[name] for name in names])
-        costs.append(solution.chi_square)
-        evaluations.append(solution.evaluations)
-    apart = np.abs(np.array(ends) / [best.model.values[name] for name in names] - 1.0).max(axis=0)
-    stderr = np.array([(best.covariance.stderr(name) or 0.0) / best.model.values[name] for name in names])
-    print(f"100 starts: apart by {shown(apart)}; {np.median(evaluations):.0f} evaluations, at most {max(evaluations)}")
-    assert np.ptp(costs) < 1e-3
-    assert np.all(apart < 0.02 * stderr)
 
 
 @pytest.mark.parametrize("factor", [0.1, 10.0])
@@ -276,28 +255,11 @@ def test_held_and_bounded_parameters(measured: Data) -> None:
     assert any(line.startswith("mu rests on the max given in [fit]") for line in result.warnings)
 
 
-def test_dynamic_amplitudes_choose_the_levels(measured: Data) -> None:
-    assert set(measured.smallest_sweep.amplitude) == {1e-4}
-    other = replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(2e-4, 5e-4)))
-    assert set(Data.of(other).smallest_sweep.amplitude) == {2e-4, 5e-4}
-    absent = Data.of(replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(3e-4,))))
-    with pytest.raises(FitError, match="no sweep at these amplitudes"):
-        _ = absent.smallest_sweep
-
-
 def test_missing_tests_are_said(measured: Data) -> None:
     with pytest.raises(FitError, match="fit-static needs a loop"):
         fit_static(with_tests(measured.campaign, loops=()))
     with pytest.raises(FitError, match="fit-dynamic needs a sweep"):
         fit_dynamic(with_tests(measured.campaign, sweeps=()), fit_joint(measured))
-
-
-def test_axial_tests_are_used_unless_told(measured: Data) -> None:
-    assert {data_set.direction for data_set in measured.chosen(None)} == {Direction.AXIAL}
-    every = fit_joint(measured, directions=list(Direction))
-    assert every.quality.points > fit_joint(measured).quality.points  # type: ignore[union-attr]
-    radial = with_tests(measured.campaign, loops=(), sweeps=measured.campaign.sweeps[1:])
-    assert {data_set.direction for data_set in radial.chosen(None)} == {Direction.RADIAL}
 
 
 def test_a_fit_leaves_its_input_alone(measured: Data) -> None:
