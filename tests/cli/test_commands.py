@@ -3,124 +3,18 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import pandas as pd
 import pytest
 from commandline import Done, call
 
 Run = Callable[..., Done]
-CAMPAIGN_FILES = {
-    "fit-static": {"static.json", "loops.csv", "loops.png"},
-    "fit-dynamic": {"dynamic.json", "sweeps.csv", "sweeps.png"},
-    "fit": {"model.json", "loops.csv", "loops.png", "sweeps.csv", "sweeps.png"},
-}
-
-
-@pytest.fixture(scope="module")
-def work(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a copy of the campaign and, under `model`, its joint fit."""
-    folder = tmp_path_factory.mktemp("work")
-    shutil.copytree(root / "data/cmp_15961", folder / "data/cmp_15961")
-    (folder / "configs").mkdir()
-    shutil.copy(root / "configs/cmp_15961.toml", folder / "configs")
-    done = call(folder, "fit", "configs/cmp_15961.toml", "-o", "model", "--no-plots")
-    assert done.returncode == 0, done.stderr
-    return folder
-
-
-@pytest.fixture
-def bushfit(work: Path) -> Run:
-    return lambda *arguments: call(work, *arguments)
 
 
 CAMPAIGN = "configs/cmp_15961.toml"
-
-
-@pytest.mark.parametrize("command", CAMPAIGN_FILES)
-def test_fits_write_the_files_of_the_interface(bushfit: Run, tmp_path: Path, command: str) -> None:
-    done = bushfit(command, CAMPAIGN, "-o", str(tmp_path / "x"))
-    assert done.returncode == 0, done.stderr
-    assert done.stdout == ""
-    assert {file.name for file in (tmp_path / "x").iterdir()} == CAMPAIGN_FILES[command]
-    for word in ("parameter", "std error", "95 % interval", "unit", "NRMSE", "correlation"):
-        assert word in done.stderr
-
-
-def test_run_does_the_whole_chain_and_says_what_two_steps_cost(bushfit: Run, tmp_path: Path) -> None:
-    done = bushfit("run", CAMPAIGN, "-o", str(tmp_path / "x"))
-    assert done.returncode == 0, done.stderr
-    named = {file.name for file in (tmp_path / "x").iterdir()}
-    tables = {f"{kind}.{end}" for kind in ("loops", "sweeps", "axial", "radial") for end in ("csv", "png")}
-    assert {"static.json", "dynamic.json", "model.json"} | tables <= named
-    assert "pass by pass" in done.stderr
-    assert "what the two-step procedure costs" in done.stderr
-    assert f"the model to use: {tmp_path / 'x/model.json'}, the joint fit" in done.stderr
-    assert "springpot was left out" in done.stderr
-    radial = pd.read_csv(tmp_path / "x" / "radial.csv")
-    assert list(radial.columns[:2]) == ["frequency [Hz]", "amplitude [mm]"]
-    assert len(radial) == 48
-    ordered = radial.sort_values(["amplitude [mm]", "frequency [Hz]"], ignore_index=True)
-    pd.testing.assert_frame_equal(radial, ordered)
-
-
-def test_the_paper_s_order_by_hand(bushfit: Run, tmp_path: Path) -> None:
-    """fit-static, fit-dynamic --static, predict: each takes what the one before wrote."""
-    s, d, p = (str(tmp_path / name) for name in "sdp")
-    assert bushfit("fit-static", CAMPAIGN, "-o", s, "--no-plots").returncode == 0
-    assert bushfit("fit-dynamic", CAMPAIGN, "--static", f"{s}/static.json", "-o", d, "--no-plots").returncode == 0
-    done = bushfit("predict", f"{d}/dynamic.json", "-o", p, "--no-plots", "--direction", "torsion")
-    assert done.returncode == 0, done.stderr
-    assert [file.name for file in Path(p).iterdir()] == ["torsion.csv"]
-    again = bushfit("fit-static", CAMPAIGN, "--dynamic", f"{d}/dynamic.json", "-o", str(tmp_path / "s2"), "--no-plots")
-    assert "left out" not in again.stderr
-
-
-def test_predict_lays_measurements_over_and_takes_grids(bushfit: Run, tmp_path: Path) -> None:
-    done = bushfit(
-        "predict", "model/model.json", "--campaign", CAMPAIGN, "-o", str(tmp_path / "x"),
-        "--frequencies", "10:30:10 Hz", "--amplitudes", "0.1, 0.3 mm",
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert {file.name for file in (tmp_path / "x").iterdir()} == {
-        f"{d}.{end}" for d in ("axial", "radial") for end in ("csv", "png")
-    }
-    table = pd.read_csv(tmp_path / "x" / "axial.csv")
-    assert table["frequency [Hz]"].tolist() == [10, 20, 30] * 2
-    assert table["amplitude [mm]"].tolist() == [0.1] * 3 + [0.3] * 3
-
-
-def test_predict_says_each_warning_once_and_in_its_document(bushfit: Run, root: Path, tmp_path: Path) -> None:
-    at = (*("-o", str(tmp_path / "x")), "--no-plots", "--force", "--json")
-    truth = str(root / "data/mystery_mount/open_last/truth.json")
-    for model, said in ((truth, "left out of the prediction"), ("model/model.json", "radial: not fitted")):
-        done = bushfit("predict", model, *at)
-        told = [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
-        assert len(set(told)) == len(told) > 0
-        warnings = json.loads(done.stdout)["warnings"]
-        assert [f"warning: {line}" for line in warnings] == [line for line in told if ": of the fit: " not in line]
-        assert any(line.startswith(said) for line in warnings)
-
-
-def test_simulate_writes_a_campaign_that_run_takes(bushfit: Run, tmp_path: Path) -> None:
-    at = str(tmp_path / "sim")
-    one = bushfit("simulate", "model/model.json", "--seed", "7", "--noise", "0.5 %", "-o", at)
-    assert one.returncode == 0, one.stderr
-    assert {"campaign.toml", "truth.json", "loop_axial_1.csv", "sweep_axial.csv", "sweep_radial.csv"} == {
-        file.name for file in Path(at).iterdir()
-    }
-    bushfit("simulate", "model/model.json", "--seed", "7", "--noise", "0.5 %", "-o", f"{at}2")
-    bushfit("simulate", "model/model.json", "--seed", "8", "--noise", "0.5 %", "-o", f"{at}3")
-    same, other = ((Path(at + n) / "sweep_axial.csv").read_text() for n in ("2", "3"))
-    assert (Path(at) / "sweep_axial.csv").read_text() == same != other
-    fitted = bushfit("fit", f"{at}/campaign.toml", "-o", str(tmp_path / "fit"), "--no-plots", "--json")
-    truth = json.loads((Path(at) / "truth.json").read_text())["parameters"]
-    for name, entry in json.loads(fitted.stdout)["parameters"].items():
-        assert entry["value"] == pytest.approx(truth[name]["value"], rel=0.06)
 
 
 @pytest.mark.parametrize(
@@ -189,16 +83,6 @@ def test_results_go_to_a_folder_of_the_campaign_by_default(work: Path, tmp_path:
     done = call(tmp_path, "fit-static", str(work / CAMPAIGN), "--no-plots")
     assert done.returncode == 0
     assert (tmp_path / "results" / "CMP 15 961" / "static.json").exists()
-
-
-def test_one_loop_alone_is_fitted_and_what_it_leaves_open_is_named(work: Path, tmp_path: Path) -> None:
-    text = (work / CAMPAIGN).read_text()
-    (work / "configs/loop.toml").write_text(text[: text.index("[[sweeps]]")])
-    done = call(work, "run", "configs/loop.toml", "-o", str(tmp_path / "x"), "--no-plots")
-    assert done.returncode == 0, done.stderr
-    assert "no sweeps: the two-step procedure is passed over" in done.stderr
-    assert "one loop rate, 0.1 Hz: mu, m and alpha cannot be told from one another" in done.stderr
-    assert "the further test that would help most: a loop at" in done.stderr
 
 
 def test_the_installed_command(work: Path, tmp_path: Path) -> None:
