@@ -1,9 +1,9 @@
 """Bytes of a test file -> UTF-8, whatever the file is encoded in.
 
 Test files are ASCII but for a few letters of their header, which is too little for detectors that count letters:
-tests/test_dialects.py compares charset-normalizer and chardet on such files. So the bytes decide here: a byte
-order mark, zeros beside ASCII (UTF-16), what is valid UTF-8, pairs of common Chinese characters (GB18030), and for the
-rest Western Latin (cp1252, or Latin-1 where it uses bytes that cp1252 lacks).
+tests/benchmarks/test_dialects_elsewhere.py compares charset-normalizer and chardet on such files. So the bytes decide
+here: a byte order mark, zeros beside ASCII (UTF-16), what is valid UTF-8, pairs of common Chinese characters (GB18030),
+and for the rest Western Latin (cp1252, or Latin-1 where it uses bytes that cp1252 lacks).
 """
 
 from __future__ import annotations

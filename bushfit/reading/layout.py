@@ -1,9 +1,9 @@
 """Where a table begins in a file, and what parts its columns.
 
-Of the candidates of tests/test_dialects.py (csv.Sniffer, clevercsv, DuckDB, polars), each left to itself, none reads
-half of the dialects; told the encoding and the decimal mark, clevercsv parts the columns of nearly all, in twenty times
-the time. What wins is a rule of the domain: the header is the line that names the columns a test must have, with rows
-of as many numbers below it.
+Of the candidates of tests/benchmarks/test_dialects_elsewhere.py (csv.Sniffer, clevercsv, DuckDB, polars), each left to
+itself, none reads half of the dialects; told the encoding and the decimal mark, clevercsv parts the columns of nearly
+all, in twenty times the time. What wins is a rule of the domain: the header is the line that names the columns a test
+must have, with rows of as many numbers below it.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
     pytest tests/benchmarks/test_reading_speed.py --benchmark-enable -s
 
 Every run is a process of its own, which tells its seconds without its imports, and its peak memory. In the ordinary
-test run the loop has some thousand rows, so that this cannot rot.
+test run the loop has some thousand rows, so that this cannot rot. The long loop needs the dependency group bench.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import polars
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
@@ -69,6 +68,8 @@ def run(program: tuple[str, str], file: Path) -> dict[str, float]:
 @pytest.fixture
 def long_loop(paper_model: Model, tmp_path: Path, benchmark: BenchmarkFixture) -> tuple[Path, int]:
     """100 cycles of the paper's loop, with noise on displacement and force."""
+    polars = pytest.importorskip("polars", reason="the group bench is not installed")
+    pytest.importorskip("duckdb", reason="the group bench is not installed")
     rows = 50_000 if benchmark.disabled else 10_000_000
     cycle = rig.record(paper_model, Direction.AXIAL, 0.1, 1e-3, cycles=1, run_in=6, kind="loop")
     time, rng = np.arange(rows) * (1000.0 / rows), np.random.default_rng(0)

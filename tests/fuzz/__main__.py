@@ -2,7 +2,7 @@
 
 Needs the dependency group `fuzz`. Starts from the corpus beside this file; what crashes, hangs for ten seconds or takes
 more than 2 GiB is left in the working folder as crash-*, timeout-* or oom-*, and the exit status is 1. With --keep the
-inputs that reach new code are added to the corpus.
+inputs that reach new code are added to the corpus, and listed: name each after what it shows.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
     parser.add_argument("--seconds", type=int, default=60, help="for each target")
     parser.add_argument("--target", choices=TARGETS, action="append")
-    parser.add_argument("--keep", action="store_true", help="add what reaches new code to the corpus")
+    parser.add_argument("--keep", action="store_true", help="add what reaches new code to the corpus, to be named")
     options = parser.parse_args()
     failed = []
     for target in options.target or TARGETS:
@@ -33,7 +33,10 @@ def main() -> int:
             if fuzz(target, found, str(corpus), time, "-print_final_stats=1", *LIMITS):
                 failed.append(target)
             if options.keep:
+                known = set(corpus.iterdir())
                 fuzz(target, "-merge=1", str(corpus), found, *LIMITS)
+                for added in sorted(set(corpus.iterdir()) - known):
+                    print(f"to be named after what it shows: {added}")
     print(f"failed: {', '.join(failed)}" if failed else "no crash, no hang, no blow-up of memory")
     return int(bool(failed))
 

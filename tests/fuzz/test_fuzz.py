@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,13 @@ def test_the_corpus(name: str) -> None:
     assert len(inputs) >= 10
     for data in inputs:
         run(data)
+
+
+@each_target
+def test_every_seed_has_a_name(name: str) -> None:
+    """Words and an ending, as in `key_twice.json`; the fuzzer itself names inputs by their checksum."""
+    names = [file.name for file in (CORPUS / name).iterdir()]
+    assert [name for name in names if not re.fullmatch(r"[a-z]\w*\.(csv|toml|json)", name)] == []
 
 
 @each_target

@@ -1,45 +1,28 @@
-"""Every dialect reads to the same numbers, and what other sniffers make of the same files."""
+"""Every dialect reads to the same numbers, and its errors name line and column."""
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-import chardet
-import charset_normalizer
-import clevercsv
-import duckdb
 import numpy as np
-import pandas as pd
-import polars
 import pytest
-from dialects import DIALECTS, HEADERS, NUMBERS, Dialect, Kind
+from dialects import DIALECTS, HEADERS, NUMBERS, Dialect, expected
 
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
-from bushfit.reading.encoding import detect
-from bushfit.reading.headers import LOOP_COLUMNS
-from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
-from bushfit.reading.measurement import Floats, Loop, Sweep
-from bushfit.reading.numerals import Numerals
+from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.sweeps import read_sweep
-from bushfit.reading.table import Table
-
-#: Typographic separators, as the plain ones that they count as.
-SEPARATORS = {"\u00a0": " ", "\u202f": " ", "\u2019": "'"}
-
-
-def expected(kind: Kind) -> list[Floats]:
-    return [np.array([float(cell) for cell in column]) for column in zip(*NUMBERS[kind], strict=True)]
 
 
 def written(dialect: Dialect, folder: Path) -> Path:
     file = folder / f"{dialect.kind}.csv"
     file.write_bytes(dialect.bytes())
     return file
+
+
+def by_bushfit(file: Path) -> Loop | Sweep:
+    return read_loop(file, Direction.AXIAL) if file.stem == "loop" else read_sweep(file, Direction.AXIAL)
 
 
 @pytest.mark.parametrize("name", DIALECTS)
@@ -81,215 +64,3 @@ def test_errors_name_line_and_column_in_every_dialect(name: str, tmp_path: Path)
     message = str(caught.value)
     assert f'line {line}, column "{header}' in message, message
     assert 'found: "bad"' in message, message
-
-
-UNCLEAR: dict[str, tuple[str, dict[str, str], float | None]] = {
-    "a thousand or a bit more than one": ("1.234;1.234;2.345", {}, None),
-    "the same, decimal point stated": ("1.234;1.234;2.345", {"decimal": "."}, 2.345),
-    "the same, decimal comma stated": ("1.234;1.234;2.345", {"decimal": ","}, 2345.0),
-    "the same, nothing parts thousands": ("1.234;1.234;2.345", {"thousands": "none"}, 2.345),
-    "commas": ("1,234;1,234;2,345", {}, None),
-    "commas, thousands stated": ("1,234;1,234;2,345", {"thousands": ","}, 2345.0),
-    "settled by another column": ("1.234;0.5;2.345", {}, 2.345),
-    "settled by four digits": ("1.234;1234.567;2.345", {}, 2.345),
-    "settled by both marks": ("1.234,5;1.234;2.345", {}, 2345.0),
-    "settled by an exponent": ("1.234;1.234e3;2.345", {}, 2.345),
-    "settled by a group too many": ("1.234.567;1.234;2.345", {}, 2345.0),
-}
-
-
-@pytest.mark.parametrize("case", UNCLEAR)
-def test_what_can_be_read_in_two_ways_is_refused(case: str, tmp_path: Path) -> None:
-    """Ten rows alike but for their first digit: only the row given can tell what its points and commas mean."""
-    cells, stated, force = UNCLEAR[case]
-    rows = [f"{n}.001;{n}.002;{n}.003" if "." in cells else f"{n},001;{n},002;{n},003" for n in range(2, 12)]
-    file = tmp_path / "loop.csv"
-    file.write_text("\n".join(["time [s];displacement [mm];force [N]", cells, *rows]))
-    table = Table.open(file, LOOP_COLUMNS, stated=FileFormat(**stated))  # type: ignore[arg-type]
-    wanted = {"force": table.column("force", "N")}
-    if force is None:
-        with pytest.raises(MeasurementError, match=r"two ways[\s\S]*decimal = "):
-            table.read(wanted, fewest_rows=1)
-    else:
-        assert table.read(wanted, fewest_rows=1)["force"][0] == force
-
-
-def test_numbers_in_two_ways_are_refused(tmp_path: Path) -> None:
-    text = DIALECTS["German"].text().replace("62,598", "62.598")
-    (tmp_path / "loop.csv").write_text(text)
-    with pytest.raises(MeasurementError, match=r"line 4[\s\S]*another way[\s\S]*decimal comma"):
-        read_loop(tmp_path / "loop.csv", Direction.AXIAL)
-
-
-AMPLITUDES = {
-    "Amplitude pk-pk [mm]": 0.5,
-    "amplitude (p-p) (mm)": 0.5,
-    "Amplitude peak-to-peak [mm]": 0.5,
-    "amplitude_pp_mm": 0.5,
-    "Displacement p-p [mm]": 0.5,
-    "double amplitude [mm]": 0.5,
-    "Doppelamplitude [mm]": 0.5,
-    "Schwingbreite in mm": 0.5,
-    "Amplitude Spitze-Spitze [mm]": 0.5,
-    "Amplitude crête à crête [mm]": 0.5,
-    "Amplitude crete-a-crete [mm]": 0.5,
-    "Amplitud pico a pico [mm]": 0.5,
-    "Amplitude [mm p-p]": 0.5,
-    "Amplitude SS [mm]": 0.5,
-    "Amplitude s-s (mm)": 0.5,
-    "Amplitude Spitze zu Spitze / mm": 0.5,
-    "Amplitude [mm SS]": 0.5,
-    "Amplitude [mmpp]": 0.5,
-    "Weg [mmp-p]": 0.5,
-    "Weg SS in mm": 0.5,
-    "Schwingweite [mm]": 0.5,
-    "2A [mm]": 0.5,
-    "total amplitude [mm]": 0.5,
-    "displacement range [mm]": 0.5,
-    "amplitude totale [mm]": 0.5,
-    "Amplitude c-à-c [mm]": 0.5,
-    "Amplitud pico-pico (mm)": 0.5,
-    "Amplitude [mm]": 1.0,
-    "Amplitude 0-p [mm]": 1.0,
-    "Amplitude zero-to-peak (mm)": 1.0,
-}
-
-
-@pytest.mark.parametrize("header", AMPLITUDES)
-def test_a_header_says_how_amplitudes_count(header: str, tmp_path: Path) -> None:
-    file = tmp_path / "sweep.csv"
-    file.write_text(DIALECTS["plain sweep"].text().replace("amplitude [mm]", header), encoding="utf-8")
-    found = read_sweep(file, Direction.AXIAL).amplitude
-    assert np.array_equal(found, expected("sweep")[1] * 1e-3 * AMPLITUDES[header])
-    contrary = "zero-to-peak" if AMPLITUDES[header] == 0.5 else "peak-to-peak"
-    if header != "Amplitude [mm]":
-        with pytest.raises(MeasurementError, match="header and campaign count amplitudes differently"):
-            read_sweep(file, Direction.AXIAL, amplitude=contrary)  # type: ignore[arg-type]
-
-
-NAMED = {
-    "Amplitude SS [mm]": ("Amplitude SS", 0.5),
-    "Level SS [mm]": ("Level SS", 0.5),
-    "Pegel p-p [mm]": ("Pegel p-p [mm]", 0.5),
-    "Pegel [mm pp]": ("Pegel", 0.5),
-    "Schwingbreite [mm]": ("Schwingbreite", 0.5),
-    "Doppelamplitude [mm] ": ("Doppelamplitude [mm]", 0.5),
-    "Pegel 0-p [mm]": ("Pegel 0-p", 1.0),
-    "range [mm]": ("range", 1.0),
-    "Stress level [mm]": ("Stress level", 1.0),
-}
-
-
-@pytest.mark.parametrize("header", NAMED)
-def test_a_header_that_is_named_says_it_too(header: str, tmp_path: Path) -> None:
-    named, counted = NAMED[header]
-    file = tmp_path / "sweep.csv"
-    file.write_text(DIALECTS["plain sweep"].text().replace("amplitude [mm]", header), encoding="utf-8")
-    found = read_sweep(file, Direction.AXIAL, columns={"amplitude": named}).amplitude
-    assert np.array_equal(found, expected("sweep")[1] * 1e-3 * counted)
-
-
-Rows = Iterable[Sequence[object]]
-
-
-def rows_by_csv_sniffer(file: Path) -> Rows:
-    text = file.read_text("utf-8-sig")
-    return csv.reader(io.StringIO(text), csv.Sniffer().sniff(text))
-
-
-def rows_by_clevercsv(file: Path) -> Rows:
-    text = file.read_text("utf-8-sig")
-    return clevercsv.reader(io.StringIO(text), clevercsv.Sniffer().sniff(text))
-
-
-def rows_by_duckdb(file: Path) -> Rows:
-    return duckdb.sql(f"select * from read_csv('{file}', all_varchar = true)").fetchall()
-
-
-def rows_by_polars(file: Path) -> Rows:
-    return polars.read_csv(file, infer_schema=False).rows()
-
-
-def rows_by_pandas(file: Path) -> Rows:
-    return pd.read_csv(file, sep=None, engine="python", dtype=str).to_numpy().tolist()
-
-
-def by_bushfit(file: Path) -> Loop | Sweep:
-    return read_loop(file, Direction.AXIAL) if file.stem == "loop" else read_sweep(file, Direction.AXIAL)
-
-
-CANDIDATES: dict[str, Callable[[Path], Rows]] = {
-    "csv.Sniffer": rows_by_csv_sniffer,
-    "clevercsv": rows_by_clevercsv,
-    "DuckDB": rows_by_duckdb,
-    "polars": rows_by_polars,
-    "pandas": rows_by_pandas,
-}
-
-
-def numbers(rows: Rows, numerals: Numerals) -> list[Floats]:
-    """The columns of numbers below a header, wherever that is; blank rows are left out."""
-    table = [[numerals.value(str(cell).strip()) for cell in row] for row in rows if any(str(c).strip() for c in row)]
-    first = next(index for index, row in enumerate(table) if sum(cell is not None for cell in row) > 1)
-    columns = zip(*table[first:], strict=True)
-    return [np.array(column, dtype=float) for column in columns if None not in column]
-
-
-def is_right(candidate: Callable[[Path], Rows], file: Path, kind: Kind, numerals: Numerals) -> bool:
-    """Whether all columns are found; a refusal counts as other numbers do."""
-    try:
-        found = numbers(candidate(file), numerals)
-    except Exception:
-        return False
-    return all(any(np.array_equal(column, other) for column in found) for other in expected(kind))
-
-
-def test_candidates_for_the_detection(tmp_path: Path) -> None:
-    """csv.Sniffer and pandas with it, clevercsv, DuckDB and polars on all dialects, which bushfit reads without an
-    exception: first each left to itself, then told the encoding and how numbers are written, so that only the
-    delimiter and where the table begins are left to find."""
-    counts = {(candidate, told): 0 for candidate in CANDIDATES for told in (False, True)}
-    print(f"\n{'':30}" + " ".join(name.ljust(12) for name in CANDIDATES))
-    for name, dialect in DIALECTS.items():
-        alone, told = written(dialect, tmp_path), tmp_path / "told.csv"
-        told.write_text(dialect.text(), encoding="utf-8", newline="")
-        numerals = Numerals(dialect.decimal, SEPARATORS.get(dialect.thousands, dialect.thousands) or None)
-        line = f"{name:30}"
-        for candidate, rows in CANDIDATES.items():
-            by_itself = is_right(rows, alone, dialect.kind, Numerals())
-            when_told = is_right(rows, told, dialect.kind, numerals)
-            counts[candidate, False] += by_itself
-            counts[candidate, True] += when_told
-            line += ("right" if by_itself else "if told" if when_told else "-").ljust(13)
-        print(line)
-    for (candidate, told_it), count in counts.items():
-        print(f"{candidate}{' (told)' * told_it}: {count} of {len(DIALECTS)}")
-    assert len(DIALECTS) >= 40
-    assert max(counts.values()) < len(DIALECTS)
-
-
-def test_candidates_for_the_encoding() -> None:
-    """charset-normalizer and chardet against the ladder of bushfit.encoding, on all dialects with other than ASCII."""
-    detectors: dict[str, Callable[[bytes], str | None]] = {
-        "charset-normalizer": lambda data: getattr(charset_normalizer.from_bytes(data).best(), "encoding", None),
-        "chardet": lambda data: chardet.detect(data)["encoding"],
-        "bushfit": detect,
-    }
-    counts = dict.fromkeys(detectors, 0)
-    special = {name: dialect for name, dialect in DIALECTS.items() if not dialect.bytes().isascii()}
-    for name, dialect in special.items():
-        data, text = dialect.bytes(), dialect.text()
-        said = {detector: detect_in(data) for detector, detect_in in detectors.items()}
-        for detector, encoding in said.items():
-            counts[detector] += decoded(data, encoding) == text
-        print(f"{name:32}" + ", ".join(f"{detector} {encoding}" for detector, encoding in said.items()))
-    print(f"{len(special)} dialects: " + ", ".join(f"{detector} {count}" for detector, count in counts.items()))
-    assert counts.pop("bushfit") == len(special)
-    assert max(counts.values()) < len(special)
-
-
-def decoded(data: bytes, encoding: str | None) -> str | None:
-    try:
-        return data.decode(encoding or "utf-8").removeprefix("\ufeff")
-    except UnicodeDecodeError:
-        return None

@@ -15,7 +15,6 @@ from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop
-from bushfit.reduction.cycles import turning_points
 from bushfit.reduction.steps import Reduction, reduce
 
 FREQUENCIES = (5.0, 25.0, 100.0, 101.0, 155.0)
@@ -281,17 +280,3 @@ def test_any_sine_gives_its_stiffness(
     assert step.frequency == pytest.approx(frequency, rel=1e-6)
     assert step.amplitude == pytest.approx(amplitude, rel=1e-6)
     assert step.stiffness == pytest.approx(3e5 * np.exp(1j * lead), rel=1e-6)
-
-
-@settings(max_examples=200, deadline=None)
-@given(st.lists(st.integers(-6, 6), min_size=2, max_size=60), st.integers(1, 6))
-def test_turning_points_alternate_and_stand_out(values: list[int], least: int) -> None:
-    series = np.array(values, dtype=float)
-    turns = turning_points(series, least)
-    heights = np.diff(series[turns])
-    if turns.size > 2:
-        assert np.abs(heights).min() >= least
-        assert np.all(heights[1:] * heights[:-1] < 0)
-    if np.ptp(series) >= least:
-        assert series[turns].max() == series.max()
-        assert series[turns].min() == series.min()

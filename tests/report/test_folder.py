@@ -7,10 +7,7 @@ import stat
 from pathlib import Path
 
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
 
-from bushfit.campaign.naming import folder_name
 from bushfit.errors import OutputError
 from bushfit.report.folder import check_free, write_files
 
@@ -75,38 +72,3 @@ def test_a_folder_in_the_way(tmp_path: Path) -> None:
 def test_check_free_says_nothing_where_nothing_stands(tmp_path: Path) -> None:
     check_free(tmp_path / "absent", ["a.csv"], force=False)
     check_free(tmp_path, ["a.csv"], force=False)
-
-
-@pytest.mark.parametrize(
-    ("name", "folder"),
-    [
-        ("CMP 15 961", "CMP 15 961"),
-        ("../../etc", "_.._etc"),
-        ("", "campaign"),
-        ("...", "campaign"),
-        ("a/b\\c:d", "a_b_c_d"),
-        ("CON", "_CON"),
-        ("nul.txt", "_nul.txt"),
-        ("lpt1", "_lpt1"),
-        ("console", "console"),
-        ("a\ud800b", "a_b"),
-        ("line\nbreak", "line_break"),
-    ],
-)
-def test_folder_names_never_lead_out(name: str, folder: str) -> None:
-    assert folder_name(name).strip(".") == folder.strip(".")
-    assert not {"/", "\\"} & set(folder_name(name))
-    assert folder_name("x" * 500) == "x" * 60
-
-
-@given(st.text(max_size=300))
-@example("con")
-@example("Aux .txt")
-@example("../" * 50)
-def test_a_name_is_one_folder_on_every_system(name: str) -> None:
-    folder = folder_name(name)
-    assert (Path("base") / folder).parent == Path("base")
-    assert folder.strip(" .") == folder
-    assert 0 < len(folder.encode()) < 250
-    assert not set(folder) & set('/\\:*?"<>|\n')
-    assert folder.partition(".")[0].upper() not in {"CON", "PRN", "AUX", "NUL", "COM1", "LPT9"}

@@ -1,64 +1,56 @@
-"""CSV files that a spreadsheet opens as tables of numbers and texts, and runs nothing of."""
+"""Tables of results: units in every header, one row a point, and numbers that are those of the model."""
 
 from __future__ import annotations
 
-import csv
-import io
+from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from bushfit.reading.csvfile import to_csv
-
-FORMULAS = [
-    "=1+1",
-    "+cmd",
-    "-2+3",
-    "@SUM(A1)",
-    "\t=1",
-    " =1",
-    '=HYPERLINK("http://x")',
-    "\uff1d1",
-    '"=1',
-    "%0A=1",
-    "|x",
-]
+from bushfit.campaign.campaign import load_campaign
+from bushfit.fitting.data import Data
+from bushfit.model.model import Model
+from bushfit.report.tables import gap_table, loops_table, sweeps_table
 
 
-def cells(data: bytes) -> list[list[str]]:
-    return list(csv.reader(io.StringIO(data.decode(), newline="")))
+@pytest.fixture(scope="module")
+def data(root: Path) -> Data:
+    return Data.of(load_campaign(root / "configs/cmp_15961.toml"))
 
 
-@pytest.mark.parametrize("text", FORMULAS)
-def test_a_text_that_would_run_is_quoted(text: str) -> None:
-    header, row = cells(to_csv(pd.DataFrame({text: [1.0], "loop": [text]})))
-    assert header == [f"'{text}", "loop"]
-    assert row == ["1", f"'{text}"]
+def test_loops_row_by_row(data: Data, paper_model: Model) -> None:
+    table = loops_table(paper_model, data.loops)
+    loop = data.loops[0].loop
+    assert len(table) == loop.time.size
+    assert set(table["loop"]) == {loop.name}
+    np.testing.assert_allclose(table["force [N]"], loop.force, rtol=1e-12)
+    np.testing.assert_allclose(table["displacement [mm]"], 1e3 * loop.displacement, atol=2e-3)
+    off = (table["model force [N]"] - table["force [N]"]) / data.loops[0].drive.noise
+    np.testing.assert_allclose(table["residual [noise]"], off, rtol=1e-9, atol=1e-9)
+    assert np.std(table["residual [noise]"]) == pytest.approx(1.0, abs=0.1)
 
 
-def test_a_line_end_starts_no_cell() -> None:
-    assert to_csv(pd.DataFrame({"loop": ["\r=1", "a\r\n=1"]})) == b"loop\n' =1\na =1\n"
+def test_sweeps_sorted_by_amplitude_repeat_and_frequency(data: Data, paper_model: Model) -> None:
+    table = sweeps_table(paper_model, data.sweeps)
+    assert len(table) == sum(data_set.sweep.frequency.size for data_set in data.sweeps)
+    assert list(dict.fromkeys(table["direction"])) == ["axial", "radial"]
+    axial = table[table["direction"] == "axial"].reset_index(drop=True)
+    order = ["amplitude [mm]", "repeat", "frequency [Hz]"]
+    assert axial.equals(axial.sort_values(order, ignore_index=True))
+    stiffness = paper_model.stiffness(
+        "axial", axial["frequency [Hz]"].to_numpy(), axial["amplitude [mm]"].to_numpy() / 1e3
+    )
+    np.testing.assert_allclose(axial["model stiffness [N/mm]"], np.abs(stiffness) / 1e3, rtol=1e-12)
+    np.testing.assert_allclose(axial["model loss factor [-]"], stiffness.imag / stiffness.real, rtol=1e-9)
 
 
-@pytest.mark.parametrize("text", ["loop_axial_1", "0.1 mm", "a=b", "A-4", "", "'quoted'", "Prüfling 3"])
-def test_other_texts_stay(text: str) -> None:
-    assert cells(to_csv(pd.DataFrame({"loop": [text], "x": [1]})))[1] == [text, "1"]
-
-
-@given(st.lists(st.text(), min_size=1))
-def test_no_cell_runs(texts: list[str]) -> None:
-    rows = cells(to_csv(pd.DataFrame({"text": texts, "n": range(len(texts))})))[1:]
-    assert len(rows) == len(texts)
-    for row in rows:
-        assert not row[0].lstrip().startswith(("=", "+", "-", "@"))
-
-
-def test_numbers_stay_numbers() -> None:
-    table = pd.DataFrame({"a": [-1.5, 2.0], "b": [-3, 4], "c": [None, -0.25], "d": ["x", None]})
-    found = pd.read_csv(io.BytesIO(to_csv(table)))
-    np.testing.assert_array_equal(found["a"], [-1.5, 2.0])
-    np.testing.assert_array_equal(found["b"], [-3, 4])
-    np.testing.assert_array_equal(found["c"], [np.nan, -0.25])
+def test_a_gap_has_every_residual_before_and_after(data: Data, paper_model: Model) -> None:
+    data_sets = data.chosen(None)
+    softer = paper_model.with_values({"mu": 0.98 * paper_model.values["mu"]})
+    table = gap_table(softer, paper_model, data_sets)
+    for when, model in (("before", softer), ("after", paper_model)):
+        columns = [f"{part} {when} [noise]" for part in ("force", "storage", "loss")]
+        values = table[columns].to_numpy()
+        chi_square = sum(float(np.sum(data_set.residual(model) ** 2)) for data_set in data_sets)
+        assert np.nansum(values**2) == pytest.approx(chi_square, rel=1e-9)
+    assert list(dict.fromkeys(table["kind"])) == ["loop", "sweep"]

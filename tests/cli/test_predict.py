@@ -1,0 +1,39 @@
+"""predict as typed: grids, measurements laid over, and each warning once."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+from commandline import Done
+
+Run = Callable[..., Done]
+CAMPAIGN = "configs/cmp_15961.toml"
+
+
+def test_predict_lays_measurements_over_and_takes_grids(bushfit: Run, tmp_path: Path) -> None:
+    done = bushfit(
+        "predict", "model/model.json", "--campaign", CAMPAIGN, "-o", str(tmp_path / "x"),
+        "--frequencies", "10:30:10 Hz", "--amplitudes", "0.1, 0.3 mm",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert {file.name for file in (tmp_path / "x").iterdir()} == {
+        f"{d}.{end}" for d in ("axial", "radial") for end in ("csv", "png")
+    }
+    table = pd.read_csv(tmp_path / "x" / "axial.csv")
+    assert table["frequency [Hz]"].tolist() == [10, 20, 30] * 2
+    assert table["amplitude [mm]"].tolist() == [0.1] * 3 + [0.3] * 3
+
+
+def test_predict_says_each_warning_once_and_in_its_document(bushfit: Run, root: Path, tmp_path: Path) -> None:
+    at = (*("-o", str(tmp_path / "x")), "--no-plots", "--force", "--json")
+    truth = str(root / "data/mystery_mount/open_last/truth.json")
+    for model, said in ((truth, "left out of the prediction"), ("model/model.json", "radial: not fitted")):
+        done = bushfit("predict", model, *at)
+        told = [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
+        assert len(set(told)) == len(told) > 0
+        warnings = json.loads(done.stdout)["warnings"]
+        assert [f"warning: {line}" for line in warnings] == [line for line in told if ": of the fit: " not in line]
+        assert any(line.startswith(said) for line in warnings)

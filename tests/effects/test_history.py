@@ -1,0 +1,71 @@
+"""Histories: the derivatives, harmonics and turning points of a motion, steady or from rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bushfit.effects.history import History, reversals
+
+COUNT, FREQUENCY = 1024, 2.0
+PHASE = 2.0 * np.pi * np.arange(COUNT) / COUNT
+
+
+def test_a_steady_cycle_knows_its_clock() -> None:
+    history = History.steady(np.sin(PHASE), FREQUENCY)
+    assert history.step == pytest.approx(1.0 / (FREQUENCY * COUNT))
+    assert history.omega == pytest.approx(4.0 * np.pi)
+    assert history.cycles == 1
+    assert History.steady(np.sin(3.0 * PHASE), FREQUENCY, cycles=3).cycles == 3
+    assert history.amplitude == pytest.approx(1.0, rel=1e-4)
+
+
+def test_derivatives_are_those_of_the_motion() -> None:
+    history = History.steady(np.sin(PHASE), FREQUENCY)
+    np.testing.assert_allclose(history.rate, history.omega * np.cos(PHASE), atol=1e-4 * history.omega)
+    from_rest = History(np.sin(PHASE), history.step, periodic=False, frequency=FREQUENCY)
+    np.testing.assert_allclose(from_rest.acceleration[2:-2], -(history.omega**2) * np.sin(PHASE)[2:-2], atol=0.01)
+
+
+def test_the_spectrum_holds_each_harmonic_at_its_frequency() -> None:
+    history = History.steady(2.0 * np.sin(PHASE) + 0.5 * np.cos(3.0 * PHASE), FREQUENCY)
+    size = np.abs(history.spectrum) / (COUNT / 2)
+    np.testing.assert_allclose(size[[1, 3]], [2.0, 0.5], atol=1e-12)
+    np.testing.assert_allclose(history.harmonics[[1, 3]], [4.0 * np.pi, 12.0 * np.pi])
+
+
+def test_a_sine_turns_at_its_top_and_bottom_wherever_it_begins() -> None:
+    for shift in (0, 100, 700):
+        history = History.steady(np.roll(np.sin(PHASE), shift), FREQUENCY)
+        turning = history.turning
+        (turns,) = turning.turns
+        assert np.array_equal(np.sort(turning.path[0, turns])[:1], [-1.0])
+        assert turning.path[0, 0] == turning.path[0, -1] == 1.0
+        np.testing.assert_array_equal(turning.at_samples(turning.path, np.array([0]))[0], history.value)
+
+
+def test_a_motion_from_rest_begins_at_zero() -> None:
+    history = History(np.array([[1.0, 2.0, 1.0, 3.0]]), 0.1, periodic=False, frequency=1.0)
+    assert history.turning.path.tolist() == [[0.0, 1.0, 2.0, 1.0, 3.0]]
+    assert [turns.tolist() for turns in history.turning.turns] == [[2, 3]]
+
+
+@pytest.mark.parametrize(
+    ("values", "turned"),
+    [
+        ([0, 1, 2, 1], [False, False, True]),
+        ([0, 1, 1, 0], [False, False, True]),
+        ([0, 1, 1, 2], [False, False, False]),
+        ([1, 1, 1, 1], [False, False, False]),
+        ([0, 1, 0, 1], [False, True, True]),
+    ],
+)
+def test_of_level_stretches_the_last_sample_turns(values: list[float], turned: list[bool]) -> None:
+    assert reversals(np.array(values, dtype=float)).tolist() == turned
+
+
+def test_the_sense_is_that_of_the_motion_that_drives() -> None:
+    slowed = History.steady(np.sin(PHASE), FREQUENCY).driven().with_value(np.cos(PHASE))
+    assert np.array_equal(slowed.sense, np.sign(History.steady(np.sin(PHASE), FREQUENCY).rate))
+    assert slowed.scaled(2.0) is slowed.scaled(2.0)
+    assert np.array_equal(slowed.scaled(2.0).value, 2.0 * np.cos(PHASE))

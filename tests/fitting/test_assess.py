@@ -1,0 +1,84 @@
+"""What a solution is worth: covariance, quality, reach of the tests, and whether the model misses the data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.fitting.assess import Stage, covariance, lack_of_fit, measured_range, misfit, quality
+from bushfit.fitting.data import Data
+from bushfit.fitting.procedures import fit_joint
+from bushfit.fitting.solve import jacobian
+from bushfit.geometry import Direction
+from bushfit.model.model import FIVE, Model
+from bushfit.model.result import Result
+
+
+@pytest.fixture(scope="module")
+def measured(root: Path) -> Data:
+    return Data.of(load_campaign(root / "configs/cmp_15961.toml"))
+
+
+@pytest.fixture(scope="module")
+def fitted(measured: Data) -> Result:
+    return fit_joint(measured)
+
+
+def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(measured: Data, fitted: Result) -> None:
+    """The noise is estimated too, which can only add to the inverse of J J^T."""
+    model, data_sets = fitted.model, measured.chosen(None)
+    found = covariance(model, [Stage(FIVE, data_sets)])
+    slope = jacobian(model, data_sets, FIVE)
+    values = np.array([model.values[name] for name in FIVE])
+    plain = np.sqrt(np.diag(np.linalg.inv(slope @ slope.T))) * values
+    stated = np.array([found.stderr(name) for name in FIVE])
+    assert np.all(stated >= plain * (1.0 - 1e-6))
+    np.testing.assert_allclose(stated, plain, rtol=0.1)
+
+
+def test_half_the_data_make_wider_errors(measured: Data, fitted: Result) -> None:
+    model, data_sets = fitted.model, measured.chosen(None)
+    names = ("mu", "sigma_fmax", "eps_half")
+    few, many = (covariance(model, [Stage(names, part)]) for part in (measured.loops, data_sets))
+    assert all(few.stderr(name) > many.stderr(name) for name in names)  # type: ignore[operator]
+
+
+def test_quality_and_reach_are_those_of_the_data(measured: Data, fitted: Result) -> None:
+    data_sets = measured.chosen(None)
+    found = quality(fitted.model, data_sets, 5)
+    assert found.points == sum(data_set.counted for data_set in data_sets)
+    assert found.reduced_chi_square == pytest.approx(1.0, abs=0.1)
+    assert found.nrmse == pytest.approx(found.noise, rel=0.15)
+    reach = measured_range(fitted.model, data_sets)
+    assert reach.frequency == pytest.approx((0.1, 155.0), rel=1e-3)
+    assert reach.strain == pytest.approx((0.0062, 0.062), rel=0.01)
+    assert reach.directions == (Direction.AXIAL,)
+
+
+def test_a_model_that_misses_the_data_is_told_and_one_that_does_not_is_not(measured: Data, fitted: Result) -> None:
+    data_sets = measured.chosen(None)
+    assert lack_of_fit(fitted.model, data_sets, 5) is None
+    assert misfit(fitted.model, data_sets, 5) == []
+    off = fitted.model.with_values({"mu": 1.05 * fitted.model.values["mu"]})
+    reduced = lack_of_fit(off, data_sets, 5)
+    assert reduced is not None
+    assert reduced > 2.0
+    (sentence,) = misfit(off, data_sets, 5, ", and so on")
+    assert sentence.endswith("standard errors are scaled up, and so on")
+
+
+def test_a_parameter_that_no_test_sees_has_an_error_beyond_all_bounds(
+    rig: Callable[..., Campaign], paper_model: Model
+) -> None:
+    campaign = rig(paper_model)
+    data_sets = Data.of(replace(campaign, sweeps=())).chosen(None)
+    model = paper_model.with_effect("radial_factor")
+    names = (*FIVE[:1], "radial_factor.excess")
+    found = covariance(model, [Stage(names, data_sets)])
+    assert found.stderr("radial_factor.excess") > 10.0  # type: ignore[operator]
+    assert found.stderr("mu") < 1e-2 * model.values["mu"]  # type: ignore[operator]

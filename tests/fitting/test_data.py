@@ -1,0 +1,64 @@
+"""A campaign made ready to fit: which tests are taken, at which levels, and what the campaign holds or gives."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bushfit.campaign.campaign import load_campaign
+from bushfit.campaign.schema import FitSettings, ParameterSetting
+from bushfit.errors import FitError
+from bushfit.fitting.data import Data
+from bushfit.fitting.procedures import fit_joint
+from bushfit.geometry import Direction
+from bushfit.model.model import FIVE
+from bushfit.model.result import Outlier
+
+
+@pytest.fixture(scope="module")
+def measured(root: Path) -> Data:
+    return Data.of(load_campaign(root / "configs/cmp_15961.toml"))
+
+
+def test_axial_tests_are_used_unless_told(measured: Data) -> None:
+    assert {data_set.direction for data_set in measured.chosen(None)} == {Direction.AXIAL}
+    every = fit_joint(measured, directions=list(Direction))
+    assert every.quality.points > fit_joint(measured).quality.points  # type: ignore[union-attr]
+    radial = Data.of(replace(measured.campaign, loops=(), sweeps=measured.campaign.sweeps[1:]))
+    assert {data_set.direction for data_set in radial.chosen(None)} == {Direction.RADIAL}
+
+
+def test_dynamic_amplitudes_choose_the_levels(measured: Data) -> None:
+    assert set(measured.smallest_sweep.amplitude) == {1e-4}
+    other = replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(2e-4, 5e-4)))
+    assert set(Data.of(other).smallest_sweep.amplitude) == {2e-4, 5e-4}
+    absent = Data.of(replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(3e-4,))))
+    with pytest.raises(FitError, match="no sweep at these amplitudes"):
+        _ = absent.smallest_sweep
+
+
+def test_a_direction_without_tests_is_refused_with_those_there_are(measured: Data) -> None:
+    with pytest.raises(FitError, match=r"no test in the directions[\s\S]*axial, radial[\s\S]*torsion"):
+        measured.chosen([Direction.TORSION])
+    with pytest.raises(FitError, match="there is nothing to fit"):
+        Data.of(replace(measured.campaign, loops=(), sweeps=())).chosen(None)
+
+
+def test_what_the_campaign_gives_and_holds(measured: Data) -> None:
+    settings = {"mu": ParameterSetting(value=1e6, max=2e6), "alpha": ParameterSetting(value=0.3, vary=False)}
+    data = Data.of(replace(measured.campaign, fit=FitSettings(parameters=settings)))
+    assert data.given == {"mu": 1e6, "alpha": 0.3}
+    assert data.free(FIVE) == tuple(name for name in FIVE if name != "alpha")
+    assert data.bounds == {"mu": (None, 2e6), "alpha": (None, None)}
+    assert measured.free(FIVE) == FIVE
+
+
+def test_points_that_are_left_out_have_no_weight(measured: Data) -> None:
+    name = measured.sweeps[0].name
+    without = measured.without([Outlier(name, None, 5, "stiffness", 9.0)])
+    assert without.sweeps[0].counted == measured.sweeps[0].counted - 2
+    assert np.count_nonzero(without.sweeps[0].weights == 0.0) == 1
+    assert without.sweeps[1] is measured.sweeps[1]

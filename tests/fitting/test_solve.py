@@ -1,0 +1,96 @@
+"""The least-squares problem: one minimum from anywhere, coordinates there and back, and parameters held at bounds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bushfit.campaign.campaign import load_campaign
+from bushfit.errors import FitError
+from bushfit.fitting.data import Data
+from bushfit.fitting.procedures import fit_joint
+from bushfit.fitting.solve import Coordinates, jacobian, residual, solve
+from bushfit.model.model import FIVE, Model
+
+
+@pytest.fixture(scope="module")
+def measured(root: Path) -> Data:
+    return Data.of(load_campaign(root / "configs/cmp_15961.toml"))
+
+
+def shown(values: np.ndarray) -> str:
+    return ", ".join(f"{name} {100 * value:+.3g} %" for name, value in zip(FIVE, values, strict=True))
+
+
+def test_coordinates_lead_there_and_back(paper_model: Model) -> None:
+    model = paper_model.with_effect("inertia", {"inertia.mass": 0.02})
+    coordinates = Coordinates.of(model, ["mu", "alpha", "inertia.mass"])
+    point = coordinates.point(model.values)
+    there = coordinates.values(point)
+    assert there == pytest.approx({name: model.values[name] for name in coordinates.names}, rel=1e-12)
+    step = 1e-6
+    moved = np.array([list(coordinates.values(point + step * axis).values()) for axis in np.eye(3)]) - np.array(
+        list(there.values())
+    )
+    np.testing.assert_allclose(np.diag(moved) / step, coordinates.slopes(model.values), rtol=1e-5)
+
+
+def test_the_jacobian_is_that_of_the_residual(measured: Data, paper_model: Model) -> None:
+    data_sets, names = measured.chosen(None), list(FIVE)
+    coordinates = Coordinates.of(paper_model, names)
+    point, slopes = coordinates.point(paper_model.values), jacobian(paper_model, data_sets, names)
+    for number in range(5):
+        high, low = (
+            residual(paper_model.with_values(coordinates.values(point + sign * 1e-5 * np.eye(5)[number])), data_sets)
+            for sign in (1.0, -1.0)
+        )
+        change = (high - low) / 2e-5
+        np.testing.assert_allclose(slopes[number], change, atol=1e-5 * np.abs(change).max())
+
+
+def test_a_parameter_pushed_against_a_bound_rests_on_it_and_is_named(measured: Data, paper_model: Model) -> None:
+    solution = solve(paper_model, measured.chosen(None), list(FIVE), {"mu": (None, 1.05e6)})
+    assert dict(solution.at_bound) == {"mu": "max"}
+    assert solution.model.values["mu"] == pytest.approx(1.05e6, rel=1e-2)
+    assert solution.flat
+    free = solve(paper_model, measured.chosen(None), list(FIVE))
+    assert not free.at_bound
+    assert free.chi_square < solution.chi_square
+
+
+def test_what_is_not_named_is_held(measured: Data, paper_model: Model) -> None:
+    start = paper_model.with_values({"m": 2.2e5})
+    found = solve(start, measured.chosen(None), ["mu"]).model.values
+    assert found["mu"] != start.values["mu"]
+    assert {name: found[name] for name in FIVE[1:]} == {name: start.values[name] for name in FIVE[1:]}
+
+
+def test_a_solver_that_runs_out_of_evaluations_says_so(measured: Data, paper_model: Model) -> None:
+    start = paper_model.with_values({name: 5.0 * paper_model.values[name] for name in ("mu", "sigma_fmax")})
+    data_sets, names = measured.chosen(None), list(FIVE)
+    stopped = solve(start, data_sets, names, evaluations=2, strict=False)
+    assert stopped.stopped
+    with pytest.raises(FitError):
+        solve(start, data_sets, names, evaluations=2)
+
+
+def test_100_random_starts_end_at_one_minimum(measured: Data) -> None:
+    """Two decades per parameter: a tenth to ten times the answer, alpha over its own range."""
+    best = fit_joint(measured)
+    data_sets, names, rng = measured.chosen(None), list(FIVE), np.random.default_rng(1)
+    ends, costs, evaluations = [], [], []
+    for _ in range(100):
+        factor = dict(zip(names, 10.0 ** rng.uniform(-1.0, 1.0, 5), strict=True))
+        start = {name: best.model.values[name] * factor[name] for name in names}
+        start["alpha"] = np.clip(10.0 ** rng.uniform(-2.0, 0.0), *best.model.parameters["alpha"].bounds)
+        solution = solve(best.model.with_values(start), data_sets, names)
+        ends.append([solution.model.values[name] for name in names])
+        costs.append(solution.chi_square)
+        evaluations.append(solution.evaluations)
+    apart = np.abs(np.array(ends) / [best.model.values[name] for name in names] - 1.0).max(axis=0)
+    stderr = np.array([(best.covariance.stderr(name) or 0.0) / best.model.values[name] for name in names])
+    print(f"100 starts: apart by {shown(apart)}; {np.median(evaluations):.0f} evaluations, at most {max(evaluations)}")
+    assert np.ptp(costs) < 1e-3
+    assert np.all(apart < 0.02 * stderr)

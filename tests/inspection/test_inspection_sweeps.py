@@ -1,0 +1,58 @@
+"""Sweeps looked at: each fault told with its figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from looking import look, without
+
+from bushfit.reading.measurement import Sweep
+
+
+def spoiled(sweep: Sweep, rows: np.ndarray, factor: complex) -> Sweep:
+    return replace(sweep, stiffness=np.where(rows, factor, 1.0) * sweep.stiffness)
+
+
+def copied(sweep: Sweep) -> Sweep:
+    """The second repeat of the smallest level is the first one once more."""
+    first, second = ((sweep.amplitude == 1e-4) & (sweep.repeat == number) for number in (1, 2))
+    stiffness = sweep.stiffness.copy()
+    stiffness[second] = stiffness[first]
+    return replace(sweep, stiffness=stiffness)
+
+
+SWEEP_FAULTS: dict[str, tuple[Callable[[Sweep], Sweep], str]] = {
+    "copied block": (copied, "16 rows repeat others digit by digit, the first of them at 5 Hz (data row 1)"),
+    "missing frequencies": (
+        lambda x: without(x, (x.amplitude == 2e-4) & np.isin(x.frequency, (45.0, 55.0))),
+        "0.2 mm, repeat 1, lacks 45, 55 Hz, which most others have",
+    ),
+    "wild point": (
+        lambda x: spoiled(x, np.arange(x.repeat.size) == 20, 1.15),
+        "data row 21 (45 Hz, 0.1 mm, repeat 2) is +1",
+    ),
+    "block off": (
+        lambda x: spoiled(x, (x.amplitude == 5e-4) & (x.repeat == 3), 1.08),
+        "0.5 mm, repeat 3 lies +",
+    ),
+    "drift over repeats": (
+        lambda x: replace(x, stiffness=x.stiffness * (1.0 - 0.02 * x.repeat)),
+        "|K| drifts by -4",
+    ),
+    "loss below zero": (
+        lambda x: spoiled(x, x.frequency == 155.0, np.exp(-0.4j)),
+        "9 points with a loss factor below zero, the first at 155 Hz, 0.1 mm",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", SWEEP_FAULTS)
+def test_each_fault_of_a_sweep_is_told(sweep: Sweep, tmp_path: Path, fault: str) -> None:
+    spoil, said = SWEEP_FAULTS[fault]
+    odd = look(tmp_path, spoil(sweep)).looked.odd
+    print("; ".join(odd))
+    assert any(said in sentence for sentence in odd)

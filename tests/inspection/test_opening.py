@@ -1,0 +1,152 @@
+"""Files opened: what is recognised, that clean files raise nothing, and that any damage is told or refused."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from looking import NOISE, SEEDS, look, plan
+
+from bushfit.errors import BushfitError
+from bushfit.geometry import Direction
+from bushfit.inspection.draft import file_text
+from bushfit.inspection.opening import inspect
+from bushfit.reading.csvfile import raw_loop_table, raw_sweep_table
+from bushfit.reading.measurement import Loop, Sweep
+from bushfit.simulation import Undisturbed, measure
+
+
+@pytest.mark.parametrize("rig", NOISE)
+def test_clean_tests_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str) -> None:
+    raised = []
+    for seed in range(SEEDS):
+        made = measure(clean, plan(seed=seed, **NOISE[rig]))
+        for test in (*made.loops, *made.sweeps):
+            raised += [f"seed {seed}, {test.name}: {sentence}" for sentence in look(tmp_path, test).looked.odd]
+    print(f"{rig} rig: {len(raised)} sentences over {SEEDS} clean campaigns")
+    assert raised == []
+
+
+@pytest.mark.parametrize("rig", NOISE)
+def test_clean_loops_without_time_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str) -> None:
+    """Time rebuilt from a noisy motion is uneven at its turning points; rows there are no wilder for it."""
+    raised, file = [], tmp_path / "axial.csv"
+    for seed in range(SEEDS):
+        loops = measure(clean, plan(seed=seed, **NOISE[rig])).loops
+        for loop, waveform, frequency in zip(loops, ("sine", "triangle"), ("0.1 Hz", "0.2 Hz"), strict=True):
+            raw_loop_table(loop).iloc[:, 1:].to_csv(file, index=False)
+            seen = inspect(file, {"frequency": frequency, "waveform": waveform})
+            raised += [f"seed {seed}, {waveform}: {sentence}" for sentence in seen.looked.odd]
+    print(f"{rig} rig: {len(raised)} sentences over {2 * SEEDS} clean loops without time")
+    assert raised == []
+
+
+def test_a_gap_in_a_loop_without_time_is_told_by_its_motion(loop: Loop, tmp_path: Path) -> None:
+    table = raw_loop_table(loop).iloc[:, 1:].drop(index=range(500, 530))
+    table.to_csv(tmp_path / "axial.csv", index=False)
+    odd = inspect(tmp_path / "axial.csv", {"frequency": "0.1 Hz", "waveform": "sine"}).looked.odd
+    assert any("1 gap in the motion, the first after data row 500: the displacement goes from " in line for line in odd)
+
+
+def test_the_data_of_the_repository_raise_nothing(root: Path) -> None:
+    files = [*root.glob("data/cmp_15961*/*.csv"), *root.glob("data/arm_bushing/*.csv")]
+    assert len(files) == 8
+    assert {file.name: inspect(file, {}).looked.odd for file in files} == {file.name: () for file in files}
+
+
+def test_practice_campaigns_raise_only_what_is_there(root: Path) -> None:
+    """Two of them lag so much that loss factors fall below zero; nothing else is odd in a single file."""
+    files = [*root.glob("data/practice/*/*.csv"), *root.glob("data/mystery_mount/*.csv")]
+    said = {file: odd for file in files if (odd := inspect(file, {}).looked.odd)}
+    assert all("loss factor below zero" in sentence for odd in said.values() for sentence in odd)
+    assert len(said) <= 2
+
+
+def test_a_history_points_to_reduce(root: Path) -> None:
+    seen = inspect(root / "data/cmp_15961_raw/stepped_sine_axial.csv", {})
+    assert seen.kind == "history"
+    assert "bushfit reduce" in file_text(seen, root)
+    assert tomllib.loads(file_text(seen, root)) == {}
+    assert seen.looked.facts["frequencies"] == "5, from 10 to 155 Hz"
+
+
+@pytest.mark.parametrize(
+    ("frequency", "amplitudes", "said"),
+    [
+        (1.0, (1.0,), None),
+        (5.0, (1.0,), "a motion at 5 Hz is taken for a loop"),
+        (0.1, (0.2, 0.6, 1.0), "a motion of several amplitudes is taken for a loop"),
+    ],
+)
+def test_one_sine_is_a_loop_however_fast(
+    tmp_path: Path, frequency: float, amplitudes: tuple[float, ...], said: str | None
+) -> None:
+    time = np.arange(0.0, 5.0 * len(amplitudes), 0.005) / frequency
+    size = np.asarray(amplitudes)[np.minimum(time * frequency // 5, len(amplitudes) - 1).astype(int)]
+    phase = 2.0 * np.pi * frequency * time
+    noise = np.random.default_rng(3).standard_normal((2, time.size))
+    motion = 1e-3 * (size * np.sin(phase) + 1e-4 * noise[0])
+    force = 500.0 * (size * np.sin(phase + 0.1) + 1e-3 * noise[1])
+    seen = look(tmp_path, Loop("x", Direction.AXIAL, time, motion, force))
+    print(seen.kind, seen.looked.facts, seen.looked.odd)
+    assert seen.kind == "loop"
+    told = [sentence for sentence in seen.looked.odd if "taken for a loop" in sentence]
+    assert [sentence.startswith(said or "") for sentence in told] == [True] * bool(said)
+    assert all("bushfit reduce" in sentence for sentence in told)
+
+
+def damaged(values: np.ndarray, kind: int, random: np.random.Generator) -> np.ndarray:
+    """Rows of a file cut out, thinned, mixed up, or with a column that is constant, noisy, coarse or scaled."""
+    column = random.integers(values.shape[1])
+    match kind:
+        case 0:
+            return values[: random.integers(1, 60)]
+        case 1:
+            return values[:: random.integers(2, 400)]
+        case 2:
+            return values[random.integers(values.shape[0]) :]
+        case 3:
+            return values[np.sort(random.integers(0, values.shape[0], random.integers(1, 300)))]
+        case 4:
+            values[:, column] = random.choice([0.0, 1.0, -5.0, 1e30])
+        case 5:
+            values[:, column] += random.standard_normal(values.shape[0]) * 10.0 ** random.integers(-6, 4)
+        case 6:
+            values[:, column] *= np.where(random.random(values.shape[0]) < 0.01, 10.0 ** random.integers(-3, 13), 1.0)
+        case 7:
+            values[:, 1:] = values[:, 1:].round(random.integers(0, 3))
+    return values
+
+
+def test_damaged_files_are_told_or_refused(root: Path, tmp_path: Path) -> None:
+    """Whatever a file holds: a look at it, or one of bushfit's errors; no warning of NumPy's, no other exception."""
+    files = "cmp_15961/loop_axial_1.csv", "cmp_15961/sweep_axial.csv", "cmp_15961_raw/stepped_sine_axial.csv"
+    told = refused = 0
+    for seed in range(96):
+        random = np.random.default_rng(seed)
+        table = pd.read_csv(root / "data" / files[seed % 3])
+        rows = damaged(table.to_numpy(dtype=float).copy(), seed // 3 % 8, random)
+        pd.DataFrame(rows, columns=list(table)).to_csv(tmp_path / "axial.csv", index=False, float_format="%.9g")
+        try:
+            told += bool(file_text(inspect(tmp_path / "axial.csv", {})))
+        except BushfitError:
+            refused += 1
+    print(f"{told} told, {refused} refused")
+    assert told > 40
+    assert refused > 25
+
+
+def test_a_sweep_in_another_dialect(sweep: Sweep, tmp_path: Path) -> None:
+    table = raw_sweep_table(sweep).set_axis(
+        ["Frequenz [Hz]", "Amplitude [mm]", "Wiederholung", "Steifigkeit [N/mm]", "Verlustfaktor [-]"], axis=1
+    )
+    text = table.to_csv(index=False, sep=";", decimal=",", float_format="%.6f")
+    (tmp_path / "Kennlinie_radial.csv").write_bytes(text.encode("cp1252"))
+    seen = inspect(tmp_path / "Kennlinie_radial.csv", {})
+    assert (seen.kind, seen.direction) == ("sweep", Direction.RADIAL)
+    assert seen.written["columns parted by"] == "semicolon"
+    assert seen.written["decimal mark"] == "comma"
+    assert seen.columns[3].low == pytest.approx(pd.to_numeric(table["Steifigkeit [N/mm]"]).min(), rel=1e-5)

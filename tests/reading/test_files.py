@@ -1,0 +1,67 @@
+"""Files of the user's: their bytes, or one clear error."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import pytest
+
+from bushfit.errors import CampaignError, MeasurementError
+from bushfit.geometry import Direction
+from bushfit.reading.files import read_bytes, read_utf8, sha256, view_bytes
+from bushfit.reading.loops import read_loop
+
+
+@pytest.mark.parametrize(
+    ("name", "words"), [("", "a folder"), ("lop.csv", 'did you mean "loop.csv"'), ("a/b", "no such")]
+)
+def test_what_is_no_file(name: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / "loop.csv").touch()
+    with pytest.raises(MeasurementError, match=words):
+        read_loop(tmp_path / name, Direction.AXIAL)
+
+
+def test_bytes_come_as_they_are_and_the_error_is_of_the_kind_asked_for(tmp_path: Path) -> None:
+    file = tmp_path / "x.toml"
+    file.write_bytes(b"\xef\xbb\xbfname = 1\r\n")
+    assert read_bytes(file, CampaignError) == read_utf8(file, CampaignError) == b"\xef\xbb\xbfname = 1\r\n"
+    with pytest.raises(CampaignError, match="there is no such file"):
+        read_bytes(tmp_path / "y.toml", CampaignError)
+
+
+def test_a_file_of_more_bytes_than_allowed_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    file = tmp_path / "x.toml"
+    file.write_bytes(b"12345")
+    assert read_bytes(file, CampaignError, largest=5) == b"12345"
+    with pytest.raises(CampaignError, match=r"too large[\s\S]*5 bytes[\s\S]*at most 4 bytes[\s\S]*give another"):
+        read_bytes(file, CampaignError, largest=4, hint="give another")
+
+
+@pytest.mark.parametrize("content", [b"", b" \r\n\t", b" " * 70_000])
+def test_a_file_of_nothing_but_blanks_is_empty(content: bytes, tmp_path: Path) -> None:
+    file = tmp_path / "x.csv"
+    file.write_bytes(content)
+    with pytest.raises(MeasurementError, match="the file is empty"):
+        view_bytes(file, MeasurementError)
+    file.write_bytes(content + b"1")
+    assert view_bytes(file, MeasurementError)[:] == content + b"1"
+
+
+@pytest.mark.parametrize(("content", "place", "byte"), [(b"a\nb\xfc", 2, "0xfc"), (b"a\n\nb\0", 3, "0x00")])
+def test_bytes_that_are_no_utf8_are_named_with_their_line(
+    content: bytes, place: int, byte: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "x.toml"
+    file.write_bytes(content)
+    with pytest.raises(CampaignError, match=rf"line {place}[\s\S]*not UTF-8[\s\S]*{byte}"):
+        read_utf8(file, CampaignError)
+
+
+@pytest.mark.parametrize("size", [1, (1 << 22) + 1])
+def test_a_checksum_is_that_of_all_bytes(size: int, tmp_path: Path) -> None:
+    """A large file is mapped, and summed in a thread."""
+    data = bytes(range(256)) * (size // 256 + 1)
+    file = tmp_path / "x.csv"
+    file.write_bytes(data)
+    assert sha256(view_bytes(file, MeasurementError)).result() == hashlib.sha256(data).hexdigest()

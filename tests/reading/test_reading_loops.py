@@ -1,0 +1,169 @@
+"""Loops from files: every way to write a table reads the same, and every kind of damage has its one error."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from texts import LOOP, LOOP_ROWS, TIME, loop_from, with_line
+
+from bushfit.errors import BushfitError, MeasurementError
+from bushfit.geometry import Direction
+from bushfit.reading.parallel import CHUNK
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        LOOP,
+        LOOP.rstrip("\n"),
+        LOOP.replace(",", ";"),
+        LOOP.replace(",", "\t"),
+        LOOP.replace("\n", "\r\n"),
+        LOOP.replace("\n", "\n\n"),
+        "\ufeff" + LOOP,
+        "\ufeff\r\n# rig 3\r\n\n" + LOOP,
+        LOOP.replace("force [N]", "force (N)"),
+        LOOP.replace("force [N]", "Force_N").replace("displacement [mm]", "DISPLACEMENT_mm"),
+        LOOP.replace("force [N]", "load [N]").replace("time [s]", "t [s]"),
+        LOOP.replace("time [s],displacement [mm],force [N]", "time,displacement,force\ns,mm,N"),
+        LOOP.replace("time [s],displacement [mm],force [N]", "time [s],displacement,force\n,mm,N"),
+        LOOP.replace("\n", ",ok\n").replace("force [N],ok", "force [N],remark"),
+        "\n".join(",".join(f'"{cell}"' for cell in line.split(",")) for line in LOOP.splitlines()),
+        "\n".join(",".join(reversed(line.split(","))) for line in LOOP.splitlines()),
+    ],
+)
+def test_loops_in_every_dialect(text: str, tmp_path: Path) -> None:
+    loop = loop_from(text, tmp_path, noise=0.01)
+    np.testing.assert_allclose(loop.time, TIME, rtol=1e-12)
+    np.testing.assert_allclose(loop.displacement, 1e-3 * np.sin(3 * TIME), atol=1e-7)
+    np.testing.assert_allclose(loop.force, 100 * np.sin(3 * TIME + 0.1), atol=1e-3)
+    assert loop.noise == 0.01
+    assert loop.source is not None
+    assert loop.source.sha256 == hashlib.sha256(text.encode()).hexdigest()
+
+
+@pytest.mark.parametrize(("first", "last"), [('"rerun', '"ok'), ('5" rig', '"x'), ('"rerun', "")])
+def test_a_quote_left_open_in_a_remark_takes_no_rows(first: str, last: str, tmp_path: Path) -> None:
+    """A library would read everything up to the next quote as one cell, lines and all."""
+    remarks = {5: first, 30: last}
+    lines = [f"{line},{remarks.get(number, '')}" for number, line in enumerate(LOOP.splitlines())]
+    loop = loop_from("\n".join([LOOP.splitlines()[0] + ",remark", *lines[1:]]), tmp_path)
+    assert np.array_equal(loop.force, loop_from(LOOP, tmp_path).force)
+
+
+def test_names_and_units_from_the_campaign(tmp_path: Path) -> None:
+    text = LOOP.replace("force [N]", "Kraft").replace("displacement [mm]", "Weg [mm]")
+    columns = {"force": "Kraft", "displacement": "weg"}
+    loop = loop_from(text, tmp_path, columns=columns, units={"force": "kN"}, force_sign=1)
+    assert loop.force.max() == pytest.approx(99.96e3, rel=1e-3)
+
+
+def test_force_sign_turns_the_force(tmp_path: Path) -> None:
+    rows = (row.split(",") for row in LOOP_ROWS)
+    turned = "\n".join([LOOP.splitlines()[0], *(f"{t},{x},{-float(f):.3f}" for t, x, f in rows)])
+    assert np.array_equal(loop_from(turned, tmp_path, force_sign=-1).force, loop_from(LOOP, tmp_path).force)
+
+
+def test_torsion_counts_in_rad(tmp_path: Path) -> None:
+    text = LOOP.replace("displacement [mm]", "angle [deg]").replace("force [N]", "torque [Nm]")
+    loop = loop_from(text, tmp_path, direction=Direction.TORSION)
+    assert loop.displacement.max() == pytest.approx(np.radians(1.0), rel=1e-2)
+
+
+@pytest.mark.parametrize("lead", ["", "# rig 3\n\n", 'Operator "A"\n', "\ufeff", "Prüfstand 3\n"])
+def test_a_large_file_reads_like_a_small_one(lead: str, tmp_path: Path) -> None:
+    """5 MB, which pandas reads on all cores; an error late in the file still has its line."""
+    count = 300_000
+    numbers = np.column_stack((np.arange(count), np.arange(count) % 7 + 0.125, np.arange(count) % 7 - 0.25))
+    rows = [f"{t},{x},{f}" for t, x, f in zip(*numbers.T.tolist(), strict=True)]
+    text = lead + "\n".join(["time [s],displacement [mm],force [kN]", *rows]) + "\n"
+    assert len(text) > 1 << 22
+    loop = loop_from(text, tmp_path)
+    assert np.array_equal(loop.time, numbers[:, 0])
+    assert np.array_equal(loop.displacement, numbers[:, 1] * 1e-3)
+    assert np.array_equal(loop.force, numbers[:, 2] * 1e3)
+    assert loop.source is not None
+    assert loop.source.sha256 == hashlib.sha256(text.encode()).hexdigest()
+    last = lead.count("\n") + 1 + count
+    with pytest.raises(MeasurementError, match=rf'line {last}, column "force \[kN\]"[\s\S]*"abc"'):
+        loop_from(text.rsplit(",", 1)[0] + ",abc\n", tmp_path)
+
+
+@pytest.mark.parametrize("row", [CHUNK - 1, CHUNK, CHUNK + 1])
+def test_time_that_stands_still_is_found_wherever_blocks_meet(row: int, tmp_path: Path) -> None:
+    rows = [f"{i - (i == row)},{i % 7}.5,{i % 7}.25" for i in range(CHUNK + 9)]
+    text = "\n".join(["time [s],displacement [mm],force [kN]", *rows])
+    with pytest.raises(MeasurementError, match=rf'line {row + 2}, column "time \[s\]"'):
+        loop_from(text, tmp_path)
+
+
+NEVER = [f"{i},{i},7" for i in range(20)]
+
+
+BAD_LOOPS: list[tuple[str, str | bytes, list[str]]] = [
+    ("empty", "", ["empty"]),
+    ("blank", " \n\r\n", ["empty"]),
+    ("zeros", LOOP.encode().replace(b"0.3,", b"0.3\0,"), ["line 5", "not text", "0x00"]),
+    ("binary", bytes(range(256)) * 10, ["line 1", "not text", "0x00"]),
+    ("half UTF-16", LOOP.encode("utf-16")[:-1], ["UTF-16"]),
+    ("no table", "just text\nmore\n", ["line 1", "only one column", "just text"]),
+    ("no header", "\n".join(LOOP_ROWS), ["line 1", "no header", "time [s]"]),
+    ("long header", "x" * 200_000 + ",b\n1,2\n", ["line 1", "no column for the displacement", "xxx..."]),
+    ("no force", LOOP.replace("force [N]", "y [N]"), ["line 1", "no column for the force", "y [N]", "columns ="]),
+    ("no time", LOOP.replace("time [s]", "x [s]"), ["no column for the time", "rate", "waveform"]),
+    ("two forces", LOOP.replace("time [s]", "force [kN]"), ["line 1", "more than one", "force [kN], force [N]"]),
+    ("no unit", LOOP.replace("force [N]", "force"), ["line 1", "the force has no unit", "force [N]", "units ="]),
+    ("unknown unit", LOOP.replace("[N]", "[foo]"), ["line 1", "force [foo]", "unknown unit"]),
+    ("wrong unit", LOOP.replace("[N]", "[bar]"), ["line 1", "force [bar]", "does not fit", "a force"]),
+    ("angle", LOOP.replace("[mm]", "[deg]"), ["line 1", "does not fit", "a length"]),
+    ("swapped", LOOP.replace("[N]", "[x]").replace("[mm]", "[N]").replace("[x]", "[mm]"), ["swapped", "columns ="]),
+    ("two units", LOOP.replace("force [N]\n", "force [N]\ns,mm,kN\n"), ["two units", "N and kN"]),
+    ("text", with_line(LOOP, 5, "0.3,abc,3"), ["line 5", '"displacement [mm]"', '"abc"', "no finite number"]),
+    ("empty cell", with_line(LOOP, 5, "0.3,,3"), ["line 5", '"displacement [mm]"', "empty"]),
+    ("nan", with_line(LOOP, 5, "0.3,nan,3"), ["line 5", '"nan"']),
+    ("inf", with_line(LOOP, 5, "0.3,3,-inf"), ["line 5", '"-inf"']),
+    ("huge", with_line(LOOP, 5, "0.3,3,1e300"), ["line 5", '"1e300"']),
+    ("overflow", with_line(LOOP, 5, "0.3,3,1e999"), ["line 5", '"1e999"']),
+    ("decimal comma", with_line(LOOP.replace(",", ";"), 5, "0.3;0,5;3"), ["line 5", '"0,5"', "decimal point"]),
+    ("short row", with_line(LOOP, 5, "0.3,1"), ["line 5", "2 cells", "3 cells"]),
+    ("long row", with_line(LOOP, 5, "0.3,1,2,3"), ["line 5", "4 cells", "3 cells"]),
+    ("long rows", LOOP.replace("\n", ",1\n").replace("[N],1", "[N]"), ["line 2", "4 cells", "3 cells"]),
+    ("open quote", with_line(LOOP, 5, '"0.3,1,2'), ["1 cell"]),
+    ("endless cell", with_line(LOOP, 5, f'0.3,"{"9" * 200_000}",2'), ["cannot be read", "field limit"]),
+    ("endless line", LOOP + "1," * 1_000_000, ["cannot be read", "a line of 2000000 characters, line 42"]),
+    ("endless header", "time [s]" + " " * 300_000 + "force [N]\n1 2\n", ["line 1", "only one column"]),
+    ("endless blanks", LOOP.replace("0.3,", " " * 100_000 + "0.3,", 1) + "x,1,2", ["line 42", "x"]),
+    ("endless number", with_line(LOOP, 5, "0.3," + "1" * 100_000 + ",2"), ["line 5", "no finite number", "111..."]),
+    ("many columns", ",".join(["time [s]"] * 100_000) + "\n1,2\n", ["line 1", "more than one column"]),
+    ("nothing but quotes", '"' * 1_000_000, ["only one column"]),
+    ("after blanks", with_line("\n# x\n\n" + LOOP, 8, "0.3,abc,3"), ["line 8", '"abc"']),
+    ("time back", with_line(LOOP, 5, "0.1,1,2"), ["line 5", '"time [s]"', "does not increase", '"0.1"']),
+    ("few rows", "\n".join(LOOP.splitlines()[:5]), ["too few rows", "4", "10"]),
+    ("no rows", LOOP.splitlines()[0], ["too few rows", "0"]),
+    ("standstill", "time [s],displacement [mm],force [N]\n" + "\n".join(f"{i},7,{i}" for i in range(20)),
+     ["displacement never changes"]),
+    ("no force", "time [s],displacement [mm],force [N]\n" + "\n".join(NEVER), ["force never changes"]),
+    ("sign", "time [s],displacement [mm],force [N]\n" + "\n".join(f"{i},{i},{-i}" for i in range(20)),
+     ["force falls", "force_sign = -1"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "words"), [case[1:] for case in BAD_LOOPS], ids=[case[0] for case in BAD_LOOPS])
+def test_spoiled_loops_have_one_clear_error(text: str | bytes, words: list[str], tmp_path: Path) -> None:
+    with pytest.raises(BushfitError) as caught:
+        loop_from(text, tmp_path)
+    message = str(caught.value)
+    assert all(word in message for word in ["loop.csv", *words]), message
+
+
+@given(st.binary(max_size=300) | st.text(alphabet='timeforcdsplan[]mN,;"\t\n\r#._0123-e', max_size=300).map(str.encode))
+def test_any_bytes_are_a_loop_or_a_clear_error(tmp_path_factory: pytest.TempPathFactory, data: bytes) -> None:
+    for content in (data, LOOP.encode() + data):
+        with contextlib.suppress(BushfitError):
+            loop_from(content, tmp_path_factory.getbasetemp())

@@ -1,0 +1,56 @@
+"""Predictions to draw, and what a figure shows: its lines, points, labels and legends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bushfit.effects.contract import Array
+from bushfit.fitting.data_sets import LoopData, SweepData
+from bushfit.geometry import Direction
+from bushfit.model.covariance import Covariance
+from bushfit.model.model import Model
+from bushfit.model.result import Result
+from bushfit.prediction import Prediction, predict
+from bushfit.report.plots import fine_grid
+
+Swept = Callable[..., SweepData]
+Looped = Callable[..., LoopData]
+FREQUENCIES = np.arange(5.0, 156.0, 10.0)
+AMPLITUDES = np.array([1e-4, 2e-4, 5e-4])
+TORSION = np.radians([0.5, 1.0, 2.0])
+
+
+def fitted(model: Model) -> Result:
+    names = tuple(model.values)
+    return Result(model, names, Covariance(names, np.diag([(0.02 * model.values[name]) ** 2 for name in names])))
+
+
+def predicted(
+    model: Model, direction: Direction, frequencies: Array = FREQUENCIES, amplitudes: Array = AMPLITUDES
+) -> tuple[Prediction, Prediction]:
+    """A prediction and its curves."""
+    prediction = predict(fitted(model), direction, frequencies, amplitudes)
+    return prediction, predict(fitted(model), direction, *fine_grid(prediction))
+
+
+def lines(axes: Axes) -> list[Any]:
+    """Lines of a model: neither points nor the zero of a residual."""
+    return [line for line in axes.get_lines() if line.get_linestyle() != "None" and len(line.get_xdata()) > 2]
+
+
+def points(axes: Axes) -> list[Any]:
+    return [line for line in axes.get_lines() if line.get_linestyle() == "None"]
+
+
+def labels(figure: Figure) -> list[str]:
+    return [label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
+
+
+def legend(axes: Axes) -> list[str]:
+    box = axes.get_legend()
+    return [] if box is None else [text.get_text() for text in box.get_texts()]

@@ -1,0 +1,51 @@
+"""Hidden campaigns: the same for the same seed, with what is hidden visible and everything else plausible."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bushfit.effects import BASE
+from bushfit.model.model import FIVE
+from bushfit.scorecard.hidden import OUTSIDE, hidden_campaign, hideable
+
+
+def test_the_same_seed_makes_the_same_campaign() -> None:
+    (one, sealed), (same, again), (_, other) = (hidden_campaign(seed, ("inertia",)) for seed in (3, 3, 4))
+    assert sealed == again != other
+    for mine, theirs in zip(one.sweeps, same.sweeps, strict=True):
+        assert np.array_equal(mine.stiffness, theirs.stiffness)
+    assert np.array_equal(one.loops[0].force, same.loops[0].force)
+
+
+@pytest.mark.parametrize("hidden", [("inertia",), ("viscous", "force_offset")])
+def test_what_is_hidden_is_in_the_truth_and_visible(hidden: tuple[str, ...]) -> None:
+    simulated, sealed = hidden_campaign(1, hidden)
+    assert simulated.truth.effects == (*BASE, *[name for name in simulated.truth.effects if name in hidden])
+    assert {name.partition(".")[0] for name in sealed.values} - set(FIVE) == set(hidden)
+    assert sealed.visible > 0.01
+    assert dict(simulated.truth.values) == sealed.values
+
+
+def test_a_clean_campaign_hides_nothing() -> None:
+    simulated, sealed = hidden_campaign(2, ())
+    assert (sealed.hidden, sealed.outside, sealed.visible) == ((), "", 0.0)
+    assert simulated.truth.effects == BASE
+    assert simulated.campaign().simulate is None
+
+
+@pytest.mark.parametrize("outside", OUTSIDE)
+def test_what_the_library_lacks_disturbs_the_tests_and_not_the_model(outside: str) -> None:
+    (plain, _), (disturbed, sealed) = (hidden_campaign(6, (), what) for what in ("", outside))
+    assert sealed.outside == outside
+    assert disturbed.truth == plain.truth
+    changed = [
+        not np.allclose(mine.stiffness, theirs.stiffness, rtol=0.02)
+        for mine, theirs in zip(plain.sweeps, disturbed.sweeps, strict=True)
+    ]
+    assert any(changed)
+
+
+def test_every_effect_but_the_paper_s_can_be_hidden() -> None:
+    assert not set(hideable()) & set(BASE)
+    assert {"inertia", "rig_compliance", "delay"} <= set(hideable())
