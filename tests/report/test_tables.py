@@ -20,7 +20,7 @@ def data(root: Path) -> Data:
 
 def test_loops_row_by_row(data: Data, paper_model: Model) -> None:
     table = loops_table(paper_model, data.loops)
-    loop = data.loops[0].loop
+    loop = data.loops[0].test
     assert len(table) == loop.time.size
     assert set(table["loop"]) == {loop.name}
     np.testing.assert_allclose(table["force [N]"], loop.force, rtol=1e-12)
