@@ -226,9 +226,9 @@ def check_judged(limits: Limits, path: Path, rows: Iterable[Row]) -> None:
     """Refuse limits that no work on these rows could answer.
 
     Raises:
-        CampaignError: `verdicts`, and a row without diagnose.
+        CampaignError: `verdicts`, and a row without diagnose or run.
     """
-    silent = [row.name for row in rows if "diagnose" not in (row.settings.commands or ())] if limits.verdicts else []
+    silent = [row.name for row in rows if not row.settings.diagnosed] if limits.verdicts else []
     if silent:
         more = f" and {len(silent) - 1} more" if len(silent) > 1 else ""
         raise CampaignError(
@@ -236,7 +236,7 @@ def check_judged(limits: Limits, path: Path, rows: Iterable[Row]) -> None:
             file=path,
             place="verdicts",
             found=f"{silent[0]}{more} without it",
-            hint='--command diagnose, or commands = ["diagnose"] in the manifest',
+            hint='--command diagnose, or commands = ["diagnose"] in the manifest (or run, which diagnoses too)',
         )
 
 

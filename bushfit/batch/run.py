@@ -188,7 +188,7 @@ def _report(plan: Plan, spool: Spool, seconds: float) -> Summary:
     errors, edge = [], []
     aside = output / ledger.ASIDE / TABLE
     with aside.open("w", encoding="utf-8", newline="") as stream:
-        diagnosed = any("diagnose" in (row.settings.commands or ()) for row in plan.rows)
+        diagnosed = any(row.settings.diagnosed for row in plan.rows)
         table = Table(stream, parameters, points, verdicts=diagnosed, limits=judge is not None)
         for number, (row, record) in enumerate(zip(plan.rows, spool, strict=True)):
             done = record["status"] == "done"

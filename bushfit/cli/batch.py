@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, new_table, shared_options, warn
+from bushfit.cli.common import Options, shared_options
+from bushfit.cli.show import new_table, warn
 from bushfit.units import alike, for_people
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ _DIRECTIONS = click.Choice(["axial", "radial", "torsion"])
 @click.option(
     "--command",
     "commands",
-    type=click.Choice(["fit", "diagnose", "predict"]),
+    type=click.Choice(["run", "fit", "diagnose", "predict"]),
     multiple=True,
     help="What to do with each campaign; may be given again [fit].",
 )

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, shared_options, warn
+from bushfit.cli.common import Options, shared_options
 from bushfit.cli.inspect import KEYS, tell_assumed
 from bushfit.cli.raw import direction_error, file_options, options_named
+from bushfit.cli.show import warn
 from bushfit.errors import BushfitError, CampaignError, MeasurementError
 
 if TYPE_CHECKING:

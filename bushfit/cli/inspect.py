@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, new_table, shared_options
+from bushfit.cli.common import Options, shared_options
 from bushfit.cli.raw import file_options, options_named
+from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError
 
 if TYPE_CHECKING:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, new_table, shared_options, warn
+from bushfit.cli.common import Options, shared_options
 from bushfit.cli.inspect import KEYS
 from bushfit.cli.raw import direction_error, file_options, options_named
+from bushfit.cli.show import new_table, warn
 from bushfit.errors import MeasurementError
 from bushfit.units import alike, number
 

@@ -9,7 +9,8 @@ from tempfile import TemporaryDirectory
 
 import click
 
-from bushfit.cli.common import Options, new_table, options_without_folder
+from bushfit.cli.common import Options, options_without_folder
+from bushfit.cli.show import new_table
 
 
 @click.command("scorecard")

@@ -52,7 +52,7 @@ def test_fits_write_the_files_of_the_interface(bushfit: Run, tmp_path: Path, com
 
 
 def test_run_does_the_whole_chain_and_says_what_two_steps_cost(bushfit: Run, tmp_path: Path) -> None:
-    done = bushfit("run", CAMPAIGN, "-o", str(tmp_path / "x"))
+    done = bushfit("run", CAMPAIGN, "-o", str(tmp_path / "x"), "-v")
     assert done.returncode == 0, done.stderr
     named = {file.name for file in (tmp_path / "x").iterdir()}
     tables = {f"{kind}.{end}" for kind in ("loops", "sweeps", "axial", "radial") for end in ("csv", "png")}
@@ -66,6 +66,95 @@ def test_run_does_the_whole_chain_and_says_what_two_steps_cost(bushfit: Run, tmp
     assert len(radial) == 48
     ordered = radial.sort_values(["amplitude [mm]", "frequency [Hz]"], ignore_index=True)
     pd.testing.assert_frame_equal(radial, ordered)
+
+
+def test_run_shows_the_result_first_and_the_steps_in_a_line(bushfit: Run, tmp_path: Path) -> None:
+    done = bushfit("run", CAMPAIGN, "-o", str(tmp_path / "x"), "--no-plots")
+    assert done.returncode == 0, done.stderr
+    words = (
+        *("CMP 15 961: consistent", "joint fit", "mu ", "NRMSE", "correlation: ", "tested range"),
+        *("frequencies: 0.1 to 155 Hz", "strains: 0.62 to 6.2 %, which is axial 0.1 to 1 mm, radial ", "directions: axial"),
+        *("axial, corners", "radial, corners", "extrapolated beyond", "two-step procedure (the paper's): 10 passes, agrees"),
+        *("times less certain than there (static.json, dynamic.json; -v shows it)", "wrote static.json", "the model to use: "),
+    )  # fmt: skip
+    places = [done.stderr.index(word) for word in words]
+    assert places == sorted(places)
+    for word in ("pass by pass", "what the two-step procedure costs", "springpot was left out", "held out"):
+        assert word not in done.stderr
+
+
+def test_run_with_an_effect_shows_what_diagnose_shows(root: Path, tmp_path: Path) -> None:
+    done = call(root, "run", "configs/mystery_mount.toml", "-o", str(tmp_path / "x"), "--no-plots")
+    assert done.returncode == 0, done.stderr
+    for words in ("Mystery mount: named", "rig_compliance (instrument)", "held out", "x noise:", "next test:"):
+        assert done.stderr.count(words) == 1
+    assert "model with what was added" in done.stderr
+    assert "was not fitted, and the model misses it" not in done.stderr, "of the joint fit, which is not the one to use"
+    assert f"{tmp_path / 'x/model.json'}, with rig_compliance; joint.json is without" in done.stderr
+
+
+@pytest.mark.parametrize("ending", ["csv", "txt", "tsv", "dat", "asc", "xls", "xlsx", "xlsm", "xlsb", "ods", "XLSX"])
+@pytest.mark.parametrize("command", ["run", "fit-static"])
+def test_a_test_file_is_no_campaign(typed: Run, tmp_path: Path, command: str, ending: str) -> None:
+    (tmp_path / f"x.{ending}").write_bytes(b"PK\x03\x04")
+    done = typed(command, f"x.{ending}")
+    assert done.returncode == 2
+    assert f"x.{ending}: a campaign is needed" in done.stderr
+    assert f"try: bushfit init x.{ending} " in done.stderr
+    assert typed(command, f"lost.{ending}").stderr.count("there is no such file") == 1
+
+
+def held(work: Path, name: str, mu: str = "1.09 MPa") -> str:
+    """A campaign that holds all five parameters."""
+    values = {"mu": mu, "m": "0.2 MPa*s^alpha", "alpha": 0.24, "sigma_fmax": "14.6 kPa", "eps_half": 0.013}
+    tables = "".join(f"\n[fit.{key}]\nvalue = {json.dumps(value)}\nvary = false\n" for key, value in values.items())
+    (work / "configs" / name).write_text((work / CAMPAIGN).read_text() + tables)
+    return f"configs/{name}"
+
+
+@pytest.mark.parametrize("loss", ["linear", "soft_l1"])
+@pytest.mark.parametrize("command", [*CAMPAIGN_FILES, "run"])
+def test_five_held_parameters_are_checked_against_the_tests(
+    bushfit: Run, work: Path, tmp_path: Path, command: str, loss: str
+) -> None:
+    campaign = held(work, "held.toml")
+    done = bushfit(command, campaign, "-o", str(tmp_path / "x"), "--no-plots", "--loss", loss)
+    assert done.returncode == 0, done.stderr
+    assert "nothing was fitted here, every parameter is held; the values given meet the tests" in done.stderr
+    document = json.loads(next((tmp_path / "x").glob("[sdm]*.json")).read_text())
+    assert {entry["vary"] for entry in document["parameters"].values()} == {False}
+    assert document["parameters"]["mu"]["value"] == 1.09e6
+    assert document["fit"]["nrmse"] < 0.01
+
+
+def test_held_parameters_that_miss_the_tests_are_said_to(bushfit: Run, work: Path, tmp_path: Path) -> None:
+    campaign = held(work, "off.toml", mu="1.3 MPa")
+    done = bushfit("fit", campaign, "-o", str(tmp_path / "x"), "--no-plots", "--max-nrmse", "0.02")
+    assert done.returncode == 1, done.stderr
+    assert "the values given miss the tests by" in done.stderr
+    refused = bushfit("diagnose", campaign, "-o", str(tmp_path / "y"), "--no-plots")
+    assert refused.returncode == 2
+    assert "every parameter is held" in refused.stderr
+
+
+def test_a_parameter_at_nothing_shows_no_interval(bushfit: Run, work: Path, tmp_path: Path) -> None:
+    """Sweeps whose stiffness falls with frequency leave the springpot nothing."""
+    from bushfit.model.result import load_result
+
+    sweep = pd.read_csv(work / "data/cmp_15961/sweep_axial.csv", comment="#")
+    frequency, stiffness, loss = (next(c for c in sweep if c.startswith(n)) for n in ("freq", "stiff", "loss f"))
+    sweep[stiffness] = 600.0 * (sweep[frequency] / 5.0) ** -0.05
+    sweep[loss] = 0.01
+    sweep.to_csv(work / "data/cmp_15961/falling.csv", index=False)
+    (work / "configs/falling.toml").write_text((work / CAMPAIGN).read_text().replace("sweep_axial", "falling"))
+    done = bushfit("fit", "configs/falling.toml", "-o", str(tmp_path / "x"), "--no-plots")
+    assert done.returncode == 0, done.stderr
+    result = load_result(tmp_path / "x" / "model.json")
+    assert result.at_bound["m"] == "min"
+    (row,) = [line for line in done.stderr.splitlines() if line.split()[:1] == ["m"]]
+    assert row.split()[:3] == ["m", "(at", "min)"]
+    assert " to " not in row
+    assert result.interval("m") is not None, "files keep it"
 
 
 def test_the_paper_s_order_by_hand(bushfit: Run, tmp_path: Path) -> None:
