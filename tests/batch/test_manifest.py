@@ -99,7 +99,7 @@ BAD = [
     (
         "m.toml",
         ROW + 'commands = ["run"]\neffects = ["inertia"]',
-        ["effects", "does nothing", "try: leave effects out"],
+        ["effects", "nothing", "try: leave effects out"],
     ),
     ("m.toml", ROW + 'effects = ["inertai"]', ["bushings #1.effects #1", "did you mean inertia?"]),
     ("m.toml", ROW + "max_effects = 9", ["bushings #1.max_effects", "9"]),
