@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from bushfit.jobs.diagnose import Diagnose, Diagnosed
     from bushfit.jobs.fits import Fit
 
-#: As good as no effect, as a share of its parameter's usual size.
-_NOTHING = 1e-3
+#: Size below which an effect is as good as none, relative to its parameter's typical size (chosen).
+_NO_EFFECT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -220,7 +220,9 @@ def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> R
 def _vanishes(name: str, parameter: Parameter, value: float) -> bool:
     """Whether a value on a bound is that of an added effect that is not there, which is an answer like any other."""
     return (
-        "." in name and parameter.neutral is not None and abs(value - parameter.neutral) <= _NOTHING * parameter.typical
+        "." in name
+        and parameter.neutral is not None
+        and abs(value - parameter.neutral) <= _NO_EFFECT * parameter.typical
     )
 
 

@@ -25,8 +25,10 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 #: Width of tables where standard error is no terminal, in characters.
 _WIDTH = 100
-#: Names of the directions, as the commands take them.
+#: Directions as the commands take them.
 DIRECTIONS = click.Choice(["axial", "radial", "torsion"])
+#: The same in the left column of a help, short so that the right one has room.
+DIRECTION = "DIRECTION"
 
 
 class _Folder(click.Path):
@@ -98,7 +100,7 @@ def example(*commands: str) -> str:
 
 def _shared_options(where: str, function: F) -> F:
     @click.option("-o", "--output", type=_Folder(path_type=Path), help=f"Folder for the results [{where}].")
-    @click.option("-v", "--verbose", is_flag=True, help="Say more: steps on the way, all correlations, files read.")
+    @click.option("-v", "--verbose", is_flag=True, help="Say more: steps on the way, all correlations, files.")
     @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
     @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on standard output.")
     @click.option("--no-plots", is_flag=True, help="Write no PNG files.")

@@ -15,6 +15,7 @@ from bushfit.units import alike, for_people
 if TYPE_CHECKING:
     from bushfit.jobs.diagnose import Diagnosed
 
+#: Colours of the verdicts on a terminal.
 _COLOURS = {"consistent": "green", "named": "green", "ambiguous": "yellow", "partly": "yellow", "unexplained": "red"}
 
 

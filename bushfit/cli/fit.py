@@ -7,7 +7,7 @@ from contextlib import contextmanager, nullcontext
 
 import click
 
-from bushfit.cli.common import DIRECTIONS, Options, Task, campaign_options, example
+from bushfit.cli.common import DIRECTION, DIRECTIONS, Options, Task, campaign_options, example
 from bushfit.cli.show import tell_fit
 
 
@@ -18,8 +18,10 @@ from bushfit.cli.show import tell_fit
     "--direction",
     "directions",
     type=DIRECTIONS,
+    metavar=DIRECTION,
     multiple=True,
-    help="Tests to fit; may be given again [axial, as in the paper; of loops, or of sweeps, all where none is axial].",
+    help="Tests to fit: axial, radial or torsion; may be given again [axial, as in the paper; of loops, or of sweeps, "
+    "all where none is axial].",
 )
 @click.option(
     "--effect",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import DIRECTIONS, Options, example, open_model, shared_options
+from bushfit.cli.common import DIRECTION, DIRECTIONS, Options, example, open_model, shared_options
 from bushfit.cli.show import new_table, warn
 
 if TYPE_CHECKING:
@@ -30,8 +30,9 @@ if TYPE_CHECKING:
     "--direction",
     "directions",
     type=DIRECTIONS,
+    metavar=DIRECTION,
     multiple=True,
-    help="May be given again [axial and radial].",
+    help="axial, radial or torsion; may be given again [axial and radial].",
 )
 @click.option("--frequencies", help='Such as "5:155:10 Hz" or "20, 50, 100 Hz" [the campaign\'s].')
 @click.option("--amplitudes", help='Zero-to-peak, such as "0.1, 0.2, 0.5 mm" [the campaign\'s].')

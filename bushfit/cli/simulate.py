@@ -41,7 +41,8 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
 
     The model is MODEL.json, tested as the paper's bushing was, or the [simulate] table of CAMPAIGN with tests of its
     own. Equations (3) and (5) are stepped through time; the closed form that the fits use is not involved. Noise is
-    that of the [simulate] table, or none; each option replaces one entry of the table.
+    that of the [simulate] table, or none; each option replaces one entry of the table. Good for planning: would
+    `bushfit diagnose` see in these tests what --effect hides there?
 
     Writes campaign.toml, the CSV files it names, and truth.json, the model behind them.
     """
