@@ -5,8 +5,8 @@ its fit is not settled by the tests: it passes on condition at best.
 
 Notes:
     A value with its 95 % interval meets a limit in one of four ways, in the words of ILAC-G8:09/2019 for statements of
-    conformity. Pass: the whole interval is within. Conditional pass: the value is within, but the interval reaches over
-    the limit. Conditional fail: the value is outside, but the interval reaches back. Fail: the whole interval is outside.
+    conformity. Pass: the whole interval is within. Conditional pass: the value is within, but the interval reaches
+    over the limit. Conditional fail: the value is outside, but the interval reaches back. Fail: all of it is outside.
 """
 
 from __future__ import annotations
