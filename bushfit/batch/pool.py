@@ -166,16 +166,16 @@ def run(
         BatchError: the workers are gone for good.
     """
     left, size = iter(enumerate(rows)), 1
-    out: dict[Future[Sequence[R]], Sequence[tuple[int, T]]] = {}
+    out: dict[Future[Sequence[R]], list[tuple[int, T]]] = {}
     started: dict[Future[Sequence[R]], float] = {}
     suspects: deque[tuple[int, T]] = deque()
     try:
         while True:
-            while (
-                not suspects and len(out) < _CHUNKS_PER_WORKER * pool.workers() and (batch := list(islice(left, size)))
-            ):
-                future = pool.executor().submit(work, [row for _, row in batch])
-                out[future], started[future] = batch, time.monotonic()
+            while not suspects and len(out) < _CHUNKS_PER_WORKER * pool.workers():
+                if not (chunk := list(islice(left, size))):
+                    break
+                future = pool.executor().submit(work, [row for _, row in chunk])
+                out[future], started[future] = chunk, time.monotonic()
             if not out:
                 if not suspects:
                     return

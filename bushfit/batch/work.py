@@ -219,11 +219,9 @@ def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> R
 
 def _vanishes(name: str, parameter: Parameter, value: float) -> bool:
     """Whether a value on a bound is that of an added effect that is not there, which is an answer like any other."""
-    return (
-        "." in name
-        and parameter.neutral is not None
-        and abs(value - parameter.neutral) <= _NO_EFFECT * parameter.typical
-    )
+    if "." not in name or parameter.neutral is None:
+        return False
+    return abs(value - parameter.neutral) <= _NO_EFFECT * parameter.typical
 
 
 def _band(band: Band) -> list[float | None]:

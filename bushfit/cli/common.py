@@ -168,7 +168,7 @@ class Task:
         return replace(loaded, fit=replace(loaded.fit, loss=cast("Loss", self.loss))) if self.loss else loaded
 
 
-def campaign_options(soft_l1: str = "points far off pull less, wild ones not at all") -> Callable[[F], F]:
+def campaign_options(soft_l1: str = "points far off pull less, outliers not at all") -> Callable[[F], F]:
     """CAMPAIGN, --loss, --max-nrmse and the shared options, gathered into one `task` argument.
 
     Args:

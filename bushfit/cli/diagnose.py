@@ -31,7 +31,7 @@ _COLOURS = {"consistent": "green", "named": "green", "ambiguous": "yellow", "par
 @click.option("--without", multiple=True, metavar="EFFECT", help="Do not consider this effect; may be given again.")
 @click.option("--max-effects", type=click.IntRange(0, 5), default=3, show_default=True, help="Effects to add at most.")
 @click.option("--tolerance", default="1 %", show_default=True, help="Gaps below this share of |K| do not count.")
-@campaign_options("the same with wild points left out")
+@campaign_options("the same with outliers left out")
 def command(
     model: Path | None,
     adopt: tuple[str, ...],
