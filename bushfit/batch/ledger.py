@@ -1,8 +1,11 @@
-"""What is kept of a row: a folder of its own, complete or absent, that says of which inputs it is the result.
+"""What is kept of a row: a folder with its result files and row.json, the record of what was found.
 
-Below the batch's folder: bushings/<row>/ with the row's result files and row.json, its record. A folder is written
-aside and renamed, so a process that is killed leaves a whole one or none; and since a record lists the hashes of its
-inputs and of its files, nothing is trusted that a crash of the machine has left torn. No disk is waited for.
+The folder is bushings/<row>/ below that of the batch. A record lists the hashes of the row's inputs and of its files,
+so that a later run can tell whether they still hold.
+
+Notes:
+    A folder is written aside and renamed: a process that is killed leaves a whole one or none. What a crash of the
+    machine leaves torn is found by its hash, so that no write has to wait for the disk.
 """
 
 from __future__ import annotations
@@ -24,8 +27,14 @@ from bushfit.batch.points import Point
 from bushfit.errors import OutputError
 from bushfit.report import disk
 
+#: Layout of a record; records of another are done again.
 SCHEMA = "bushfit/row/2"
-RECORD, ROWS, ASIDE = "row.json", "bushings", ".aside"
+#: File of a row's record, in the row's folder.
+RECORD = "row.json"
+#: Folder of the rows' folders, in that of the batch.
+ROWS = "bushings"
+#: Folder in which results are made ready, in that of the batch; gone when the batch ends.
+ASIDE = ".aside"
 
 Record = dict[str, Any]
 

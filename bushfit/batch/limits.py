@@ -1,11 +1,12 @@
 """Limits: a TOML file of bounds, fixed or relative to the batch, and the verdict on each bushing.
 
-A value with its 95 % interval meets a limit in one of four ways (the words are those of ILAC-G8:09/2019 for
-statements of conformity): pass, the whole interval is within; conditional pass, the value is within but the interval
-reaches over the limit; conditional fail, the value is outside but the interval reaches back; fail, the whole interval
-is outside. A bushing is as good as the worst of its quantities; what is not known of it cannot be said to be within,
-and fails. A parameter that came to rest on a bound of its fit is a value that the tests do not settle: within its
-limits, or without any, it passes on condition.
+A bushing is as good as the worst of its quantities. What is not known of it fails. A parameter that rests on a bound of
+its fit is not settled by the tests: it passes on condition at best.
+
+Notes:
+    A value with its 95 % interval meets a limit in one of four ways, in the words of ILAC-G8:09/2019 for statements of
+    conformity. Pass: the whole interval is within. Conditional pass: the value is within, but the interval reaches
+    over the limit. Conditional fail: the value is outside, but the interval reaches back. Fail: all of it is outside.
 """
 
 from __future__ import annotations
@@ -101,6 +102,7 @@ class Bounds:
         return None
 
 
+#: Keys of a table of limits that have the unit of the quantity.
 _SIZES = ("min", "max", "nominal")
 
 
@@ -226,9 +228,9 @@ def check_judged(limits: Limits, path: Path, rows: Iterable[Row]) -> None:
     """Refuse limits that no work on these rows could answer.
 
     Raises:
-        CampaignError: `verdicts`, and a row without diagnose.
+        CampaignError: `verdicts`, and a row without diagnose or run.
     """
-    silent = [row.name for row in rows if "diagnose" not in (row.settings.commands or ())] if limits.verdicts else []
+    silent = [row.name for row in rows if not row.settings.diagnosed] if limits.verdicts else []
     if silent:
         more = f" and {len(silent) - 1} more" if len(silent) > 1 else ""
         raise CampaignError(
@@ -236,7 +238,7 @@ def check_judged(limits: Limits, path: Path, rows: Iterable[Row]) -> None:
             file=path,
             place="verdicts",
             found=f"{silent[0]}{more} without it",
-            hint='--command diagnose, or commands = ["diagnose"] in the manifest',
+            hint='--command diagnose, or commands = ["diagnose"] in the manifest (or run, which diagnoses too)',
         )
 
 

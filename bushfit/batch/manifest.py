@@ -26,8 +26,9 @@ from bushfit.geometry import Direction
 from bushfit.reading.files import read_utf8
 from bushfit.validation import Text, check_tables, converted, unknown_key
 
-Command = Literal["fit", "diagnose", "predict"]
+Command = Literal["run", "fit", "diagnose", "predict"]
 
+#: What is done to a campaign where nothing is said.
 _DEFAULT: tuple[Command, ...] = ("fit",)
 #: Which commands look at a setting.
 _READERS: dict[str, tuple[Command, ...]] = {
@@ -36,8 +37,11 @@ _READERS: dict[str, tuple[Command, ...]] = {
     "model": ("diagnose", "predict"),
 }
 
+#: Largest manifest that is read, in bytes: some million rows.
 _LARGEST_BYTES = 200_000_000
-_WILD = re.compile(r"[*?\[]")
+#: What makes a path a pattern.
+_PATTERN = re.compile(r"[*?\[]")
+#: Of a CSV manifest: the one that its first line has most of.
 _DELIMITERS = ",;\t"
 
 
@@ -59,7 +63,7 @@ class Settings:
     """What to do with a campaign; None where a row leaves it to the manifest, and the manifest to the default.
 
     Args:
-        commands: any of fit, diagnose, predict [fit].
+        commands: run alone, or any of fit, diagnose, predict [fit].
         directions, effects: of fit, as `bushfit fit --direction --effect`.
         adopt, without, max_effects, tolerance: of diagnose, as its options.
         model: a model file to predict from, or for diagnose to start from.
@@ -77,6 +81,11 @@ class Settings:
     def over(self, other: Settings) -> Settings:
         """These, and where they say nothing the other's."""
         return replace(other, **{key: value for key, value in vars(self).items() if value is not None})
+
+    @property
+    def diagnosed(self) -> bool:
+        """Whether a row with these ends in a verdict."""
+        return not {"run", "diagnose"}.isdisjoint(self.commands or ())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +145,7 @@ def read_manifest(source: str, given: Settings, *more: str) -> Manifest:
                 "this is no campaign", file=strange[0], expected="one manifest, or campaign files alone"
             )
         stem, base, entries = "batch", Path(), iter([Entry(campaign=name) for name in listed])
-    elif _WILD.search(source) and not path.exists():
+    elif _PATTERN.search(source) and not path.exists():
         stem, base, entries = "batch", Path(), _expanded([Entry(campaign=source)], Path(), source)
     elif path.suffix.lower() == ".toml":
         content = _toml(path)
@@ -194,7 +203,7 @@ def _csv_entries(path: Path) -> Iterator[Entry]:
 def _expanded(entries: Iterable[Entry], base: Path, source: str) -> Iterator[Entry]:
     """Entries with their patterns replaced by what they match, sorted."""
     for entry in entries:
-        if not _WILD.search(entry.campaign) or (base / entry.campaign).exists():
+        if not _PATTERN.search(entry.campaign) or (base / entry.campaign).exists():
             yield entry
             continue
         found = sorted(glob.glob(entry.campaign, root_dir=base, recursive=True))  # noqa: PTH207 - Path.glob refuses ".."
@@ -241,13 +250,14 @@ def _check_used(settings: Settings, rows: Collection[tuple[Command, ...]], sourc
     """Refuse a setting that none of the rows, by their commands, looks at."""
     for name, readers in _READERS.items():
         if getattr(settings, name) is not None and not any(_reads(commands, name) for commands in rows):
+            way = "" if ("run",) in rows else f"--command {readers[0]} too, or "
             raise CampaignError(
                 "this setting does nothing here",
                 file=source,
                 place=name,
                 found=f"commands {', '.join(sorted({command for commands in rows for command in commands}))}",
                 expected=f"it goes with {' or '.join(readers)}",
-                hint=f"--command {readers[0]} too, or leave {name} out",
+                hint=f"{way}leave {name} out",
             )
 
 
@@ -261,6 +271,15 @@ def _complete(own: Settings, given: Settings, base: Path, source: str) -> Settin
     """A row's settings with every default filled in, checked against each other."""
     settings = own.over(given)
     commands = settings.commands or _DEFAULT
+    if "run" in commands and set(commands) != {"run"}:
+        raise CampaignError(
+            "run is the whole chain and does the others too",
+            file=source,
+            place="commands",
+            found=", ".join(commands),
+            expected='commands = ["run"], or any of fit, diagnose, predict without it',
+            hint="--command run alone" if own.commands is None else None,
+        )
     _check_used(own, [commands], source)
     if commands == ("predict",) and not settings.model:
         raise CampaignError(

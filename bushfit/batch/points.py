@@ -11,6 +11,7 @@ from bushfit.geometry import Direction
 from bushfit.units import quantity
 from bushfit.validation import converted
 
+#: A direction, a frequency and an amplitude, each number with its unit.
 _WORDS = re.compile(r"\s*([a-z]+)[\s,]+([-+\d.eE]+\s*[A-Za-z]+)[\s,]+([-+\d.eE]+\s*[^\d\s.]+)\s*")
 
 

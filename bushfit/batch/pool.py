@@ -26,16 +26,22 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 R = TypeVar("R")
 
-#: A chunk should take about this long [s]: far more than handing it over, far less than one would like to lose.
+#: Time that a chunk should take [s]: far more than handing it over, far less than one would like to lose.
 _CHUNK_SECONDS = 0.5
+#: Rows of a chunk at most (chosen: at 7 ms a row it takes _CHUNK_SECONDS).
 _LARGEST_CHUNK = 64
 #: Chunks handed out per worker: one to do and one to go on with.
-_AHEAD = 2
-#: A row that was alone with its worker this often when the worker died is to blame.
+_CHUNKS_PER_WORKER = 2
+#: Times that a row may be alone with its worker when the worker dies; then the row is to blame.
 _MOST_DEATHS = 3
-#: Let a worker keep the memory that one row frees for the next: glibc hands it back otherwise, a tenth of the time.
+#: Sizes in bytes below which glibc keeps freed memory for the next row: handing it back takes a tenth of the time.
 _HEAP = {"MALLOC_TRIM_THRESHOLD_": "134217728", "MALLOC_MMAP_THRESHOLD_": "33554432"}
-_CONNECT, _WAIT_FOR_WORKERS = 5.0, 60.0
+#: Time for a Dask scheduler to answer [s] (chosen: a cluster in the same house answers at once).
+_CONNECT_SECONDS = 5.0
+#: Time for a first worker of a Dask cluster to appear [s] (chosen: a queue may have to start it).
+_WORKER_SECONDS = 60.0
+#: Time for which the count of a cluster's workers is taken to hold [s]: they come and go, but asking costs a message.
+_COUNT_SECONDS = 5.0
 
 
 class Pool(Protocol):
@@ -112,8 +118,8 @@ class DaskPool:
         for name in ("distributed", "distributed.client", "distributed.core", "tornado.application", "asyncio"):
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what goes wrong is told once, in our words
         try:
-            self._client: Client = Client(address, timeout=_CONNECT, set_as_default=False)
-            self._client.wait_for_workers(1, timeout=_WAIT_FOR_WORKERS)
+            self._client: Client = Client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
+            self._client.wait_for_workers(1, timeout=_WORKER_SECONDS)
         except (OSError, TimeoutError, ValueError) as error:
             raise BatchError(
                 "no cluster answers there",
@@ -129,9 +135,9 @@ class DaskPool:
         return self._executor
 
     def workers(self) -> int:
-        if time.monotonic() > self._counted:  # workers come and go
+        if time.monotonic() > self._counted:
             self._count = max(1, sum(self._client.nthreads().values()))
-            self._counted = time.monotonic() + 5.0
+            self._counted = time.monotonic() + _COUNT_SECONDS
         return self._count
 
     def mend(self, cause: BaseException) -> None:
@@ -160,14 +166,16 @@ def run(
         BatchError: the workers are gone for good.
     """
     left, size = iter(enumerate(rows)), 1
-    out: dict[Future[Sequence[R]], Sequence[tuple[int, T]]] = {}
+    out: dict[Future[Sequence[R]], list[tuple[int, T]]] = {}
     started: dict[Future[Sequence[R]], float] = {}
     suspects: deque[tuple[int, T]] = deque()
     try:
         while True:
-            while not suspects and len(out) < _AHEAD * pool.workers() and (batch := list(islice(left, size))):
-                future = pool.executor().submit(work, [row for _, row in batch])
-                out[future], started[future] = batch, time.monotonic()
+            while not suspects and len(out) < _CHUNKS_PER_WORKER * pool.workers():
+                if not (chunk := list(islice(left, size))):
+                    break
+                future = pool.executor().submit(work, [row for _, row in chunk])
+                out[future], started[future] = chunk, time.monotonic()
             if not out:
                 if not suspects:
                     return
@@ -185,7 +193,7 @@ def run(
                     pool.mend(error)
                     suspects.extend(chunk)
                 else:
-                    size = _next_size(size, seconds / (_AHEAD * len(chunk)))
+                    size = _next_size(size, seconds / (_CHUNKS_PER_WORKER * len(chunk)))
                     yield from ((number, result) for (number, _), result in zip(chunk, results, strict=True))
     finally:
         pool.close()

@@ -32,8 +32,14 @@ class Quantity:
         return f"{self.name} [{self.unit}]"
 
 
-NRMSE, CHI_SQUARE = Quantity("NRMSE", "-"), Quantity("reduced chi-square", "-")
-STIFFNESS, LOSS_FACTOR = "stiffness", "loss factor"
+#: Root mean square difference of model and tests, relative.
+NRMSE = Quantity("NRMSE", "-")
+#: Mean square residual in units of noise.
+CHI_SQUARE = Quantity("reduced chi-square", "-")
+#: What is told of an operating point: |K| ...
+STIFFNESS = "stiffness"
+#: ... and K''/K'.
+LOSS_FACTOR = "loss factor"
 
 
 def at_point(point: Point, what: str) -> Quantity:

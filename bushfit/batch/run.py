@@ -8,7 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ import numpy as np
 
 from bushfit.batch import ledger, pool
 from bushfit.batch.junit import Report
-from bushfit.batch.limits import Judge, Limits
+from bushfit.batch.limits import Judge, Judgement, Limits
 from bushfit.batch.manifest import Row
 from bushfit.batch.pool import Pool
 from bushfit.batch.quantities import (
@@ -38,9 +38,13 @@ from bushfit.reduction.scatter import scatter
 from bushfit.report.folder import check_free as check_writable
 from bushfit.report.folder import write_files
 
+#: Layout of the summary as JSON.
 SCHEMA = "bushfit/batch/1"
-TABLE, PICTURE = "batch.csv", "batch.png"
-#: A quantity that fewer bushings have shows no scatter.
+#: File of the table, in the batch's folder.
+TABLE = "batch.csv"
+#: File of the picture, in the batch's folder.
+PICTURE = "batch.png"
+#: Bushings that must have a quantity for it to be drawn: fewer show no scatter.
 _LEAST_DRAWN = 3
 
 
@@ -175,59 +179,99 @@ def _on_strays(count: int, *, kept: bool) -> Iterator[str]:
         yield f"results of {count} bushings of an earlier batch, no rows of this one, {fate}"
 
 
+@dataclass
+class _Tally:
+    """What is counted and named over the rows of a batch, one after the other.
+
+    Args:
+        status: rows by done, failed.
+        kept: rows taken over from an earlier run.
+        warned: bushings with warnings.
+        bounded: bushings with a parameter at rest on a bound.
+        bounds: bushings by the parameter at rest.
+        limits: bushings by verdict.
+        missed: by row number, the limits that a bushing misses, in words by quantity.
+        edge: name of each bushing that passes on condition, and why.
+        errors: name and error of rows that failed.
+    """
+
+    status: Counter[str] = field(default_factory=Counter)
+    kept: int = 0
+    warned: int = 0
+    bounded: int = 0
+    bounds: Counter[str] = field(default_factory=Counter)
+    limits: Counter[str] = field(default_factory=Counter)
+    missed: dict[int, Mapping[str, str]] = field(default_factory=dict)
+    edge: list[tuple[str, str]] = field(default_factory=list)
+    errors: list[tuple[str, str]] = field(default_factory=list)
+
+    def add(self, number: int, row: Row, record: ledger.Record, judged: Judgement | None) -> None:
+        """Count one row."""
+        self.status[record["status"]] += 1
+        self.kept += bool(record.get("kept"))
+        self.warned += bool(record.get("warnings"))
+        self.bounded += bool(record.get("at_bound"))
+        self.bounds.update(list(record.get("at_bound", ())))
+        if record["status"] != "done":
+            self.errors.append((row.name, record["error"]))
+        if judged:
+            self.limits[str(judged.verdict)] += 1
+            if judged.missed:
+                self.missed[number] = judged.missed
+            elif judged.edge:
+                self.edge.append((row.name, "; ".join(judged.edge.values())))
+
+
 def _report(plan: Plan, spool: Spool, seconds: float) -> Summary:
     """Hold every record against the limits and write what people read."""
-    output, (columns, intervals) = plan.orders.output, spool.columns()
+    columns, intervals = spool.columns()
     parameters = parameter_quantities(columns)
     points = [at_point(point, what) for point in plan.orders.points for what in (STIFFNESS, LOSS_FACTOR)]
     quantities = {quantity.name: quantity for quantity in (*parameters, NRMSE, CHI_SQUARE, *points)}
     judge = Judge(plan.limits, columns, quantities) if plan.limits else None
     report = Report(plan.title) if plan.junit else None
-    status, limits, bounds, kept, warned, bounded = Counter[str](), Counter[str](), Counter[str](), 0, 0, 0
-    missed: dict[int, Mapping[str, str]] = {}
-    errors, edge = [], []
-    aside = output / ledger.ASIDE / TABLE
-    with aside.open("w", encoding="utf-8", newline="") as stream:
-        diagnosed = any("diagnose" in (row.settings.commands or ()) for row in plan.rows)
-        table = Table(stream, parameters, points, verdicts=diagnosed, limits=judge is not None)
-        for number, (row, record) in enumerate(zip(plan.rows, spool, strict=True)):
-            done = record["status"] == "done"
-            judged = judge(record) if judge and done else None
-            table.add(row, record, judged)
-            if report:
-                report.add(row, record, judged)
-            status[record["status"]] += 1
-            kept += bool(record.get("kept"))
-            warned += bool(record.get("warnings"))
-            bounded += bool(record.get("at_bound"))
-            bounds.update(list(record.get("at_bound", ())))
-            if not done:
-                errors.append((row.name, record["error"]))
-            if judged:
-                limits[str(judged.verdict)] += 1
-                if judged.missed:
-                    missed[number] = judged.missed
-                elif judged.edge:
-                    edge.append((row.name, "; ".join(judged.edge.values())))
-        stream.flush()
-        os.fsync(stream.fileno())
-    aside.replace(output / TABLE)
+    tally = _tabled(plan, spool, (parameters, points), judge, report)
     if plan.picture:
-        _draw(plan, columns, intervals, quantities, judge, missed)
+        _draw(plan, columns, intervals, quantities, judge, tally.missed)
     if report and plan.junit:
         with _blamed_on(plan.junit):
             write_files(plan.junit.parent, {plan.junit.name: report.to_xml()}, force=True)
     return Summary(
-        status,
-        kept,
-        limits,
-        tuple((plan.rows[number].name, "; ".join(words.values())) for number, words in missed.items()),
-        tuple(edge),
-        tuple(errors),
+        tally.status,
+        tally.kept,
+        tally.limits,
+        tuple((plan.rows[number].name, "; ".join(words.values())) for number, words in tally.missed.items()),
+        tuple(tally.edge),
+        tuple(tally.errors),
         {q: _scatter(columns[q.name], q.factor) for q in quantities.values() if q.name in columns},
-        (*(judge.notes if judge else ()), *_on_bounds(bounded, bounds), *_on_warnings(warned)),
+        (*(judge.notes if judge else ()), *_on_bounds(tally.bounded, tally.bounds), *_on_warnings(tally.warned)),
         seconds,
     )
+
+
+def _tabled(
+    plan: Plan,
+    spool: Spool,
+    quantities: tuple[Sequence[Quantity], Sequence[Quantity]],
+    judge: Judge | None,
+    report: Report | None,
+) -> _Tally:
+    """Write batch.csv, fill the JUnit report, and count, row by row; quantities are parameters, and those at points."""
+    output, tally = plan.orders.output, _Tally()
+    aside = output / ledger.ASIDE / TABLE
+    with aside.open("w", encoding="utf-8", newline="") as stream:
+        diagnosed = any(row.settings.diagnosed for row in plan.rows)
+        table = Table(stream, *quantities, verdicts=diagnosed, limits=judge is not None)
+        for number, (row, record) in enumerate(zip(plan.rows, spool, strict=True)):
+            judged = judge(record) if judge and record["status"] == "done" else None
+            table.add(row, record, judged)
+            tally.add(number, row, record, judged)
+            if report:
+                report.add(row, record, judged)
+        stream.flush()
+        os.fsync(stream.fileno())
+    aside.replace(output / TABLE)
+    return tally
 
 
 def _on_bounds(count: int, by_name: Counter[str]) -> Iterator[str]:

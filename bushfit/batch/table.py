@@ -11,9 +11,13 @@ from bushfit.batch.manifest import Row
 from bushfit.batch.quantities import CHI_SQUARE, NRMSE, Quantity, figures
 from bushfit.reading.csvfile import Rows
 
+#: Columns of every batch, before its numbers.
 _FIRST = ("name", "campaign", "folder", "status", "error")
+#: Columns where rows are diagnosed.
 _FOUND = ("verdict", "named effects", "cannot be told from")
+#: Columns where there are limits.
 _JUDGED = ("limits", "out of limits", "on the edge")
+#: Columns of every batch, after its numbers.
 _LAST = ("on a bound", "warnings")
 
 

@@ -24,9 +24,11 @@ from bushfit.prediction import Band, predict
 
 if TYPE_CHECKING:
     from bushfit.batch.manifest import Row, Settings
+    from bushfit.jobs.diagnose import Diagnose, Diagnosed
+    from bushfit.jobs.fits import Fit
 
-#: As good as no effect, as a share of its parameter's usual size.
-_NOTHING = 1e-3
+#: Size below which an effect is as good as none, relative to its parameter's typical size (chosen).
+_NO_EFFECT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -111,12 +113,34 @@ def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Record:
     campaign = load_campaign(path)
     sources = [*(loop.source for loop in campaign.loops), *(sweep.source for sweep in campaign.sweeps)]
     inputs |= {str(source.file): source.sha256 for source in sources if source}
-    result = load_result(Path(settings.model)) if settings.model else None
     if settings.model:
         inputs[settings.model] = ledger.digest(Path(settings.model).read_bytes())
-    found: Record = {"campaign_name": campaign.name, "inputs": inputs}
-    commands, formats = settings.commands or (), orders.formats
+    if "run" in (settings.commands or ()):
+        result, diagnosed = _run(campaign, orders.formats, files)
+    else:
+        result, diagnosed = _one_by_one(campaign, settings, orders.formats, files)
+    found = {"campaign_name": campaign.name, "inputs": inputs, **_verdict(diagnosed)}
+    return {**found, **_numbers(result, orders.points, found.get("warnings", []))}
+
+
+def _run(campaign: Campaign, formats: Collection[str], files: dict[str, bytes]) -> tuple[Result, Diagnosed | None]:
+    """The whole chain, as `bushfit run` does it; the tables of the prediction come in any case, as of predict."""
+    from bushfit.jobs import TABLES
+    from bushfit.jobs.run import Run
+
+    ran = Run().run(Data.of(campaign))
+    files |= ran.files(formats) | ran.predicted.files({TABLES, *formats})
+    return ran.result, ran.diagnosed
+
+
+def _one_by_one(
+    campaign: Campaign, settings: Settings, formats: Collection[str], files: dict[str, bytes]
+) -> tuple[Result, Diagnosed | None]:
+    """fit, diagnose and predict, as far as they are asked for, each going on from the one before."""
+    commands = settings.commands or ()
+    result = load_result(Path(settings.model)) if settings.model else None
     data = Data.of(campaign) if set(commands) - {"predict"} else None
+    diagnosed = None
     if "fit" in commands and data:
         fitted = _fit(settings).run(data)
         result = fitted.result
@@ -128,25 +152,32 @@ def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Record:
         diagnosed = _diagnose(settings).run(data)
         result = diagnosed.result
         files |= diagnosed.files(formats)
-        found |= {
-            "verdict": diagnosed.diagnosis.verdict,
-            "effects": [named.name for named in diagnosed.diagnosis.effects],
-            "alternatives": [name for named in diagnosed.diagnosis.effects for name in named.alternatives],
-            "warnings": list(diagnosed.diagnosis.notes),
-        }
     assert result is not None  # the manifest has seen to it that there is a model
     if "predict" in commands:
         files |= _predict(result, campaign, formats)
-    return {**found, **_numbers(result, orders.points, found.get("warnings", []))}
+    return result, diagnosed
 
 
-def _fit(settings: Settings) -> Any:
+def _verdict(diagnosed: Diagnosed | None) -> Record:
+    """What a diagnosis adds to the record of a row."""
+    if diagnosed is None:
+        return {}
+    diagnosis = diagnosed.diagnosis
+    return {
+        "verdict": diagnosis.verdict,
+        "effects": [named.name for named in diagnosis.effects],
+        "alternatives": [name for named in diagnosis.effects for name in named.alternatives],
+        "warnings": list(diagnosis.notes),
+    }
+
+
+def _fit(settings: Settings) -> Fit:
     from bushfit.jobs.fits import Fit
 
     return Fit(settings.directions or (), settings.effects or ())
 
 
-def _diagnose(settings: Settings) -> Any:
+def _diagnose(settings: Settings) -> Diagnose:
     from bushfit.diagnosis.record import Settings as How
     from bushfit.jobs.diagnose import Diagnose
 
@@ -189,9 +220,9 @@ def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> R
 
 def _vanishes(name: str, parameter: Parameter, value: float) -> bool:
     """Whether a value on a bound is that of an added effect that is not there, which is an answer like any other."""
-    return (
-        "." in name and parameter.neutral is not None and abs(value - parameter.neutral) <= _NOTHING * parameter.typical
-    )
+    if "." not in name or parameter.neutral is None:
+        return False
+    return abs(value - parameter.neutral) <= _NO_EFFECT * parameter.typical
 
 
 def _band(band: Band) -> list[float | None]:

@@ -18,6 +18,9 @@ from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.sweeps import read_sweep
 
+#: Endings of test files, which `bushfit init` makes a campaign of.
+TEST_FILES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods")
+
 
 @dataclass(frozen=True, eq=False)
 class Campaign:
@@ -57,6 +60,7 @@ def load_campaign(path: str | Path) -> Campaign:
         MeasurementError: a measurement that cannot be used.
     """
     path = Path(path)
+    _refuse_tests(path)
     content = read_toml(path, CampaignFile)
     if not (content.loops or content.sweeps or content.simulate):
         raise CampaignError(
@@ -76,6 +80,21 @@ def load_campaign(path: str | Path) -> Campaign:
         content.fit,
         content.predict,
         content.simulate,
+    )
+
+
+def _refuse_tests(path: Path) -> None:
+    """Raise a CampaignError where a test file or a folder was given in place of a campaign."""
+    if not (path.is_dir() or (path.suffix.lower() in TEST_FILES and path.exists())):
+        return
+    files = path / "*.csv" if path.is_dir() else path
+    raise CampaignError(
+        "a campaign is needed",
+        file=path,
+        found="a folder" if path.is_dir() else "a test file",
+        expected="a .toml file that names the bushing and its tests",
+        hint=f'bushfit init {files} --inner-radius "10 mm" --outer-radius "18 mm" --length "34 mm" makes one, with '
+        "the sizes of your rubber",
     )
 
 

@@ -30,6 +30,8 @@ _COMMANDS = {
 
 #: Linear algebra on one thread: the matrices are small, and a sum split over threads ends in other digits.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+#: Widest text of a help, in characters: longer lines are hard to read.
+_HELP_WIDTH = 110
 
 
 class _Commands(click.Group):
@@ -50,7 +52,7 @@ class _Commands(click.Group):
             formatter.write_dl([(name, line) for name, (_, line) in _COMMANDS.items()])
 
 
-@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": _HELP_WIDTH})
 @click.version_option(__version__, "-V", "--version", prog_name="bushfit")
 def cli() -> None:
     """Fit the stiffness and loss of rubber bushings over frequency and amplitude.
@@ -59,9 +61,10 @@ def cli() -> None:
 
         bushfit run CAMPAIGN.toml
 
-    which writes parameters, stiffness tables and plots to results/<campaign name>; `bushfit diagnose` then looks for
-    what the model lacks. `bushfit COMMAND --help` tells more of each. Text for people goes to standard error. Exit
-    status: 0 done, 1 done but a stated limit is missed, 2 wrong usage or unusable input.
+    which says what the model lacks, if anything, and writes parameters, stiffness tables and plots to
+    results/<campaign name>. `bushfit init` makes a campaign of test files. `bushfit COMMAND -h` tells more of each.
+    Text for people goes to standard error. Exit status: 0 done, 1 done but a stated limit is missed, 2 wrong usage or
+    unusable input.
     """
 
 

@@ -11,51 +11,67 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, new_table, shared_options, warn
+from bushfit.cli.common import DIRECTION, DIRECTIONS, Options, example, shared_options
+from bushfit.cli.show import new_table, warn
 from bushfit.units import alike, for_people
 
 if TYPE_CHECKING:
+    from bushfit.batch.manifest import Settings
     from bushfit.batch.points import Point
     from bushfit.batch.pool import Pool
     from bushfit.batch.run import Plan, Summary
 
+#: Bushings of a kind (failed, out of limits, on the edge) that the terminal names; batch.csv has all.
 _MOST_SHOWN = 10
-#: Where standard error is no terminal: a line every so many seconds, and every tenth.
+#: Seconds between two lines on progress where standard error is no terminal.
 _SECONDS_A_LINE = 10.0
 
-_DIRECTIONS = click.Choice(["axial", "radial", "torsion"])
 
-
-@click.command("batch")
+@click.command("batch", epilog=example('bushfit batch "data/practice/*/bushing.toml" --at "axial 25 Hz 0.1 mm"'))
 @click.argument("manifest", metavar="MANIFEST", nargs=-1, required=True)
 @click.option(
     "--command",
     "commands",
-    type=click.Choice(["fit", "diagnose", "predict"]),
+    type=click.Choice(["run", "fit", "diagnose", "predict"]),
+    metavar="COMMAND",
     multiple=True,
-    help="What to do with each campaign; may be given again [fit].",
+    help="What to do with each campaign: fit, diagnose, predict, may be given again; or run, the whole chain [fit].",
 )
-@click.option("--direction", "directions", type=_DIRECTIONS, multiple=True, help="Tests to fit, as in bushfit fit.")
+@click.option(
+    "--direction",
+    "directions",
+    type=DIRECTIONS,
+    metavar=DIRECTION,
+    multiple=True,
+    help="Tests to fit, as in bushfit fit.",
+)
 @click.option("--effect", "effects", multiple=True, metavar="NAME", help="Add an effect, as in bushfit fit.")
 @click.option(
     "--at",
     multiple=True,
     metavar="POINT",
-    help='Stiffness and loss factor there, such as "axial 25 Hz 0.1 mm"; may be given again.',
+    help='Stiffness and loss factor there, such as "axial 25 Hz 0.1 mm" (zero-to-peak); may be given again.',
 )
-@click.option("--limits", type=click.Path(path_type=Path), metavar="FILE", help="Judge each bushing by this TOML file.")
+@click.option(
+    "--limits", type=click.Path(path_type=Path), metavar="FILE", help="Judge each bushing by this TOML file (above)."
+)
 @click.option("--junit", type=click.Path(path_type=Path), metavar="FILE", help="Write a JUnit report for CI.")
 @click.option("--jobs", type=click.IntRange(min=1), default=None, help="Worker processes [the cores there are].")
-@click.option("--scheduler", metavar="ADDRESS", help="Work on the Dask cluster of this scheduler instead.")
-@click.option("--resume", is_flag=True, help="Go on with the results that stand: do what is missing or has changed.")
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Work on this Dask cluster, such as tcp://10.0.0.5:8786, whose workers see the same files and paths.",
+)
+@click.option(
+    "--resume",
+    is_flag=True,
+    help="Go on with the results that stand: do what is missing, failed, or has changed (a test, a setting, bushfit).",
+)
 @click.option("--tables", is_flag=True, help="Write each bushing's loops.csv, sweeps.csv and the like too.")
 @click.option("--plots", is_flag=True, help="Write each bushing's plots too.")
 @shared_options
 def command(
     manifest: tuple[str, ...],
-    commands: tuple[str, ...],
-    directions: tuple[str, ...],
-    effects: tuple[str, ...],
     at: tuple[str, ...],
     limits: Path | None,
     junit: Path | None,
@@ -65,28 +81,33 @@ def command(
     tables: bool,
     plots: bool,
     options: Options,
+    **asked: tuple[str, ...],
 ) -> None:
-    """Fit (diagnose, predict) every campaign of MANIFEST: a TOML or CSV list, a pattern in quotes, or campaign files.
+    """Fit (diagnose, predict, run) every campaign of MANIFEST: a TOML or CSV list, a pattern in quotes, or campaigns.
+
+    A TOML list has a [[bushings]] table a row: campaign (a file or a pattern, counted from the list's folder), and on
+    request name, commands, directions, effects, adopt, without, max_effects, tolerance, model. The same keys, and at,
+    may stand at its top for all rows; the options here win over these, a row's own keys over both. A CSV list has the
+    keys as columns.
+
+    LIMITS are TOML: nrmse, reduced_chi_square, verdicts; tables [parameters.mu], and [[stiffness]] and [[loss_factor]]
+    with at = "axial 25 Hz 0.1 mm", each with min, max, nominal and tolerance, or sigma (standard deviations of the
+    batch, where it has at_least bushings). guard = true counts as missed what is only within by its value.
 
     Work is kept as it finishes: after an interruption the same command with --resume does what is missing. A row that
-    fails costs that row; its error stands in the table. Exit status 1 where a row failed or a limit is missed.
+    fails costs that row; its error stands in the table. --force also removes results of bushings that are no longer
+    listed. Exit status 1 where a row failed or a limit is missed.
 
-    Writes batch.csv (a row a bushing), batch.png, and bushings/<name>/ with model.json of each.
+    Writes batch.csv (a row a bushing), batch.png, and bushings/<name>/ with model.json of each, or all that `bushfit
+    run` writes.
     """
     from bushfit.batch.limits import check_judged, read_limits
-    from bushfit.batch.manifest import Settings, read_manifest
+    from bushfit.batch.manifest import read_manifest
     from bushfit.batch.pool import DaskPool, LocalPool
     from bushfit.batch.run import Plan, check_free, run
     from bushfit.batch.work import Orders
-    from bushfit.effects import effect_named
-    from bushfit.geometry import Direction
 
-    given = Settings(
-        commands=commands or None,  # type: ignore[arg-type]
-        directions=tuple(Direction(direction) for direction in directions) or None,
-        effects=tuple(effect_named(name).name for name in effects) or None,
-    )
-    read = read_manifest(manifest[0], given, *manifest[1:])
+    read = read_manifest(manifest[0], _settings(**asked), *manifest[1:])
     judged_by = read_limits(limits) if limits else None
     if limits and judged_by:
         check_judged(judged_by, limits, read.rows)
@@ -103,6 +124,19 @@ def command(
     options.tell(summary.to_document())
     if summary.status["failed"] or summary.missed:
         click.get_current_context().exit(1)
+
+
+def _settings(commands: tuple[str, ...], directions: tuple[str, ...], effects: tuple[str, ...]) -> Settings:
+    """What the options ask of every row that does not say otherwise."""
+    from bushfit.batch.manifest import Settings
+    from bushfit.effects import effect_named
+    from bushfit.geometry import Direction
+
+    return Settings(
+        commands=commands or None,  # type: ignore[arg-type]
+        directions=tuple(Direction(direction) for direction in directions) or None,
+        effects=tuple(effect_named(name).name for name in effects) or None,
+    )
 
 
 def _points(texts: tuple[str, ...]) -> tuple[Point, ...]:

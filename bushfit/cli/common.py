@@ -1,4 +1,4 @@
-"""What the commands share: options, where results go, and how they are told."""
+"""What the commands share: their options, where results go, and the order of work on a campaign."""
 
 from __future__ import annotations
 
@@ -12,24 +12,23 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import click
 
 from bushfit.report.folder import check_free, to_json, write_files
-from bushfit.units import alike, for_people, number
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
     from bushfit.campaign.campaign import Campaign
     from bushfit.campaign.schema import Loss
     from bushfit.jobs import Found, Job
-    from bushfit.jobs.fits import Fitted
     from bushfit.model.result import Result
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-#: Width of tables where standard error is no terminal.
+#: Width of tables where standard error is no terminal, in characters.
 _WIDTH = 100
-
-campaign_argument = click.argument("campaign", type=click.Path(path_type=Path))
+#: Directions as the commands take them.
+DIRECTIONS = click.Choice(["axial", "radial", "torsion"])
+#: The same in the left column of a help, short so that the right one has room.
+DIRECTION = "DIRECTION"
 
 
 class _Folder(click.Path):
@@ -94,9 +93,14 @@ class Options:
             click.echo(to_json(document).decode(), nl=False)
 
 
+def example(*commands: str) -> str:
+    """The end of a command's help: commands that work in a copy of the repository."""
+    return "\b\n" + "\n".join([f"Example{'s' * (len(commands) > 1)}:", *(f"  {command}" for command in commands)])
+
+
 def _shared_options(where: str, function: F) -> F:
     @click.option("-o", "--output", type=_Folder(path_type=Path), help=f"Folder for the results [{where}].")
-    @click.option("-v", "--verbose", is_flag=True, help="Say more: all correlations, the equation, the files read.")
+    @click.option("-v", "--verbose", is_flag=True, help="Say more: steps on the way, all correlations, files.")
     @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
     @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on standard output.")
     @click.option("--no-plots", is_flag=True, help="Write no PNG files.")
@@ -121,129 +125,106 @@ def options_without_folder(function: F) -> F:
     return _shared_options("nothing is written", function)
 
 
-max_nrmse_option = click.option(
-    "--max-nrmse",
-    type=_Share(min=0.0, min_open=True),
-    help="Exit with status 1 if the NRMSE is above this share (0.02 is 2 %).",
-)
+@dataclass(frozen=True)
+class Task:
+    """Work on one campaign as its command line asks for it."""
+
+    campaign: Path
+    loss: str | None
+    max_nrmse: float | None
+    options: Options
+
+    def perform(
+        self,
+        job: Job[Found],
+        tell: Callable[[Options, str, Found], None],
+        last_line: Callable[[Path, Found], str] | None = None,
+    ) -> None:
+        """What every command on a campaign does: read, refuse to overwrite, work, tell, write, hold to a limit.
+
+        Args:
+            job: the work.
+            tell: shows what it found, given the campaign's name.
+            last_line: said of it below the files written, given their folder.
+        """
+        from bushfit.fitting.data import Data
+
+        options, loaded = self.options, self._loaded()
+        folder = options.folder(loaded.slug)
+        options.require_free(folder, job.names(loaded, options.formats))
+        outcome = job.run(Data.of(loaded))
+        tell(options, loaded.name, outcome)
+        options.write(folder, outcome.files(options.formats))
+        if last_line:
+            options.console.print(last_line(folder, outcome), markup=False)
+        options.tell(outcome.document)
+        _enforce_nrmse(outcome.result, self.max_nrmse)
+
+    def _loaded(self) -> Campaign:
+        """The campaign as it is, or with another loss."""
+        from bushfit.campaign.campaign import load_campaign
+
+        loaded = load_campaign(self.campaign)
+        return replace(loaded, fit=replace(loaded.fit, loss=cast("Loss", self.loss))) if self.loss else loaded
 
 
-def _loss_option(soft_l1: str) -> Callable[[Any], Any]:
-    words = f"linear: least squares [the campaign's, else this]. soft_l1: {soft_l1}."
-    return click.option("--loss", type=click.Choice(["linear", "soft_l1"]), help=words)
+def campaign_options(soft_l1: str = "points far off pull less, outliers not at all") -> Callable[[F], F]:
+    """CAMPAIGN, --loss, --max-nrmse and the shared options, gathered into one `task` argument.
+
+    Args:
+        soft_l1: what the robust loss does in this command, for its help.
+    """
+
+    def decorate(function: F) -> F:
+        @click.argument("campaign", type=click.Path(path_type=Path))
+        @click.option(
+            "--loss",
+            type=click.Choice(["linear", "soft_l1"]),
+            help=f"linear: least squares [the campaign's, else this]. soft_l1: {soft_l1}.",
+        )
+        @click.option(
+            "--max-nrmse",
+            type=_Share(min=0.0, min_open=True),
+            help="Exit with status 1 if the NRMSE is above this share (0.02 is 2 %).",
+        )
+        @shared_options
+        @wraps(function)
+        def wrapped(*args: Any, options: Options, **kwargs: Any) -> Any:
+            task = Task(kwargs.pop("campaign"), kwargs.pop("loss"), kwargs.pop("max_nrmse"), options)
+            return function(*args, task=task, **kwargs)
+
+        return wrapped  # type: ignore[return-value]
+
+    return decorate
 
 
-loss_option = _loss_option("points far off pull less, wild ones not at all")
-diagnose_loss_option = _loss_option("the same with wild points left out")
+def open_model(file: Path) -> Result:
+    """The result in a model file.
+
+    Raises:
+        ModelError: a campaign or a test file, or whatever else is no model.
+    """
+    from bushfit.campaign.campaign import TEST_FILES
+    from bushfit.errors import ModelError
+    from bushfit.model.file import load_result
+
+    ending = file.suffix.lower()
+    if file.is_file() and ending in (".toml", *TEST_FILES):
+        found = "a campaign" if ending == ".toml" else "a test file"
+        way = f"bushfit run {file}" if ending == ".toml" else f"bushfit init {file} ..., then bushfit run"
+        raise ModelError(
+            "a fitted model is needed",
+            file=file,
+            found=found,
+            expected="a model.json, as bushfit run, fit, fit-dynamic and diagnose write it",
+            hint=f"{way} makes one",
+        )
+    return load_result(file)
 
 
-def open_campaign(file: Path, loss: str | None) -> Campaign:
-    """A campaign as it is, or with another loss."""
-    from bushfit.campaign.campaign import load_campaign
-
-    loaded = load_campaign(file)
-    return replace(loaded, fit=replace(loaded.fit, loss=cast("Loss", loss))) if loss else loaded
-
-
-def perform(
-    options: Options,
-    campaign: Path,
-    job: Job[Found],
-    tell: Callable[[Options, str, Found], None],
-    max_nrmse: float | None,
-    loss: str | None,
-) -> None:
-    """What every command on a campaign does: read, refuse to overwrite, work, tell, write, hold to a limit."""
-    from bushfit.fitting.data import Data
-
-    loaded = open_campaign(campaign, loss)
-    folder = options.folder(loaded.slug)
-    options.require_free(folder, job.names(loaded, options.formats))
-    outcome = job.run(Data.of(loaded))
-    tell(options, loaded.name, outcome)
-    options.write(folder, outcome.files(options.formats))
-    options.tell(outcome.document)
-    enforce_nrmse(outcome.result, max_nrmse)
-
-
-def enforce_nrmse(result: Result, limit: float | None) -> None:
+def _enforce_nrmse(result: Result, limit: float | None) -> None:
     """Exit with status 1 where the fit misses the user's limit."""
     if limit is None or result.quality is None or result.quality.nrmse <= limit:
         return
     click.echo(f"bushfit: NRMSE {result.quality.nrmse:.4g} is above --max-nrmse {limit:g}", err=True)
     click.get_current_context().exit(1)
-
-
-def tell_fit(options: Options, name: str, outcome: Fitted) -> None:
-    """Each step of a fit."""
-    for title, result in outcome.reports:
-        report(options, f"{name}: {title}", result)
-
-
-def report(options: Options, title: str, result: Result) -> None:
-    """Table 1 of a result, its quality, and its warnings."""
-    console = options.console
-    console.print(parameter_table(title, result))
-    if result.quality:
-        quality = result.quality
-        console.print(
-            f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)} "
-            f"over {quality.points} points, noise {number(100 * quality.noise, 2)} % a point"
-        )
-    tells = result.covariance.correlations()
-    shown = tells if options.verbose else [pair for pair in tells if abs(pair[2]) > 0.9]
-    if shown:
-        console.print("correlation: " + ", ".join(f"{one}/{other} {value:+.2f}" for one, other, value in shown))
-    warn(options, result.warnings)
-    if options.verbose:
-        console.print(result.model.equation(), markup=False)
-        for source in result.inputs:
-            console.print(f"input: {source.file} sha256 {source.sha256[:12]}", markup=False)
-
-
-def warn(options: Options, lines: Sequence[str]) -> None:
-    from rich.markup import escape
-
-    for line in lines:
-        options.console.print(f"[yellow]warning:[/yellow] {escape(line)}")
-
-
-def new_table(title: str, *columns: str) -> Table:
-    """A table in the house's style: the first column names, the others are numbers."""
-    from rich import box
-    from rich.markup import escape
-    from rich.table import Table
-
-    table = Table(title=escape(title), title_justify="left", box=box.SIMPLE_HEAD, title_style="bold")
-    for place, column in enumerate(columns):
-        table.add_column(escape(column), justify="right" if place else "left", no_wrap=True)
-    return table
-
-
-def parameter_table(title: str, result: Result) -> Table:
-    """The paper's Table 1 with uncertainty: value, standard error, 95 % interval (by profile, if any), unit."""
-    kind = "95 % by profile" if result.profile else "95 % interval"
-    table = new_table(title, "parameter", "value", "std error", kind, "unit")
-    for name, parameter in result.model.parameters.items():
-        value, stderr = result.model.values[name], result.covariance.stderr(name)
-        interval = result.profile.get(name) or result.interval(name)
-        digits, (unit, factor) = _digits(value, stderr), for_people(parameter.unit, 1.0, value)
-        known = [end * factor for end in interval or () if end is not None]
-        shown, *texts = alike([value * factor, *known], digits, least=2)
-        ends = ["open" if end is None else texts.pop(0) for end in interval or ()]
-        error = "" if stderr is None else alike([stderr * factor], 2)[0]
-        table.add_row(_labelled(name, result), shown, error, " to ".join(ends), unit)
-    return table
-
-
-def _labelled(name: str, result: Result) -> str:
-    if name in result.at_bound:
-        return f"{name} (at {result.at_bound[name]})"
-    return name if name in result.fitted else f"{name} (held)"
-
-
-def _digits(value: float, stderr: float | None) -> int:
-    """Digits that carry meaning: two of the standard error."""
-    if not stderr or not value:
-        return 4
-    return int(min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(stderr)) + 2, 2), 6))

@@ -2,32 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import (
-    Options,
-    campaign_argument,
-    diagnose_loss_option,
-    max_nrmse_option,
-    new_table,
-    parameter_table,
-    perform,
-    shared_options,
-    warn,
-)
+from bushfit.cli.common import Options, Task, campaign_options, example, open_model
+from bushfit.cli.show import new_table, parameter_table, warn
 from bushfit.units import alike, for_people
 
 if TYPE_CHECKING:
     from bushfit.jobs.diagnose import Diagnosed
 
+#: Colours of the verdicts on a terminal.
 _COLOURS = {"consistent": "green", "named": "green", "ambiguous": "yellow", "partly": "yellow", "unexplained": "red"}
 
 
-@click.command("diagnose")
-@campaign_argument
+@click.command("diagnose", epilog=example("bushfit diagnose configs/mystery_mount.toml"))
 @click.option(
     "--model",
     type=click.Path(path_type=Path),
@@ -39,19 +31,14 @@ _COLOURS = {"consistent": "green", "named": "green", "ambiguous": "yellow", "par
 @click.option("--without", multiple=True, metavar="EFFECT", help="Do not consider this effect; may be given again.")
 @click.option("--max-effects", type=click.IntRange(0, 5), default=3, show_default=True, help="Effects to add at most.")
 @click.option("--tolerance", default="1 %", show_default=True, help="Gaps below this share of |K| do not count.")
-@diagnose_loss_option
-@max_nrmse_option
-@shared_options
+@campaign_options("the same with outliers left out")
 def command(
-    campaign: Path,
     model: Path | None,
     adopt: tuple[str, ...],
     without: tuple[str, ...],
     max_effects: int,
     tolerance: str,
-    loss: str | None,
-    max_nrmse: float | None,
-    options: Options,
+    task: Task,
 ) -> None:
     """Find where the model and the tests of CAMPAIGN disagree, name the missing effect, add it, show the gap shrink.
 
@@ -63,11 +50,9 @@ def command(
     """
     from bushfit.diagnosis.record import Settings
     from bushfit.jobs.diagnose import Diagnose
-    from bushfit.model.file import load_result
 
     settings = Settings(max_effects, _share(tolerance), adopt, without)
-    job = Diagnose(settings, load_result(model).model if model else None)
-    perform(options, campaign, job, tell_diagnosis, max_nrmse, loss)
+    task.perform(Diagnose(settings, open_model(model).model if model else None), tell_diagnosis)
 
 
 def _share(text: str) -> float:
@@ -86,26 +71,31 @@ def _share(text: str) -> float:
 
 def tell_diagnosis(options: Options, name: str, outcome: Diagnosed) -> None:
     """The finding at a glance: verdict, names with sizes, gap before and after, where, and what to do next."""
+    diagnosis = outcome.diagnosis
+    tell_verdict(options, name, outcome)
+    tell_findings(options, outcome)
+    if diagnosis.verdict in ("named", "partly") or options.verbose:
+        options.console.print(parameter_table("model with what was added", diagnosis.result))
+    warn(options, (*diagnosis.notes, *diagnosis.result.warnings))
+
+
+def tell_verdict(options: Options, name: str, outcome: Diagnosed) -> None:
+    """The verdict in a word and in a sentence."""
+    from rich.markup import escape
+
+    verdict = outcome.diagnosis.verdict
+    colour = _COLOURS[verdict]
+    options.console.print(f"[bold]{escape(name)}:[/bold] [bold {colour}]{verdict}[/bold {colour}]")
+    options.console.print(f"  {escape(outcome.diagnosis.summary)}")
+
+
+def tell_findings(options: Options, outcome: Diagnosed) -> None:
+    """The effects named, the gap before and after, where it is, and the next test."""
     from rich.markup import escape
 
     console, diagnosis = options.console, outcome.diagnosis
-    colour = _COLOURS[diagnosis.verdict]
-    console.print(f"[bold]{escape(name)}:[/bold] [bold {colour}]{diagnosis.verdict}[/bold {colour}]")
-    console.print(f"  {escape(diagnosis.summary)}")
     for effect in outcome.document["effects"]:
-        console.print(f"  [bold]{effect['name']}[/bold] ({effect['level']}): {escape(effect['sentence'])}")
-        for parameter, entry in effect["parameters"].items():
-            unit, factor = for_people(entry["unit"], 1.0, entry["value"])
-            value, *ends = alike([factor * x for x in (entry["value"], *(entry["ci95"] or ()))], 4, least=2)
-            size = f"{value} {unit}".removesuffix(" -")
-            console.print(f"    {parameter} = {size}" + (f", 95 % {' to '.join(ends)}" if ends else ""))
-        console.print(f"    {escape(effect['evidence'])}")
-        if effect["alternatives"]:
-            console.print(f"    cannot be told from: {escape(', '.join(effect['alternatives']))}")
-        if effect["richer"]:
-            console.print(
-                f"    the simpler name; a limit of {', '.join(effect['richer'])}, which these tests do not show"
-            )
+        _tell_effect(options, effect)
     table = new_table("gap, in units of noise (1 is the floor)", "", "before", "after")
     for words, pair in (
         ("data fitted", diagnosis.calibration),
@@ -120,6 +110,21 @@ def tell_diagnosis(options: Options, name: str, outcome: Diagnosed) -> None:
                 console.print(f"    {where.excess:5.1f} x noise: {escape(where.reading)}")
     if diagnosis.next_test:
         console.print(f"  [bold]next test:[/bold] {escape(diagnosis.next_test)}")
-    if diagnosis.verdict in ("named", "partly") or options.verbose:
-        console.print(parameter_table("model with what was added", diagnosis.result))
-    warn(options, (*diagnosis.notes, *diagnosis.result.warnings))
+
+
+def _tell_effect(options: Options, effect: Mapping[str, Any]) -> None:
+    """One effect that was named, as an entry of the document: its physics, sizes, evidence and look-alikes."""
+    from rich.markup import escape
+
+    console = options.console
+    console.print(f"  [bold]{effect['name']}[/bold] ({effect['level']}): {escape(effect['sentence'])}")
+    for parameter, entry in effect["parameters"].items():
+        unit, factor = for_people(entry["unit"], 1.0, entry["value"])
+        value, *ends = alike([factor * x for x in (entry["value"], *(entry["ci95"] or ()))], 4, least=2)
+        size = f"{value} {unit}".removesuffix(" -")
+        console.print(f"    {parameter} = {size}" + (f", 95 % {' to '.join(ends)}" if ends else ""))
+    console.print(f"    {escape(effect['evidence'])}")
+    if effect["alternatives"]:
+        console.print(f"    cannot be told from: {escape(', '.join(effect['alternatives']))}")
+    if effect["richer"]:
+        console.print(f"    the simpler name; a limit of {', '.join(effect['richer'])}, which these tests do not show")

@@ -4,29 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
-from pathlib import Path
 
 import click
 
-from bushfit.cli.common import (
-    Options,
-    campaign_argument,
-    loss_option,
-    max_nrmse_option,
-    perform,
-    shared_options,
-    tell_fit,
+from bushfit.cli.common import DIRECTION, DIRECTIONS, Options, Task, campaign_options, example
+from bushfit.cli.show import tell_fit
+
+
+@click.command(
+    "fit", epilog=example("bushfit fit configs/arm_bushing.toml --direction axial --direction radial --profile")
 )
-
-
-@click.command("fit")
-@campaign_argument
 @click.option(
     "--direction",
     "directions",
-    type=click.Choice(["axial", "radial", "torsion"]),
+    type=DIRECTIONS,
+    metavar=DIRECTION,
     multiple=True,
-    help="Tests to fit; may be given again [axial, as in the paper; of loops, or of sweeps, all where none is axial].",
+    help="Tests to fit: axial, radial or torsion; may be given again [axial, as in the paper; of loops, or of sweeps, "
+    "all where none is axial].",
 )
 @click.option(
     "--effect",
@@ -36,22 +31,15 @@ from bushfit.cli.common import (
     help="Add an effect to the paper's three, such as inertia; may be given again. A wrong NAME lists them all.",
 )
 @click.option("--profile", is_flag=True, help="Add 95 % intervals by profile likelihood (some seconds).")
-@loss_option
-@max_nrmse_option
-@shared_options
-def command(
-    campaign: Path,
-    directions: tuple[str, ...],
-    effects: tuple[str, ...],
-    profile: bool,
-    loss: str | None,
-    max_nrmse: float | None,
-    options: Options,
-) -> None:
+@campaign_options()
+def command(directions: tuple[str, ...], effects: tuple[str, ...], profile: bool, task: Task) -> None:
     """Fit all five parameters to the loops and sweeps of CAMPAIGN together.
 
     Writes model.json, and the tables and plots of both: loops.csv, loops.png, sweeps.csv, sweeps.png. Tests in
     directions that were not fitted are shown as predictions.
+
+    Where [fit] of the campaign holds all five (vary = false) nothing is fitted, and it is said how well the values
+    given meet the tests.
 
     --profile moves each parameter until the fit of all others is worse than chance allows: slower than the interval
     from the standard error, and right where that is not, as where a parameter is hardly determined.
@@ -60,8 +48,8 @@ def command(
     from bushfit.jobs.fits import Fit
 
     chosen = tuple(Direction(direction) for direction in directions)
-    with _progress(options) if profile else nullcontext() as advance:
-        perform(options, campaign, Fit(chosen, effects, advance), tell_fit, max_nrmse, loss)
+    with _progress(task.options) if profile else nullcontext() as advance:
+        task.perform(Fit(chosen, effects, advance), tell_fit)
 
 
 @contextmanager

@@ -6,28 +6,18 @@ from pathlib import Path
 
 import click
 
-from bushfit.cli.common import (
-    Options,
-    campaign_argument,
-    loss_option,
-    max_nrmse_option,
-    perform,
-    shared_options,
-    tell_fit,
-)
+from bushfit.cli.common import Task, campaign_options, example, open_model
+from bushfit.cli.show import tell_fit
 
 
-@click.command("fit-dynamic")
-@campaign_argument
+@click.command("fit-dynamic", epilog=example("bushfit fit-dynamic configs/cmp_15961.toml"))
 @click.option(
     "--static",
     type=click.Path(path_type=Path),
     help="Hold mu, sigma_fmax and eps_half at those of this static.json [fitted to the loops on the spot].",
 )
-@loss_option
-@max_nrmse_option
-@shared_options
-def command(campaign: Path, static: Path | None, loss: str | None, max_nrmse: float | None, options: Options) -> None:
+@campaign_options()
+def command(static: Path | None, task: Task) -> None:
     """Fit m and alpha to the smallest-amplitude sweep of CAMPAIGN, the other three held.
 
     They are held at --static, and their errors are carried over. Without it the loops of CAMPAIGN are fitted first,
@@ -36,7 +26,5 @@ def command(campaign: Path, static: Path | None, loss: str | None, max_nrmse: fl
     Writes dynamic.json, which `bushfit predict` takes as it is, sweeps.csv and sweeps.png.
     """
     from bushfit.jobs.fits import FitDynamic
-    from bushfit.model.file import load_result
 
-    job = FitDynamic(load_result(static) if static else None)
-    perform(options, campaign, job, tell_fit, max_nrmse, loss)
+    task.perform(FitDynamic(open_model(static) if static else None), tell_fit)

@@ -6,28 +6,18 @@ from pathlib import Path
 
 import click
 
-from bushfit.cli.common import (
-    Options,
-    campaign_argument,
-    loss_option,
-    max_nrmse_option,
-    perform,
-    shared_options,
-    tell_fit,
-)
+from bushfit.cli.common import Task, campaign_options, example, open_model
+from bushfit.cli.show import tell_fit
 
 
-@click.command("fit-static")
-@campaign_argument
+@click.command("fit-static", epilog=example("bushfit fit-static configs/cmp_15961.toml"))
 @click.option(
     "--dynamic",
     type=click.Path(path_type=Path),
     help="Hold the springpot at m and alpha of this dynamic.json or model.json.",
 )
-@loss_option
-@max_nrmse_option
-@shared_options
-def command(campaign: Path, dynamic: Path | None, loss: str | None, max_nrmse: float | None, options: Options) -> None:
+@campaign_options()
+def command(dynamic: Path | None, task: Task) -> None:
     """Fit mu, sigma_fmax and eps_half to the hysteresis loops of CAMPAIGN, the springpot held.
 
     m and alpha come from --dynamic, or from [fit] of the campaign where it gives both. Where they are not known
@@ -36,7 +26,5 @@ def command(campaign: Path, dynamic: Path | None, loss: str | None, max_nrmse: f
     Writes static.json, loops.csv and loops.png.
     """
     from bushfit.jobs.fits import FitStatic
-    from bushfit.model.file import load_result
 
-    job = FitStatic(load_result(dynamic) if dynamic else None)
-    perform(options, campaign, job, tell_fit, max_nrmse, loss)
+    task.perform(FitStatic(open_model(dynamic) if dynamic else None), tell_fit)

@@ -7,7 +7,8 @@ import re
 from bushfit.errors import BushfitError, UnitError
 from bushfit.units import quantity
 
-_MOST = 100_000
+#: Values of a grid at most: more is a typing error in the step.
+_MOST_VALUES = 100_000
 
 
 def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | None:
@@ -34,7 +35,7 @@ def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | 
     try:
         if ":" in numbers:
             start, stop, step = (quantity(f"{number} {suffix}", unit) for number in numbers.split(":"))
-            if not (step > 0 and stop >= start > 0 and (stop - start) / step < _MOST):
+            if not (step > 0 and stop >= start > 0 and (stop - start) / step < _MOST_VALUES):
                 raise UnitError("start:stop:step does not count upward", place=option, found=text, expected=expected)
             count = int((stop - start) / step * (1 + 1e-9)) + 1
             return tuple(start + i * step for i in range(count))

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, shared_options, warn
+from bushfit.cli.common import Options, example, shared_options
 from bushfit.cli.inspect import KEYS, tell_assumed
 from bushfit.cli.raw import direction_error, file_options, options_named
+from bushfit.cli.show import warn
 from bushfit.errors import BushfitError, CampaignError, MeasurementError
 
 if TYPE_CHECKING:
@@ -18,7 +19,13 @@ if TYPE_CHECKING:
     from bushfit.inspection.record import Inspected
 
 
-@click.command("init")
+@click.command(
+    "init",
+    epilog=example(
+        "bushfit init data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_axial.csv "
+        '--inner-diameter "28 mm" --outer-diameter "40 mm" --length "45 mm"'
+    ),
+)
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--inner-radius", help='Of the rubber, such as "10 mm"; or else')
 @click.option("--inner-diameter", help='such as "20 mm".')
@@ -43,9 +50,11 @@ def command(
 
     Loops and sweeps are told apart by their columns, the direction by the file's name or columns. What only you can
     know, such as a unit, the rate of a loop without time, or the direction, is asked for in an error that names the
-    option. Raw stepped-sine histories go through `bushfit reduce` first.
+    option. An option holds for all files of its kind; where files differ otherwise, edit the campaign. Numbers are
+    written with a decimal point. Raw stepped-sine histories go through `bushfit reduce` first.
 
-    Writes campaign.toml; -o may also name the file itself, such as -o my_bushing.toml.
+    Writes campaign.toml, which names the files as seen from its folder; -o may also name the file itself, such as
+    -o my_bushing.toml.
     """
     from bushfit.inspection.draft import campaign_text
     from bushfit.inspection.opening import inspect, stated_of_each

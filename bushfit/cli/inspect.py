@@ -8,35 +8,44 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, new_table, shared_options
+from bushfit.cli.common import Options, example, shared_options
 from bushfit.cli.raw import file_options, options_named
+from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError
 
 if TYPE_CHECKING:
     from bushfit.inspection.record import Inspected
 
+#: Keys of a campaign's tables that inspect and init take as options.
 KEYS = (
     *("force_sign", "rate", "frequency", "waveform", "amplitude"),
     *("encoding", "delimiter", "decimal", "thousands", "header_line", "sheet"),
 )
+#: Kinds of test file, in words.
 _KINDS = {"loop": "a hysteresis loop", "sweep": "a sweep", "history": "a raw stepped-sine history"}
-#: Files in one picture.
-_PICTURE = 5
+#: Files in one picture: more would be too small to read.
+_FILES_A_PICTURE = 5
 
 
-@click.command("inspect")
+@click.command(
+    "inspect",
+    epilog=example("bushfit inspect data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_radial.csv"),
+)
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @file_options(*KEYS)
 @shared_options
 def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options) -> None:
-    """Look at test files before a campaign names them: loops, sweeps, raw stepped-sine histories.
+    """Look at test files before a campaign names them: loops, sweeps, raw stepped-sine histories, in any mixture.
 
     For each FILE: how every column was understood, in which unit, and its range; cycles, sampling, waveform, noise,
-    frequencies, amplitudes, repeats; and what is odd, in sentences with figures. The text for the campaign goes to
-    standard output, ready to paste into a campaign in any folder.
+    frequencies, amplitudes, repeats; and what is odd beyond noise, in sentences with figures. Odd is an amplitude or
+    frequency other than the file's name says, a gap, rows that stand still, cut-off tops, outliers, drift, cycles that
+    still settle, a motion off zero, a force that counts the other way; in sweeps copied rows, missing frequencies, a
+    repeat that is off or drifts, loss factors below zero. Rows count from 1 below the header.
 
-    A file that cannot be used does not keep the others from being told; then nothing is written, and the exit status
-    is 2.
+    The text for the campaign goes to standard output; it names the files by their full path, to be pasted into a
+    campaign in any folder. A file that cannot be used does not keep the others from being told; then nothing is
+    written, and the exit status is 2.
 
     Writes inspect.png (inspect_2.png and so on of more than five files), with -o there, else under results/ in a folder
     of the first file's name.
@@ -46,7 +55,9 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     from bushfit.inspection.opening import inspect, stated_of_each
 
     folder = options.folder(folder_name(files[0].stem))
-    pages = [f"inspect{f'_{page}' if page > 1 else ''}.png" for page in range(1, -(-len(files) // _PICTURE) + 1)]
+    pages = [
+        f"inspect{f'_{page}' if page > 1 else ''}.png" for page in range(1, -(-len(files) // _FILES_A_PICTURE) + 1)
+    ]
     if options.plots:
         options.require_free(folder, pages)
     seen: list[Inspected] = []
@@ -105,6 +116,6 @@ def _pictures(seen: Sequence[Inspected], pages: Sequence[str]) -> dict[str, byte
     from bushfit.report.plots import inspection_figure, to_png
 
     return {
-        name: to_png(inspection_figure(seen[page * _PICTURE : (page + 1) * _PICTURE]))
+        name: to_png(inspection_figure(seen[page * _FILES_A_PICTURE : (page + 1) * _FILES_A_PICTURE]))
         for page, name in enumerate(pages)
     }

@@ -7,13 +7,19 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, new_table, shared_options, warn
+from bushfit.cli.common import DIRECTION, DIRECTIONS, Options, example, open_model, shared_options
+from bushfit.cli.show import new_table, warn
 
 if TYPE_CHECKING:
     from bushfit.jobs.predict import Predicted
 
 
-@click.command("predict")
+@click.command(
+    "predict",
+    epilog=example(
+        'bushfit predict data/arm_bushing/truth.json --frequencies "10:100:10 Hz" --amplitudes "0.1, 0.5 mm"'
+    ),
+)
 @click.argument("model", type=click.Path(path_type=Path))
 @click.option(
     "--campaign",
@@ -23,9 +29,10 @@ if TYPE_CHECKING:
 @click.option(
     "--direction",
     "directions",
-    type=click.Choice(["axial", "radial", "torsion"]),
+    type=DIRECTIONS,
+    metavar=DIRECTION,
     multiple=True,
-    help="May be given again [axial and radial].",
+    help="axial, radial or torsion; may be given again [axial and radial].",
 )
 @click.option("--frequencies", help='Such as "5:155:10 Hz" or "20, 50, 100 Hz" [the campaign\'s].')
 @click.option("--amplitudes", help='Zero-to-peak, such as "0.1, 0.2, 0.5 mm" [the campaign\'s].')
@@ -40,7 +47,7 @@ def command(
     torsion_amplitudes: str | None,
     options: Options,
 ) -> None:
-    """Dynamic stiffness and loss factor of MODEL (a JSON file of fit, fit-dynamic or diagnose) over a grid.
+    """Dynamic stiffness and loss factor of MODEL (the model.json of run, fit or diagnose, or dynamic.json) over a grid.
 
     Writes axial.csv and radial.csv (torsion.csv on request) with 95 % bands, and a plot of each. Effects of the rig
     are left out. Without a grid in the options or the campaign it is that of the campaign's sweeps in each direction,
@@ -52,9 +59,8 @@ def command(
     from bushfit.cli.grids import parse_grid
     from bushfit.geometry import Direction
     from bushfit.jobs.predict import Predict
-    from bushfit.model.file import load_result
 
-    result = load_result(model)
+    result = open_model(model)
     loaded = load_campaign(campaign) if campaign else None
     job = Predict(
         PredictSettings(

@@ -1,5 +1,4 @@
-"""What the commands on test files share: options that state what a file does not say itself, and errors that name
-them."""
+"""What the commands on test files share: options for what a file does not say itself, and errors that name them."""
 
 from __future__ import annotations
 
@@ -12,31 +11,40 @@ from typing import Any, TypeVar
 
 import click
 
+from bushfit.cli.common import DIRECTION, DIRECTIONS
 from bushfit.errors import BushfitError, MeasurementError
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 
 F = TypeVar("F", bound=Callable[..., Any])
-#: Keys of a campaign's tables that are an option of the same name here.
+#: Keys of a campaign's tables that are an option of the same name here, and its help.
 _SAME_NAME = {
     "force_sign": "-1: the load cell counts the other way.",
     "rate": 'Of a loop without time: a triangle at this speed, such as "10 mm/min".',
     "frequency": 'Of a loop without time, with --waveform, such as "0.1 Hz".',
     "waveform": "sine or triangle.",
-    "amplitude": "How sweeps count amplitudes, where the header does not say: zero-to-peak or peak-to-peak.",
+    "amplitude": "Of sweeps whose header does not say: zero-to-peak or peak-to-peak.",
     "encoding": 'Such as "cp1252" [detected].',
     "delimiter": "comma, semicolon, tab, pipe or blanks [detected].",
     "decimal": '"." or "," [detected].',
     "thousands": 'What parts thousands: ".", ",", " ", "\'" or none [detected].',
     "header_line": "Line of the header, from 1 [found].",
-    "sheet": "Sheet of a workbook.",
+    "sheet": "Of a workbook [the only one with such a table].",
 }
+#: Keys that are whole numbers.
 _NUMBERS = ("force_sign", "header_line")
+#: An inline table of TOML in the hint of an error.
 _TABLE = re.compile(r"\{[^}]*\}")
+#: One entry of such a table that is an option here.
 _PAIRED = re.compile(r'(column|unit)s = \{ (\w+) = "([^"]*)"')
 
 
-def file_options(*keys: str) -> Callable[[F], F]:
-    """--direction, --column, --unit and an option for each of some keys, gathered into one `stated` argument: keys of
-    [[loops]] and [[sweeps]] as a campaign would have them."""
+def file_options(*keys: str, sweeps: bool = True) -> Callable[[F], F]:
+    """--direction, --column, --unit and an option for each of some keys, gathered into one `stated` argument.
+
+    Args:
+        keys: of [[loops]] and [[sweeps]], as a campaign would have them.
+        sweeps: whether the command takes sweeps.
+    """
 
     def decorate(function: F) -> F:
         @wraps(function)
@@ -46,36 +54,43 @@ def file_options(*keys: str) -> Callable[[F], F]:
             stated["units"] = _pairs(kwargs.pop("units"), "--unit", "force=kN")
             return function(*args, stated={key: value for key, value in stated.items() if value}, **kwargs)
 
-        decorators = [
-            click.option(
-                "--direction",
-                type=click.Choice(["axial", "radial", "torsion"]),
-                help="Of all files given [found from their names and columns].",
-            ),
-            click.option(
-                "--column",
-                "columns",
-                multiple=True,
-                metavar="ROLE=HEADER",
-                help='Such as "force=Fz", of all loops given; roles of a sweep, of all sweeps.',
-            ),
-            click.option(
-                "--unit",
-                "units",
-                multiple=True,
-                metavar="ROLE=UNIT",
-                help='Such as "force=kN", of all loops given; roles of a sweep, of all sweeps.',
-            ),
-            *(
-                click.option(
-                    "--" + key.replace("_", "-"), key, type=int if key in _NUMBERS else str, help=_SAME_NAME[key]
-                )
-                for key in keys
-            ),
-        ]
-        return reduce(lambda command, decorator: decorator(command), reversed(decorators), wrapped)  # type: ignore[return-value]
+        return reduce(lambda command, option: option(command), reversed(_options(keys, sweeps=sweeps)), wrapped)  # type: ignore[return-value]
 
     return decorate
+
+
+def _options(keys: Sequence[str], *, sweeps: bool) -> list[Callable[[Any], Any]]:
+    """The options that state what a file does not say itself."""
+    roles, of_all = f"ROLEs: {', '.join(LOOP_COLUMNS)}", "all files given"
+    if sweeps:
+        roles = f"ROLEs of loops: {', '.join(LOOP_COLUMNS)}; of sweeps: {', '.join(SWEEP_COLUMNS)}"
+        of_all = "all files given that have the role"
+    return [
+        click.option(
+            "--direction",
+            type=DIRECTIONS,
+            metavar=DIRECTION,
+            help="axial, radial or torsion, of all files given [found from their names and columns].",
+        ),
+        click.option(
+            "--column",
+            "columns",
+            multiple=True,
+            metavar="ROLE=HEADER",
+            help=f'Such as "force=Fz", of files that have this header; may be given again. {roles}.',
+        ),
+        click.option(
+            "--unit",
+            "units",
+            multiple=True,
+            metavar="ROLE=UNIT",
+            help=f'Such as "force=kN", of {of_all}; ROLEs as above.',
+        ),
+        *(
+            click.option("--" + key.replace("_", "-"), key, type=int if key in _NUMBERS else str, help=_SAME_NAME[key])
+            for key in keys
+        ),
+    ]
 
 
 @contextmanager
@@ -105,9 +120,7 @@ def direction_error(file: Path) -> MeasurementError:
 
 
 def _pairs(texts: Sequence[str], option: str, example: str) -> Mapping[str, str]:
-    from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
-
-    known = list(dict.fromkeys([*LOOP_COLUMNS, *SWEEP_COLUMNS]))
+    known = (*LOOP_COLUMNS, *SWEEP_COLUMNS)
     pairs = {}
     for text in texts:
         role, equals, value = text.partition("=")

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, new_table, shared_options, warn
+from bushfit.cli.common import Options, example, shared_options
 from bushfit.cli.inspect import KEYS
 from bushfit.cli.raw import direction_error, file_options, options_named
+from bushfit.cli.show import new_table, warn
 from bushfit.errors import MeasurementError
 from bushfit.units import alike, number
 
@@ -20,10 +21,14 @@ if TYPE_CHECKING:
     from bushfit.reduction.steps import Reduction, Step
 
 
-@click.command("reduce")
+@click.command("reduce", epilog=example("bushfit reduce data/cmp_15961_raw/stepped_sine_axial.csv"))
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@file_options(*(key for key in KEYS if key not in ("rate", "frequency", "waveform", "amplitude")))
-@click.option("--levels", help='Amplitudes that were asked for, such as "0.1, 0.2, 0.5 mm" [found from the data].')
+@file_options(*(key for key in KEYS if key not in ("rate", "frequency", "waveform", "amplitude")), sweeps=False)
+@click.option(
+    "--levels",
+    help='Amplitudes that were asked for, such as "0.1, 0.2, 0.5 mm", where the rig missed them by more than 10 %; a '
+    "step more than 30 % off all of them is refused [found from the data].",
+)
 @click.option("--cycles", type=click.IntRange(3, 1000), default=3, show_default=True, help="Fewest steady cycles.")
 @shared_options
 def command(
@@ -35,11 +40,16 @@ def command(
 ) -> None:
     """Reduce raw stepped-sine histories (columns time, displacement, force) to a sweep.
 
-    One FILE may hold one step or many, joined by ramps and pauses; several files of one direction make one sweep. The
-    steady whole cycles of each step are found, its transient left out, and stiffness and loss factor of the
-    fundamental computed by least squares, with the amplitude really reached, noise and harmonic distortion.
+    One FILE may hold one step or many, joined by ramps and pauses; several files of one direction make one sweep, and
+    what occurs again is a repeat. The steady whole cycles of each step are found, its transient left out, and stiffness
+    and loss factor of the fundamental computed by least squares. A step needs five or six cycles: three steady ones
+    and what its start and end take. A swept sine is refused; single outliers are left out and counted.
 
-    Writes sweep.csv, which a campaign names under [[sweeps]], and reduce.png.
+    Shows and writes with each point its noise (the standard error, from the scatter of its cycles and rows), THD (the
+    overtones of the force over its fundamental: friction makes some, a loose fixture many), and the amplitude that the
+    rig really reached.
+
+    Writes sweep.csv, which a campaign names under [[sweeps]] and `bushfit init` takes, and reduce.png.
     """
     from bushfit.campaign.naming import folder_name
     from bushfit.cli.grids import parse_grid

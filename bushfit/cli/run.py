@@ -2,114 +2,139 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import (
-    Options,
-    campaign_argument,
-    enforce_nrmse,
-    loss_option,
-    max_nrmse_option,
-    new_table,
-    open_campaign,
-    report,
-    shared_options,
-    tell_fit,
-    warn,
-)
-from bushfit.units import alike, for_people
+from bushfit.cli.common import Options, Task, campaign_options, example
+from bushfit.cli.diagnose import tell_findings, tell_verdict
+from bushfit.cli.predict import tell_predictions
+from bushfit.cli.show import new_table, parameter_table, report, tell_fit, tell_result, tell_sources, warn
+from bushfit.units import alike, for_people, number
 
 if TYPE_CHECKING:
-    from bushfit.fitting.data import Data
     from bushfit.fitting.procedures import TwoStep
-    from bushfit.model.result import Result
+    from bushfit.jobs.run import Ran
+    from bushfit.model.result import Range, Result
+
+#: Standard errors up to which two fits are said to agree.
+_AGREED = 2
 
 
-@click.command("run")
-@campaign_argument
-@loss_option
-@max_nrmse_option
-@shared_options
-def command(campaign: Path, loss: str | None, max_nrmse: float | None, options: Options) -> None:
+@click.command("run", epilog=example("bushfit run configs/cmp_15961.toml"))
+@campaign_options()
+def command(task: Task) -> None:
     """Fit CAMPAIGN in every way, ask what the model lacks, and predict from the result.
 
-    fit-static and fit-dynamic are repeated in turn until they agree (the paper's procedure), with the table of each
-    pass; then all parameters are fitted together, and both results stand side by side; then diagnose, on all tests;
-    then predict. Steps whose tests are missing are passed over, and said.
+    Shows the verdict of diagnose, the parameters of the model to use, the range that was tested, and the corners of
+    the prediction. The paper's procedure, fit-static and fit-dynamic in turn until they agree, is said in a line; -v
+    shows its passes and what it costs beside the joint fit. Steps whose tests are missing are passed over, and said.
 
     Writes static.json, dynamic.json, model.json (with what diagnose added; then joint.json is the plain fit),
     diagnosis.json, candidates.csv, and as CSV and PNG: loops, sweeps, gap, axial and radial.
     """
-    from bushfit.cli.diagnose import tell_diagnosis
-    from bushfit.cli.predict import tell_predictions
-    from bushfit.fitting.data import Data
-    from bushfit.jobs.diagnose import Diagnose
-    from bushfit.jobs.fits import Fit, FitStatic, tests_of
-    from bushfit.jobs.predict import Predict
-    from bushfit.model.file import to_document
-    from bushfit.report.artifacts import artifact_names, diagnosis_files, loop_files, sweep_files
-    from bushfit.report.folder import to_json
+    from bushfit.jobs.run import Run
 
-    loaded = open_campaign(campaign, loss)
-    folder = options.folder(loaded.slug)
-    names = [*Diagnose().names(loaded, options.formats), *Predict().names(loaded, options.formats)]
-    options.require_free(folder, [*names, *artifact_names(tests_of(loaded), options.formats)])
-    data = Data.of(loaded)
-    results: dict[str, Result] = {}
-    if loaded.loops:
-        static = FitStatic().run(data)
-        results["static"] = static.result
-        tell_fit(options, loaded.name, static)
-    two_step = _two_step(options, data)
-    if two_step:
-        results["dynamic"] = two_step.result
-        _tell_passes(options, two_step)
-        report(options, f"{loaded.name}: static and dynamic fit in turn", two_step.result)
-    joint = Fit().run(data)
-    tell_fit(options, loaded.name, joint)
-    if two_step:
-        _tell_cost(options, two_step.result, joint.result)
-    diagnosed = Diagnose().run(data)
-    tell_diagnosis(options, loaded.name, diagnosed)
-    added = diagnosed.diagnosis.after is not diagnosed.diagnosis.before
-    results |= {"joint": joint.result, "model": diagnosed.result} if added else {"model": joint.result}
-    final = results["model"]
-    predicted = Predict().run(final, loaded)
-    tell_predictions(options, predicted)
-    marked = data.without(final.outliers)
-    documents = {**{name: to_document(result) for name, result in results.items()}, "diagnosis": diagnosed.document}
-    files = {
-        **{f"{name}.json": to_json(document) for name, document in documents.items()},
-        **loop_files(final.model, marked.loops, options.formats),
-        **sweep_files(final.model, marked.sweeps, options.formats),
-        **diagnosis_files(diagnosed.diagnosis, loaded.name, options.formats),
-        **predicted.files(options.formats),
-    }
-    options.write(folder, files)
-    found = ", ".join(effect.name for effect in diagnosed.diagnosis.effects)
-    which = f"with {found}; joint.json is without" if added else "the joint fit"
-    options.console.print(f"the model to use: {folder / 'model.json'}, {which}", markup=False)
-    options.tell(documents)
-    enforce_nrmse(final, max_nrmse)
+    task.perform(Run(), tell_run, _which)
 
 
-def _two_step(options: Options, data: Data) -> TwoStep | None:
-    """The paper's procedure, or a word on why it is passed over."""
-    from bushfit.errors import FitError
-    from bushfit.fitting.procedures import fit_two_step
+def tell_run(options: Options, name: str, outcome: Ran) -> None:
+    """The result, with -v the steps on the way, and the procedure of the paper in one line."""
+    found, result = outcome.diagnosed, outcome.result
+    if found:
+        tell_verdict(options, name, found)
+    else:
+        options.console.print(f"{name}: every parameter is held, so diagnose is passed over", markup=False)
+    tell_result(options, f"{name}: {'model with what was added' if outcome.added else 'joint fit'}", result)
+    if found and found.diagnosis.verdict != "consistent":
+        tell_findings(options, found)
+    if result.measured:
+        _tell_range(options, outcome, result.measured)
+    warn(options, list(dict.fromkeys((*result.warnings, *(found.diagnosis.notes if found else ())))))
+    tell_sources(options, result)
+    tell_predictions(options, outcome.predicted)
+    if options.verbose:
+        _tell_steps(options, name, outcome)
+    line = f"{outcome.no_two_step}: the two-step procedure is passed over"
+    if outcome.two_step:
+        line = _in_a_line(outcome.two_step, outcome.joint.result)
+    options.console.print(line, markup=False)
 
-    if not (data.loops and data.sweeps):
-        missing = "sweeps" if data.loops else "loops"
-        options.console.print(f"no {missing}: the two-step procedure is passed over", markup=False)
-        return None
-    try:
-        return fit_two_step(data)
-    except FitError as error:
-        warn(options, [f"the two-step procedure is passed over: {error.problem}"])
-        return None
+
+def _which(folder: Path, outcome: Ran) -> str:
+    """Which of the files to use."""
+    which = "the joint fit"
+    if outcome.diagnosed and outcome.added:
+        found = ", ".join(effect.name for effect in outcome.diagnosed.diagnosis.effects)
+        which = f"with {found}; joint.json is without"
+    return f"the model to use: {folder / 'model.json'}, {which}"
+
+
+def _tell_range(options: Options, outcome: Ran, measured: Range) -> None:
+    """Where the model was fitted to tests: least and largest frequency and amplitude, and the directions."""
+    bushing, predicted = outcome.result.model.bushing, [p.direction for p in outcome.predicted.predictions]
+    amplitudes = []
+    for direction in dict.fromkeys((*measured.directions, *predicted)):
+        unit, factor = direction.display.displacement
+        per_strain = factor / bushing.unit_strain(direction)
+        amplitudes.append(f"{direction} {_span([per_strain * end for end in measured.strain], 3)} {unit}")
+    options.console.print(
+        "tested range, least and largest of all tests; beyond it the model extrapolates", style="bold"
+    )
+    strains = f"{_span([100.0 * end for end in measured.strain], 2)} %"
+    for label, text in (
+        ("frequencies", f"{_span(measured.frequency, 3)} Hz"),
+        ("strains", f"{strains}, which is {', '.join(amplitudes)}"),
+        ("directions", ", ".join(measured.directions)),
+    ):
+        options.console.print(f"  {label}: {text}", markup=False)
+
+
+def _span(ends: Sequence[float], digits: int) -> str:
+    return " to ".join(dict.fromkeys(number(end, digits) for end in ends))
+
+
+def _in_a_line(two_step: TwoStep, joint: Result) -> str:
+    """What the paper's procedure found, beside the joint fit."""
+    found, off, ratio = two_step.result, dict[str, float](), dict[str, float]()
+    for name in joint.fitted:
+        error, least = found.covariance.stderr(name), joint.covariance.stderr(name)
+        if error and least:
+            off[name] = abs(found.model.values[name] - joint.model.values[name]) / error
+            ratio[name] = error / least
+    parts = [f"{len(two_step.passes)} passes"]
+    if off:
+        far, unsure = (max(sizes, key=sizes.__getitem__) for sizes in (off, ratio))
+        count = math.ceil(off[far])
+        parts.append(
+            f"agrees with the joint fit within {count} standard error{'s' * (count > 1)}"
+            if count <= _AGREED
+            else f"{far} is {off[far]:.1f} standard errors off the joint fit"
+        )
+        if ratio[unsure] > 1.0:
+            parts.append(f"{unsure} {number(ratio[unsure], 2)} times less certain than there")
+    return f"two-step procedure (the paper's): {', '.join(parts)} (static.json, dynamic.json; -v shows it)"
+
+
+def _tell_steps(options: Options, name: str, outcome: Ran) -> None:
+    """Every step on the way to the result: the two-step procedure, the joint fit, and the diagnosis in full."""
+    if outcome.static:
+        tell_fit(options, name, outcome.static)
+    if outcome.two_step:
+        _tell_passes(options, outcome.two_step)
+        report(options, f"{name}: static and dynamic fit in turn", outcome.two_step.result)
+    if outcome.added:
+        tell_fit(options, name, outcome.joint)
+    if outcome.two_step:
+        _tell_cost(options, outcome.two_step.result, outcome.joint.result)
+    if outcome.diagnosed and not outcome.added:
+        if outcome.diagnosed.diagnosis.verdict == "consistent":
+            tell_findings(options, outcome.diagnosed)
+        options.console.print(parameter_table("the same from the tests of every direction", outcome.diagnosed.result))
+        warn(options, outcome.diagnosed.result.warnings)
 
 
 def _tell_passes(options: Options, two_step: TwoStep) -> None:

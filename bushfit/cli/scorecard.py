@@ -9,10 +9,11 @@ from tempfile import TemporaryDirectory
 
 import click
 
-from bushfit.cli.common import Options, new_table, options_without_folder
+from bushfit.cli.common import Options, example, options_without_folder
+from bushfit.cli.show import new_table
 
 
-@click.command("scorecard")
+@click.command("scorecard", epilog=example("bushfit scorecard --campaigns 5 --seed 3"))
 @click.option("--campaigns", type=click.IntRange(min=5), default=300, show_default=True, help="Hidden campaigns.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of everything random.")
 @click.option("--jobs", type=click.IntRange(min=1), default=os.cpu_count() or 1, show_default=True, help="Cores.")

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, shared_options
+from bushfit.cli.common import Options, example, open_model, shared_options
 
 if TYPE_CHECKING:
     from bushfit.campaign.schema import SimulateSettings
     from bushfit.model.model import Model
 
 
-@click.command("simulate")
+@click.command("simulate", epilog=example("bushfit simulate configs/simulate_arm_bushing.toml --seed 7"))
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=click.Path(path_type=Path))
 @click.option(
     "--seed", type=click.IntRange(min=0), help="Of the random numbers; the same seed gives the same data [0]."
@@ -41,7 +41,8 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
 
     The model is MODEL.json, tested as the paper's bushing was, or the [simulate] table of CAMPAIGN with tests of its
     own. Equations (3) and (5) are stepped through time; the closed form that the fits use is not involved. Noise is
-    that of the [simulate] table, or none; each option replaces one entry of the table.
+    that of the [simulate] table, or none; each option replaces one entry of the table. Good for planning: would
+    `bushfit diagnose` see in these tests what --effect hides there?
 
     Writes campaign.toml, the CSV files it names, and truth.json, the model behind them.
     """
@@ -62,11 +63,10 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
 def _task(source: Path) -> tuple[Model, SimulateSettings]:
     from bushfit.campaign.campaign import load_campaign
     from bushfit.campaign.schema import SimulateSettings
-    from bushfit.model.file import load_result
     from bushfit.simulation import model_of
 
     if source.suffix.lower() == ".json":
-        return load_result(source).model, SimulateSettings()
+        return open_model(source).model, SimulateSettings()
     campaign = load_campaign(source)
     truth = model_of(campaign)
     return truth, campaign.simulate or SimulateSettings()

@@ -10,19 +10,20 @@ import numpy as np
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.assess import Stage, covariance, measured_range, misfit, quality
+from bushfit.fitting.assess import Stage, covariance, lack_of_fit, measured_range, misfit, quality
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.identify import left_open
 from bushfit.fitting.plausible import implausible, unfitted
 from bushfit.fitting.profile import profile95
 from bushfit.fitting.robust import Estimate, estimate, told
-from bushfit.fitting.solve import Bounds, Coordinates, Solution
+from bushfit.fitting.solve import Bounds, Coordinates, Solution, residual
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import End, Result
+from bushfit.units import number
 
 STATIC = ("mu", "sigma_fmax", "eps_half")
 DYNAMIC = ("m", "alpha")
@@ -142,7 +143,7 @@ def fit_two_step(data: Data) -> TwoStep:
             answered.append(coordinates.point(model.values))
         springpot = {name: model.values[name] for name in DYNAMIC}
         if len(asked) > 1:
-            springpot = coordinates.values(_anderson(asked, answered))
+            springpot = _possible(model, coordinates.values(_anderson(asked, answered)))
     raise FitError(
         "the static and the dynamic fit do not settle on each other",
         file=data.campaign.path,
@@ -159,6 +160,11 @@ def _anderson(asked: Sequence[Array], answered: Sequence[Array]) -> Array:
     change = gap - before
     weight = np.clip(-(change @ gap) / (change @ change), 0.0, _LONGEST_STRIDE)
     return images[-1] + weight * (images[-1] - images[-2])
+
+
+def _possible(model: Model, values: Mapping[str, float]) -> dict[str, float]:
+    """Values moved to the nearest that their parameters may have: an extrapolated one may lie beyond."""
+    return {name: float(np.clip(value, *model.parameters[name].bounds)) for name, value in values.items()}
 
 
 def _agree(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
@@ -207,15 +213,28 @@ def _solve(data: Data, data_sets: Sequence[DataSet], effects: Sequence[str], hel
             hint="check the units of displacement and force, and the dimensions of the bushing",
         ) from error
     names = [name for name in data.free(tuple(model.parameters)) if name not in held]
+    if not names:
+        return _as_given(model, data_sets, robust=data.robust)
     return estimate(model, data_sets, names, data.bounds, robust=data.robust)
+
+
+def _as_given(model: Model, data_sets: Sequence[DataSet], *, robust: bool) -> Estimate:
+    """The estimate of a model of which nothing is free: its own values, beside the data they are checked against."""
+    outlying = tuple(data_set.outlying(model) for data_set in data_sets)
+    kept = tuple(data_sets)
+    if robust:
+        kept = tuple(data_set.without(points) for data_set, points in zip(data_sets, outlying, strict=True))
+    left = residual(model, kept)
+    solution = Solution(model, Coordinates((), ()), left, np.empty((0, left.size)), 1, {}, stopped=False)
+    return Estimate(solution, kept, kept, kept, outlying)
 
 
 def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = None, notes: Sequence[str] = ()) -> Result:
     """What the steps of a procedure found, the last one's model, with the uncertainty of all of them."""
     solution, data_sets = steps[-1].solution, [data_set for step in steps for data_set in step.data_sets]
-    stages = [Stage(step.solution.coordinates.names, step.weighed) for step in steps]
+    stages = [Stage(step.solution.coordinates.names, step.weighed) for step in steps if step.solution.coordinates.names]
     fitted = tuple(name for stage in stages for name in stage.names)
-    cov = covariance(solution.model, stages, held)
+    cov = covariance(solution.model, stages, held) if stages else held or Covariance()
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
     return Result(
         solution.model,
@@ -255,13 +274,28 @@ def cautions(
     """What is odd about the loops of a fit, and what its data cannot tell: bounds met, what stays open, and a model
     that does not fit."""
     names, at_bound = solution.coordinates.names, solution.at_bound
+    notes = [f"{data_set.name}: {note}" for data_set in data_sets for note in data_set.notes]
+    if not names:
+        return [*notes, _checked(model, data_sets)]
     return [
-        *(f"{data_set.name}: {note}" for data_set in data_sets for note in data_set.notes),
+        *notes,
         *(_stopped(solution) if solution.stopped else []),
         *(_at_edge(name, end, bounds) for name, end in at_bound.items()),
         *left_open(model, data_sets, [name for name in names if name not in at_bound], covariance),
         *misfit(model, data_sets, len(names), advice),
     ]
+
+
+def _checked(model: Model, data_sets: Sequence[DataSet]) -> str:
+    """How well a model that was given in full meets the data, in words."""
+    found = quality(model, data_sets, 0)
+    missed = lack_of_fit(model, data_sets, 0)
+    how = "meet" if missed is None else "miss"
+    by = "within their noise" if missed is None else f"by {number(np.sqrt(missed), 2)} times their noise"
+    return (
+        f"nothing was fitted here, every parameter is held; the values given {how} the tests {by} "
+        f"(NRMSE {number(100.0 * found.nrmse, 2)} %, reduced chi-square {number(found.reduced_chi_square, 3)})"
+    )
 
 
 def _stopped(solution: Solution) -> list[str]:

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from bushfit.fitting.data import Data
     from bushfit.model.result import Result
 
-#: Files that a job makes besides its JSON documents.
-TABLES, PLOTS = "csv", "png"
+#: Format of the tables that a job makes besides its JSON documents.
+TABLES = "csv"
 
 
 class Outcome(Protocol):

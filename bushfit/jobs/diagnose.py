@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
+from bushfit.errors import FitError
 from bushfit.model.file import to_document
+from bushfit.model.model import FIVE, Model
 from bushfit.report.artifacts import artifact_names, diagnosis_files
 from bushfit.report.folder import to_json
 
 if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
     from bushfit.fitting.data import Data
-    from bushfit.model.model import Model
     from bushfit.model.result import Result
 
 
@@ -59,4 +60,13 @@ class Diagnose:
         ]
 
     def run(self, data: Data) -> Diagnosed:
+        parameters = self.model.parameters if self.model else FIVE
+        if not (self.settings.adopt or data.free(tuple(parameters))):
+            raise FitError(
+                "there is nothing to fit, and so nothing to diagnose",
+                file=data.campaign.path,
+                place="[fit]",
+                found="every parameter is held with vary = false",
+                hint="bushfit fit says how well the values given meet the tests; free one to diagnose",
+            )
         return Diagnosed(data.campaign.name, diagnose(data, self.model, self.settings))

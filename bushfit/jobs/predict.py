@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
     from bushfit.model.result import Result
 
+#: Directions that are predicted where none is asked for: those of the paper.
 _DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
 
 

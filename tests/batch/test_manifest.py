@@ -95,6 +95,12 @@ BAD = [
         "campaign,directions,commands\na.toml,axial,fit\nb.toml,axial,diagnose",
         ["b.toml", "directions", "commands diag"],
     ),
+    ("m.toml", ROW + 'commands = ["run", "fit"]', ["commands", "run is the whole chain", "found: run, fit"]),
+    (
+        "m.toml",
+        ROW + 'commands = ["run"]\neffects = ["inertia"]',
+        ["effects", "nothing", "try: leave effects out"],
+    ),
     ("m.toml", ROW + 'effects = ["inertai"]', ["bushings #1.effects #1", "did you mean inertia?"]),
     ("m.toml", ROW + "max_effects = 9", ["bushings #1.max_effects", "9"]),
     ("m.toml", 'at = ["axial 25 Hz"]\n' + ROW, ["at", "no operating point", "axial 25 Hz"]),

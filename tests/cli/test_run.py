@@ -13,7 +13,7 @@ CAMPAIGN = "configs/cmp_15961.toml"
 
 
 def test_run_does_the_whole_chain_and_says_what_two_steps_cost(bushfit: Run, tmp_path: Path) -> None:
-    done = bushfit("run", CAMPAIGN, "-o", str(tmp_path / "x"))
+    done = bushfit("run", CAMPAIGN, "-o", str(tmp_path / "x"), "-v")
     assert done.returncode == 0, done.stderr
     named = {file.name for file in (tmp_path / "x").iterdir()}
     tables = {f"{kind}.{end}" for kind in ("loops", "sweeps", "axial", "radial") for end in ("csv", "png")}
@@ -27,6 +27,33 @@ def test_run_does_the_whole_chain_and_says_what_two_steps_cost(bushfit: Run, tmp
     assert len(radial) == 48
     ordered = radial.sort_values(["amplitude [mm]", "frequency [Hz]"], ignore_index=True)
     pd.testing.assert_frame_equal(radial, ordered)
+
+
+def test_run_shows_the_result_first_and_the_steps_in_a_line(bushfit: Run, tmp_path: Path) -> None:
+    done = bushfit("run", CAMPAIGN, "-o", str(tmp_path / "x"), "--no-plots")
+    assert done.returncode == 0, done.stderr
+    words = (
+        *("CMP 15 961: consistent", "joint fit", "mu ", "NRMSE", "correlation: ", "tested range"),
+        *("frequencies: 0.1 to 155 Hz", "strains: 0.62 to 6.2 %, which is axial 0.1 to 1 mm, radial "),
+        *("directions: axial", "axial, corners", "radial, corners", "extrapolated beyond"),
+        "two-step procedure (the paper's): 10 passes, agrees with the joint fit within 1 standard error",
+        *("times less certain than there (static.json, dynamic.json; -v shows it)", "wrote static.json"),
+        "the model to use: ",
+    )
+    places = [done.stderr.index(word) for word in words]
+    assert places == sorted(places)
+    for word in ("pass by pass", "what the two-step procedure costs", "springpot was left out", "held out"):
+        assert word not in done.stderr
+
+
+def test_run_with_an_effect_shows_what_diagnose_shows(root: Path, tmp_path: Path) -> None:
+    done = call(root, "run", "configs/mystery_mount.toml", "-o", str(tmp_path / "x"), "--no-plots")
+    assert done.returncode == 0, done.stderr
+    for words in ("Mystery mount: named", "rig_compliance (instrument)", "held out", "7.7 x noise:", "next test:"):
+        assert done.stderr.count(words) == 1
+    assert "model with what was added" in done.stderr
+    assert "was not fitted, and the model misses it" not in done.stderr, "of the joint fit, which is not the one to use"
+    assert f"{tmp_path / 'x/model.json'}, with rig_compliance; joint.json is without" in done.stderr
 
 
 def test_one_loop_alone_is_fitted_and_what_it_leaves_open_is_named(work: Path, tmp_path: Path) -> None:

@@ -1,0 +1,123 @@
+"""What people read on the terminal: tables of parameters, quality, correlations and warnings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from bushfit.units import alike, for_people, number
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from bushfit.cli.common import Options
+    from bushfit.effects.contract import Parameter
+    from bushfit.jobs.fits import Fitted
+    from bushfit.model.result import Result
+
+#: Correlation between two parameters from which on it is shown without -v: they trade off against each other.
+_CLOSE = 0.9
+#: A value below its least possible value times this is shown as resting there: logarithms tell no more apart.
+_AT_LEAST = 1.01
+#: Digits of a value whose standard error is not known.
+_PLAIN_DIGITS = 4
+#: Fewest and most digits of a value, however small or large its standard error.
+_FEWEST_DIGITS = 2
+_MOST_DIGITS = 6
+
+
+def tell_fit(options: Options, name: str, outcome: Fitted) -> None:
+    """Each step of a fit."""
+    for title, result in outcome.reports:
+        report(options, f"{name}: {title}", result)
+
+
+def report(options: Options, title: str, result: Result) -> None:
+    """The parameters of a result, its quality, and its warnings."""
+    tell_result(options, title, result)
+    warn(options, result.warnings)
+    tell_sources(options, result)
+
+
+def tell_result(options: Options, title: str, result: Result) -> None:
+    """The parameters of a result and its quality."""
+    console = options.console
+    console.print(parameter_table(title, result))
+    if result.quality:
+        quality = result.quality
+        console.print(
+            f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)} "
+            f"over {quality.points} points, noise {number(100 * quality.noise, 2)} % a point"
+        )
+    pairs = result.covariance.correlations()
+    shown = pairs if options.verbose else [pair for pair in pairs if abs(pair[2]) > _CLOSE]
+    if shown:
+        console.print("correlation: " + ", ".join(f"{one}/{other} {value:+.2f}" for one, other, value in shown))
+
+
+def tell_sources(options: Options, result: Result) -> None:
+    """With -v the equation of a model and the files behind it."""
+    if options.verbose:
+        options.console.print(result.model.equation(), markup=False)
+        for source in result.inputs:
+            options.console.print(f"input: {source.file} sha256 {source.sha256[:12]}", markup=False)
+
+
+def warn(options: Options, lines: Sequence[str]) -> None:
+    """A line for each warning."""
+    from rich.markup import escape
+
+    for line in lines:
+        options.console.print(f"[yellow]warning:[/yellow] {escape(line)}")
+
+
+def new_table(title: str, *columns: str) -> Table:
+    """An empty table: the first column holds names, the others numbers."""
+    from rich import box
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(title=escape(title), title_justify="left", box=box.SIMPLE_HEAD, title_style="bold")
+    for place, column in enumerate(columns):
+        table.add_column(escape(column), justify="right" if place else "left", no_wrap=True)
+    return table
+
+
+def parameter_table(title: str, result: Result) -> Table:
+    """The paper's Table 1 with uncertainty: value, standard error, 95 % interval (by profile, if any), unit."""
+    kind = "95 % by profile" if result.profile else "95 % interval"
+    table = new_table(title, "parameter", "value", "std error", kind, "unit")
+    for name, parameter in result.model.parameters.items():
+        value, stderr = result.model.values[name], result.covariance.stderr(name)
+        interval = result.profile.get(name) or result.interval(name)
+        if _at_nothing(parameter, value):
+            stderr = interval = None
+        elif interval == parameter.bounds:
+            interval = None
+        digits, (unit, factor) = _digits(value, stderr), for_people(parameter.unit, 1.0, value)
+        known = [end * factor for end in interval or () if end is not None]
+        shown, *texts = alike([value * factor, *known], digits, least=2)
+        ends = ["open" if end is None else texts.pop(0) for end in interval or ()]
+        error = "" if stderr is None else alike([stderr * factor], 2)[0]
+        table.add_row(_labelled(name, result), shown, error, " to ".join(ends), unit)
+    return table
+
+
+def _at_nothing(parameter: Parameter, value: float) -> bool:
+    """Whether a strictly positive parameter is as small as it may be: there a slope tells nothing of its error."""
+    return parameter.log and value <= _AT_LEAST * parameter.bounds[0]
+
+
+def _labelled(name: str, result: Result) -> str:
+    if name in result.at_bound:
+        return f"{name} (at {result.at_bound[name]})"
+    return name if name in result.fitted else f"{name} (held)"
+
+
+def _digits(value: float, stderr: float | None) -> int:
+    """Digits that carry meaning: two of the standard error."""
+    if not stderr or not value:
+        return _PLAIN_DIGITS
+    carried = math.floor(math.log10(abs(value))) - math.floor(math.log10(stderr)) + 2
+    return int(min(max(carried, _FEWEST_DIGITS), _MOST_DIGITS))

@@ -1,0 +1,112 @@
+"""run: every fit of one campaign, what the model lacks, and the prediction from the model to use."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from bushfit.errors import FitError
+from bushfit.fitting.procedures import TwoStep, fit_two_step
+from bushfit.jobs.diagnose import Diagnose, Diagnosed
+from bushfit.jobs.fits import Fit, FitStatic, Fitted, tests_of
+from bushfit.jobs.predict import Predict, Predicted
+from bushfit.model.file import to_document
+from bushfit.model.model import FIVE
+from bushfit.report.artifacts import artifact_names, diagnosis_files, loop_files, sweep_files
+from bushfit.report.folder import to_json
+
+if TYPE_CHECKING:
+    from bushfit.campaign.campaign import Campaign
+    from bushfit.fitting.data import Data
+    from bushfit.model.result import Result
+
+
+@dataclass(frozen=True, eq=False)
+class Ran:
+    """The outcome of the whole chain.
+
+    Args:
+        data: the tests.
+        static: the first step of the paper's procedure; None where there are no loops.
+        two_step: the paper's procedure; None where it was passed over.
+        no_two_step: why it was passed over, or "".
+        joint: all parameters together.
+        diagnosed: what the model lacks; None where no parameter is free.
+        predicted: from the model to use.
+    """
+
+    data: Data
+    static: Fitted | None
+    two_step: TwoStep | None
+    no_two_step: str
+    joint: Fitted
+    diagnosed: Diagnosed | None
+    predicted: Predicted
+
+    @property
+    def result(self) -> Result:
+        """The model to use: the joint fit, or the model with what diagnose added."""
+        return self.predicted.result
+
+    @property
+    def added(self) -> bool:
+        """Whether the model to use holds more than the joint fit."""
+        return self.result is not self.joint.result
+
+    @cached_property
+    def document(self) -> Mapping[str, Any]:
+        results = {"static": self.static and self.static.result, "dynamic": self.two_step and self.two_step.result}
+        results |= {"joint": self.joint.result if self.added else None, "model": self.result}
+        documents = {name: to_document(result) for name, result in results.items() if result}
+        return {**documents, "diagnosis": self.diagnosed.document} if self.diagnosed else documents
+
+    def files(self, formats: Collection[str]) -> dict[str, bytes]:
+        model, marked = self.result.model, self.data.without(self.result.outliers)
+        found, title = self.diagnosed, self.data.campaign.name
+        return {
+            **{f"{name}.json": to_json(document) for name, document in self.document.items()},
+            **loop_files(model, marked.loops, formats),
+            **sweep_files(model, marked.sweeps, formats),
+            **(diagnosis_files(found.diagnosis, title, formats) if found else {}),
+            **self.predicted.files(formats),
+        }
+
+
+@dataclass(frozen=True)
+class Run:
+    """The whole chain: the paper's two steps, all parameters together, what is missing, and the prediction."""
+
+    def names(self, campaign: Campaign, formats: Collection[str]) -> list[str]:
+        kinds = tests_of(campaign)
+        return [
+            *(["static.json"] if campaign.loops else []),
+            *(["dynamic.json"] if campaign.loops and campaign.sweeps else []),
+            "joint.json",
+            *Diagnose().names(campaign, formats),
+            *artifact_names(kinds, formats),
+            *Predict().names(campaign, formats),
+        ]
+
+    def run(self, data: Data) -> Ran:
+        static = FitStatic().run(data) if data.loops else None
+        two_step, why_not = _two_step(data)
+        joint = Fit().run(data)
+        diagnosed = Diagnose().run(data) if data.free(FIVE) else None
+        added = diagnosed is not None and diagnosed.diagnosis.after is not diagnosed.diagnosis.before
+        result = diagnosed.result if diagnosed and added else joint.result
+        predicted = Predict().run(result, data.campaign)
+        return Ran(data, static, two_step, why_not, joint, diagnosed, predicted)
+
+
+def _two_step(data: Data) -> tuple[TwoStep | None, str]:
+    """The paper's procedure, or why it is passed over."""
+    if not (data.loops and data.sweeps):
+        return None, f"no {'sweeps' if data.loops else 'loops'}"
+    if not data.free(FIVE):
+        return None, "every parameter is held"
+    try:
+        return fit_two_step(data), ""
+    except FitError as error:
+        return None, error.problem
