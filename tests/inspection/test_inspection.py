@@ -36,7 +36,7 @@ def test_clean_tests_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str)
 
 @pytest.mark.parametrize("rig", NOISE)
 def test_clean_loops_without_time_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str) -> None:
-    """Time rebuilt from a noisy motion is uneven at its turning points; rows there are no wilder for it."""
+    """Time rebuilt from a noisy motion is uneven at its turning points; rows there are no outliers for it."""
     raised, file = [], tmp_path / "axial.csv"
     for seed in range(SEEDS):
         loops = measure(clean, plan(seed=seed, **NOISE[rig])).loops
@@ -118,9 +118,9 @@ LOOP_FAULTS: dict[str, tuple[Callable[[Loop], Loop], str]] = {
         lambda x: replace(x, force=x.force * (1.0 + 0.1 * np.exp(-x.time / 20.0))),
         "the cycles are still settling: the force amplitude goes from",
     ),
-    "wild row": (
+    "outlier row": (
         lambda x: replace(x, force=x.force + np.where(np.arange(x.force.size) == 700, 90.0, 0.0)),
-        "the force is wild at data row 701",
+        "the force has an outlier at data row 701",
     ),
     "gap": (
         lambda x: replace(x, **{key: np.delete(getattr(x, key), slice(300, 330)) for key in CHANNELS}),
@@ -194,7 +194,7 @@ SWEEP_FAULTS: dict[str, tuple[Callable[[Sweep], Sweep], str]] = {
         lambda x: without(x, (x.amplitude == 2e-4) & np.isin(x.frequency, (45.0, 55.0))),
         "0.2 mm, repeat 1, lacks 45, 55 Hz, which most others have",
     ),
-    "wild point": (
+    "outlier point": (
         lambda x: spoiled(x, np.arange(x.repeat.size) == 20, 1.15),
         "data row 21 (45 Hz, 0.1 mm, repeat 2) is +1",
     ),
