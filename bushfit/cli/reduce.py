@@ -18,7 +18,7 @@ from bushfit.units import alike, number
 
 if TYPE_CHECKING:
     from bushfit.reading.measurement import Loop
-    from bushfit.reduction.steps import Reduction, Step
+    from bushfit.reduction.result import Reduction, Step
 
 
 @click.command("reduce", epilog=example("bushfit reduce data/cmp_15961_raw/stepped_sine_axial.csv"))

@@ -1,4 +1,4 @@
-"""What can be wrong with a recorded channel, whatever the test: gaps, stuck rows, cut-off tops, wild rows."""
+"""Faults that any recorded channel may have: gaps, stuck rows, cut-off tops and outliers."""
 
 from __future__ import annotations
 
@@ -9,33 +9,56 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.reading.measurement import Floats, Loop
-from bushfit.reduction.cycles import least_turn, wild_rows
+from bushfit.reduction.cycles import least_prominence, lone_outliers
 from bushfit.units import number
 
-#: A gap is that many usual steps of the clock, and so many times the widest steps of an uneven clock.
-_GAP, _UNEVEN = 5.0, 3.0
-#: Rows in which nothing moves though the motion went on by this share of its range.
-_STUCK_ROWS, _STUCK_MOTION = 5, 0.02
-#: A top is cut off where so many rows hold the very same extreme, and so many times those just below it.
-_FLAT_ROWS, _FLAT_RATIO = 8, 5.0
-#: Values are equal, and just below the extreme, within these shares of the range.
-_EQUAL, _BELOW = 1e-9, 2e-3
+#: Usual steps of the clock that make a gap; chosen: a clock that stutters takes fewer.
+_GAP_STEPS = 5.0
+#: Widest steps of an uneven clock that make a gap; chosen: rows kept at random leave no such holes.
+_GAP_WIDEST_STEPS = 3.0
+#: Quantile of the steps of a clock that counts as the widest one, gaps aside.
+_WIDEST_QUANTILE = 0.99
+#: Share of its usual step by which the steps of an even clock differ; chosen: times are rounded in files.
+_EVEN_CLOCK = 0.02
+#: Rows that a stuck recorder repeats; chosen: a converter repeats fewer where the motion turns.
+_STUCK_ROWS = 5
+#: Share of its range by which the motion goes on meanwhile; chosen: a motion that stands still goes on by less.
+_STUCK_MOTION = 0.02
+#: Rows that hold the very same extreme where a top is cut off; chosen: noise makes fewer alike.
+_FLAT_ROWS = 8
+#: Such rows to one that lies just below the extreme; chosen: a top that is not cut off has more of the latter.
+_FLAT_RATIO = 5.0
+#: Share of the range within which values are equal: rounding of floats.
+_EQUAL = 1e-9
+#: Share of the range within which values lie just below the extreme, or else one step of the converter.
+_JUST_BELOW = 2e-3
+#: Steps of the converter that count as one: rounding of floats.
+_ONE_STEP = 1.01
+#: Outliers that are told one by one; chosen: they make a sentence.
 _MOST_LISTED = 3
 
+#: Which rows something is true of.
 Flags = NDArray[np.bool_]
 
 
 def clock(history: Loop) -> str:
-    """The sampling in words."""
+    """How the rows of a record lie in time, in words."""
     steps = np.diff(history.time)
     usual = float(np.median(steps))
-    if np.ptp(steps) < 0.02 * usual:
+    if np.ptp(steps) < _EVEN_CLOCK * usual:
         return f"even, every {usual:.4g} s"
     return f"uneven, every {steps.min():.3g} to {steps.max():.3g} s, mostly {usual:.3g} s"
 
 
 class Channel(NamedTuple):
-    """A recorded channel, and how it is shown."""
+    """A recorded channel.
+
+    Args:
+        name: such as "displacement".
+        unit: in which its values are told.
+        factor: from SI to that unit.
+        values: in SI, (n,).
+    """
 
     name: str
     unit: str
@@ -43,11 +66,12 @@ class Channel(NamedTuple):
     values: Floats
 
     def shown(self, row: int) -> str:
+        """The value of a row in words, without its unit."""
         return number(self.factor * self.values[row], 4)
 
 
 def odd_channels(history: Loop) -> Iterator[str]:
-    """Sentences on the channels of a loop or a raw history."""
+    """A sentence for each fault in the channels of a loop or a raw history."""
     names = history.direction.motion.words
     units = history.direction.display
     motion = Channel(names[0], *units.displacement, history.displacement)
@@ -57,14 +81,16 @@ def odd_channels(history: Loop) -> Iterator[str]:
     yield from _stuck(motion, force, still)
     for channel in (motion, force):
         yield from _cut_off(channel)
-        yield from _wild(channel, history.time)
+        yield from _outliers(channel, history.time)
 
 
 def _wide(steps: Floats) -> Flags:
-    return steps > max(_GAP * np.median(steps), _UNEVEN * np.quantile(steps, 0.99))
+    """Which steps from row to row are far wider than the others, (n,)."""
+    return steps > max(_GAP_STEPS * np.median(steps), _GAP_WIDEST_STEPS * np.quantile(steps, _WIDEST_QUANTILE))
 
 
 def _gaps(time: Floats) -> Iterator[str]:
+    """A sentence on gaps in a recorded time."""
     steps = np.diff(time)
     wide = _wide(steps)
     if wide.any():
@@ -76,9 +102,9 @@ def _gaps(time: Floats) -> Iterator[str]:
 
 
 def _jumps(motion: Channel, time: Floats) -> Iterator[str]:
-    """Gaps in a file without time, where only the motion tells of them."""
-    steps, wild = np.abs(np.diff(motion.values)), wild_rows(time, motion.values)
-    wide = _wide(steps) & (steps > least_turn(motion.values)) & ~(wild[1:] | wild[:-1])
+    """A sentence on gaps in a file without time, where only the motion tells of them."""
+    steps, outliers = np.abs(np.diff(motion.values)), lone_outliers(time, motion.values)
+    wide = _wide(steps) & (steps > least_prominence(motion.values)) & ~(outliers[1:] | outliers[:-1])
     if wide.any():
         first, count = int(np.argmax(wide)), int(wide.sum())
         yield (
@@ -88,6 +114,12 @@ def _jumps(motion: Channel, time: Floats) -> Iterator[str]:
 
 
 def _stuck(motion: Channel, force: Channel, still: Flags) -> Iterator[str]:
+    """A sentence on rows in which the recorder stood still though the motion went on.
+
+    Args:
+        motion, force: the channels, n rows.
+        still: which rows the next one repeats, (n - 1,).
+    """
     edges = np.flatnonzero(np.diff(np.concatenate(([0], still.astype(np.int8), [0]))))
     starts, ends = edges[::2], edges[1::2]
     moved = np.zeros(starts.size)
@@ -103,10 +135,11 @@ def _stuck(motion: Channel, force: Channel, still: Flags) -> Iterator[str]:
 
 
 def _cut_off(channel: Channel) -> Iterator[str]:
+    """A sentence on each end of its range at which a channel is cut off."""
     values, span = channel.values, float(np.ptp(channel.values))
     steps = np.abs(np.diff(values))
     finest = float(steps[steps > _EQUAL * span].min(initial=span))
-    width = max(1.01 * finest, _BELOW * span)
+    width = max(_ONE_STEP * finest, _JUST_BELOW * span)
     for side, row in (("top", int(np.argmax(values))), ("bottom", int(np.argmin(values)))):
         depth = np.abs(values - values[row])
         same = int(np.count_nonzero(depth <= _EQUAL * span))
@@ -118,8 +151,9 @@ def _cut_off(channel: Channel) -> Iterator[str]:
             )
 
 
-def _wild(channel: Channel, time: Floats) -> Iterator[str]:
-    rows = np.flatnonzero(wild_rows(time, channel.values))
+def _outliers(channel: Channel, time: Floats) -> Iterator[str]:
+    """A sentence on rows that lie alone far off their neighbours."""
+    rows = np.flatnonzero(lone_outliers(time, channel.values))
     if rows.size:
         listed = ", ".join(
             f"data row {row + 1} ({channel.shown(row)} {channel.unit} between {channel.shown(row - 1)} and "
@@ -127,4 +161,5 @@ def _wild(channel: Channel, time: Floats) -> Iterator[str]:
             for row in rows[:_MOST_LISTED]
         )
         more = f" and {rows.size - _MOST_LISTED} more" if rows.size > _MOST_LISTED else ""
-        yield f"the {channel.name} is wild at {listed}{more}"
+        outlier = "outliers" if rows.size > 1 else "an outlier"
+        yield f"the {channel.name} has {outlier} at {listed}{more}"

@@ -1,4 +1,4 @@
-"""Campaign text from files that were looked at."""
+"""The text of a campaign for files that were inspected."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from typing import Any
 
 from bushfit.inspection.record import Inspected
 
-_PLURAL = {"loop": "loops", "sweep": "sweeps"}
+#: For each kind of test the array of tables that lists it in a campaign.
+_TABLES = {"loop": "loops", "sweep": "sweeps"}
 
 
 def campaign_text(bushing: Mapping[str, str], files: Sequence[Inspected], folder: Path) -> str:
-    """A whole campaign file.
+    """The text of a whole campaign file.
 
     Args:
         bushing: keys of [bushing], quantities as texts.
@@ -22,18 +23,18 @@ def campaign_text(bushing: Mapping[str, str], files: Sequence[Inspected], folder
         folder: where the campaign will lie; its files are named from there.
     """
     head = ["[bushing]", *(f"{key} = {toml_value(value)}" for key, value in bushing.items())]
-    order = [seen for kind in _PLURAL for seen in files if seen.kind == kind]
+    order = [seen for kind in _TABLES for seen in files if seen.kind == kind]
     return "\n".join([*head, "", *(file_text(seen, folder) for seen in order)])
 
 
 def pasted_text(files: Sequence[Inspected]) -> str:
-    """Tables to paste into a campaign in whatever folder: files are named from the root."""
+    """Tables to paste into a campaign in any folder: files are named by their full path."""
     head = "# files by their full path, which holds in any folder; bushfit init writes them as seen from the campaign\n"
-    return head * any(seen.kind in _PLURAL for seen in files) + "\n".join(file_text(seen) for seen in files)
+    return head * any(seen.kind in _TABLES for seen in files) + "\n".join(file_text(seen) for seen in files)
 
 
 def file_text(seen: Inspected, folder: Path | None = None) -> str:
-    """The table of one file in a campaign; of a raw history, what to do first.
+    """The table of one file in a campaign; for a raw history, a comment on what to do first.
 
     Args:
         seen: the file.
@@ -44,13 +45,13 @@ def file_text(seen: Inspected, folder: Path | None = None) -> str:
     if seen.kind == "history":
         stated = f" --direction {seen.direction}" if seen.direction else " --direction ..."
         return f"# {name} is a raw history: bushfit reduce {_quoted(name)}{stated} makes a sweep of it\n"
-    lines = [f"[[{_PLURAL[seen.kind]}]]", f"file = {toml_value(name)}", f"direction = {direction}"]
+    lines = [f"[[{_TABLES[seen.kind]}]]", f"file = {toml_value(name)}", f"direction = {direction}"]
     lines += [f"{key} = {toml_value(value)}" for key, value in seen.entry.items()]
     return "\n".join(lines) + "\n"
 
 
 def _named(file: Path, folder: Path | None) -> str:
-    """The file as seen from a folder, with forward slashes; its full path where there is no way between them."""
+    """The path of a file from a folder, with forward slashes; its full path where none leads there."""
     if folder is not None:
         with suppress(ValueError):  # another drive
             return Path(os.path.relpath(file, folder)).as_posix()
@@ -58,6 +59,7 @@ def _named(file: Path, folder: Path | None) -> str:
 
 
 def _quoted(name: str) -> str:
+    """A name as a word of a command line."""
     return f'"{name}"' if " " in name else name
 
 

@@ -1,4 +1,4 @@
-"""Amplitudes and frequencies that the name of a file states, held against what it contains."""
+"""Amplitudes and frequencies that the name of a file states, compared with what the file contains."""
 
 from __future__ import annotations
 
@@ -9,22 +9,25 @@ from pathlib import Path
 from bushfit import units
 from bushfit.geometry import Direction
 
-#: "0.5mm", "0,5 mm", "0p5mm", "10Hz", "2deg"; not "10mm_min" nor the "18mm" of "abc18mm".
+#: A quantity in a name: "0.5mm", "0,5 mm", "0p5mm", "10Hz", "2deg"; not "10mm_min" nor the "18mm" of "abc18mm".
 _LABEL = re.compile(
     r"(?<![A-Za-z0-9.,])(\d+(?:[.,p]\d+)?)[ _-]?(mm|um|µm|deg|grad|rad|mhz|hz)(?![A-Za-z])"
     r"(?![\s/_-]*(?:(?:per|pro|p)[\s_-]*)?(?:min|s|sec)(?![A-Za-z]))",
     re.IGNORECASE,
 )
-_UNITS = {"grad": "deg", "um": "µm", "mhz": "mHz", "hz": "Hz"}
-#: A label is met within this share.
-_MET = 0.03
+#: Units as names have them, in lower case, that are written in another way elsewhere.
+_UNIT_SPELLINGS = {"grad": "deg", "um": "µm", "mhz": "mHz", "hz": "Hz"}
+#: Relative difference up to which a file contains what its name states; chosen: rigs miss a level by that much.
+_AGREEMENT = 0.03
+#: Values that are listed one by one; chosen: of more a range says enough.
+_MOST_LISTED = 4
 
 
 def labelled(file: Path, expected: str) -> list[tuple[str, float]]:
-    """Quantities in a file's name that agree with an SI unit: as written, and in SI."""
+    """The quantities in a file's name whose unit has the dimension of `expected`: as a text, and in SI."""
     found = []
     for number, unit in _LABEL.findall(file.stem):
-        unit = _UNITS.get(unit.lower(), unit.lower())
+        unit = _UNIT_SPELLINGS.get(unit.lower(), unit.lower())
         if units.agrees(unit, expected):
             value = float(re.sub("[,p]", ".", number))
             found.append((f"{value:g} {unit}", value * units.factor(unit, expected)))
@@ -49,7 +52,7 @@ def wrong_labels(
 
 
 def _near(one: float, other: float) -> bool:
-    return abs(one - other) <= _MET * other
+    return abs(one - other) <= _AGREEMENT * other
 
 
 def _or(stated: Sequence[tuple[str, float]]) -> str:
@@ -58,4 +61,4 @@ def _or(stated: Sequence[tuple[str, float]]) -> str:
 
 def _listed(values: Sequence[float]) -> str:
     texts = list(dict.fromkeys(f"{value:.4g}" for value in values))
-    return ", ".join(texts) if len(texts) < 5 else f"{texts[0]} to {texts[-1]}"
+    return ", ".join(texts) if len(texts) <= _MOST_LISTED else f"{texts[0]} to {texts[-1]}"

@@ -1,32 +1,40 @@
-"""A hysteresis loop looked at: cycles, sampling, waveform, noise, and what is odd."""
+"""What a hysteresis loop holds: its cycles, sampling, waveform and noise, and what is odd about it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.drive import Drive, drive_of
 from bushfit.fitting.waveform import waveform
+from bushfit.geometry import Unit
 from bushfit.inspection.channels import clock, odd_channels
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.record import Looked
 from bushfit.reading.measurement import Loop
-from bushfit.reduction.cycles import least_turn
+from bushfit.reduction.cycles import least_prominence
 from bushfit.units import alike, for_people, number
 
-#: Cycles differ beyond so many standard errors and this share of half the force's range.
-_SURE, _SHARE = 6.0, 2e-3
-#: A loop's zero is off by this share of half the range.
+#: Standard errors beyond which cycles differ; chosen: noise does not go that far in any of many tests.
+_REAL_CHANGE = 6.0
+#: Share of half the force's range beyond which cycles differ; chosen: less does not matter to a fit.
+_WORTH_TELLING = 2e-3
+#: Share of half its range by which a loop's zero is off; chosen: less does not matter to a fit.
 _OFF_ZERO = 0.02
-#: At most so many cycles are looked at from either end, with so many harmonics.
-_ENDS, _HARMONICS = 6, 7
+#: Cycles that are looked at from either end of a loop; chosen: what settles shows in them.
+_MOST_END_CYCLES = 6
+#: Harmonics that are fitted to a cycle; chosen: a loop of rubber has next to nothing beyond.
+_HARMONICS = 7
+#: Rows of a cycle for each harmonic that is fitted; chosen: twice the unknowns and some.
+_ROWS_PER_HARMONIC = 5
 
 
 def look_at_loop(loop: Loop, file: Path) -> Looked:
-    """Facts and oddities of a loop.
+    """Facts and oddities of a loop; `file` is where it was read.
 
     Raises:
         FitError: no whole cycle, or a loop that runs the wrong way round.
@@ -38,7 +46,7 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
     names = loop.direction.motion.words
     rows = loop.time.size / drive.cycles
     half_motion = np.ptp(loop.displacement) / 2.0
-    amplitude, mean_motion, mean_force = drive.amplitude, drive.coefficients[0].real, _mean(drive)
+    amplitude, mean_motion, mean_force = drive.amplitude, drive.coefficients[0].real, float(drive.force.mean())
     facts = {
         "cycles": f"{drive.cycles:.3g}, {'the first from rest' if drive.from_rest else 'taken as steady'}",
         "frequency": f"{drive.frequency:.4g} Hz, {waveform(drive.coefficients)}",
@@ -53,7 +61,7 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
         *wrong_labels(file, loop.direction, [amplitude, half_motion], [drive.frequency]),
         *odd_channels(loop),
         *drive.notes,
-        *_changing(drive, names),
+        *_changing(drive),
     ]
     if abs(mean_motion) > _OFF_ZERO * half_motion and not drive.from_rest:
         odd.append(
@@ -63,58 +71,89 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
     return Looked(facts, tuple(odd))
 
 
-def _mean(drive: Drive) -> float:
-    return float(np.average(drive.force, weights=np.ones_like(drive.weight)))
+class _EndCycles(NamedTuple):
+    """The cycles at both ends of a loop, k of them.
+
+    Args:
+        amplitude: of the force in each [N or N m], (k,).
+        mean_force: in each [N or N m], (k,).
+        mean_motion: in each [m or rad], (k,).
+        error: noise of the force over the root of the rows of a cycle [N or N m].
+    """
+
+    amplitude: Array
+    mean_force: Array
+    mean_motion: Array
+    error: float
 
 
-def _changing(drive: Drive, names: tuple[str, str]) -> Iterator[str]:
-    """Whether force amplitude, mean force or mean motion change from cycle to cycle."""
-    loop = drive.loop
-    count = int(drive.cycles + 0.01)
+def _end_cycles(drive: Drive) -> _EndCycles | None:
+    """The first and the last cycles of a loop; None where it has only one, or too few rows in each."""
+    loop, count = drive.loop, int(drive.cycles + 0.01)
     if count < 2:
-        return
-    units = loop.direction.display
+        return None
     phase = (loop.time - loop.time[0]) * drive.frequency
-    numbers = sorted({*range(min(count, _ENDS)), *range(max(count - _ENDS, 0), count)})
-    wild = drive.outliers["force"].rows
-    parts = [np.setdiff1d(np.flatnonzero((phase >= n) & (phase < n + 1)), wild) for n in numbers]
+    numbers = sorted({*range(min(count, _MOST_END_CYCLES)), *range(max(count - _MOST_END_CYCLES, 0), count)})
+    outliers = drive.outliers["force"].rows
+    parts = [np.setdiff1d(np.flatnonzero((phase >= n) & (phase < n + 1)), outliers) for n in numbers]
     rows = min(part.size for part in parts)
-    order = int(np.clip(rows // 5, 1, _HARMONICS))
+    order = int(np.clip(rows // _ROWS_PER_HARMONIC, 1, _HARMONICS))
     if rows < 4 * order:
-        return
+        return None
     fitted = [
         _cycle(phase[part], np.stack((loop.force[part], loop.displacement[part]), axis=1), order) for part in parts
     ]
-    means, force = np.array([mean for mean, *_ in fitted]), np.array([abs(first[0]) for _, first, _ in fitted])
-    half = np.ptp(loop.force) / 2.0
+    mean_force, mean_motion = np.array([mean for mean, *_ in fitted]).T
+    amplitude = np.array([abs(first[0]) for _, first, _ in fitted])
     error = max(drive.noise, *(left for *_, left in fitted)) * np.sqrt(1.0 / rows)
-    change = force[-1] - force[0]
-    if abs(change) > max(_SURE * 2.0 * error, _SHARE * half):
-        last = force[-1] - force[-2]
-        unit, factor = for_people(*units.force, float(force[-1]))
-        final, first = alike([factor * force[-1], factor * force[0]], 4)
-        settled = abs(last) < max(_SURE * error, _SHARE * half / 2.0) and count > 2
+    return _EndCycles(amplitude, mean_force, mean_motion, error)
+
+
+def _settling(cycles: _EndCycles, least: float, name: str, unit: Unit) -> Iterator[str]:
+    """A sentence where the force amplitude changes over the cycles, by `least` or more [N or N m]."""
+    force, error = cycles.amplitude, cycles.error
+    change, last_change = force[-1] - force[0], force[-1] - force[-2]
+    # the standard error of an amplitude is sqrt(2) `error`, that of a difference of two is 2 `error`
+    if abs(change) > max(_REAL_CHANGE * 2.0 * error, least):
+        shown, factor = for_people(*unit, float(force[-1]))
+        last, first = alike([factor * force[-1], factor * force[0]], 4)
+        settled = abs(last_change) < max(_REAL_CHANGE * error, least / 2.0) and force.size > 2
         yield (
-            f"the cycles {'settle' if settled else 'are still settling'}: the {names[1]} amplitude goes from "
-            f"{first} {unit} in the first cycle to {final} in the last ({number(100 * change / force[0], 2, '+')} %)"
+            f"the cycles {'settle' if settled else 'are still settling'}: the {name} amplitude goes from "
+            f"{first} {shown} in the first cycle to {last} in the last ({number(100 * change / force[0], 2, '+')} %)"
         )
-    for name, (unit, factor), mean, least in (
-        (names[1], units.force, means[:, 0], max(_SURE * 1.5 * error, _SHARE * half)),
-        # a time that was made from the motion turns its noise into drift
-        (names[0], units.displacement, means[:, 1], _least_drift(drive)),
-    ):
-        drift = mean[-1] - mean[0]
-        if abs(drift) > least:
-            last, first = alike([factor * mean[-1], factor * mean[0]], 3, least=1)
-            yield f"the {name} drifts: its mean goes from {first} to {last} {unit}"
 
 
-def _least_drift(drive: Drive) -> float:
-    return 2.0 * _SHARE * drive.amplitude if drive.loop.timed else least_turn(drive.loop.displacement)
+def _drifting(mean: Array, least: float, name: str, unit: Unit) -> Iterator[str]:
+    """A sentence where the mean of a channel changes over the cycles by more than `least`."""
+    if abs(mean[-1] - mean[0]) > least:
+        last, first = alike([unit.factor * mean[-1], unit.factor * mean[0]], 3, least=1)
+        yield f"the {name} drifts: its mean goes from {first} to {last} {unit.name}"
+
+
+def _changing(drive: Drive) -> Iterator[str]:
+    """Sentences where force amplitude, mean force or mean motion change from cycle to cycle."""
+    cycles = _end_cycles(drive)
+    if cycles is None:
+        return
+    loop = drive.loop
+    (motion, force), units = loop.direction.motion.words, loop.direction.display
+    least = _WORTH_TELLING * np.ptp(loop.force) / 2.0
+    yield from _settling(cycles, least, force, units.force)
+    yield from _drifting(cycles.mean_force, max(_REAL_CHANGE * 1.5 * cycles.error, least), force, units.force)
+    # a time that was made from the motion turns its noise into drift
+    least_drift = 2.0 * _WORTH_TELLING * drive.amplitude if loop.timed else least_prominence(loop.displacement)
+    yield from _drifting(cycles.mean_motion, least_drift, motion, units.displacement)
 
 
 def _cycle(phase: Array, values: Array, order: int) -> tuple[Array, Array, float]:
-    """Mean and complex fundamental of the columns over one cycle, and what the fit leaves of the first."""
+    """Mean and complex fundamental of each column over one cycle, and the scatter that the fit leaves of the first.
+
+    Args:
+        phase: of the rows [cycles], (n,).
+        values: (n, columns).
+        order: harmonics that are fitted.
+    """
     turns = 2.0 * np.pi * np.outer(phase, np.arange(1, order + 1))
     basis = np.hstack((np.ones((phase.size, 1)), np.cos(turns), -np.sin(turns)))
     solution = np.linalg.lstsq(basis, values, rcond=None)[0]

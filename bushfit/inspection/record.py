@@ -1,4 +1,4 @@
-"""What a look at a test file tells."""
+"""What an inspection of a test file finds."""
 
 from __future__ import annotations
 
@@ -16,8 +16,14 @@ Kind = Literal["loop", "sweep", "history"]
 
 @dataclass(frozen=True)
 class ColumnSeen:
-    """A column of a file: its header, the role it was taken for (None: not needed), its unit, and the range of its
-    values in that unit."""
+    """A column of a file.
+
+    Args:
+        header: its header cell.
+        role: what it was taken for; None where no test needs it.
+        unit: its unit, where it is stated.
+        low, high: the range of its values in that unit, where they were read.
+    """
 
     header: str
     role: str | None
@@ -28,7 +34,12 @@ class ColumnSeen:
 
 @dataclass(frozen=True)
 class Looked:
-    """What the content of a file tells: facts by label, and each oddity in a sentence with its figures."""
+    """What the content of a file tells.
+
+    Args:
+        facts: in words, by label.
+        odd: a sentence for each thing that is odd, with its figures.
+    """
 
     facts: Mapping[str, str]
     odd: tuple[str, ...] = ()
@@ -36,13 +47,13 @@ class Looked:
 
 @dataclass(frozen=True, eq=False)
 class Inspected:
-    """A file that can be used.
+    """A test file that can be used, with all that an inspection finds.
 
     Args:
         file: the file.
         kind: what it holds.
         direction: of the test; None where neither file nor options say it.
-        written: how the file is written: encoding, delimiter, decimal mark and so on, by label.
+        written: how the file is written, by label: encoding, delimiter, decimal mark and so on.
         columns: all columns, in order.
         looked: facts and oddities.
         entry: keys of its table in a campaign besides `file` and `direction`, as TOML has them.
@@ -62,13 +73,13 @@ class Inspected:
 
     @property
     def assumed(self) -> str | None:
-        """What was taken for granted, as a sentence with the option that says otherwise; None where nothing was."""
+        """What was assumed, in a sentence with the option that says otherwise; None where nothing was."""
         if self.kind != "sweep" or self.counted or "amplitude" in self.entry:
             return None
         return "its header does not say how amplitudes are counted: taken zero-to-peak, else --amplitude peak-to-peak"
 
     def to_document(self) -> dict[str, Any]:
-        """As JSON."""
+        """All of it but the content, as JSON has it."""
         return {
             "file": str(self.file),
             "kind": self.kind,

@@ -1,4 +1,4 @@
-"""A sweep looked at: frequencies, amplitudes, repeats, noise, and what is odd."""
+"""What a sweep holds: its frequencies, amplitudes, repeats and noise, and what is odd about it."""
 
 from __future__ import annotations
 
@@ -16,29 +16,44 @@ from bushfit.reading.measurement import Sweep
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 from bushfit.units import number
 
-#: A point is wild beyond so many standard deviations from its repeats and this share of |K|.
-_WILD, _WILD_SHARE = 8.0, 0.01
-#: A block is off beyond so many (robust) standard deviations of the others and this share of |K|.
-_BLOCK_OFF, _BLOCK_SHARE, _FEWEST_BLOCKS = 8.0, 0.02, 5
-#: |K| drifts from repeat to repeat where chance would do so this rarely, and by this share.
-_DRIFT_P, _DRIFT_SHARE = 1e-4, 5e-3
-#: The amplitude reached is off that of the level by this share.
-_MISSED = 0.03
-#: Equal points are copies where chance would make as many equal this rarely; phases of few digits agree this often.
-_COPIED, _SAME_PHASE = 1e-4, 0.05
+#: Standard deviations from its repeats from which a point is an outlier; chosen: noise never goes that far.
+_OUTLIER_DEVIATIONS = 8.0
+#: Distance of ln K from its repeats from which a point is an outlier; chosen: less does not matter to a fit.
+_LEAST_OUTLIER = 0.01
+#: Standard deviations of the blocks from which one is off; chosen: noise never goes that far.
+_BLOCK_DEVIATIONS = 8.0
+#: Distance of ln |K| from the other repeats from which a block is off; chosen: mountings differ by less.
+_LEAST_BLOCK_OFFSET = 0.02
+#: Blocks whose scatter can be judged.
+_FEWEST_BLOCKS = 5
+#: Probability of chance below which |K| drifts over the repeats; chosen.
+_DRIFT_P = 1e-4
+#: Change of ln |K| from the first repeat to the last that is told; chosen: less does not matter to a fit.
+_LEAST_DRIFT = 5e-3
+#: Relative distance of the amplitude reached from that of the level that is told; chosen: |K| may then be 1 % off.
+_MISSED_LEVEL = 0.03
+#: Probability of chance below which equal points are copies; chosen.
+_COPIED_P = 1e-4
+#: Probability at the least that two phases are equal; chosen: some files have them in few digits.
+_SAME_PHASE_P = 0.05
+#: Share of the blocks of which one has to have a frequency for the others to lack it.
+_USUAL = 0.5
+#: Points or frequencies that are told one by one; chosen: they make a sentence.
 _MOST_LISTED = 4
+#: Levels that are listed one by one; chosen: they make a line.
+_MOST_LEVELS = 8
 
 
 def look_at_sweep(sweep: Sweep, file: Path) -> Looked:
-    """Facts and oddities of a sweep."""
+    """Facts and oddities of a sweep; `file` is where it was read."""
     unit, factor = sweep.direction.display.displacement
     frequencies, levels = np.unique(sweep.frequency), np.unique(sweep.amplitude)
     repeats = np.unique(sweep.repeat)
     noise = sweep_noise([sweep])
     facts = {
         "frequencies": f"{frequencies.size}, from {frequencies[0]:.4g} to {frequencies[-1]:.4g} Hz",
-        "amplitudes": f"{', '.join(f'{factor * level:.4g}' for level in levels[:8])}"
-        f"{', ...' if levels.size > 8 else ''} {unit} zero-to-peak",
+        "amplitudes": f"{', '.join(f'{factor * level:.4g}' for level in levels[:_MOST_LEVELS])}"
+        f"{', ...' if levels.size > _MOST_LEVELS else ''} {unit} zero-to-peak",
         "repeats": f"{repeats.size}",
         "noise": noise.describe(),
     }
@@ -46,8 +61,8 @@ def look_at_sweep(sweep: Sweep, file: Path) -> Looked:
         *wrong_labels(file, sweep.direction, [float(x) for x in levels], [float(x) for x in frequencies]),
         *_copies(sweep, noise),
         *_missing(sweep, unit, factor),
-        *_wild(sweep, noise, unit, factor),
-        *_blocks(sweep, unit, factor),
+        *_outliers(sweep, noise, unit, factor),
+        *_odd_blocks(sweep, unit, factor),
         *_missed(sweep, unit, factor),
         *_negative(sweep, unit, factor),
     ]
@@ -55,8 +70,10 @@ def look_at_sweep(sweep: Sweep, file: Path) -> Looked:
 
 
 def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
-    """Rows that hold the same numbers as others at the same frequency and amplitude, digit by digit, where the digits
-    of the file and the noise would hardly make as many equal by chance."""
+    """A sentence on rows that repeat others at the same frequency and amplitude digit by digit.
+
+    It is due where noise would hardly make as many equal by chance, in as many digits as the file has.
+    """
     magnitude, phase = (_rounded(values) for values in (np.abs(sweep.stiffness), np.angle(sweep.stiffness)))
     finest = _finest(magnitude)
     copies, expected, first = 0, 0.0, sweep.frequency.size
@@ -67,8 +84,8 @@ def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
         first = min([first, *rows[start[count > 1]].tolist()])
         scatter = noise.random[sweep.name, float(sweep.amplitude[rows[0]])][0] * magnitude[rows[0]]
         same = min(float(finest[rows[0]] / scatter), 1.0)  # two draws fall on the same last digit
-        expected += rows.size * (rows.size - 1) / 2.0 * same * max(same, _SAME_PHASE)
-    if copies and poisson.sf(copies - 1, expected) < _COPIED:
+        expected += rows.size * (rows.size - 1) / 2.0 * same * max(same, _SAME_PHASE_P)
+    if copies and poisson.sf(copies - 1, expected) < _COPIED_P:
         verb = "s repeat others" if copies > 1 else " repeats another"
         yield (
             f"{copies} row{verb} digit by digit, the first of them at {sweep.frequency[first]:.4g} Hz (data row "
@@ -77,24 +94,24 @@ def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
 
 
 def _rounded(values: Array) -> Array:
-    """Values without what units and roots leave in the last digits."""
+    """Values in nine digits, without what the conversion of units leaves in the last ones."""
     return np.array([float(f"{value:.9g}") for value in values])
 
 
 def _finest(values: Array) -> Array:
-    """What the last digit of each value counts, if all have as many digits as the longest."""
+    """The value of one in the last digit of each value, if all have as many digits as the longest, (n,)."""
     digits = max(len(f"{value:.8e}".partition("e")[0].replace(".", "").rstrip("0")) for value in values)
     return 10.0 ** (np.floor(np.log10(values)) + 1 - digits)
 
 
 def _missing(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
-    """Frequencies that a level, or a repeat of it, lacks while most others have them."""
+    """A sentence for each block, a repeat of a level, that lacks frequencies which most others have."""
     blocks = np.stack((sweep.amplitude, sweep.repeat.astype(float)), axis=1)
     names, block = np.unique(blocks, axis=0, return_inverse=True)
     frequencies, column = np.unique(sweep.frequency, return_inverse=True)
     there = np.zeros((len(names), frequencies.size), dtype=bool)
     there[block.ravel(), column] = True
-    usual = there.mean(axis=0) > 0.5
+    usual = there.mean(axis=0) > _USUAL
     for (level, repeat), has in zip(names, there, strict=True):
         absent = frequencies[usual & ~has]
         if absent.size and len(names) > 1:
@@ -105,12 +122,14 @@ def _missing(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
             yield f"{factor * level:.4g} {unit}{which} lacks {listed} Hz, which most others have"
 
 
-def _wild(sweep: Sweep, noise: SweepNoise, unit: str, factor: float) -> Iterator[str]:
-    """Points far off the other repeats at the same frequency and amplitude, three or more."""
-    off = _from_repeats(sweep)
+def _outliers(sweep: Sweep, noise: SweepNoise, unit: str, factor: float) -> Iterator[str]:
+    """A sentence for each of the points that lie far off their repeats at the same frequency and amplitude."""
+    off = np.nan_to_num(_from_repeats(sweep))
+    for rows in _blocks(sweep):
+        off[rows] -= _median(off[rows])
     random = np.array([noise.random[sweep.name, float(x)] for x in sweep.amplitude])
     parts = np.stack((off.real, off.imag), axis=1)
-    far = np.any((np.abs(parts) > _WILD * random) & (np.abs(parts) > _WILD_SHARE), axis=1)
+    far = np.any((np.abs(parts) > _OUTLIER_DEVIATIONS * random) & (np.abs(parts) > _LEAST_OUTLIER), axis=1)
     for row in np.flatnonzero(far)[:_MOST_LISTED]:
         yield (
             f"data row {row + 1} ({sweep.frequency[row]:.4g} Hz, {factor * sweep.amplitude[row]:.4g} {unit}, repeat "
@@ -122,52 +141,48 @@ def _wild(sweep: Sweep, noise: SweepNoise, unit: str, factor: float) -> Iterator
 
 
 def _from_repeats(sweep: Sweep) -> Array:
-    """ln K less the median of its repeats, and less what its block shares; 0 where there are fewer than three."""
-    off = np.zeros(sweep.frequency.size, dtype=complex)
-    value = np.log(sweep.stiffness)
+    """Distance of ln K from the median of its repeats, nan where there are fewer than three, (n,)."""
+    value, off = np.log(sweep.stiffness), np.full(sweep.frequency.size, np.nan + 0j)
     for rows in _groups(sweep.frequency, sweep.amplitude):
         if rows.size > 2:
             off[rows] = value[rows] - _median(value[rows])
-    for rows in _groups(sweep.repeat.astype(float), sweep.amplitude):
-        off[rows] -= _median(off[rows])
     return off
 
 
-def _blocks(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
-    """Repeats that lie apart as a whole, and a drift over the repeats."""
-    value, offsets = np.log(sweep.stiffness), np.full(sweep.frequency.size, np.nan + 0j)
-    for rows in _groups(sweep.frequency, sweep.amplitude):
-        if rows.size > 2:
-            offsets[rows] = value[rows] - _median(value[rows])
-    found = [
-        (float(sweep.amplitude[rows[0]]), int(sweep.repeat[rows[0]]), _median(offsets[rows]))
-        for rows in _groups(sweep.repeat.astype(float), sweep.amplitude)
-        if not np.isnan(offsets[rows]).any()
-    ]
-    if len(found) < _FEWEST_BLOCKS:
+def _blocks(sweep: Sweep) -> list[Array]:
+    """The rows of each block: a run of the rig over all frequencies at one level, of which repeats are told apart."""
+    return _groups(sweep.repeat.astype(float), sweep.amplitude)
+
+
+def _odd_blocks(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
+    """A sentence for each block that lies apart as a whole, and one on a drift over the repeats."""
+    off = _from_repeats(sweep)
+    blocks = [rows for rows in _blocks(sweep) if not np.isnan(off[rows]).any()]
+    if len(blocks) < _FEWEST_BLOCKS:
         return
-    gain = np.array([offset.real for *_, offset in found])
+    gain = np.array([_median(off[rows]).real for rows in blocks])
     usual = MEDIAN_TO_SIGMA * float(np.median(np.abs(gain[gain != 0.0]))) if np.any(gain) else 0.0
-    for (level, repeat, offset), own in zip(found, gain, strict=True):
-        if abs(own) > max(_BLOCK_OFF * usual, _BLOCK_SHARE):
+    for rows, own in zip(blocks, gain, strict=True):
+        if abs(own) > max(_BLOCK_DEVIATIONS * usual, _LEAST_BLOCK_OFFSET):
             yield (
-                f"{factor * level:.4g} {unit}, repeat {repeat} lies "
-                f"{number(100 * np.expm1(offset.real), 2, '+')} % off the other repeats as a whole: "
+                f"{factor * sweep.amplitude[rows[0]]:.4g} {unit}, repeat {sweep.repeat[rows[0]]} lies "
+                f"{number(100 * np.expm1(own), 2, '+')} % off the other repeats as a whole: "
                 "other amplitude, temperature or mounting?"
             )
-    numbers = np.array([repeat for _, repeat, _ in found], dtype=float)
-    if np.unique(numbers).size > 2 and np.ptp(gain) > 0.0:
-        line = linregress(numbers, gain)
-        drift = line.slope * np.ptp(numbers)
-        if line.pvalue < _DRIFT_P and abs(drift) > _DRIFT_SHARE:
+    repeat = np.array([sweep.repeat[rows[0]] for rows in blocks], dtype=float)
+    if np.unique(repeat).size > 2 and np.ptp(gain) > 0.0:
+        line = linregress(repeat, gain)
+        drift = line.slope * np.ptp(repeat)
+        if line.pvalue < _DRIFT_P and abs(drift) > _LEAST_DRIFT:
             share = number(100 * drift, 2, "+")
             yield f"|K| drifts by {share} % from the first repeat to the last: warming up, or settling?"
 
 
 def _missed(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
+    """A sentence on the point that missed the amplitude of its level by most."""
     off = sweep.amplitude_reached / sweep.amplitude - 1.0
     row = int(np.argmax(np.abs(off)))
-    if abs(off[row]) > _MISSED:
+    if abs(off[row]) > _MISSED_LEVEL:
         yield (
             f"{factor * sweep.amplitude_reached[row]:.4g} {unit} was reached where the level is "
             f"{factor * sweep.amplitude[row]:.4g} {unit} ({sweep.frequency[row]:.4g} Hz)"
@@ -175,6 +190,7 @@ def _missed(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
 
 
 def _negative(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
+    """A sentence on points whose loss factor is below zero."""
     bad = np.flatnonzero(sweep.stiffness.imag < 0.0)
     if bad.size:
         row = int(bad[0])
@@ -185,11 +201,12 @@ def _negative(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
 
 
 def _groups(*keys: Array) -> list[Array]:
-    """Rows that share all keys."""
+    """The rows of each group that shares all keys; each key (n,)."""
     _, group = np.unique(np.stack(keys), axis=1, return_inverse=True)
     order = np.argsort(group.ravel(), kind="stable")
     return np.split(order, np.cumsum(np.bincount(group.ravel()))[:-1])
 
 
 def _median(values: Array) -> complex:
+    """Median of the real and of the imaginary parts."""
     return complex(np.median(values.real), np.median(values.imag))

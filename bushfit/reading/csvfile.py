@@ -1,7 +1,7 @@
-"""CSV as bushfit writes it, and tests as CSV that the reader takes back.
+"""CSV files as bushfit writes them, those of tests among them, which the reader takes back.
 
-Every file of rows comes through here: a comma between cells, a decimal point, seven digits, UTF-8, and no text that a
-spreadsheet would run as a formula.
+Every one has a comma between cells, a decimal point, seven digits, UTF-8, and no text that a spreadsheet would run as a
+formula.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ if TYPE_CHECKING:
 
     from bushfit.reading.measurement import Floats, Loop, Sweep
 
-#: How a text begins that a spreadsheet takes for a formula, in ASCII or full width, be it after blanks.
+#: The start of a text that a spreadsheet takes for a formula, in ASCII or full width, even after blanks.
 _FORMULA = re.compile("[\\s\"']*[=+\\-@\uff1d\uff0b\uff0d\uff20|%]|\\t")
-_LINES = re.compile("[\\r\\n]+")
+#: What parts the lines of a text.
+_LINE_ENDS = re.compile("[\\r\\n]+")
 
 
 class Rows:
@@ -33,12 +34,12 @@ class Rows:
         self._writer.writerow([defused(header) for header in headers])
 
     def add(self, cells: Iterable[str | float | None]) -> None:
-        """One row; None and nan are empty cells."""
+        """Write one row; None and nan become empty cells."""
         self._writer.writerow([_cell(value) for value in cells])
 
 
 def to_csv(table: pd.DataFrame) -> bytes:
-    """A table as the bytes of its file."""
+    """The bytes of a table's file."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([defused(str(name)) for name in table.columns])
@@ -47,7 +48,7 @@ def to_csv(table: pd.DataFrame) -> bytes:
 
 
 def _cells(values: list[object]) -> list[str]:
-    """The cells of a column; a text that stands in many of them is looked at once."""
+    """The cells of a column; a text that stands in many of them is defused once."""
     known = {value: _cell(value) for value in set(values) if isinstance(value, str)}
     return [known[value] if isinstance(value, str) else _cell(value) for value in values]
 
@@ -61,13 +62,13 @@ def _cell(value: object) -> str:
 
 
 def defused(text: str) -> str:
-    """A text as one line, with an apostrophe before one that a spreadsheet would run as a formula."""
-    line = " ".join(_LINES.split(text))
+    """A text in one line, after an apostrophe where a spreadsheet would run it as a formula."""
+    line = " ".join(_LINE_ENDS.split(text))
     return f"'{line}" if _FORMULA.match(line) else line
 
 
 def raw_loop_table(loop: Loop) -> pd.DataFrame:
-    """A loop as a rig writes it: time, displacement, force."""
+    """A loop as a rig writes it: time, displacement and force in the units of engineers."""
     import pandas as pd
 
     units = loop.direction.display
@@ -82,7 +83,7 @@ def raw_loop_table(loop: Loop) -> pd.DataFrame:
 
 
 def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
-    """A sweep as a rig writes it: frequency, amplitude, repeat, stiffness, loss factor."""
+    """A sweep as a rig writes it: frequency, amplitude, repeat, stiffness and loss factor in the units of engineers."""
     import pandas as pd
 
     units = sweep.direction.display
@@ -99,5 +100,5 @@ def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
 
 
 def loss_factor(stiffness: NDArray[np.complex128]) -> Floats:
-    """Loss over storage stiffness."""
+    """Loss over storage stiffness [-], (n,)."""
     return np.imag(stiffness) / np.real(stiffness)

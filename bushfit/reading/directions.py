@@ -1,4 +1,4 @@
-"""The direction of a test, from the words in the name of its file and from the units of its columns."""
+"""The direction of a test, by words in the name and headers of its file, and by the units of its columns."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pathlib import Path
 
 from bushfit.geometry import Direction
 
-#: How the words begin, in English, German, French and Spanish, without accents.
-_WORDS = {
+#: For the starts of words in English, German, French and Spanish, without accents, the direction they name.
+_WORD_STARTS = {
     "axial": Direction.AXIAL,
     "axiaux": Direction.AXIAL,
     "radial": Direction.RADIAL,
@@ -26,22 +26,22 @@ _WORDS = {
 
 
 def named_direction(texts: Iterable[str]) -> Direction | None:
-    """The one direction that some texts (a file's name, its headers) speak of; None where none or several do."""
+    """The one direction that texts, such as headers, name; None where they name none or several."""
     found = set()
     for text in texts:
         plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().casefold()
         for word in re.findall(r"[a-z]+", plain):
-            found |= {direction for start, direction in _WORDS.items() if word.startswith(start)}
+            found |= {direction for start, direction in _WORD_STARTS.items() if word.startswith(start)}
     return found.pop() if len(found) == 1 else None
 
 
 def direction_of_file(file: Path, headers: Iterable[str], *, turns: bool) -> Direction | None:
-    """The direction that a test's file and headers settle.
+    """The direction that the file of a test names; None where it does not say.
 
     Args:
-        file: its name, without the folders, may hold the word.
+        file: of which the name, without the folders, may hold a word.
         headers: of its columns; they count where the name says nothing.
-        turns: whether the displacement is in units of angle, which is torsion whatever the words.
+        turns: whether the displacement is in units of angle, which means torsion whatever the words.
     """
     if turns:
         return Direction.TORSION

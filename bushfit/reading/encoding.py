@@ -1,9 +1,10 @@
-"""Bytes of a test file -> UTF-8, whatever the file is encoded in.
+"""The encoding of a test file, and its text as UTF-8.
 
-Test files are ASCII but for a few letters of their header, which is too little for detectors that count letters:
-tests/benchmarks/test_dialects_elsewhere.py compares charset-normalizer and chardet on such files. So the bytes decide
-here: a byte order mark, zeros beside ASCII (UTF-16), what is valid UTF-8, pairs of common Chinese characters (GB18030),
-and for the rest Western Latin (cp1252, or Latin-1 where it uses bytes that cp1252 lacks).
+Notes:
+    Test files are ASCII but for a few letters of their header, too few for detectors that count letters, as
+    tests/benchmarks/test_dialects_elsewhere.py shows of charset-normalizer and chardet. Here the bytes decide, in this
+    order: a byte order mark; zeros beside ASCII (UTF-16); valid UTF-8; pairs of common Chinese characters (GB18030);
+    and Western Latin for the rest (cp1252, or Latin-1 where it has bytes that cp1252 lacks).
 """
 
 from __future__ import annotations
@@ -18,14 +19,22 @@ from bushfit.errors import MeasurementError
 from bushfit.reading.files import Bytes
 from bushfit.reading.parallel import by_chunks
 
+#: Byte order marks, and Python's name of the encoding that each tells. UTF-32's begins with UTF-16's.
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     (codecs.BOM_UTF32_LE, "utf-32"),
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
-_CHUNK = 1 << 22
-_SAMPLE = 1 << 16
+#: Bytes that are checked at a time; chosen: few enough to be held beside the file, enough to be fast.
+_CHUNK_BYTES = 1 << 22
+#: Bytes at the start of a file in which zeros are counted; chosen: they hold the header and many rows.
+_HEAD_BYTES = 1 << 16
+#: Share of zeros among every other byte from which a text is taken for UTF-16; ASCII has nearly all of them zero.
+_LEAST_ZERO_SHARE = 0.3
+#: Runs of bytes beyond ASCII that are compared; chosen: many times those of a header.
+_MOST_RUNS = 1 << 16
+#: A run of bytes beyond ASCII.
 _HIGH_RUN = re.compile(rb"[\x80-\xff]+")
 #: Two bytes of GB2312: its punctuation and its 3755 commonest characters. Western accents make few such pairs.
 _COMMON_CHINESE = re.compile(rb"(?:[\xa1-\xa3\xb0-\xd7][\xa1-\xfe])+")
@@ -35,9 +44,9 @@ def to_utf8(data: Bytes, file: Path, stated: str | None = None) -> tuple[Bytes, 
     """A text as UTF-8 without byte order mark, and the encoding it had.
 
     Args:
-        data: the file's bytes.
-        file: for errors.
-        stated: the encoding, where the user knows it.
+        data: bytes of the file.
+        file: the file, which errors name.
+        stated: the encoding, where the user states it.
 
     Raises:
         MeasurementError: no text, or not in the encoding stated.
@@ -68,22 +77,22 @@ def to_utf8(data: Bytes, file: Path, stated: str | None = None) -> tuple[Bytes, 
 def _is_ascii(data: Bytes) -> bool:
     """Whether all bytes are from 1 to 127."""
     codes = np.frombuffer(data, dtype=np.int8)
-    return all(by_chunks(lambda part: bool(codes[part].min() > 0), codes.size, _CHUNK))
+    return all(by_chunks(lambda part: bool(codes[part].min() > 0), codes.size, _CHUNK_BYTES))
 
 
 def detect(data: bytes) -> str:
-    """The encoding of a text, by Python's name; "utf-8" also for what is no text at all."""
+    """Python's name of the encoding of a text; "utf-8" also where it is no text."""
     for mark, encoding in _MARKS:
         if data.startswith(mark):
             return encoding
-    if 0 in (head := data[:_SAMPLE]):
+    if 0 in (head := data[:_HEAD_BYTES]):
         even, odd = head[::2].count(0), head[1::2].count(0)
-        if max(even, odd) > 0.3 * len(head) / 2 and min(even, odd) == 0:
+        if max(even, odd) > _LEAST_ZERO_SHARE * len(head) / 2 and min(even, odd) == 0:
             return "utf-16-le" if odd else "utf-16-be"
         return "utf-8"
     if _not_utf8(data) is None:
         return "utf-8"
-    runs = _HIGH_RUN.findall(data)[:_SAMPLE]
+    runs = _HIGH_RUN.findall(data)[:_MOST_RUNS]
     chinese = sum(_COMMON_CHINESE.fullmatch(run) is not None for run in runs)
     for encoding in ("gb18030", "cp1252") if 2 * chinese > len(runs) else ("cp1252", "gb18030"):
         try:
@@ -95,19 +104,20 @@ def detect(data: bytes) -> str:
 
 
 def _not_utf8(data: bytes) -> int | None:
-    """Index of the first byte that UTF-8 text cannot have; None where there is none."""
+    """Index of the first byte that no text in UTF-8 has there; None where there is none."""
     if (zero := data.find(0)) >= 0:
         return zero
     decoder = codecs.getincrementaldecoder("utf-8")()
-    for start in range(0, len(data), _CHUNK):
+    for start in range(0, len(data), _CHUNK_BYTES):
         try:
-            decoder.decode(data[start : start + _CHUNK], final=start + _CHUNK >= len(data))
+            decoder.decode(data[start : start + _CHUNK_BYTES], final=start + _CHUNK_BYTES >= len(data))
         except UnicodeDecodeError as error:
             return min(start + error.start, len(data) - 1)
     return None
 
 
 def _undecodable(data: bytes, file: Path, bad: int, encoding: str) -> MeasurementError:
+    """The error for a byte, by its index, that a text in this encoding does not have."""
     line = data.count(b"\n", 0, bad) + 1
     return MeasurementError(
         "this is not text" if data[bad] == 0 else f"this is not {encoding.upper()} text",

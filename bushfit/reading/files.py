@@ -12,14 +12,17 @@ from typing import TypeVar
 
 from bushfit.errors import BushfitError
 
-#: A loop of 10 million rows has a tenth of this.
+#: Bytes of the largest file that is read: ten times a loop of 10 million rows.
 _LARGEST_BYTES = 4 << 30
+#: Bytes from which a file is mapped and not copied, and its checksum made in a thread; chosen: a smaller one takes
+#: milliseconds.
+_MAPPED_BYTES = 1 << 22
+#: Bytes at the start of a file in which anything but blanks is looked for first; chosen: nearly every file has some.
+_HEAD_BYTES = 1 << 16
 
-
-#: A large file is looked at where the system keeps it, not copied.
+#: The bytes of a file: copied, or where the system keeps those of a large one.
 Bytes = bytes | mmap.mmap
 _AnyBytes = TypeVar("_AnyBytes", bytes, Bytes)
-_LARGE, _HEAD = 1 << 22, 1 << 16
 
 
 def read_bytes(
@@ -40,17 +43,18 @@ def read_bytes(
 
 
 def view_bytes(file: Path, kind: type[BushfitError]) -> Bytes:
-    """The bytes of a file that may be large.
+    """The bytes of a file that may be large, without copying them.
 
     Raises:
-        kind: as `read_bytes`.
+        kind: the same as of `read_bytes`.
     """
     return _checked(file, kind, _LARGEST_BYTES, "thin it out", _view)
 
 
 def _view(file: Path) -> Bytes:
+    """The bytes of a file, mapped where it is large."""
     with file.open("rb") as stream:
-        if file.stat().st_size < _LARGE:
+        if file.stat().st_size < _MAPPED_BYTES:
             return stream.read()
         return mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
 
@@ -58,6 +62,7 @@ def _view(file: Path) -> Bytes:
 def _checked(
     file: Path, kind: type[BushfitError], largest: int, hint: str, read: Callable[[Path], _AnyBytes]
 ) -> _AnyBytes:
+    """What `read` gives of a file, which has to be there, regular, not too large and not empty."""
     try:
         if not file.exists():
             raise _missing(file, kind)
@@ -70,7 +75,7 @@ def _checked(
         data = read(file)
     except OSError as error:
         raise kind("the file cannot be read", file=file, found=error.strerror or str(error)) from error
-    if (data[:_HEAD].isspace() and data[:].isspace()) or not data:
+    if (data[:_HEAD_BYTES].isspace() and data[:].isspace()) or not data:
         raise kind("the file is empty", file=file, expected="text", hint="export it again")
     return data
 
@@ -78,7 +83,10 @@ def _checked(
 def read_utf8(
     file: Path, kind: type[BushfitError], *, largest: int = _LARGEST_BYTES, hint: str = "thin it out"
 ) -> bytes:
-    """The bytes of a text file in UTF-8, a byte order mark left in place; arguments as of `read_bytes`.
+    """The bytes of a text file in UTF-8; a byte order mark stays in place.
+
+    Args:
+        file, kind, largest, hint: as of `read_bytes`.
 
     Raises:
         kind: as `read_bytes`, or the file is not UTF-8 text.
@@ -89,6 +97,7 @@ def read_utf8(
 
 
 def _missing(file: Path, kind: type[BushfitError]) -> BushfitError:
+    """The error for a file that is not there, with the name beside it that is most alike."""
     siblings = [path.name for path in file.parent.iterdir()] if file.parent.is_dir() else []
     near = get_close_matches(file.name, siblings, n=1)
     return kind(
@@ -100,6 +109,7 @@ def _missing(file: Path, kind: type[BushfitError]) -> BushfitError:
 
 
 def _check_utf8(data: bytes, file: Path, kind: type[BushfitError]) -> None:
+    """Refuse bytes that are no text in UTF-8, naming the line of the first."""
     bad = data.find(b"\0")
     if bad < 0 and not data.isascii():
         try:
@@ -119,11 +129,11 @@ def _check_utf8(data: bytes, file: Path, kind: type[BushfitError]) -> None:
 
 
 def sha256(data: Bytes) -> Future[str]:
-    """SHA-256 of a file's bytes, of large ones in a thread."""
-    if len(data) >= _LARGE:
-        with_thread = ThreadPoolExecutor(max_workers=1)
-        future = with_thread.submit(_sha256, data)
-        with_thread.shutdown(wait=False)
+    """SHA-256 of a file's bytes as hexadecimal digits; that of a large file is made meanwhile, in a thread."""
+    if len(data) >= _MAPPED_BYTES:
+        thread = ThreadPoolExecutor(max_workers=1)
+        future = thread.submit(_sha256, data)
+        thread.shutdown(wait=False)
         return future
     done: Future[str] = Future()
     done.set_result(_sha256(data))

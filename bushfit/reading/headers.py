@@ -1,4 +1,4 @@
-"""Names that columns go by in test files: English, German, French, Spanish and Chinese words, and symbols.
+"""The headers that columns go by in test files: English, German, French, Spanish and Chinese words, and symbols.
 
 Case, accents, blanks, hyphens and underscores do not count, and an umlaut is the same as its vowel with or without e.
 """
@@ -14,6 +14,7 @@ from typing import Literal
 
 from bushfit import units
 
+#: How an amplitude is counted.
 AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak"]
 
 #: For each column of a loop, the headers it goes by.
@@ -80,48 +81,64 @@ SWEEP_COLUMNS = {
         *("repeat", "repetition", "Wiederholung", "Wdh", "Messung", "répétition", "repetición", "重复"),
     ),
 }  # fmt: skip
-#: Words that say where or how a channel was recorded, and not what it is.
+#: Words that tell where or how a channel was recorded, but not what it is.
 _ASIDES = re.compile(r"\b(?:axial|radial|torsional|measured|actual|gemessen|mesure|medido|ist)\b")
-#: Units by which the symbol f is not the role it could stand for.
-_NOT_F = {"force": ("Hz",), "frequency": ("N", "N m")}
-#: Names of an amplitude that say peak-to-peak by themselves; "range" alone and "Schwingungsweite" do not, which some
-#: take for the amplitude.
-_DOUBLE = {
+#: For the roles that the symbol f may stand for, units by which it stands for the other one.
+_UNITS_NOT_F = {"force": ("Hz",), "frequency": ("N", "N m")}
+#: Names of an amplitude that count it peak-to-peak by themselves. "range" alone and "Schwingungsweite" are not among
+#: them, because some call the amplitude so.
+_PEAK_TO_PEAK_NAMES = {
     *("doppelamplitude", "schwingbreite", "schwingungsbreite", "schwingweite", "doppelhub", "2a", "2amplitude"),
     *("doubleamplitude", "totalamplitude", "fullamplitude", "doublestroke", "displacementrange", "rotationrange"),
     *("amplitudedouble", "amplitudetotale", "amplituddoble", "dobleamplitud", "amplitudtotal"),
     *("2xamplitude", "2xa", "峰峰值"),
 }
+#: The word "peak".
 _PEAK = r"(?:peak|pk|spitze|crete|cresta|pico|pic)"
-_BEFORE, _AFTER = r"(?<![^\W_])", r"(?![^\W_])"
-#: A unit that the word is glued to: "mmpp".
-_UNIT_BEFORE = r"(?:(?<=mm)|(?<=[u\u03bc]m)|(?<=deg)|(?<=rad))"
+#: Where a word begins; an underscore parts words.
+_WORD_START = r"(?<![^\W_])"
+#: Where a word ends.
+_WORD_END = r"(?![^\W_])"
+#: A unit that a word may be glued to: "mmpp".
+_AFTER_UNIT = r"(?:(?<=mm)|(?<=[u\u03bc]m)|(?<=deg)|(?<=rad))"
+#: Words that count an amplitude peak-to-peak.
 _PEAK_TO_PEAK = re.compile(
-    rf"{_BEFORE}(?:{_PEAK}[\s_/-]*(?:(?:to|zu|a|2)[\s_-]*)?{_PEAK}|p[\s_./-]?(?:t[\s_./-]?|2[\s_./-]?)?p|c[\s-]a[\s-]c"
-    rf"|s[.-]?s)\.?{_AFTER}|{_UNIT_BEFORE}(?:pk?-?pk?|s-?s){_AFTER}"
+    rf"{_WORD_START}(?:{_PEAK}[\s_/-]*(?:(?:to|zu|a|2)[\s_-]*)?{_PEAK}|p[\s_./-]?(?:t[\s_./-]?|2[\s_./-]?)?p"
+    rf"|c[\s-]a[\s-]c|s[.-]?s)\.?{_WORD_END}|{_AFTER_UNIT}(?:pk?-?pk?|s-?s){_WORD_END}"
 )
+#: Words that count an amplitude zero-to-peak.
 _ZERO_TO_PEAK = re.compile(
-    rf"{_BEFORE}(?:(?:zero|null|cero|0)[\s_/-]*(?:(?:to|bis|zu|a|2)[\s_-]*)?(?:{_PEAK}|p))\.?{_AFTER}"
+    rf"{_WORD_START}(?:(?:zero|null|cero|0)[\s_/-]*(?:(?:to|bis|zu|a|2)[\s_-]*)?(?:{_PEAK}|p))\.?{_WORD_END}"
 )
 _CONVENTIONS: tuple[tuple[re.Pattern[str], AmplitudeConvention], ...] = (
     (_ZERO_TO_PEAK, "zero-to-peak"),
     (_PEAK_TO_PEAK, "peak-to-peak"),
 )
-#: Characters of a header.
-_LONGEST = 200
+#: Characters of the longest header that is compared; chosen: a longer one is a text and no name.
+_LONGEST_HEADER = 200
+#: What is left of brackets that held no more than a convention.
 _EMPTY_BRACKETS = re.compile(r"[\[(]\s*[\])]")
+#: Full-width brackets and typographic primes as their plain signs; quotation marks go.
 _SPELLINGS: dict[int, int | str] = {
     **str.maketrans("\uff08\uff09\uff3b\uff3d\u2032\u2019\u00b4", "()[]'''"),
     **{0x2033: "''", ord('"'): ""},
 }
 #: Where a name may end and a unit begin, other than at a bracket: "force_N", "Kraft in N", "F / kN", "load, N".
-_CUT = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
+_NAME_END = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the file: the role it plays, its header, its place, its unit as stated, that unit in SI, and how
-    its header says that it counts amplitudes."""
+    """A column of a file.
+
+    Args:
+        role: what it holds, a key of LOOP_COLUMNS or SWEEP_COLUMNS.
+        header: its header cell.
+        index: its place among the columns, from 0.
+        unit: its unit as the file or the user states it; None where neither does.
+        scale: factor from that unit to SI.
+        convention: how it counts amplitudes, where its header or unit says so.
+    """
 
     role: str
     header: str
@@ -133,7 +150,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Heading:
-    """What a header says of its column: its role, its unit as written, and how it counts an amplitude."""
+    """What a header cell says of its column: its role, its unit as written, and how it counts amplitudes."""
 
     role: str
     unit: str | None = None
@@ -141,11 +158,11 @@ class Heading:
 
 
 class Vocabulary:
-    """The headers that each role of a table goes by.
+    """What headers mean: the role, unit and convention that each states.
 
     Args:
-        names: for each role its usual names.
-        columns: header of a role that goes by another name; the usual ones then do not count.
+        names: for each role the names it usually goes by.
+        columns: for each role that goes by another name this name; the usual ones then do not count.
     """
 
     def __init__(self, names: Mapping[str, Sequence[str]], columns: Mapping[str, str]) -> None:
@@ -159,11 +176,11 @@ class Vocabulary:
     def heading(self, header: str) -> Heading | None:
         """What a header cell says; None where it names no role."""
         if header not in self._known:
-            self._known[header] = self._read(header) if len(header) <= _LONGEST else None
+            self._known[header] = self._read(header) if len(header) <= _LONGEST_HEADER else None
         return self._known[header]
 
     def roles(self, cells: Sequence[str]) -> set[str]:
-        """The roles that a row of cells names."""
+        """The roles that some header cells name."""
         return {heading.role for cell in cells if (heading := self.heading(cell))}
 
     def _read(self, header: str) -> Heading | None:
@@ -171,24 +188,30 @@ class Vocabulary:
         text, convention = split_convention(whole)
         if plain(header) in self._roles:  # a campaign may name a header with its unit
             name, unit = units.split_header(text)
-            return Heading(self._roles[plain(header)], unit, "peak-to-peak" if plain(name) in _DOUBLE else convention)
-        # and a header with what it says of counting
-        for name, unit, bracketed in (split for way in dict.fromkeys((text, whole)) for split in _splits(way)):
-            bare, double = plain(name), plain(name) in _DOUBLE
+            double = plain(name) in _PEAK_TO_PEAK_NAMES
+            return Heading(self._roles[plain(header)], unit, "peak-to-peak" if double else convention)
+        # and a header with the words that tell its convention
+        for name, unit, certain in (split for way in dict.fromkeys((text, whole)) for split in _splits(way)):
+            bare, without_asides = plain(name), plain(_ASIDES.sub("", _folded(name)))
+            double = bare in _PEAK_TO_PEAK_NAMES
             counted = "peak-to-peak" if double else convention
-            with_aside = plain(_ASIDES.sub("", _folded(name)))
-            for candidate in (bare, with_aside, *([bare + "amplitude"] if counted else []), *["amplitude"] * double):
+            for candidate in (
+                bare,
+                without_asides,
+                *([bare + "amplitude"] if counted else []),
+                *(["amplitude"] if double else []),
+            ):
                 role = self._roles.get(candidate)
-                if role is None or not (bracketed or units.is_unit(unit or "")):
+                if role is None or not (certain or units.is_unit(unit or "")):
                     continue
-                if not (candidate == "f" and unit and any(units.agrees(unit, si) for si in _NOT_F[role])):
+                if not (candidate == "f" and unit and any(units.agrees(unit, si) for si in _UNITS_NOT_F[role])):
                     return Heading(role, unit, counted)
         return None
 
 
 @lru_cache(maxsize=4096)
 def split_convention(text: str) -> tuple[str, AmplitudeConvention | None]:
-    """A header or unit without what it says of counting amplitudes, and what it says."""
+    """A header or unit without the words that tell how amplitudes are counted, and the convention they tell."""
     folded = _folded(text)
     for pattern, convention in _CONVENTIONS:
         if found := pattern.search(folded):
@@ -199,20 +222,20 @@ def split_convention(text: str) -> tuple[str, AmplitudeConvention | None]:
 
 @lru_cache(maxsize=4096)
 def plain(name: str) -> str:
-    """A name by which spellings agree: letters, digits and the signs ' | * alone, without case, accents and umlauts."""
+    """A name in the one spelling that is compared: letters, digits and ' | * alone, no case, accents or umlauts."""
     letters = re.sub(r"[^\w'|*]|_", "", _folded(name.translate(_SPELLINGS)).replace("ß", "ss"))
     return letters.replace("ae", "a").replace("oe", "o").replace("ue", "u")
 
 
 def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
-    """All ways to take a header apart into name and unit, and whether brackets say that it is one."""
+    """Name and unit for each way to take a header apart, and whether the unit is certain or has yet to be known."""
     name, unit = units.split_header(text)
     yield name, unit, True
     if unit is None:
-        for cut in _CUT.finditer(name):
+        for cut in _NAME_END.finditer(name):
             yield name[: cut.start()], name[cut.end() :].replace("_", " "), False
 
 
 def _folded(text: str) -> str:
-    """Lower case without accents, of the same length."""
+    """A text in lower case without accents, of the same length."""
     return "".join(unicodedata.normalize("NFKD", letter)[0] for letter in text.lower())

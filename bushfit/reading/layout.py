@@ -1,9 +1,11 @@
-"""Where a table begins in a file, and what parts its columns.
+"""Where a table begins in its file, and what parts its columns.
 
-Of the candidates of tests/benchmarks/test_dialects_elsewhere.py (csv.Sniffer, clevercsv, DuckDB, polars), each left to
-itself, none reads half of the dialects; told the encoding and the decimal mark, clevercsv parts the columns of nearly
-all, in twenty times the time. What wins is a rule of the domain: the header is the line that names the columns a test
-must have, with rows of as many numbers below it.
+The header is the line that names the columns a test must have, with rows of as many numbers below it.
+
+Notes:
+    tests/benchmarks/test_dialects_elsewhere.py compares this rule with csv.Sniffer, clevercsv, DuckDB and polars. Each
+    left to itself, none of them reads half of the dialects; told the encoding and the decimal mark, clevercsv parts the
+    columns of nearly all.
 """
 
 from __future__ import annotations
@@ -18,20 +20,26 @@ from bushfit import units
 from bushfit.reading.headers import Vocabulary, split_convention
 from bushfit.reading.numerals import is_like_number
 
-#: Campaign names of the delimiters, in the order in which they are tried.
+#: Delimiters by their names in a campaign, in the order in which they are tried.
 DELIMITERS = {"semicolon": ";", "tab": "\t", "pipe": "|", "comma": ",", "blanks": " "}
-#: The header lies within this many bytes and filled lines.
-HEAD = 1 << 18
-MOST_LINES = 500
-MOST_COLUMNS = 1000
-#: Characters of a line, and of a header's.
-_LONGEST_LINE, _LONGEST_HEADER = 1 << 20, 10_000
-#: Filled lines below a header within which its units row and first numbers lie.
-_NEAR = 8
-_COMMENTS = ("#", "%", "//")
+#: Bytes at the start of a file within which its header lies; chosen: far more than preambles have.
+HEAD_BYTES = 1 << 18
+#: Filled lines at the start of a file within which its header lies; chosen: far more than preambles have.
+MOST_HEAD_LINES = 500
+#: Columns of a table; chosen: far more than a test has.
+_MOST_COLUMNS = 1000
+#: Characters of a line; chosen: a longer one is no row of a table.
+_LONGEST_LINE = 1 << 20
+#: Characters of a header's line; chosen: ten for each of the most columns.
+_LONGEST_HEADER = 10_000
+#: Filled lines below a header that may hold its units row and first numbers; chosen: room for comments there.
+_LINES_BELOW_HEADER = 8
+#: Signs with which a comment begins.
+_COMMENT_SIGNS = ("#", "%", "//")
+#: Blanks between a name and the bracket of its unit, which part no columns.
 _BLANK_BEFORE_BRACKET = re.compile(r"\s+(?=[\[(])")
+#: What parts columns of which the headers have single blanks.
 _COLUMN_GAP = re.compile(r"\t|\s{2,}")
-
 
 #: A line of a text, or the cells of a workbook's row: texts and numbers.
 Content = str | Sequence[str | float]
@@ -93,7 +101,7 @@ def split(content: Content, delimiter: str) -> list[str]:
     """The cells of a line, without blanks around them.
 
     Raises:
-        csv.Error: a line or a quoted cell beyond all measure.
+        csv.Error: a line or a quoted cell that is far too long.
     """
     if not isinstance(content, str):
         return [cell if isinstance(cell, str) else repr(cell) for cell in content]
@@ -107,9 +115,9 @@ def split(content: Content, delimiter: str) -> list[str]:
 
 
 def is_comment(content: Content, delimiter: str) -> bool:
-    """Whether a line is none of the table's; a semicolon begins a comment where it does not part columns."""
+    """Whether a line is a comment; a semicolon begins one where it does not part columns."""
     text = content if isinstance(content, str) else next((str(cell) for cell in content if cell != ""), "")
-    return text.lstrip().startswith(_COMMENTS if delimiter == ";" else (*_COMMENTS, ";"))
+    return text.lstrip().startswith(_COMMENT_SIGNS if delimiter == ";" else (*_COMMENT_SIGNS, ";"))
 
 
 def fits(cells: Sequence[str | float], width: int) -> bool:
@@ -120,10 +128,10 @@ def fits(cells: Sequence[str | float], width: int) -> bool:
 def find_layout(
     lines: Sequence[Line], vocabulary: Vocabulary, *, delimiter: str | None = None, header_line: int | None = None
 ) -> Layout:
-    """Find the header of a table: the line that names most columns of the test and has rows like itself below it.
+    """Find the header of a table: the line that names most columns of a test and has rows of as many cells below it.
 
-    Where no line names two columns, the line above the first rows of numbers is taken, or else the first one, so that
-    an error can show it. A comment is a header where nothing else is.
+    A comment is taken for the header only where no other line names two columns. Where no line at all does, the line
+    above the first rows of numbers is taken, or else the first line, so that an error can show it.
 
     Args:
         lines: the filled lines at the start of the file.
@@ -150,7 +158,7 @@ def find_layout(
 def _candidates(
     lines: Sequence[Line], before: Sequence[int], delimiters: Sequence[str], vocabulary: Vocabulary, commented: bool
 ) -> Iterator[tuple[tuple[int, ...], int, str, list[str]]]:
-    """Lines that name two columns or more, with their rank, delimiter and cells."""
+    """Rank, index, delimiter and cells of each line that names two columns or more."""
     for index in before:
         for order, delimiter in enumerate(delimiters):
             content = lines[index].content
@@ -166,7 +174,7 @@ def _candidates(
 
 
 def _header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
-    """The ways to take a header apart, without empty cells at its end."""
+    """The cells of a header, without empty ones at its end, for each way to take it apart."""
     if len(content) > _LONGEST_HEADER:
         return
     ways = [split(content, delimiter)]
@@ -175,13 +183,13 @@ def _header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
     for cells in ways:
         while cells and not cells[-1]:
             cells.pop()
-        if 1 < len(cells) <= MOST_COLUMNS:
+        if 1 < len(cells) <= _MOST_COLUMNS:
             yield cells
 
 
 def _is_followed(lines: Sequence[Line], header: int, delimiter: str, width: int) -> bool:
     """Whether the first row of numbers below a header has as many cells."""
-    for line in lines[header + 1 : header + 1 + _NEAR]:
+    for line in lines[header + 1 : header + 1 + _LINES_BELOW_HEADER]:
         if not is_comment(line.content, delimiter) and _is_row(cells := split(line.content, delimiter)):
             return fits(cells, width)
     return False
@@ -189,7 +197,7 @@ def _is_followed(lines: Sequence[Line], header: int, delimiter: str, width: int)
 
 def _is_row(cells: Sequence[str]) -> bool:
     """Whether two cells or more, and no fewer than half of them, hold numbers."""
-    numbers = sum(is_like_number(cell) for cell in cells[:MOST_COLUMNS])
+    numbers = sum(is_like_number(cell) for cell in cells[:_MOST_COLUMNS])
     return numbers > 1 and 2 * numbers >= len(cells)
 
 
@@ -208,9 +216,11 @@ def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> int:
 def _likeliest(
     lines: Sequence[Line], before: Sequence[int], end: int, delimiters: Sequence[str]
 ) -> tuple[int, str, list[str]]:
-    """A line that might have been meant as the header, where none names the columns of a test: the last one above the
-    first rows of numbers that has as many cells and is no units row, or else that row itself; the first line where
-    there is no row."""
+    """Index, delimiter and cells of the line that is likeliest meant as the header, where none names the columns.
+
+    That is the last line above the first row of numbers that has as many cells as the row and is no units row; or else
+    the row itself; and where there is no row, the first line.
+    """
     if end == len(lines):
         content = lines[before[0] if before else 0].content
         delimiter = max(delimiters, key=lambda mark: len(split(content, mark)) if mark != " " else 0)
@@ -229,7 +239,7 @@ def _likeliest(
 def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence[str]) -> Layout:
     """The layout of a header, with the units row that may follow it."""
     nothing = ("",) * len(headers)
-    for line in lines[index + 1 : index + 1 + _NEAR]:
+    for line in lines[index + 1 : index + 1 + _LINES_BELOW_HEADER]:
         if is_comment(line.content, delimiter):
             continue
         cells = [cell.strip("[]() ") for cell in split(line.content, delimiter)]
@@ -241,7 +251,7 @@ def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence
 
 
 def _is_units_row(cells: Sequence[str]) -> bool:
-    """Whether half of the filled cells or more are units, and none is a number; a ratio may have the unit "1"."""
+    """Whether no cell is a number and half of the filled cells or more are units; a ratio may have the unit "1"."""
     filled = [split_convention(cell)[0] for cell in cells if cell]
     if any(is_like_number(cell) and cell != "1" for cell in filled):
         return False

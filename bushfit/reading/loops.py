@@ -1,4 +1,4 @@
-"""A table of time, displacement and force -> Loop in SI, with one clear error for what cannot be a loop."""
+"""Hysteresis loops read from files, or one error that tells why a file cannot be a loop."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from typing import Literal
 import numpy as np
 
 from bushfit.geometry import Direction
-from bushfit.reading.headers import LOOP_COLUMNS
+from bushfit.reading.headers import LOOP_COLUMNS, Column
 from bushfit.reading.layout import FileFormat
-from bushfit.reading.measurement import Loop, Source, Waveform, rebuild_time
+from bushfit.reading.measurement import Floats, Loop, Source, Waveform, rebuild_time
 from bushfit.reading.parallel import by_chunks
 from bushfit.reading.table import Table
 
+#: Rows of the shortest loop; chosen: fewer do not show a shape.
 _FEWEST_LOOP_ROWS = 10
 
 
@@ -41,61 +42,30 @@ def read_loop(
         direction: direction of the test, which settles the units that fit.
         name: of the loop; default the stem of the file.
         listed_as: the file as the campaign names it, for provenance; default its name.
-        columns: header of a role (a key of LOOP_COLUMNS), where it is not the usual one.
-        units: unit of a role, where the file does not carry it.
+        columns: header of a role (a key of LOOP_COLUMNS), where it is not a usual one.
+        units: unit of a role, where the file does not tell it.
         written: how the file is written, where it does not tell.
         force_sign: -1 turns the recorded force around.
         rate: speed of the displacement [m/s or rad/s], for a file without time.
         frequency: cycles per time [Hz], for a file without time; goes with `waveform`.
         waveform: course of the displacement in time.
-        noise: passed on.
+        noise: of the loop, see `Loop`.
 
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
     """
     table = Table.open(file, LOOP_COLUMNS, columns, units, written)
     _check_not_swapped(table, direction)
-    wanted = {
-        "displacement": table.column("displacement", direction.motion.displacement_unit),
-        "force": table.column("force", direction.motion.force_unit),
-    }
-    wanted["force"] = replace(wanted["force"], scale=force_sign * wanted["force"].scale)
-    if "time" in table.roles:
-        wanted["time"] = table.column("time", "s")
-    elif rate is None and frequency is None:
-        raise table.missing(
-            "time",
-            "s",
-            hint='or state rate = "10 mm/min", or frequency = "0.1 Hz" and waveform = "sine", in the campaign',
-        )
+    wanted = _loop_columns(table, direction, force_sign, has_clock=rate is not None or frequency is not None)
     values = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
-
+    displacement, force, time = values["displacement"], values["force"], values.get("time")
     for role in ("displacement", "force"):
-        if np.ptp(values[role][:_FEWEST_LOOP_ROWS]) == 0.0 == np.ptp(values[role]):
-            raise table.error(f"the {role} never changes", column=wanted[role], expected="a loop")
-    displacement, force = values["displacement"], values["force"]
-
-    def sums(rows: slice) -> tuple[float, float, float]:
-        return np.einsum("i,i", displacement[rows], force[rows]), displacement[rows].sum(), force[rows].sum()
-
-    product, *each = np.sum(by_chunks(sums, force.size), axis=0)
-    if product < each[0] * each[1] / force.size:
-        raise table.error(
-            "the force falls where the displacement rises",
-            column=wanted["force"],
-            expected="force and displacement counted in the same direction",
-            hint="if the load cell counts the other way round, write force_sign = -1 in the campaign"
-            if force_sign == 1
-            else "take force_sign = -1 out of the campaign",
-        )
-    if "time" in values:
-        time = values["time"]
-        after, before = time[1:], time[:-1]
-        if any(by_chunks(lambda rows: bool((after[rows] <= before[rows]).any()), after.size)):
-            late = np.append(False, after <= before)
-            table.refuse(late, wanted["time"], "time does not increase", "a later time on every row")
-    else:
+        _check_changes(table, wanted[role], values[role])
+    _check_sense(table, wanted["force"], displacement, force, force_sign)
+    if time is None:
         time = rebuild_time(displacement, rate=rate, frequency=frequency, waveform=waveform)
+    else:
+        _check_increases(table, wanted["time"], time)
     source = Source(listed_as or Path(file.name), table.sha256)
     return Loop(name or file.stem, direction, time, displacement, force, noise, source, "time" in values)
 
@@ -114,3 +84,51 @@ def _check_not_swapped(table: Table, direction: Direction) -> None:
             hint="correct the header, or name the columns in the campaign: columns = "
             f'{{ displacement = "{force}", force = "{displacement}" }}',
         )
+
+
+def _loop_columns(table: Table, direction: Direction, force_sign: int, *, has_clock: bool) -> dict[str, Column]:
+    """The columns of a loop with their units; only one `has_clock`, a rate or frequency that is stated, lacks time."""
+    displacement = table.column("displacement", direction.motion.displacement_unit)
+    force = table.column("force", direction.motion.force_unit)
+    wanted = {"displacement": displacement, "force": replace(force, scale=force_sign * force.scale)}
+    if "time" in table.roles:
+        wanted["time"] = table.column("time", "s")
+    elif not has_clock:
+        raise table.missing(
+            "time",
+            "s",
+            hint='or state rate = "10 mm/min", or frequency = "0.1 Hz" and waveform = "sine", in the campaign',
+        )
+    return wanted
+
+
+def _check_changes(table: Table, column: Column, values: Floats) -> None:
+    """Refuse a channel that holds one value throughout."""
+    if np.ptp(values[:_FEWEST_LOOP_ROWS]) == 0.0 == np.ptp(values):
+        raise table.error(f"the {column.role} never changes", column=column, expected="a loop")
+
+
+def _check_sense(table: Table, column: Column, displacement: Floats, force: Floats, force_sign: int) -> None:
+    """Refuse a force whose covariance with the displacement is negative."""
+
+    def sums(rows: slice) -> tuple[float, float, float]:
+        return np.einsum("i,i", displacement[rows], force[rows]), displacement[rows].sum(), force[rows].sum()
+
+    product, *each = np.sum(by_chunks(sums, force.size), axis=0)
+    if product < each[0] * each[1] / force.size:
+        raise table.error(
+            "the force falls where the displacement rises",
+            column=column,
+            expected="force and displacement counted in the same direction",
+            hint="if the load cell counts the other way round, write force_sign = -1 in the campaign"
+            if force_sign == 1
+            else "take force_sign = -1 out of the campaign",
+        )
+
+
+def _check_increases(table: Table, column: Column, time: Floats) -> None:
+    """Refuse a time that does not increase from row to row."""
+    after, before = time[1:], time[:-1]
+    if any(by_chunks(lambda rows: bool((after[rows] <= before[rows]).any()), after.size)):
+        late = np.append(False, after <= before)
+        table.refuse(late, column, "time does not increase", "a later time on every row")

@@ -1,4 +1,4 @@
-"""Measured data: Loop and Sweep, frozen, SI, checked."""
+"""Measured tests in SI units: a hysteresis loop, a stepped-sine sweep; and the time of a loop recorded without it."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Waveform = Literal["sine", "triangle"]
 
-#: A turning point of a loop stands out from its neighbours by at least this share of the range.
+#: Share of the range by which a turning point of a loop stands out from its neighbours; chosen: noise stays below it.
 _TURN_PROMINENCE = 0.1
 
 
 @dataclass(frozen=True)
 class Source:
-    """The file a measurement came from, as the campaign names it, for provenance."""
+    """The file that a measurement came from, as the campaign names it, and its SHA-256: the provenance of results."""
 
     file: Path
     sha256: str
@@ -31,10 +31,20 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """A quasi-static hysteresis loop: time [s], displacement [m or rad], force [N or N m], each (n,).
+    """A hysteresis loop, or any other record of time, displacement and force.
 
-    noise is the standard deviation of the force relative to its half range, where the campaign states it; of a loop
-    that is not `timed` the time was made from its motion.
+    Args:
+        name: of the loop.
+        direction: of the test.
+        time: [s], (n,).
+        displacement: [m or rad], (n,).
+        force: [N or N m], (n,).
+        noise: standard deviation of the force relative to its half range, where the campaign states it.
+        source: the file it came from; None where it came from none.
+        timed: whether time was recorded; else it was rebuilt from the displacement.
+
+    Raises:
+        MeasurementError: arrays of different length.
     """
 
     name: str
@@ -52,21 +62,28 @@ class Loop:
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """Stepped sine: frequency [Hz], zero-to-peak amplitude [m or rad], complex dynamic stiffness
-    [N/m or N m/rad] and repeat number (default: all 1), each (n,).
+    """A stepped-sine sweep: a complex dynamic stiffness for each of its operating points.
 
-    amplitude is that of the level, the same for all its points; reached is what each point really reached, where
-    that is known: the model is asked there.
+    Args:
+        name: of the sweep.
+        direction: of the test.
+        frequency: [Hz], (n,).
+        amplitude: of the level, the same for all its points, zero-to-peak [m or rad], (n,).
+        stiffness: complex [N/m or N m/rad], (n,).
+        repeat: number of the repeat, (n,); all 1 unless given.
+        noise: standard deviation of the real and of the imaginary part relative to |K|, where the campaign states it.
+        source: the file it came from; None where it came from none.
+        reached: amplitude that each point really reached [m or rad], (n,); None where it is not known.
 
-    noise is the standard deviation of the real and of the imaginary part, each relative to |K|, where
-    the campaign states it.
+    Raises:
+        MeasurementError: arrays of different length.
     """
 
     name: str
     direction: Direction
     frequency: Floats
     amplitude: Floats
-    stiffness: NDArray[np.complex128]
+    stiffness: Complex
     repeat: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     noise: float | None = None
     source: Source | None = None
@@ -79,7 +96,7 @@ class Sweep:
 
     @property
     def amplitude_reached(self) -> Floats:
-        """Amplitude of each point as reached, or else of its level [m or rad], (n,)."""
+        """Amplitude that each point reached, or else that of its level [m or rad], (n,): a model is evaluated there."""
         return self.amplitude if self.reached is None else self.reached
 
 
@@ -92,10 +109,7 @@ def _check_lengths(name: str, *columns: NDArray[np.generic]) -> None:
 def rebuild_time(
     displacement: Floats, *, rate: float | None = None, frequency: float | None = None, waveform: Waveform = "triangle"
 ) -> Floats:
-    """The time of each sample of a loop that was recorded without it, from where the sample lies on its stroke.
-
-    Samples need not be even in time, and noise does not make time run backwards. Strokes that the record cuts short,
-    at its start and end, count as parts of a stroke over the whole range.
+    """The time of each row of a loop that was recorded without it, by the place of the row on its stroke.
 
     Args:
         displacement: [m or rad], (n,), any number of strokes, with a range above zero.
@@ -105,6 +119,10 @@ def rebuild_time(
 
     Returns:
         Time [s], (n,), strictly increasing from zero.
+
+    Notes:
+        Rows need not be even in time, and noise does not make time run backwards. The strokes at the start and the end,
+        which the record may cut short, count as parts of a stroke over the whole range.
     """
     edges = _stroke_edges(displacement)
     extremes = float(displacement.min()), float(displacement.max())
@@ -129,7 +147,7 @@ def rebuild_time(
 
 
 def _stroke_edges(displacement: Floats) -> NDArray[np.intp]:
-    """Indices of the first sample, of the turning points, and of the last sample."""
+    """The first row, the rows of the turning points, and the last row."""
     from scipy.signal import find_peaks
 
     prominence = _TURN_PROMINENCE * np.ptp(displacement)
@@ -147,7 +165,7 @@ def _stroke_edges(displacement: Floats) -> NDArray[np.intp]:
 
 
 def _strictly_increasing(values: Floats) -> Floats:
-    """The running maximum, with its standstills replaced by straight lines."""
+    """The running maximum of values, with straight lines where it stands still."""
     highest = np.maximum.accumulate(values)
     keep = np.append(highest[1:] > highest[:-1], True) & (highest > highest[0])
     keep[0] = True

@@ -1,7 +1,7 @@
-"""How a table writes its numbers: decimal point or comma, and what parts thousands.
+"""How numbers are written: decimal point or comma, and what parts thousands.
 
-"1.234" is one number with a decimal point and another with a thousands point. What a table means is settled by its
-other numbers; where all of them can be read both ways, nothing is guessed.
+"1.234" is one number with a decimal point and another with a thousands point. Which of them a table means, its other
+numbers tell; where all of them can be read both ways, that is an error and not a guess.
 """
 
 from __future__ import annotations
@@ -12,16 +12,22 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
-#: Signs that part thousands, and the two minus signs.
-_BLANKS, _APOSTROPHES, _SIGN = " \u00a0\u2009\u202f", "'\u2019", "[+\\-\u2212]"
-_GROUPS = {",": ",", ".": r"\.", " ": f"[{_BLANKS}]", "'": f"[{_APOSTROPHES}]"}
-#: Characters of a number.
-_LONGEST = 400
-_LIKE = re.compile(rf"{_SIGN}?[.,]?\d[\d.,{_BLANKS}{_APOSTROPHES}]*(?:[eE]{_SIGN}?\d+)?", re.ASCII)
-
-#: A number that may have one group of thousands, and one with thousands that are not grouped.
+#: Blanks that part thousands: plain, unbreakable and thin ones.
+_BLANKS = " \u00a0\u2009\u202f"
+#: Apostrophes that part thousands.
+_APOSTROPHES = "'\u2019"
+#: A sign before a number or an exponent; there are two minus signs.
+_SIGN = "[+\\-\u2212]"
+#: For each sign by which a user names what parts thousands, all that stand for it.
+_SEPARATORS = {",": ",", ".": r"\.", " ": f"[{_BLANKS}]", "'": f"[{_APOSTROPHES}]"}
+#: Characters of the longest number; chosen: the largest float written out has 309 digits.
+_LONGEST_NUMBER = 400
+#: What has the characters of a number, in an order that numbers may have.
+_LIKE_NUMBER = re.compile(rf"{_SIGN}?[.,]?\d[\d.,{_BLANKS}{_APOSTROPHES}]*(?:[eE]{_SIGN}?\d+)?", re.ASCII)
+#: A number in which the sign may part a single group of thousands, or be the decimal mark: 1.234.
 _ONE_GROUP = re.compile(rf"{_SIGN}?[1-9]\d{{0,2}}([.,])\d{{3}}", re.ASCII)
-_BARE = re.compile(rf"{_SIGN}?\d{{4,}}(?:[.,]\d*)?", re.ASCII)
+#: A number whose thousands nothing parts: 1234.5.
+_UNGROUPED = re.compile(rf"{_SIGN}?\d{{4,}}(?:[.,]\d*)?", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -41,29 +47,28 @@ class Numerals:
         mark = re.escape(self.decimal)
         forms = [rf"(?:\d+(?:{mark}\d*)?|{mark}\d+)(?:[eE]{_SIGN}?\d+)?"]
         if self.thousands:
-            forms.append(rf"[1-9]\d{{0,2}}(?:{_GROUPS[self.thousands]}\d{{3}})+(?:{mark}\d*)?")
+            forms.append(rf"[1-9]\d{{0,2}}(?:{_SEPARATORS[self.thousands]}\d{{3}})+(?:{mark}\d*)?")
         return re.compile(rf"{_SIGN}?(?:{'|'.join(forms)})", re.ASCII)
 
     def allows(self, text: str) -> bool:
-        """Whether a cell, without blanks around it, is a number when written in this way."""
-        return len(text) <= _LONGEST and self._pattern.fullmatch(text) is not None
+        """Whether a cell, without blanks around it, is a number written in this way."""
+        return len(text) <= _LONGEST_NUMBER and self._pattern.fullmatch(text) is not None
 
     def value(self, text: str) -> float | None:
         """The number in a cell; None where it holds none."""
         if not self.allows(text):
             return None
         if self.thousands:
-            text = re.sub(_GROUPS[self.thousands], "", text)
+            text = re.sub(_SEPARATORS[self.thousands], "", text)
         return float(text.replace(self.decimal, ".").replace("\u2212", "-"))
 
 
-#: All ways, the plainest first.
-ALL = tuple(
+#: All ways to write numbers, the plainest first.
+ALL_NUMERALS = tuple(
     Numerals(decimal, thousands)
     for thousands, decimal in product((None, ",", ".", " ", "'"), ".,")
     if thousands != decimal
 )
-
 
 #: Line and column of a cell.
 Place = tuple[int, int]
@@ -74,9 +79,10 @@ class Evidence:
     """What cells tell of the way their numbers are written.
 
     Args:
-        ways: those that all numbers so far allow, the plainest first.
-        unclear: place and text of the first cell that two of them read differently; None where none is.
-        contrary: place and text of the first cell that none of the ways allows that the others do.
+        ways: in which all numbers so far may be written, the plainest first.
+        unclear: place and text of the first cell that has another value in another of these ways; None where the ways
+            agree.
+        contrary: place and text of the first number that is written in none of these ways; None where there is none.
     """
 
     ways: tuple[Numerals, ...]
@@ -85,25 +91,33 @@ class Evidence:
 
 
 def is_like_number(text: str) -> bool:
-    """Whether a cell is a number in some way to write them."""
-    return len(text) <= _LONGEST and _LIKE.fullmatch(text) is not None and any(way.allows(text) for way in ALL)
+    """Whether a cell is a number in any way to write them."""
+    return (
+        len(text) <= _LONGEST_NUMBER
+        and _LIKE_NUMBER.fullmatch(text) is not None
+        and any(way.allows(text) for way in ALL_NUMERALS)
+    )
 
 
-def weigh(cells: Iterable[tuple[Place, str]], ways: tuple[Numerals, ...] = ALL, *, all_cells: bool = False) -> Evidence:
-    """Find the ways that numbers are written in. A file that groups thousands does so throughout, unless it is stated.
+def weigh(
+    cells: Iterable[tuple[Place, str]], ways: tuple[Numerals, ...] = ALL_NUMERALS, *, all_cells: bool = False
+) -> Evidence:
+    """Find the ways in which cells may write their numbers.
+
+    A file that parts thousands is taken to do so in all its numbers, unless the user states how it parts them.
 
     Args:
-        cells: place and text of each; texts that are no numbers in any way count for nothing.
-        ways: those that may be.
-        all_cells: go on when the decimal mark is settled, for thousands separators and contradictions.
+        cells: place and text of each; texts that are no numbers in any way do not count.
+        ways: in which the numbers may be written.
+        all_cells: whether to go on when the decimal mark is settled, to thousands separators and contradictions.
     """
     open_thousands = len({way.thousands for way in ways}) > 1
-    unclear, bare = None, False
+    unclear, ungrouped = None, False
     grouped: dict[str, tuple[Place, str]] = {}
     for place, text in cells:
         if not all_cells and len({way.decimal for way in ways}) == 1:
             break
-        bare = bare or _BARE.fullmatch(text) is not None
+        ungrouped = ungrouped or _UNGROUPED.fullmatch(text) is not None
         if text.isdecimal():
             continue
         left = tuple(way for way in ways if way.allows(text))
@@ -119,5 +133,5 @@ def weigh(cells: Iterable[tuple[Place, str]], ways: tuple[Numerals, ...] = ALL, 
         if len({way.decimal for way in ways}) == 1:
             unclear = None
     # 62.598 between 20,000 and 3694,85 is a slip rather than 62 thousand
-    contrary = grouped.get(ways[0].thousands or "") if bare and open_thousands else None
+    contrary = grouped.get(ways[0].thousands or "") if ungrouped and open_thousands else None
     return Evidence(ways, unclear, contrary)

@@ -1,4 +1,4 @@
-"""Long arrays in chunks that stay in a core's cache, on all cores."""
+"""Work on long arrays, chunk by chunk on all cores; a chunk stays in a core's cache."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
 _Answer = TypeVar("_Answer")
-#: Numbers of a chunk.
+#: Entries of a chunk: 2 MiB of float64, which a core's cache holds.
 CHUNK = 1 << 18
 
 

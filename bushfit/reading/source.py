@@ -1,4 +1,4 @@
-"""The rows of a file: of a text in any encoding, or of a sheet of a workbook."""
+"""The rows of a test file, which may be a text in any encoding or a sheet of a workbook."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import io
 import mmap
 import re
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -17,34 +17,36 @@ import numpy as np
 
 from bushfit.reading.encoding import to_utf8
 from bushfit.reading.files import Bytes
-from bushfit.reading.layout import HEAD, MOST_LINES, Layout, Line, is_comment, split
+from bushfit.reading.layout import HEAD_BYTES, MOST_HEAD_LINES, Layout, Line, is_comment, split
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import Numerals
 from bushfit.reading.parallel import by_chunks
 
 if TYPE_CHECKING:
+    import pandas as pd
     from _typeshed import WriteableBuffer
 
-#: In SI; far beyond every rig, and its square is still a number.
-LARGEST = 1e100
-#: Bytes of lines that are read at a time.
-_BUFFER = 1 << 16
+#: [SI] The largest value of a cell: far beyond every rig, and its square is still a number.
+LARGEST_VALUE = 1e100
+#: Bytes of lines that are read at a time; chosen: enough for thousands of rows.
+_BUFFER_BYTES = 1 << 16
 _LINE_END = re.compile(rb"\r\n|\n|\r")
-#: Signs that, inside a number, part thousands.
+#: Signs that part thousands in a number, other than those which may part columns or decimals.
 _SEPARATORS = ("'", "\u2019", "\u00a0", "\u2009", "\u202f")
+#: Thousands that are parted by a blank.
 _GROUP_BY_BLANK = re.compile(rb"\d \d{3}(?!\d)")
 
 
-class Source(Protocol):
+class RowSource(Protocol):
     """A file as rows of cells, with the line or row, from 1, that each stands on."""
 
     @property
     def encoding(self) -> str | None:
-        """The encoding of a text."""
+        """The encoding of a text; None of a sheet."""
 
     @property
     def sheet(self) -> str | None:
-        """The name of a sheet."""
+        """The name of a sheet; None of a text."""
 
     def head(self) -> list[Line]:
         """The filled lines at its start."""
@@ -56,18 +58,34 @@ class Source(Protocol):
         """Whether cells below the header may have a comma in them."""
 
     def may_group(self, layout: Layout, decimal: str) -> bool:
-        """Whether numbers below the header may have thousands separators, when that is the decimal mark."""
+        """Whether numbers below the header may have thousands separators, if `decimal` is their decimal mark."""
 
     def columns(
         self, layout: Layout, width: int, scales: Mapping[int, float], numerals: Numerals
     ) -> dict[int, Floats] | None:
-        """Columns by index times their scale, each (n,); None where the rows are not so tidy that a library reads them,
-        or hold no number, or one beyond LARGEST."""
+        """The values of columns, times their scale, if the rows are so tidy that a library reads them.
+
+        Args:
+            layout: where the table lies.
+            width: cells of a row.
+            scales: factors to SI, by the index of the column.
+            numerals: how the numbers are written.
+
+        Returns:
+            Values by the index of the column, each (n,); None where the rows are not tidy, or where a cell holds no
+            number, or one beyond LARGEST_VALUE.
+        """
 
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """A text: its file, its bytes in UTF-8, and the encoding they had."""
+    """A text as rows.
+
+    Args:
+        file: where it lies.
+        data: its bytes in UTF-8.
+        encoding: which they had.
+    """
 
     file: Path
     data: Bytes
@@ -76,7 +94,7 @@ class Text:
 
     @classmethod
     def open(cls, data: Bytes, file: Path, encoding: str | None) -> Text:
-        """Decode a text.
+        """A file's bytes as a text.
 
         Raises:
             MeasurementError: no text, or not in the encoding stated.
@@ -85,29 +103,50 @@ class Text:
 
     def head(self) -> list[Line]:
         """The filled lines at its start."""
-        return list(islice(_lines(io.BytesIO(self.data[:HEAD]), 0), MOST_LINES))
+        return list(islice(_lines(io.BytesIO(self.data[:HEAD_BYTES]), 0), MOST_HEAD_LINES))
 
     def lines(self, after: int) -> Iterator[Line]:
         """All filled lines after a line."""
-        return _lines(io.BufferedReader(_View(self.data, self._offset(after)), _BUFFER), after)
+        return _lines(io.BufferedReader(_View(self.data, self._offset(after)), _BUFFER_BYTES), after)
 
     def may_have_comma(self, layout: Layout) -> bool:
         """Whether cells below the header may have a comma in them."""
         return self._has('"' if layout.delimiter == "," else ",", self._offset(layout.lines_before_data))
 
     def may_group(self, layout: Layout, decimal: str) -> bool:
-        """Whether numbers below the header may have thousands separators, when that is the decimal mark."""
+        """Whether numbers below the header may have thousands separators, if `decimal` is their decimal mark."""
         offset = self._offset(layout.lines_before_data)
         if self.may_have_comma(layout) if decimal == "." else self._has(".", offset):
             return True
-        if self._has("'", offset) or (any(self._has(sign, offset) for sign in _SEPARATORS)):
+        if any(self._has(sign, offset) for sign in _SEPARATORS):
             return True
         return layout.delimiter != " " and self._has(" ", offset) and bool(_GROUP_BY_BLANK.search(self.data, offset))
 
     def columns(
         self, layout: Layout, width: int, scales: Mapping[int, float], numerals: Numerals
     ) -> dict[int, Floats] | None:
-        """Columns by index times their scale, each (n,); None where the rows are not so tidy that pandas reads them.
+        """The values of columns, times their scale, if the rows are so tidy that pandas reads them; see `RowSource`."""
+        frame = self._frame(layout, width, set(scales), numerals)
+        if frame is None:
+            return None
+        columns = {index: frame[index].to_numpy() for index in scales}
+        for column in columns.values():
+            column.flags.writeable = True  # the frame is nobody else's
+
+        def scale_rows(rows: slice) -> bool:
+            """Multiply some rows by their scales; False where one holds no number, or one beyond LARGEST_VALUE."""
+            for index, scale in scales.items():
+                part, largest = columns[index][rows], LARGEST_VALUE / abs(scale)
+                if not (part.min() >= -largest and part.max() <= largest):
+                    return False
+                if scale != 1.0:
+                    part *= scale
+            return True
+
+        return columns if all(by_chunks(scale_rows, len(frame))) else None
+
+    def _frame(self, layout: Layout, width: int, numbers: Set[int], numerals: Numerals) -> pd.DataFrame | None:
+        """The rows as pandas reads them, the columns `numbers` as floats; None where it does not read them.
 
         pandas rounds correctly from 3.1 on, and reads a large file on all cores if it is given the path of plain UTF-8.
         """
@@ -130,8 +169,8 @@ class Text:
                     decimal=numerals.decimal,
                     # one type for all columns spares pandas a copy
                     dtype=np.float64
-                    if len(scales) == width
-                    else {index: np.float64 if index in scales else str for index in range(width)},
+                    if len(numbers) == width
+                    else {index: np.float64 if index in numbers else str for index in range(width)},
                     na_filter=False,
                     compression=None,
                 )
@@ -139,23 +178,10 @@ class Text:
             return None
         if self._has('"', before) and len(frame) != sum(1 for _ in self.lines(layout.lines_before_data)):
             return None  # a quote left open took lines into its cell
-        columns = {index: frame[index].to_numpy() for index in scales}
-
-        def scaled(rows: slice) -> bool:
-            """Multiply some rows by their scales; False where one holds no number, or one beyond LARGEST."""
-            for index, scale in scales.items():
-                part, largest = columns[index][rows], LARGEST / abs(scale)
-                if not (part.min() >= -largest and part.max() <= largest):
-                    return False
-                if scale != 1.0:
-                    part *= scale
-            return True
-
-        for column in columns.values():
-            column.flags.writeable = True  # the frame is nobody else's
-        return columns if all(by_chunks(scaled, len(frame))) else None
+        return frame
 
     def _has(self, sign: str, offset: int) -> bool:
+        """Whether a sign stands anywhere from a byte on."""
         return self.data.find(sign.encode(), offset) >= 0
 
     def _offset(self, after: int) -> int:
@@ -165,7 +191,7 @@ class Text:
 
 
 class _View(io.RawIOBase):
-    """The bytes of a file from a place on, as a stream that copies nothing ahead."""
+    """The bytes of a file from `start` on, as a stream that copies them only as they are read."""
 
     def __init__(self, data: Bytes, start: int) -> None:
         self._rest = memoryview(data)[start:]
@@ -181,6 +207,7 @@ class _View(io.RawIOBase):
 
 
 def _lines(data: io.BytesIO | io.BufferedReader, after: int) -> Iterator[Line]:
+    """The filled lines of a stream that begins after a line of the file."""
     for number, line in enumerate(io.TextIOWrapper(data, encoding="utf-8", errors="replace"), start=after + 1):
         if line.strip(" \t\r\n,;|"):
             yield Line(number, line.rstrip("\n"))
@@ -188,7 +215,12 @@ def _lines(data: io.BytesIO | io.BufferedReader, after: int) -> Iterator[Line]:
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """A sheet of a workbook: its rows of texts and numbers, "" where a cell is empty."""
+    """A sheet of a workbook as rows.
+
+    Args:
+        sheet: its name.
+        content: its rows of texts and numbers, "" where a cell is empty.
+    """
 
     sheet: str
     content: Sequence[Sequence[str | float]]
@@ -196,7 +228,7 @@ class Sheet:
 
     def head(self) -> list[Line]:
         """The filled rows at its start."""
-        return list(islice(self.lines(0), MOST_LINES))
+        return list(islice(self.lines(0), MOST_HEAD_LINES))
 
     def lines(self, after: int) -> Iterator[Line]:
         """All filled rows after a row."""
@@ -213,14 +245,14 @@ class Sheet:
         return True
 
     def columns(self, *_: object) -> None:
-        """Cells are told apart already."""
+        """None: no library is needed where cells come apart by themselves."""
 
 
-def rows(source: Source, layout: Layout) -> Iterator[tuple[int, Sequence[str | float]]]:
-    """Line and cells of each row of data, comments left out.
+def rows(source: RowSource, layout: Layout) -> Iterator[tuple[int, Sequence[str | float]]]:
+    """Line and cells of each row of data; comments are left out.
 
     Raises:
-        csv.Error: a line or a quoted cell beyond all measure.
+        csv.Error: a line or a quoted cell that is far too long.
     """
     for number, content in source.lines(layout.lines_before_data):
         if not is_comment(content, layout.delimiter):

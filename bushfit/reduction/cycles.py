@@ -1,12 +1,13 @@
-"""The cycles of a long motion: where it goes up and down, which cycles agree, and where one steady state ends.
+"""The cycles of a long motion: where each begins, which of them agree, and which belong to one steady state.
 
-Everything is counted on the displacement and works on arrays of all rows or all cycles at once.
+They are counted on the displacement, in arrays of all rows or of all cycles at once.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,33 +15,58 @@ from numpy.typing import NDArray
 from bushfit.reading.measurement import Complex, Floats
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA, scatter
 
+#: Rows of an array.
 Integers = NDArray[np.intp]
 
-#: A turning point stands out by so many standard deviations of the noise, steps of the converter, and this share of
-#: the whole range.
-_NOISE, _CONVERTER, _RANGE = 10.0, 4.0, 1e-3
-#: Order of the differences that leave noise and no motion, rows of a block, most blocks, and the share of the blocks
-#: (those with the least motion) that count.
-_ORDER, _BLOCK, _MOST_BLOCKS, _QUIET = 6, 256, 2000, 0.1
-_DIFFERENCE_GAIN = 924.0**0.5  # square root of the sum of squared binomials of that order
-#: Variance of a row less the cubic through its neighbours at even times, over that of a row.
+#: Standard deviations of the noise by which a turning point stands out; chosen: noise goes half as far in 10^6 rows.
+_PROMINENCE_NOISE = 10.0
+#: Steps of the analogue-to-digital converter by which a turning point stands out; chosen: it flickers between two.
+_PROMINENCE_STEPS = 4.0
+#: Share of the whole range by which a turning point stands out; chosen: the range of a step is far larger.
+_PROMINENCE_SHARE = 1e-3
+#: Order of the differences that leave noise and no motion; chosen: 0.2 % of a sine of ten rows a cycle stays.
+_DIFFERENCE_ORDER = 6
+#: Standard deviation of such differences over that of a row: the root of the sum of squared binomials.
+_DIFFERENCE_GAIN = comb(2 * _DIFFERENCE_ORDER, _DIFFERENCE_ORDER) ** 0.5
+#: Rows of a window in which noise is measured; chosen: enough for a median.
+_WINDOW_ROWS = 256
+#: Windows in which noise is measured; chosen: more tell nothing new of a long record.
+_MOST_WINDOWS = 2000
+#: Quantile of the windows that gives the noise: those with the least motion.
+_QUIET_QUANTILE = 0.1
+#: Variance of a row less the cubic through two neighbours on either side at even times, over that of a row: their
+#: weights are -1/6, 4/6, 4/6 and -1/6.
 _EVEN_GAIN = 1.0 + (2.0 * 4.0**2 + 2.0) / 36.0
-#: Rows that are looked at in one go.
-_CHUNK = 1 << 18
-#: Neighbours in one run differ by less than this, in ln of period and of range.
-_SAME_PERIOD, _SAME_RANGE = 0.1, 0.25
-#: A cycle has no hole longer than this share of it.
+#: Rows that are searched for outliers at a time; chosen: their arrays stay in a core's cache.
+_CHUNK_ROWS = 1 << 18
+#: [ln of a period] Difference from which neighbouring cycles are not of one run; chosen: far beyond that of a step.
+_SAME_PERIOD = 0.1
+#: [ln of a range] Difference from which neighbouring cycles are not of one run; chosen: far beyond that of a step.
+_SAME_RANGE = 0.25
+#: Share of a cycle that its longest hole may take; chosen: a fundamental needs rows on all sides of it.
 HOLE = 0.34
-#: A split takes this much off chi-square, and parts frequencies or amplitudes by these shares at least.
-_SPLIT_GAIN, _OTHER_FREQUENCY, _OTHER_AMPLITUDE = 40.0, 1e-3, 0.02
-#: No crossing is known better than this share of a period, no amplitude better than this share of itself.
-_LEAST_JITTER, _LEAST_SCATTER = 5e-4, 5e-4
-#: Cycles on either side of a split.
-_FEWEST = 2
-#: A run of so many pieces sweeps where this share of the change between them is within them.
-_FEWEST_IN_SWEEP, _SWEPT = 4, 0.5
-#: Shares of a step that may be transient at its start, and no longer steady at its end.
-_TRANSIENT, _ENDING = 0.5, 0.25
+#: Determinant of the normal equations, relative to its rows, from which a cycle's fundamental can be solved for.
+_LEAST_DETERMINANT = 1e-3
+#: Chi-square that a split has to save; chosen: scatter saves half as much at the best of many places.
+_SPLIT_GAIN = 40.0
+#: Relative difference of two frequencies that are worth a split; chosen: smaller ones are a rig's wander.
+_OTHER_FREQUENCY = 1e-3
+#: Relative difference of two amplitudes that are worth a split; chosen: smaller ones are a rig's wander.
+_OTHER_AMPLITUDE = 0.02
+#: Share of a period to which a crossing is known at best; chosen: no rig is more even.
+_LEAST_JITTER = 5e-4
+#: Share of an amplitude to which it is known at best; chosen: no rig is more even.
+_LEAST_SCATTER = 5e-4
+#: Cycles on either side of a split: two crossings more than a line needs.
+_FEWEST_CYCLES = 2
+#: Pieces of the shortest sweep of frequency; chosen: fewer may be steps.
+_FEWEST_IN_SWEEP = 4
+#: Share of the change between pieces that lies within them in a sweep: 1 in a perfect one, 0 between steps.
+_SWEPT_SHARE = 0.5
+#: Share of a step that may be transient at its start; chosen: half of it has to be steady.
+_MOST_TRANSIENT = 0.5
+#: Share of a step that may be no longer steady at its end; chosen: a rig that stops takes less.
+_MOST_ENDING = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +74,8 @@ class Cycles:
     """The cycles of a motion, from one upward crossing of its middle to the next.
 
     Args:
-        time: of every row [s], (n,).
-        edges: the crossings [s], (m + 1,).
+        time: of each row [s], (n,).
+        edges: time of the crossings [s], (m + 1,).
         first_rows: first row after each crossing, (m + 1,).
         range: peak to peak of each cycle [m or rad], (m,).
     """
@@ -61,29 +87,21 @@ class Cycles:
 
     @classmethod
     def of(cls, time: Floats, motion: Floats) -> Cycles:
-        """Find the cycles, at any frequency and of any amplitude that stands out of the noise."""
-        turns = turning_points(motion, least_turn(motion))
+        """The cycles of a motion, at any frequency and of any amplitude that stands out of the noise."""
+        turns = turning_points(motion, least_prominence(motion))
         if turns.size < 4:
             return cls(time, np.empty(0), np.empty(0, dtype=np.intp), np.empty(0))
         height = motion[turns]
-        middle, sense = (height[1:] + height[:-1]) / 2.0, np.sign(np.diff(height))
+        middle = (height[1:] + height[:-1]) / 2.0
         if middle.size > 4:  # the record cuts the first and the last stroke short
             middle[[0, -1]] = 2.0 * middle[[1, -2]] - middle[[2, -3]]
-        length = np.diff(turns)
-        stroke = motion[turns[0] : turns[-1]]
-        before = (stroke - np.repeat(middle, length)) * np.repeat(sense, length) < 0.0
-        row = turns[:-1] + np.add.reduceat(before, turns[:-1] - turns[0], dtype=np.intp)
-        row = np.clip(row, turns[:-1] + 1, turns[1:])
-        rise = motion[row] - motion[row - 1]
-        part = np.clip((middle - motion[row - 1]) / np.where(rise == 0.0, 1.0, rise), 0.0, 1.0)
-        crossed = (middle - height[:-1]) * (height[1:] - middle) > 0.0
-        upward = np.flatnonzero((sense > 0.0) & crossed)
-        edges = (time[row - 1] + part * (time[row] - time[row - 1]))[upward]
+        upward = np.flatnonzero((height[:-1] < middle) & (middle < height[1:]))
+        edges = _crossings(time, motion, turns, middle)[upward]
         peak, trough = height[upward[:-1] + 1], height[upward[:-1] + 2]
         return cls(time, edges, np.searchsorted(time, edges).astype(np.intp), peak - trough)
 
     def runs(self) -> list[slice]:
-        """Cycles in a row whose periods and ranges are alike from one to the next."""
+        """Runs of cycles whose periods and ranges are alike from one to the next, without holes."""
         if self.range.size == 0:
             return []
         period = np.diff(self.edges)
@@ -95,81 +113,108 @@ class Cycles:
         return [slice(int(a), int(b)) for a, b in pairwise(border) if not hole[a]]
 
     def fundamentals(self, run: slice, values: Floats) -> Complex:
-        """Complex fundamental of each cycle of a run, by least squares with its mean, (k,)."""
+        """Complex fundamental of a channel in each cycle of a run, (k,): fitted with its mean by least squares.
+
+        Args:
+            run: the cycles, k of them.
+            values: of the channel in each row, (n,).
+        """
         edges, first = self.edges[run.start : run.stop + 1], self.first_rows[run.start : run.stop + 1]
         rows = slice(first[0], first[-1])
         count = np.diff(first)
         phase = (self.time[rows] - np.repeat(edges[:-1], count)) / np.repeat(np.diff(edges), count)
         turn = np.exp(-2j * np.pi * phase)
-        own = values[rows]
 
         def summed(series: NDArray[np.generic]) -> NDArray[np.generic]:
             return np.add.reduceat(series, first[:-1] - first[0])
 
-        one, twice, wave = summed(turn), summed(turn * turn), summed(own * turn)
-        size, total = count.astype(float), summed(own)
+        once, twice, wave = summed(turn), summed(turn * turn), summed(values[rows] * turn)
+        size, total = count.astype(float), summed(values[rows])
         # unknowns: mean, cosine and negative sine; turn = cosine - i sine
         gram = np.empty((count.size, 3, 3))
         gram[:, 0, 0] = size
-        gram[:, 0, 1] = gram[:, 1, 0] = one.real
-        gram[:, 0, 2] = gram[:, 2, 0] = one.imag
+        gram[:, 0, 1] = gram[:, 1, 0] = once.real
+        gram[:, 0, 2] = gram[:, 2, 0] = once.imag
         gram[:, 1, 1], gram[:, 2, 2] = (size + twice.real) / 2.0, (size - twice.real) / 2.0
         gram[:, 1, 2] = gram[:, 2, 1] = twice.imag / 2.0
         right = np.stack((total, wave.real, wave.imag), axis=1)
         solved = np.full((count.size, 3), np.nan)
-        sound = np.abs(np.linalg.det(gram / np.maximum(size, 1.0)[:, None, None])) > 1e-3
+        sound = np.abs(np.linalg.det(gram / np.maximum(size, 1.0)[:, None, None])) > _LEAST_DETERMINANT
         solved[sound] = np.linalg.solve(gram[sound], right[sound][..., None])[..., 0]
         fundamental = solved[:, 1] + 1j * solved[:, 2]
         rough = (self.range[run] / 2.0).astype(complex)  # for cycles of too few rows, which make no point
         return np.where(sound, fundamental, rough)
 
 
-def least_turn(values: Floats) -> float:
-    """How far a turning point has to stand out so that noise makes none."""
+def _crossings(time: Floats, motion: Floats, turns: Integers, middle: Floats) -> Floats:
+    """Time at which each stroke from one turning point to the next crosses its middle [s], (strokes,)."""
+    sense, length = np.sign(np.diff(motion[turns])), np.diff(turns)
+    strokes = motion[turns[0] : turns[-1]]
+    before = (strokes - np.repeat(middle, length)) * np.repeat(sense, length) < 0.0
+    row = turns[:-1] + np.add.reduceat(before, turns[:-1] - turns[0], dtype=np.intp)
+    row = np.clip(row, turns[:-1] + 1, turns[1:])
+    rise = motion[row] - motion[row - 1]
+    part = np.clip((middle - motion[row - 1]) / np.where(rise == 0.0, 1.0, rise), 0.0, 1.0)
+    return time[row - 1] + part * (time[row] - time[row - 1])
+
+
+def least_prominence(values: Floats) -> float:
+    """How far a turning point of a channel has to stand out to be none of noise, in the units of the values."""
     change = np.abs(np.diff(values))
-    converter = float(change[change > 0.0].min(initial=np.inf))
-    least = _RANGE * float(np.ptp(values))
-    if values.size <= _BLOCK:
-        blocks = values[None, :]
+    converter_step = float(change[change > 0.0].min(initial=np.inf))
+    least = _PROMINENCE_SHARE * float(np.ptp(values))
+    if values.size <= _WINDOW_ROWS:
+        windows = values[None, :]
     else:
-        starts = np.linspace(0, values.size - _BLOCK, min(_MOST_BLOCKS, values.size // _BLOCK)).astype(np.intp)
-        blocks = values[starts[:, None] + np.arange(_BLOCK)]
-    if blocks.shape[1] > _ORDER:
-        rough = np.median(np.abs(np.diff(blocks, _ORDER, axis=1)), axis=1) * (MEDIAN_TO_SIGMA / _DIFFERENCE_GAIN)
-        least = max(least, _NOISE * float(np.quantile(rough, _QUIET)))
-    return max(least, _CONVERTER * converter if converter < least else 0.0)
+        count = min(_MOST_WINDOWS, values.size // _WINDOW_ROWS)
+        starts = np.linspace(0, values.size - _WINDOW_ROWS, count).astype(np.intp)
+        windows = values[starts[:, None] + np.arange(_WINDOW_ROWS)]
+    if windows.shape[1] > _DIFFERENCE_ORDER:
+        differences = np.abs(np.diff(windows, _DIFFERENCE_ORDER, axis=1))
+        noise = np.median(differences, axis=1) * (MEDIAN_TO_SIGMA / _DIFFERENCE_GAIN)
+        least = max(least, _PROMINENCE_NOISE * float(np.quantile(noise, _QUIET_QUANTILE)))
+    return max(least, _PROMINENCE_STEPS * converter_step if converter_step < least else 0.0)
 
 
-def wild_rows(time: Floats, values: Floats) -> NDArray[np.bool_]:
-    """Rows that lie alone far off the cubic through the two before and the two after them: further than those spread,
-    and than noise goes, which a cubic through rows at uneven times magnifies. No sine does that, however few rows it
-    has, nor the kink of dry friction."""
-    wild = np.zeros(values.size, dtype=bool)
-    least = least_turn(values)
-    for start in range(0, values.size - 4, _CHUNK):
-        rows = slice(start, start + _CHUNK + 4)
+def lone_outliers(time: Floats, values: Floats) -> NDArray[np.bool_]:
+    """Which rows lie alone far off their neighbours, as faults of a record do, (n,).
+
+    Args:
+        time: of each row [s], (n,).
+        values: of a channel in each row, (n,).
+
+    Notes:
+        Such a row is farther off the cubic through the two rows before and the two after it than these spread, and
+        than noise goes; a cubic through rows at uneven times magnifies noise, which is allowed for. No sine does that,
+        however few rows it has, nor the kink of dry friction.
+    """
+    outliers = np.zeros(values.size, dtype=bool)
+    least = least_prominence(values)
+    for start in range(0, values.size - 4, _CHUNK_ROWS):
+        rows = slice(start, start + _CHUNK_ROWS + 4)
         own, clock = values[rows], time[rows]
         stop = own.size - 4
         near = [own[place : stop + place] for place in (0, 1, 3, 4)]
         apart = [clock[place : stop + place] - clock[2 : stop + 2] for place in (0, 1, 3, 4)]
-        middle, gain = np.zeros(stop), np.ones(stop)
+        cubic, gain = np.zeros(stop), np.ones(stop)
         for value, node in zip(near, apart, strict=True):
             weight = np.ones(stop)
             for other in apart:
                 if other is not node:
                     weight *= other / (other - node)
-            middle += weight * value
+            cubic += weight * value
             gain += weight * weight
         reach = least * np.sqrt(gain / _EVEN_GAIN)
-        wild[start + 2 : start + 2 + stop] = np.abs(own[2:-2] - middle) > np.ptp(near, axis=0) + reach
-    return wild
+        outliers[start + 2 : start + 2 + stop] = np.abs(own[2:-2] - cubic) > np.ptp(near, axis=0) + reach
+    return outliers
 
 
 def turning_points(values: Floats, least: float) -> Integers:
-    """Rows of the turning points that stand out by `least` at least, highs and lows in turn.
+    """Rows of the turning points that stand out by `least` or more, highs and lows in turn.
 
-    Pairs of neighbouring turning points less than `least` apart are taken out, the closest first, many at a time: what
-    stays are the extremes between which the values go up or down by more than that.
+    Notes:
+        Neighbouring turning points that are less than `least` apart are taken out in pairs, the closest first, many
+        pairs at a time. The extremes between which the values go up or down by more than that stay.
     """
     moved = np.concatenate(([0], 1 + np.flatnonzero(np.diff(values) != 0.0)))
     sense = np.sign(np.diff(values[moved]))
@@ -196,24 +241,26 @@ def turning_points(values: Floats, least: float) -> Integers:
 
 
 def pieces(edges: Floats, log_amplitude: Floats) -> list[slice]:
-    """Cycles in a row, cut where frequency or amplitude change from one steady value to another.
-
-    The crossings of a steady sine lie on a straight line over their number, and its amplitudes on a level one. A run
-    is cut in two where two lines fit better than one by far more than the scatter allows, and each part again.
+    """The pieces of a run of cycles between which its frequency or amplitude goes from one steady value to another.
 
     Args:
-        edges: crossings [s], (m + 1,).
+        edges: time of the crossings [s], (m + 1,).
         log_amplitude: ln of the amplitude of each cycle, (m,).
+
+    Notes:
+        The crossings of a steady sine lie on a straight line over their number, and its amplitudes on a level one. A
+        run is cut in two where two lines fit better than one by far more than the scatter allows, and each part again.
     """
     period = float(np.median(np.diff(edges)))
     phase = (edges - edges[0]) / period
     phase = phase - np.arange(phase.size)
-    jitter = max(_robust(np.diff(phase, 2)) / 6.0**0.5, _LEAST_JITTER)
-    scatter = max(_robust(np.diff(log_amplitude)) / 2.0**0.5, _LEAST_SCATTER)
+    # of white noise, squared weights of second differences sum up to 6, of first ones to 2
+    jitter = max(_deviation(np.diff(phase, 2)) / 6.0**0.5, _LEAST_JITTER)
+    spread = max(_deviation(np.diff(log_amplitude)) / 2.0**0.5, _LEAST_SCATTER)
     found, open_parts = [], [slice(0, log_amplitude.size)]
     while open_parts:
         part = open_parts.pop()
-        cut = _cut(phase[part.start : part.stop + 1] / jitter, log_amplitude[part] / scatter, jitter, scatter)
+        cut = _cut(phase[part.start : part.stop + 1] / jitter, log_amplitude[part] / spread, jitter, spread)
         if cut:
             open_parts += [slice(part.start + cut, part.stop), slice(part.start, part.start + cut)]
         else:
@@ -222,11 +269,16 @@ def pieces(edges: Floats, log_amplitude: Floats) -> list[slice]:
 
 
 def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
-    """Whether the frequency sweeps through the pieces of a run rather than stepping from one to the next.
+    """Whether the frequency of a run sweeps all the time and does not step from piece to piece.
 
-    In a sweep the period changes within the pieces as it does between them; in steps it is constant within.
+    Args:
+        edges: time of the crossings [s], (m + 1,).
+        parts: the pieces of the run.
+
+    Notes:
+        In a sweep the period changes within the pieces as it does between them; in steps it is constant within.
     """
-    parts = [part for part in parts if part.stop - part.start > _FEWEST]
+    parts = [part for part in parts if part.stop - part.start > _FEWEST_CYCLES]
     if len(parts) < _FEWEST_IN_SWEEP:
         return False
     middle = np.array([(part.start + part.stop) / 2.0 for part in parts])
@@ -236,16 +288,23 @@ def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
     ]
     curve, period, _ = np.array(fits).T
     within, between = 2.0 * curve / period, np.gradient(np.log(period), middle)
-    return bool(np.median(within / np.where(between == 0.0, np.inf, between)) > _SWEPT)
+    return bool(np.median(within / np.where(between == 0.0, np.inf, between)) > _SWEPT_SHARE)
 
 
-def _cut(phase: Floats, level: Floats, jitter: float, scatter: float) -> int:
-    """Where to cut a run, as a number of cycles; 0 where it is one. Both series in units of their scatter."""
+def _cut(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
+    """Number of cycles after which to cut a run; 0 where it is one.
+
+    Args:
+        phase: of the crossings, less that of an even sine [jitter], (m + 1,).
+        level: ln of the amplitude of each cycle [spread], (m,).
+        jitter: standard deviation of a crossing [periods].
+        spread: standard deviation of ln of an amplitude.
+    """
     count = level.size
-    if count < 2 * _FEWEST:
+    if count < 2 * _FEWEST_CYCLES:
         return 0
     number = np.arange(count, dtype=float)
-    at = np.arange(_FEWEST, count - _FEWEST + 1)
+    at = np.arange(_FEWEST_CYCLES, count - _FEWEST_CYCLES + 1)
     # a cut after `k` cycles gives the crossings 0..k to the first part and k..count to the second
     before, after = _line_squares(phase)[at], _line_squares(phase[::-1])[::-1][at]
     gain = _line_squares(phase)[-1] - before - after
@@ -257,14 +316,13 @@ def _cut(phase: Floats, level: Floats, jitter: float, scatter: float) -> int:
     if gain[best] + level_gain[best] < _SPLIT_GAIN:
         return 0
     slopes = [np.polyfit(number[: part.size], part, 1)[0] * jitter for part in (phase[: k + 1], phase[k:])]
-    parted = abs(slopes[0] - slopes[1]) > _OTHER_FREQUENCY or abs(first[best] - second[best]) * scatter > (
-        _OTHER_AMPLITUDE
-    )
-    return k if parted else 0
+    other_frequency = abs(slopes[0] - slopes[1]) > _OTHER_FREQUENCY
+    other_amplitude = abs(first[best] - second[best]) * spread > _OTHER_AMPLITUDE
+    return k if other_frequency or other_amplitude else 0
 
 
 def _line_squares(values: Floats) -> Floats:
-    """Sum of squares about a straight line of the values up to and with each, (n,)."""
+    """Sum of squares that a straight line leaves of the values up to and with each, (n,)."""
     n = np.arange(1, values.size + 1, dtype=float)
     x = n - 1.0
     values = values - values.mean()
@@ -275,19 +333,30 @@ def _line_squares(values: Floats) -> Floats:
 
 
 def mean_from_steady(motion: Complex, stiffness: Complex, fewest: int) -> slice:
-    """Cycles of a step that are steady: what is left out at either end makes the mean of the others most certain.
+    """The steady cycles of a step: those left when both ends are cut so that the mean is most certain.
 
-    The marginal standard error rule (White 1997) over displacement and stiffness of the cycles together.
+    Args:
+        motion: complex amplitude of the displacement in each cycle [m or rad], (m,).
+        stiffness: complex stiffness in each cycle [N/m or N m/rad], (m,).
+        fewest: cycles that are kept at least.
+
+    Notes:
+        The marginal standard error rule (White 1997), over displacement and stiffness together.
     """
     series = np.stack((motion / np.median(np.abs(motion)), stiffness / np.median(np.abs(stiffness))))
     count = motion.size
-    start = _truncation(series, min(int(_TRANSIENT * count), count - fewest))
-    ending = _truncation(series[:, start:][:, ::-1], min(int(_ENDING * count), count - start - fewest))
+    start = _truncation(series, min(int(_MOST_TRANSIENT * count), count - fewest))
+    ending = _truncation(series[:, start:][:, ::-1], min(int(_MOST_ENDING * count), count - start - fewest))
     return slice(start, count - ending)
 
 
 def _truncation(series: Complex, most: int) -> int:
-    """Entries to leave out at the start, at most that many, so that the squared standard error of the mean is least."""
+    """Number of entries to cut at the start, `most` or fewer, so that the standard error of the mean is least.
+
+    Args:
+        series: (k, m); their squared errors are added.
+        most: entries that may be cut.
+    """
     if most < 1:
         return 0
     back = (series - series.mean(axis=1, keepdims=True))[:, ::-1]
@@ -297,5 +366,6 @@ def _truncation(series: Complex, most: int) -> int:
     return int(np.argmin(error[: most + 1]))
 
 
-def _robust(values: Floats) -> float:
+def _deviation(values: Floats) -> float:
+    """Standard deviation that outliers hardly move; 0 of no values."""
     return scatter(values)[1] if values.size else 0.0

@@ -1,4 +1,4 @@
-"""The harmonics of displacement and force over the whole cycles of one steady sine, by least squares.
+"""The harmonics of displacement and force over whole cycles of one steady sine, fitted by least squares.
 
 Rows may lie anywhere in time. Drift and overtones are fitted with the fundamental, so that neither leaks into it.
 """
@@ -13,31 +13,37 @@ from scipy.special import fdtri
 
 from bushfit.reading.measurement import Complex, Floats
 
-#: Overtones in the fit, as far as the rows can tell them apart.
+#: Harmonics in the fit, as far as the rows can tell them apart; chosen: higher ones of a rig are in the noise.
 _HARMONICS = 15
+#: Harmonics in the fits that search for the frequency; chosen: the strongest ones.
+_FREQUENCY_HARMONICS = 3
+#: Condition number of the scaled normal equations up to which rows tell harmonics apart; chosen: errors grow tenfold.
 _WORST_CONDITION = 100.0
-#: Terms of the drift: mean, slope, curvature.
-_DRIFT = 3
-_CHUNK = 1 << 14
-#: The frequency is found when the phase drifts by no more than this over the whole step [cycles].
-_SETTLED = 1e-7
-#: Rows that the search for the frequency takes of a long step.
+#: Terms of the drift: mean, slope and curvature.
+_DRIFT_TERMS = 3
+#: Rows that are fitted at a time; chosen: their harmonics stay in a core's cache.
+_CHUNK_ROWS = 1 << 14
+#: [cycles] Drift of the phase over a whole step with which its frequency is found; chosen: far below its error.
+_SETTLED_DRIFT = 1e-7
+#: Corrections of the frequency; each squares what it is off by, so that fewer do.
+_MOST_CORRECTIONS = 4
+#: Rows that the search for the frequency takes of a long step; chosen: enough for its last digit.
 _FREQUENCY_ROWS = 1 << 17
-#: Cycles scatter more than white noise where chance would do so this rarely.
+#: Probability below which chance alone does not make cycles scatter more than white noise does; chosen.
 _WHITE_P = 0.005
 
 
 @dataclass(frozen=True, eq=False)
 class HarmonicFit:
-    """Drift and harmonics of displacement and force over the whole cycles of one step, and what they leave.
+    """Drift and harmonics of displacement and force over the whole cycles of one step, and their residuals.
 
     Args:
         frequency: [Hz].
-        solution: drift, then cosine and negative sine of each harmonic, of both channels, (p, 2).
+        solution: of both channels, (p, 2): drift, then cosine and negative sine of each harmonic.
         covariance: of the solution for unit variance of the values, (p, p).
-        freedom: rows less unknowns.
+        freedom: degrees of freedom: rows less unknowns.
         squares: products of the residuals of the channels, summed over the rows, (2, 2).
-        left_over: what each cycle's fundamental differs by from the fit's, (2, cycles).
+        left_over: complex fundamental of the residuals in each cycle, (2, cycles).
     """
 
     frequency: float
@@ -49,32 +55,40 @@ class HarmonicFit:
 
     @classmethod
     def of(cls, time: Floats, displacement: Floats, force: Floats, edges: Floats) -> HarmonicFit:
-        """Fit with the frequency at which the phase of the displacement does not drift from cycle to cycle."""
+        """The fit with the frequency at which the phase of the displacement does not drift from cycle to cycle.
+
+        Args:
+            time: [s], (n,).
+            displacement: [m or rad], (n,).
+            force: [N or N m], (n,).
+            edges: where the cycles begin and the last one ends [s], (cycles + 1,).
+        """
         middle = (edges[0] + edges[-1]) / 2.0
         time, values = time - middle, np.stack((displacement, force))
         count = edges.size - 1
         frequency = count / float(edges[-1] - edges[0])
         thin = slice(None, None, max(1, time.size // _FREQUENCY_ROWS))
         number = np.arange(count) - (count - 1) / 2.0
-        for _ in range(4):
-            fit = cls._solved(time[thin], values[:, thin], count, frequency, 3)
+        for _ in range(_MOST_CORRECTIONS):
+            fit = cls._solved(time[thin], values[:, thin], count, frequency, _FREQUENCY_HARMONICS)
             phase = np.unwrap(np.angle(fit.coefficients[0, 1] + fit.left_over[0]))
             drift = float(number @ phase / (number @ number)) / (2.0 * np.pi)
             frequency *= 1.0 + drift
-            if abs(drift) * count < _SETTLED:
+            if abs(drift) * count < _SETTLED_DRIFT:
                 break
         return cls._solved(time, values, count, frequency, _HARMONICS)
 
     @classmethod
     def _solved(cls, time: Floats, values: Floats, count: int, frequency: float, order: int) -> HarmonicFit:
-        size = _DRIFT + 2 * max(1, min(order, (time.size - _DRIFT) // 4))
+        """The fit over `count` cycles about time 0, with `order` harmonics or fewer, at a frequency that is given."""
+        size = _DRIFT_TERMS + 2 * max(1, min(order, (time.size - _DRIFT_TERMS) // 4))
         gram, moments = np.zeros((size, size)), np.zeros((size, 2))
         for rows, basis in _bases(time, frequency, size):
             gram += basis @ basis.T
             moments += basis @ values[:, rows].T
         scale = 1.0 / np.sqrt(np.diag(gram))
         unit = gram * np.outer(scale, scale)
-        while size > _DRIFT + 2 and np.linalg.cond(unit[:size, :size]) > _WORST_CONDITION:
+        while size > _DRIFT_TERMS + 2 and np.linalg.cond(unit[:size, :size]) > _WORST_CONDITION:
             size -= 2
         covariance = np.linalg.inv(unit[:size, :size]) * np.outer(scale[:size], scale[:size])
         solution = covariance @ moments[:size]
@@ -85,7 +99,7 @@ class HarmonicFit:
             number = np.clip(time[rows] * frequency + count / 2.0, 0, count - 1).astype(np.intp)
             rows_in += np.bincount(number, minlength=count)
             for channel, part in np.ndindex(2, 2):  # times exp(-i omega t)
-                sums[channel, part] += np.bincount(number, left[channel] * basis[_DRIFT + part], count)
+                sums[channel, part] += np.bincount(number, left[channel] * basis[_DRIFT_TERMS + part], count)
         sums *= 2.0 / np.maximum(rows_in, 1.0)
         left_over = sums[:, 0] + 1j * sums[:, 1]
         return cls(frequency, solution, covariance, max(time.size - size, 1), squares, left_over)
@@ -93,20 +107,21 @@ class HarmonicFit:
     @property
     def coefficients(self) -> Complex:
         """Complex harmonics of displacement and force, with the mean at 0: (2, order + 1)."""
-        waves = self.solution[_DRIFT::2] + 1j * self.solution[_DRIFT + 1 :: 2]
+        waves = self.solution[_DRIFT_TERMS::2] + 1j * self.solution[_DRIFT_TERMS + 1 :: 2]
         return np.vstack((self.solution[:1], waves)).T
 
     @property
     def chance(self) -> Floats:
         """Expected square of each harmonic of white noise of unit variance, (order,)."""
-        return np.diag(self.covariance)[_DRIFT:].reshape(-1, 2).sum(axis=1)
+        return np.diag(self.covariance)[_DRIFT_TERMS:].reshape(-1, 2).sum(axis=1)
 
     def errors(self) -> tuple[float, float]:
-        """Standard errors of |K| relative to |K|, and of its phase [rad].
+        """Standard errors of |K|, relative to |K|, and of its phase [rad].
 
-        e = f - K x is what the noise of both channels leaves in the force. Its scatter over the rows gives the errors
-        where it is white; where the cycles scatter more than white noise would let them (hum, slow wander), their own
-        scatter does.
+        Notes:
+            e = f - K x is what the noise of both channels leaves in the force. Where e is white, its scatter over the
+            rows gives the errors. Where the cycles scatter more than white noise would let them (hum, slow wander),
+            their own scatter gives them.
         """
         x, f = self.coefficients[:, 1]
         k = f / x
@@ -124,7 +139,7 @@ class HarmonicFit:
         return float(gain), float(phase)
 
     def distortion(self) -> tuple[float, float]:
-        """Total harmonic distortion of displacement and force, less what noise alone would show."""
+        """Total harmonic distortion of displacement and force, relative to the fundamental, less that of noise."""
         power = np.square(np.abs(self.coefficients[:, 1:]))
         noise = np.outer(np.diag(self.squares) / self.freedom, self.chance)
         overtones = np.maximum((power - noise)[:, 1:].sum(axis=1), 0.0)
@@ -133,16 +148,16 @@ class HarmonicFit:
 
 
 def _bases(time: Floats, frequency: float, size: int) -> Iterator[tuple[slice, Floats]]:
-    """Chunk by chunk: its rows, and drift, then cosine and negative sine of each harmonic there, (size, m)."""
+    """Rows of each chunk, and there the drift, then cosine and negative sine of each harmonic, (size, m)."""
     half = max(float(np.abs(time[[0, -1]]).max()), 1e-300)
-    for start in range(0, time.size, _CHUNK):
-        rows = slice(start, min(start + _CHUNK, time.size))
+    for start in range(0, time.size, _CHUNK_ROWS):
+        rows = slice(start, min(start + _CHUNK_ROWS, time.size))
         basis = np.empty((size, rows.stop - start))
         span = time[rows] / half
         basis[0], basis[1], basis[2] = 1.0, span, 1.5 * span**2 - 0.5
         turn = np.exp(2j * np.pi * frequency * time[rows])
         power = turn.copy()
-        for column in range(_DRIFT, size, 2):
+        for column in range(_DRIFT_TERMS, size, 2):
             basis[column], basis[column + 1] = power.real, -power.imag
             power *= turn
         yield rows, basis

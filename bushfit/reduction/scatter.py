@@ -1,4 +1,4 @@
-"""Scatter that a few wild values hardly move: the median, and the median absolute deviation."""
+"""Median and standard deviation of values, neither of which a few outliers move by much."""
 
 from __future__ import annotations
 
@@ -11,6 +11,6 @@ MEDIAN_TO_SIGMA = 1.482602218505602
 
 
 def scatter(values: Floats) -> tuple[float, float]:
-    """Median, and standard deviation by the median absolute deviation: outliers hardly move either."""
+    """Median of values, (n,), and their standard deviation by the median absolute deviation."""
     middle = float(np.median(values))
     return middle, MEDIAN_TO_SIGMA * float(np.median(np.abs(values - middle)))

@@ -1,14 +1,13 @@
-"""Raw stepped-sine histories -> operating points: steps found, each reduced to its complex stiffness and its noise.
+"""Operating points from raw stepped-sine histories: the steps are found, and each gives a complex stiffness.
 
-A history is cut into cycles at the upward crossings of its displacement, cycles that agree become steps, and each step
-is evaluated by least squares on all of its steady cycles at once.
+A history is cut into cycles at the upward crossings of its displacement. Cycles that agree make a step, and a step is
+evaluated by one least-squares fit to all of its steady cycles.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,101 +15,30 @@ from numpy.typing import NDArray
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
 from bushfit.reading.measurement import Complex, Floats, Loop
-from bushfit.reduction.cycles import Cycles, keeps_changing, mean_from_steady, pieces, wild_rows
+from bushfit.reduction.cycles import Cycles, keeps_changing, lone_outliers, mean_from_steady, pieces
 from bushfit.reduction.harmonics import HarmonicFit
-from bushfit.units import number
+from bushfit.reduction.result import Reduction, Skipped, Step
 
+#: Rows a cycle that make a point; chosen: drift and fundamental have five unknowns.
 _FEWEST_ROWS_PER_CYCLE = 5.0
-#: A frequency that changes by this share within a step, or differs by it between steps.
+#: Relative difference up to which two frequencies are one; chosen: rigs keep theirs far better, and grids are coarser.
 _SAME_FREQUENCY = 2e-3
-#: While a controller swings in, the frequency may be off by this share, and a step by so much from start to end.
-_SWINGING = 0.01
-#: An amplitude that changes by this share within a step, and both by so many standard errors.
-_SAME_AMPLITUDE, _SURELY = 0.03, 4.0
-#: A sine that goes on after fewer cycles, as far from its phase as this [cycles], was interrupted and not stopped.
-_INTERRUPTED, _IN_PHASE = 3.1, 0.05
-#: Amplitudes further apart than this are levels of their own.
+#: Relative change or difference up to which a frequency may be one at which a controller settles.
+_SETTLING_FREQUENCY = 0.01
+#: Relative change up to which the amplitude of a step is one; chosen: |K| changes by far less.
+_SAME_AMPLITUDE = 0.03
+#: Standard errors beyond which a change over a step is real; chosen: noise hardly ever goes that far.
+_REAL_CHANGE = 4.0
+#: [cycles] Longest interruption of a sine, beyond which it has stopped: three cycles, give or take a tenth.
+_LONGEST_INTERRUPTION = 3.1
+#: [cycles] Distance from its phase up to which a sine goes on; chosen: another start meets it once in ten times.
+_SAME_PHASE = 0.05
+#: [ln of an amplitude] Gap from which amplitudes are levels of their own; chosen: rigs miss a level by less.
 _LEVEL_GAP = 0.1
-#: A step belongs to a level that is stated if it lies within this share of it.
+#: Relative distance up to which a step belongs to a level that is stated; chosen: rigs miss a level by less.
 _LEVEL_REACH = 0.3
-#: What is said: amplitudes off their level by this share, fewer rows a cycle, more distortion of the displacement, and
-#: how many stretches that make no point.
-_MISSED, _COARSE, _DISTORTED, _MOST_TOLD = 0.03, 12, 0.02, 5
-
-
+#: Why a stretch makes no point whose frequency or amplitude is not steady.
 _CHANGING = "its frequency or amplitude keeps changing"
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """One operating point, as the steady cycles of one step give it.
-
-    Args:
-        name: of the history.
-        start, end: of the cycles used [s].
-        cycles: whole cycles used; found: cycles of the whole step.
-        rows_per_cycle: mean number of rows in a cycle.
-        frequency: fundamental [Hz].
-        amplitude: of the displacement's fundamental, zero-to-peak, as really reached [m or rad].
-        stiffness: complex K = F1/X1 [N/m or N m/rad].
-        gain_error: standard error of |K|, relative to |K|.
-        phase_error: standard error of the phase of K [rad].
-        displacement_distortion, force_distortion: total harmonic distortion, relative to the fundamental.
-        nominal_frequency, level: frequency [Hz] and amplitude [m or rad] of the group of steps it belongs to.
-        repeat: number of this step among those at the same nominal frequency and level, from 1.
-    """
-
-    name: str
-    start: float
-    end: float
-    cycles: int
-    found: int
-    rows_per_cycle: float
-    frequency: float
-    amplitude: float
-    stiffness: complex
-    gain_error: float
-    phase_error: float
-    displacement_distortion: float
-    force_distortion: float
-    nominal_frequency: float = 0.0
-    level: float = 0.0
-    repeat: int = 1
-
-    @property
-    def loss_factor(self) -> float:
-        return self.stiffness.imag / self.stiffness.real
-
-
-@dataclass(frozen=True, eq=False)
-class Skipped:
-    """A stretch of a history with cycles that make no operating point, and why; steady where it has enough cycles of
-    one frequency and amplitude, and is no mere ramp or pause."""
-
-    name: str
-    start: float
-    end: float
-    why: str
-    steady: bool
-
-
-@dataclass(frozen=True, eq=False)
-class Reduction:
-    """What histories of one direction were reduced to: steps in the order of the histories and of time, stretches
-    that make none, and the number of wild rows that were left out."""
-
-    direction: Direction
-    steps: tuple[Step, ...]
-    skipped: tuple[Skipped, ...]
-    wild: int = 0
-
-    def array(self, name: str) -> NDArray[np.generic]:
-        """One quantity of all steps, (n,)."""
-        return np.array([getattr(step, name) for step in self.steps])
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        return tuple(_warnings(self))
 
 
 def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequence[float] = ()) -> Reduction:
@@ -119,13 +47,13 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
     Args:
         histories: time, displacement and force, of one direction; steps may be joined by ramps and pauses.
         fewest_cycles: steady cycles that make a point.
-        levels: amplitudes the test was meant to have [m or rad]; without them amplitudes group where they lie close.
+        levels: amplitudes the test was meant to have [m or rad]; without them, amplitudes that lie close make a level.
 
     Raises:
         MeasurementError: no steady sine in any of them, or one far off every level.
     """
-    sound = [_without_wild_rows(history) for history in histories]
-    wild = sum(one.time.size for one in histories) - sum(one.time.size for one in sound)
+    sound = [_without_outliers(history) for history in histories]
+    outliers = sum(one.time.size for one in histories) - sum(one.time.size for one in sound)
     found = [_steps_of(history, fewest_cycles) for history in sound]
     steps = [step for some, _ in found for step in some]
     skipped = tuple(skip for _, some in found for skip in some)
@@ -140,17 +68,17 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
         )
     direction = histories[0].direction
     _check_reach(steps, levels, direction)
-    return Reduction(direction, tuple(_grouped(steps, levels)), skipped, wild)
+    return Reduction(direction, tuple(_grouped(steps, levels)), skipped, outliers)
 
 
-def _without_wild_rows(history: Loop) -> Loop:
-    """A history without the rows at which one of its channels lies alone far off; the fits need no even clock."""
-    kept = ~(wild_rows(history.time, history.displacement) | wild_rows(history.time, history.force))
+def _without_outliers(history: Loop) -> Loop:
+    """A history without the rows in which a channel is an outlier; the fits need no even clock."""
+    kept = ~(lone_outliers(history.time, history.displacement) | lone_outliers(history.time, history.force))
     return replace(history, **{name: getattr(history, name)[kept] for name in ("time", "displacement", "force")})
 
 
 def sines(history: Loop) -> list[tuple[float, float, int]]:
-    """Frequency [Hz], rough amplitude [m or rad] and cycles of each stretch of one frequency and amplitude."""
+    """Frequency [Hz], rough amplitude [m or rad] and number of cycles of each steady stretch of a history."""
     cycles = Cycles.of(history.time, history.displacement)
     found = []
     for run in cycles.runs():
@@ -165,6 +93,7 @@ def sines(history: Loop) -> list[tuple[float, float, int]]:
 
 
 def _steps_of(history: Loop, fewest: int) -> tuple[list[Step], list[Skipped]]:
+    """The steps of a history with `fewest` cycles or more, and the stretches that make none."""
     found: list[tuple[float, float, Step]] = []
     skipped: list[Skipped] = []
     cycles = Cycles.of(history.time, history.displacement)
@@ -189,15 +118,20 @@ def _steps_of(history: Loop, fewest: int) -> tuple[list[Step], list[Skipped]]:
 
 
 def _joined(found: Sequence[tuple[float, float, Step]]) -> list[Step]:
-    """Steps with the start and end of the cycles they were taken from; of two that are parts of one, the longer.
+    """The steps of a history, and only the longest part of one that fell into several.
 
-    A wild row, or an amplitude that creeps, parts a step: the sine goes on in phase, after a cycle or two at most.
+    Args:
+        found: steps with start and end of the cycles they were taken from [s].
+
+    Notes:
+        An outlier, or an amplitude that creeps, breaks a step: its sine goes on in phase after a cycle or two.
     """
     kept: list[Step] = []
     last_end = -np.inf
     for start, end, step in found:
         gap = (start - last_end) * step.frequency
-        if gap < _INTERRUPTED and abs(gap - round(gap)) < _IN_PHASE and _same_point(kept[-1], step):
+        goes_on = gap < _LONGEST_INTERRUPTION and abs(gap - round(gap)) < _SAME_PHASE
+        if goes_on and _same_point(kept[-1], step):
             kept[-1] = max(kept[-1], step, key=lambda one: one.found)
         else:
             kept.append(step)
@@ -206,16 +140,16 @@ def _joined(found: Sequence[tuple[float, float, Step]]) -> list[Step]:
 
 
 def _same_point(one: Step, other: Step) -> bool:
-    """Whether two steps in a row are one: near in frequency and amplitude, or nearly so and one is brief."""
+    """Whether two steps in a row are one by frequency and amplitude; if one is brief, they may differ by more."""
     brief = 2 * min(one.found, other.found) < max(one.found, other.found)
     return (
-        abs(np.log(one.frequency / other.frequency)) < (_SWINGING if brief else _SAME_FREQUENCY)
+        abs(np.log(one.frequency / other.frequency)) < (_SETTLING_FREQUENCY if brief else _SAME_FREQUENCY)
         and abs(np.log(one.amplitude / other.amplitude)) < _LEVEL_GAP
     )
 
 
 def _unusable(cycles: Cycles, inside: slice, fewest: int) -> str:
-    """Why some cycles make no point, as far as that is seen without a fit."""
+    """Why some cycles make no point, as far as that shows without a fit; empty where they may make one."""
     count = inside.stop - inside.start
     frequency = count / (cycles.edges[inside.stop] - cycles.edges[inside.start])
     if count < fewest:
@@ -227,14 +161,23 @@ def _unusable(cycles: Cycles, inside: slice, fewest: int) -> str:
 
 
 def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: Complex, fewest: int) -> Step | None:
-    """The point of one piece of cycles, its transient left out; None where it is not steady."""
+    """The operating point of one piece of cycles, less its transient; None where it is not steady.
+
+    Args:
+        history: the record.
+        cycles: all cycles of the record.
+        inside: the piece, k of them.
+        motion: complex fundamental of the displacement in each cycle of the piece [m or rad], (k,).
+        force: complex fundamental of the force in each cycle of the piece [N or N m], (k,).
+        fewest: steady cycles that make a point.
+    """
     steady = mean_from_steady(motion, force / motion, fewest)
     used = slice(inside.start + steady.start, inside.start + steady.stop)
     edges = cycles.edges[used.start : used.stop + 1]
     count = used.stop - used.start
     own = motion[steady]
     starts = edges[:-1] - np.angle(1j * own) / (2.0 * np.pi) * np.diff(edges)  # nearer than single crossings are
-    if _creeps(np.log(np.diff(starts)), _SWINGING) or _creeps(np.log(np.abs(own)), _SAME_AMPLITUDE):
+    if _creeps(np.log(np.diff(starts)), _SETTLING_FREQUENCY) or _creeps(np.log(np.abs(own)), _SAME_AMPLITUDE):
         return None
     rows = slice(cycles.first_rows[used.start], cycles.first_rows[used.stop])
     fit = HarmonicFit.of(history.time[rows], history.displacement[rows], history.force[rows], edges)
@@ -259,7 +202,7 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
 
 
 def _creeps(values: Floats, least: float) -> bool:
-    """Whether values change steadily from first to last, by that much and beyond their scatter."""
+    """Whether values, (n,), change steadily from first to last, by more than `least` and beyond their scatter."""
     if values.size < 3:
         return False
     number = np.arange(values.size) - (values.size - 1) / 2.0
@@ -267,7 +210,7 @@ def _creeps(values: Floats, least: float) -> bool:
     slope = float(number @ values) / squares
     left = values - values.mean() - slope * number
     error = np.sqrt(float(left @ left) / max(values.size - 2, 1) / squares)
-    return bool(abs(slope) * values.size > least and abs(slope) > _SURELY * error)
+    return bool(abs(slope) * values.size > least and abs(slope) > _REAL_CHANGE * error)
 
 
 def _check_reach(steps: Sequence[Step], levels: Sequence[float], direction: Direction) -> None:
@@ -305,59 +248,9 @@ def _grouped(steps: Sequence[Step], levels: Sequence[float]) -> list[Step]:
 
 
 def _clusters(values: Floats, gap: float) -> NDArray[np.intp]:
-    """Number of the group of each value: groups lie further apart than `gap`, neighbours in one do not."""
+    """Number of the group of each value, (n,): neighbours in a group lie no further apart than `gap`, groups do."""
     order = np.argsort(values)
     number = np.concatenate(([0], np.cumsum(np.diff(values[order]) > gap)))
     groups = np.empty(values.size, dtype=np.intp)
     groups[order] = number
     return groups
-
-
-def _warnings(reduction: Reduction) -> Iterator[str]:
-    unit, factor = reduction.direction.display.displacement
-    steps = reduction.steps
-    if reduction.wild:
-        yield f"{reduction.wild} row{'s' * (reduction.wild > 1)} far off the rows around left out"
-    slope = _amplitude_slope(steps)
-    for level in sorted({step.level for step in steps}):
-        mine = [step for step in steps if step.level == level]
-        off = np.array([step.amplitude / level - 1.0 for step in mine])
-        if np.abs(off).max() > _MISSED:
-            low, high = (factor * level * (1.0 + end) for end in (off.min(), off.max()))
-            yield (
-                f"the rig reached {low:.4g} to {high:.4g} {unit} at the level of {factor * level:.4g} {unit}: |K| "
-                f"there is up to {number(100 * abs(slope) * np.abs(off).max(), 2)} % off that at the level (fits count "
-                "with what was reached)"
-            )
-    coarse = [step for step in steps if step.rows_per_cycle < _COARSE]
-    if coarse:
-        worst = min(coarse, key=lambda step: step.rows_per_cycle)
-        yield (
-            f"{len(coarse)} of {len(steps)} points have fewer than {_COARSE} rows a cycle ({worst.rows_per_cycle:.3g} "
-            f"at {worst.frequency:.4g} Hz): overtones above half the sampling rate may fold onto the fundamental"
-        )
-    bent = [step for step in steps if step.displacement_distortion > _DISTORTED]
-    if bent:
-        worst = max(bent, key=lambda step: step.displacement_distortion)
-        yield (
-            f"the displacement is no clean sine at {len(bent)} of {len(steps)} points: up to "
-            f"{number(100 * worst.displacement_distortion, 2)} % harmonic distortion ({worst.frequency:.4g} Hz, "
-            f"{factor * worst.amplitude:.3g} {unit})"
-        )
-    rejected = [skip for skip in reduction.skipped if skip.steady]
-    for skip in rejected[:_MOST_TOLD]:
-        yield f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s makes no point: {skip.why}"
-    if len(rejected) > _MOST_TOLD:
-        yield f"{len(rejected) - _MOST_TOLD} more stretches make no point"
-
-
-def _amplitude_slope(steps: Sequence[Step]) -> float:
-    """d ln|K| / d ln X: of the smallest and largest amplitude at one frequency, the steepest; 0 where there is one."""
-    slopes = [0.0]
-    for frequency in {step.nominal_frequency for step in steps}:
-        same = sorted((step for step in steps if step.nominal_frequency == frequency), key=lambda step: step.amplitude)
-        for one, other in pairwise(same):
-            if other.level != one.level:
-                change = np.log(abs(other.stiffness / one.stiffness)) / np.log(other.amplitude / one.amplitude)
-                slopes.append(float(change))
-    return max(slopes, key=abs)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
     from bushfit.model.model import Model
     from bushfit.prediction import Prediction
-    from bushfit.reduction.steps import Reduction
+    from bushfit.reduction.result import Reduction
 
 
 def prediction_table(prediction: Prediction) -> pd.DataFrame:

@@ -1,4 +1,4 @@
-"""Recorded channels: gaps, stuck rows, cut-off tops and wild rows told with their row, and nothing of a sound one."""
+"""Recorded channels: gaps, stuck rows, cut-off tops and outliers told with their row, and nothing of a sound one."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ def test_stuck_and_cut_off_channels_are_told(sound: Loop) -> None:
     assert top.endswith("rows hold exactly 400 N")
 
 
-def test_wild_rows_are_listed_with_their_neighbours_three_at_most(sound: Loop) -> None:
+def test_outliers_are_listed_with_their_neighbours_three_at_most(sound: Loop) -> None:
     force = sound.force.copy()
     force[[100, 900, 1700, 2500]] += 100.0
     (told,) = odd_channels(replace(sound, force=force))
-    assert told.startswith("the force is wild at data row 101 (")
+    assert told.startswith("the force has an outlier at data row 101 (")
     assert "data row 1701 (" in told
     assert told.endswith(" and 1 more")
 

@@ -69,9 +69,9 @@ LOOP_FAULTS: dict[str, tuple[Callable[[Loop], Loop], str]] = {
         lambda x: replace(x, force=x.force * (1.0 + 0.1 * np.exp(-x.time / 20.0))),
         "the cycles are still settling: the force amplitude goes from",
     ),
-    "wild row": (
+    "outlier row": (
         lambda x: replace(x, force=x.force + np.where(np.arange(x.force.size) == 700, 90.0, 0.0)),
-        "the force is wild at data row 701",
+        "the force has an outlier at data row 701",
     ),
     "gap": (
         lambda x: replace(x, **{key: np.delete(getattr(x, key), slice(300, 330)) for key in CHANNELS}),

@@ -31,7 +31,7 @@ SWEEP_FAULTS: dict[str, tuple[Callable[[Sweep], Sweep], str]] = {
         lambda x: without(x, (x.amplitude == 2e-4) & np.isin(x.frequency, (45.0, 55.0))),
         "0.2 mm, repeat 1, lacks 45, 55 Hz, which most others have",
     ),
-    "wild point": (
+    "outlier point": (
         lambda x: spoiled(x, np.arange(x.repeat.size) == 20, 1.15),
         "data row 21 (45 Hz, 0.1 mm, repeat 2) is +1",
     ),

@@ -32,7 +32,7 @@ def test_clean_tests_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str)
 
 @pytest.mark.parametrize("rig", NOISE)
 def test_clean_loops_without_time_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str) -> None:
-    """Time rebuilt from a noisy motion is uneven at its turning points; rows there are no wilder for it."""
+    """Time rebuilt from a noisy motion is uneven at its turning points; rows there are no outliers for it."""
     raised, file = [], tmp_path / "axial.csv"
     for seed in range(SEEDS):
         loops = measure(clean, plan(seed=seed, **NOISE[rig])).loops

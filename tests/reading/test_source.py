@@ -10,7 +10,7 @@ import pytest
 
 from bushfit.reading.layout import Layout
 from bushfit.reading.numerals import Numerals
-from bushfit.reading.source import Sheet, Source, Text, rows
+from bushfit.reading.source import RowSource, Sheet, Text, rows
 
 FILE = Path("x.csv")
 SEMICOLONS = Layout(";", ("time", "force"), 1, ("", ""), None)
@@ -27,13 +27,13 @@ SOURCES = [
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=["text", "sheet"])
-def test_filled_lines_have_the_number_that_an_editor_shows(source: Source) -> None:
+def test_filled_lines_have_the_number_that_an_editor_shows(source: RowSource) -> None:
     assert [line.number for line in source.head()] == [1, 4, 5]
     assert [line.number for line in source.lines(4)] == [5]
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=["text", "sheet"])
-def test_rows_of_data_are_cells_below_the_header(source: Source) -> None:
+def test_rows_of_data_are_cells_below_the_header(source: RowSource) -> None:
     assert list(rows(source, SEMICOLONS)) == [(4, ["1", "2"]), (5, ["3", "4"])]
 
 

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from bushfit.reduction.cycles import (
     Cycles,
     keeps_changing,
-    least_turn,
+    least_prominence,
+    lone_outliers,
     mean_from_steady,
     pieces,
     turning_points,
-    wild_rows,
 )
 
 RATE = 1000.0
@@ -99,18 +99,18 @@ def test_noise_makes_no_turning_point(size: float) -> None:
     """The least turn lies above what noise does from row to row, and below the motion."""
     motion = np.sin(np.arange(4000) * 2.0 * np.pi / 400.0)
     motion = motion + size * np.random.default_rng(2).standard_normal(motion.size)
-    least = least_turn(motion)
+    least = least_prominence(motion)
     assert least < 2.0
     assert turning_points(motion, least).size == pytest.approx(21, abs=1)
 
 
-def test_a_row_alone_far_off_its_neighbours_is_wild() -> None:
+def test_a_row_alone_far_off_its_neighbours_is_an_outlier() -> None:
     time, motion = chirped(np.full(2000, 5.0), 1e-3)
-    assert not wild_rows(time, motion).any()
+    assert not lone_outliers(time, motion).any()
     motion[700] += 2e-4
-    assert np.flatnonzero(wild_rows(time, motion)).tolist() == [700]
+    assert np.flatnonzero(lone_outliers(time, motion)).tolist() == [700]
     corner = 1e-3 * np.abs((time * 10.0) % 2.0 - 1.0)
-    assert not wild_rows(time, corner).any()
+    assert not lone_outliers(time, corner).any()
 
 
 @settings(max_examples=200, deadline=None)

@@ -15,7 +15,8 @@ from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop
-from bushfit.reduction.steps import Reduction, reduce
+from bushfit.reduction.result import Reduction
+from bushfit.reduction.steps import reduce
 
 FREQUENCIES = (5.0, 25.0, 100.0, 101.0, 155.0)
 #: The rig misses 0.1, 0.2 and 0.5 mm.
@@ -146,7 +147,7 @@ LOGGERS = {
     "plain": lambda values, _: values,
     "12 bit": lambda values, _: np.round(values / np.ptp(values) * 3000.0) * np.ptp(values) / 3000.0,
     "offset and drift": lambda values, _: values + np.ptp(values) * (2.0 + np.linspace(0.0, 0.3, values.size)),
-    "wild rows": lambda values, random: values + np.ptp(values) * 0.1 * (random.random(values.size) < 1e-4),
+    "outliers": lambda values, random: values + np.ptp(values) * 0.1 * (random.random(values.size) < 1e-4),
 }
 
 

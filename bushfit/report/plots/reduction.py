@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from bushfit.effects.contract import Array
 from bushfit.reading.measurement import Loop
-from bushfit.reduction.steps import Reduction, Step
+from bushfit.reduction.result import Reduction, Step
 from bushfit.report.plots.style import (
     GREY,
     POINT,

@@ -1,0 +1,160 @@
+"""What raw histories are reduced to: operating points, stretches that make none, and what is to be said of both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bushfit.geometry import Direction
+from bushfit.units import number
+
+#: Relative distance of an amplitude from its level that is told; chosen: |K| may then be 1 % off.
+_MISSED_LEVEL = 0.03
+#: Rows a cycle below which a warning is due; chosen: that many tell overtones up to the sixth apart.
+_FEW_ROWS_PER_CYCLE = 12
+#: Harmonic distortion of the displacement from which a warning is due; chosen: rigs in order have less.
+_DISTORTED = 0.02
+#: Stretches without a point that are told one by one; chosen: about as many lines as a screen has room for.
+_MOST_TOLD = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """The operating point that the steady cycles of one step give.
+
+    Args:
+        name: of the history.
+        start, end: of the cycles used [s].
+        cycles: whole cycles used.
+        found: cycles of the whole step.
+        rows_per_cycle: mean number of rows in a cycle.
+        frequency: fundamental [Hz].
+        amplitude: of the displacement's fundamental, zero-to-peak, as really reached [m or rad].
+        stiffness: complex K = F1/X1 [N/m or N m/rad].
+        gain_error: standard error of |K|, relative to |K|.
+        phase_error: standard error of the phase of K [rad].
+        displacement_distortion, force_distortion: total harmonic distortion, relative to the fundamental.
+        nominal_frequency, level: frequency [Hz] and amplitude [m or rad] of the group of steps that it belongs to.
+        repeat: number of this step among those at the same nominal frequency and level, from 1.
+    """
+
+    name: str
+    start: float
+    end: float
+    cycles: int
+    found: int
+    rows_per_cycle: float
+    frequency: float
+    amplitude: float
+    stiffness: complex
+    gain_error: float
+    phase_error: float
+    displacement_distortion: float
+    force_distortion: float
+    nominal_frequency: float = 0.0
+    level: float = 0.0
+    repeat: int = 1
+
+    @property
+    def loss_factor(self) -> float:
+        """Loss over storage stiffness."""
+        return self.stiffness.imag / self.stiffness.real
+
+
+@dataclass(frozen=True, eq=False)
+class Skipped:
+    """A stretch of a history with cycles that make no operating point.
+
+    Args:
+        name: of the history.
+        start, end: of the stretch [s].
+        why: why it makes none.
+        steady: whether it has as many cycles as a step needs, and is no mere ramp or pause.
+    """
+
+    name: str
+    start: float
+    end: float
+    why: str
+    steady: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Reduction:
+    """What histories of one direction were reduced to.
+
+    Args:
+        direction: of the test.
+        steps: in the order of the histories and of time.
+        skipped: stretches that make no step.
+        outliers: number of rows that were left out as outliers.
+    """
+
+    direction: Direction
+    steps: tuple[Step, ...]
+    skipped: tuple[Skipped, ...]
+    outliers: int = 0
+
+    def array(self, name: str) -> NDArray[np.generic]:
+        """One quantity of all steps by its name in `Step`, (n,)."""
+        return np.array([getattr(step, name) for step in self.steps])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on what makes the points less good than they could be."""
+        return tuple(_warnings(self))
+
+
+def _warnings(reduction: Reduction) -> Iterator[str]:
+    """Sentences on outliers, missed levels, sampling, distortion, and stretches that make no point."""
+    unit, factor = reduction.direction.display.displacement
+    steps = reduction.steps
+    if reduction.outliers:
+        yield f"{reduction.outliers} row{'s' * (reduction.outliers > 1)} far off the rows around left out"
+    slope = _amplitude_slope(steps)
+    for level in sorted({step.level for step in steps}):
+        off = np.array([step.amplitude / level - 1.0 for step in steps if step.level == level])
+        if np.abs(off).max() > _MISSED_LEVEL:
+            low, high = (factor * level * (1.0 + end) for end in (off.min(), off.max()))
+            yield (
+                f"the rig reached {low:.4g} to {high:.4g} {unit} at the level of {factor * level:.4g} {unit}: |K| "
+                f"there is up to {number(100 * abs(slope) * np.abs(off).max(), 2)} % off that at the level (fits count "
+                "with what was reached)"
+            )
+    coarse = [step for step in steps if step.rows_per_cycle < _FEW_ROWS_PER_CYCLE]
+    if coarse:
+        worst = min(coarse, key=lambda step: step.rows_per_cycle)
+        yield (
+            f"{len(coarse)} of {len(steps)} points have fewer than {_FEW_ROWS_PER_CYCLE} rows a cycle "
+            f"({worst.rows_per_cycle:.3g} at {worst.frequency:.4g} Hz): overtones above half the sampling rate may "
+            "fold onto the fundamental"
+        )
+    bent = [step for step in steps if step.displacement_distortion > _DISTORTED]
+    if bent:
+        worst = max(bent, key=lambda step: step.displacement_distortion)
+        yield (
+            f"the displacement is no clean sine at {len(bent)} of {len(steps)} points: up to "
+            f"{number(100 * worst.displacement_distortion, 2)} % harmonic distortion ({worst.frequency:.4g} Hz, "
+            f"{factor * worst.amplitude:.3g} {unit})"
+        )
+    rejected = [skip for skip in reduction.skipped if skip.steady]
+    for skip in rejected[:_MOST_TOLD]:
+        yield f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s makes no point: {skip.why}"
+    if len(rejected) > _MOST_TOLD:
+        yield f"{len(rejected) - _MOST_TOLD} more stretches make no point"
+
+
+def _amplitude_slope(steps: Sequence[Step]) -> float:
+    """Steepest d ln|K| / d ln X between neighbouring levels at one frequency; 0 where there is only one level."""
+    slopes = [0.0]
+    for frequency in {step.nominal_frequency for step in steps}:
+        same = sorted((step for step in steps if step.nominal_frequency == frequency), key=lambda step: step.amplitude)
+        for one, other in pairwise(same):
+            if other.level != one.level:
+                change = np.log(abs(other.stiffness / one.stiffness)) / np.log(other.amplitude / one.amplitude)
+                slopes.append(float(change))
+    return max(slopes, key=abs)
