@@ -1,4 +1,4 @@
-"""A fitted model as evidence: its residuals, and what any direction orthogonal to its own parameters would gain."""
+"""A model fitted to all tests of a campaign, with the figures by which models are compared."""
 
 from __future__ import annotations
 
@@ -15,13 +15,18 @@ from bushfit.fitting.descent import Descent
 from bushfit.fitting.solve import Bounds, Solution
 from bushfit.model.model import Model
 
-#: Evaluations after which a model that fits badly is taken as it is.
+#: Evaluations of the model in one fit at most; a model that fits badly is then taken as it is.
 EVALUATIONS = 40
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """A model fitted to all tests of a campaign."""
+    """A model fitted to all tests of a campaign.
+
+    Args:
+        solution: where the fit ended.
+        data_sets: the tests.
+    """
 
     solution: Solution
     data_sets: tuple[DataSet, ...]
@@ -45,7 +50,7 @@ class Evidence:
 
     @property
     def reduced(self) -> float:
-        """Mean square residual; 1 where only noise is left."""
+        """Reduced chi-square; 1 where only noise is left."""
         return self.chi_square / max(self.counted - self.parameters, 1)
 
     @property
@@ -70,18 +75,18 @@ class Evidence:
         return basis[:, size > 1e-10 * size[0]]
 
     def beside(self, columns: Array) -> Array:
-        """Columns (c, n) less what the model's own parameters absorb of them."""
+        """What is left of columns, (c, n), when the model's own parameters have absorbed what they can."""
         return columns - (columns @ self._span) @ self._span.T
 
     @cached_property
     def slices(self) -> list[slice]:
-        """Where each data set's residuals stand."""
+        """Place of each data set's residuals among all."""
         ends = np.cumsum([data_set.size for data_set in self.data_sets])
         return [slice(int(end - data_set.size), int(end)) for end, data_set in zip(ends, self.data_sets, strict=True)]
 
     @cached_property
     def blocks(self) -> list[Array]:
-        """Indices of the residuals of each block and part (gain, phase) of the sweeps, which share an error."""
+        """Indices of the residuals that share an error: one array per block and part (gain, phase) of the sweeps."""
         groups = []
         for data_set, place in zip(self.data_sets, self.slices, strict=True):
             if not isinstance(data_set, SweepData):
@@ -94,7 +99,7 @@ class Evidence:
 
     @property
     def shared_freedom(self) -> int:
-        """Degrees of freedom behind the errors that blocks share; 0 where these are not measured."""
+        """Degrees of freedom of the measured variance that blocks share; 0 where it was not measured."""
         sweeps = [data_set for data_set in self.data_sets if isinstance(data_set, SweepData)]
         return sweeps[0].noise.freedom if sweeps else 0
 
@@ -106,10 +111,10 @@ def fit(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds:
         FitError: fewer data than parameters, or no finite response.
         ModelError: no response.
     """
-    descent = begun(model, data_sets, held, bounds).finished(EVALUATIONS)
+    descent = fit_from(model, data_sets, held, bounds).finished(EVALUATIONS)
     return Evidence(descent.solution, tuple(data_sets))
 
 
-def begun(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Descent:
-    """The same fit at its start."""
+def fit_from(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Descent:
+    """The same fit before its first step."""
     return Descent.start(model, data_sets, [name for name in model.parameters if name not in held], bounds)

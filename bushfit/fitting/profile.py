@@ -15,7 +15,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.assess import linear_errors, quality
 from bushfit.fitting.data_sets import DataSet
-from bushfit.fitting.solve import Bounds, Coordinates, Solution, solve, walls
+from bushfit.fitting.solve import Bounds, Coordinates, Solution, coordinate_bounds, solve
 from bushfit.model.result import Z95, Covariance
 
 #: Longest step of the search, in coordinates, which are of order one: one that the fit of the others follows.
@@ -152,7 +152,7 @@ def profile95(
             found=f"{len(names)} fitted",
             hint="leave out --profile, or hold fewer parameters in [fit]",
         )
-    start, limits = best.coordinates.point(best.model.values), np.transpose(walls(best.coordinates, bounds))
+    start, limits = best.coordinates.point(best.model.values), np.transpose(coordinate_bounds(best.coordinates, bounds))
     linear = linear_errors(best.jacobian)
     allowed = _allowed(best, data_sets, covariance, linear)
     found: dict[str, Interval] = {}
