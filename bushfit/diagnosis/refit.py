@@ -21,7 +21,7 @@ from bushfit.fitting.solve import Bounds
 
 #: Chi-square beyond that of the best at which a candidate is excluded without asking what the tests could tell.
 EXCLUDED = 60.0
-#: Chi-square of a fit may fall by this many times what a linear model expects: chosen, so that no winner is stopped.
+#: Fall of chi-square that a fit may yet make, over the fall that a linear model expects: chosen.
 _MOST_FALL = 4.0
 #: Evaluations of the model before which no refit is stopped.
 _FIRST_EVALUATIONS = 4

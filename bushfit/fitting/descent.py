@@ -1,7 +1,19 @@
-"""A fit that goes step by step: so that several can go side by side, and one that cannot win is left on its way.
+"""A least-squares fit that goes step by step: several can go side by side, and one that cannot win be stopped.
 
-Levenberg-Marquardt, damped as Nielsen does (Damping parameter in Marquardt's method, IMM-REP-1999-05, Lyngby 1999),
-bounds as walls: what a step would carry beyond one stays there, and the others go on without it.
+Diagnosis fits its candidates so. Everything else is fitted by lmfit, see `solve`, which ends at the same minimum.
+
+Notes:
+    Levenberg-Marquardt, damped as Nielsen does (Damping parameter in Marquardt's method, IMM-REP-1999-05, Lyngby
+    1999), with bounds: what a step would carry beyond one stays there, and the others go on without it.
+
+    Why a second optimiser: lmfit in its place was tried on the 300 campaigns of the score card of seed 11. This one
+    needs 0.4 s of processor time for a diagnosis on average, and less than 1.4 s for 99 % of them. From the same starts
+    lmfit's trust-region method changes 3 verdicts, and 99 % are within 2.6 s: the shape of an effect of no amount,
+    which the data do not see, runs to its bound. With candidates one after the other, stopped when they cannot win,
+    it changes 2 verdicts, within 2.0 s. Started at a tenth of the amount that the score test suggests, it changes 1
+    verdict (to the truth) and names an effect that is not there, within 1.6 s. Started at that amount, with 100
+    evaluations instead of 40, it changes the same verdict alone, and three lists of richer effects, within 2.2 s.
+    The rule was no verdict changed and 99 % within 2 s.
 """
 
 from __future__ import annotations
@@ -27,7 +39,7 @@ from bushfit.fitting.solve import (
 )
 from bushfit.model.model import Model
 
-#: Damping of the first step, relative to the curvature: next to none, the starts are good.
+#: Damping of the first step, relative to the curvature: next to none, the starts are good (usual for such methods).
 _FIRST_DAMPING = 1e-3
 #: Factor on the damping after a step that brought all it promised (Nielsen).
 _LEAST_DAMPING_RATIO = 1.0 / 3.0
