@@ -1,4 +1,4 @@
-"""A fitted model as evidence: its residuals, and what any direction orthogonal to its own parameters would gain."""
+"""A model fitted to all tests of a campaign, with the figures by which models are compared."""
 
 from __future__ import annotations
 
@@ -14,13 +14,18 @@ from bushfit.fitting.descent import Descent
 from bushfit.fitting.solve import Bounds, Solution
 from bushfit.model.model import Model
 
-#: Evaluations after which a model that fits badly is taken as it is.
+#: Evaluations of the model in one fit at most; a model that fits badly is then taken as it is.
 EVALUATIONS = 40
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """A model fitted to all tests of a campaign."""
+    """A model fitted to all tests of a campaign.
+
+    Args:
+        solution: where the fit ended.
+        data_sets: the tests.
+    """
 
     solution: Solution
     data_sets: tuple[DataSet, ...]
@@ -44,7 +49,7 @@ class Evidence:
 
     @property
     def reduced(self) -> float:
-        """Mean square residual; 1 where only noise is left."""
+        """Reduced chi-square; 1 where only noise is left."""
         return self.chi_square / max(self.counted - self.parameters, 1)
 
     @property
@@ -69,7 +74,7 @@ class Evidence:
         return basis[:, size > 1e-10 * size[0]]
 
     def beside(self, columns: Array) -> Array:
-        """Columns (c, n) less what the model's own parameters absorb of them."""
+        """What is left of columns, (c, n), when the model's own parameters have absorbed what they can."""
         return columns - (columns @ self._span) @ self._span.T
 
     @cached_property
@@ -102,10 +107,10 @@ def fit(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds:
         FitError: fewer data than parameters, or no finite response.
         ModelError: no response.
     """
-    descent = begun(model, data_sets, held, bounds).finished(EVALUATIONS)
+    descent = fit_from(model, data_sets, held, bounds).finished(EVALUATIONS)
     return Evidence(descent.solution, tuple(data_sets))
 
 
-def begun(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Descent:
-    """The same fit at its start."""
+def fit_from(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Descent:
+    """The same fit before its first step."""
     return Descent.start(model, data_sets, [name for name in model.parameters if name not in held], bounds)

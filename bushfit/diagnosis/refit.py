@@ -1,4 +1,7 @@
-"""The best proposals fitted together with all parameters of the model, side by side, losers left on their way."""
+"""Candidate refits: the best proposals fitted together with all parameters of the model, side by side.
+
+A refit that cannot come near the best is stopped before its end.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bushfit.diagnosis.evidence import EVALUATIONS, Evidence, begun
+from bushfit.diagnosis.evidence import EVALUATIONS, Evidence, fit_from
 from bushfit.diagnosis.propose import Proposal, stroke
 from bushfit.effects import LIBRARY, qualified
 from bushfit.errors import FitError, ModelError
@@ -16,12 +19,14 @@ from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.solve import Bounds
 
-#: Rivals farther than this from the data than the best are excluded without asking what the test could tell.
-PLAIN = 60.0
-#: A fit may fall by this many times what a linear model yet promises.
-_HOPE = 4.0
-#: It is not left before its first evaluations, and before its early ones are over only if it claimed too little.
-_FIRST, _EARLY = 4, 12
+#: Chi-square beyond that of the best at which a candidate is excluded without asking what the tests could tell.
+EXCLUDED = 60.0
+#: Fall of chi-square that a fit may yet make, over the fall that a linear model expects: chosen.
+_MOST_FALL = 4.0
+#: Evaluations of the model before which no refit is stopped.
+_FIRST_EVALUATIONS = 4
+#: Evaluations before which a refit goes on where its proposal claimed to come near the best.
+_CLAIM_HOLDS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +35,9 @@ class Candidate:
 
     Args:
         name: the effect.
-        evidence: where its fit ended, or was left.
+        evidence: the fit at its end, or where it was stopped.
         gain: what it took off chi-square.
-        left: whether it was left on its way, far behind the best.
+        left: whether it was stopped before its end, far behind the best.
     """
 
     name: str
@@ -41,7 +46,7 @@ class Candidate:
     left: bool = False
 
 
-def race(
+def refits(
     evidence: Evidence,
     proposed: Sequence[Proposal],
     known: Sequence[Candidate],
@@ -49,45 +54,61 @@ def race(
     held: Sequence[str],
     bounds: Bounds,
 ) -> list[Candidate]:
-    """Proposals fitted until they settle or cannot come near the best, beside candidates known already; best first.
+    """Fit proposals until they converge or cannot come near the best; with the candidates known already, best first.
 
-    All begin at no amount of the effect, where the model stands but for the values given to start from.
+    Args:
+        evidence: the model without the effects, fitted.
+        proposed: the effects to fit, from no amount of each.
+        known: candidates that need no fit.
+        start: values of the model's own parameters to start from, where not its fitted ones.
+        held: parameters that do not move.
+        bounds: limits inside the parameters' own.
     """
-    runners: dict[str, Descent] = {}
+    fits: dict[str, Descent] = {}
     for proposal in proposed:
         limits = {**_within_stroke(evidence.data_sets, proposal.name), **bounds}
         with suppress(FitError, ModelError):  # no response with this effect: no candidate
-            runners[proposal.name] = begun(proposal.model.with_values(start), evidence.data_sets, held, limits)
+            fits[proposal.name] = fit_from(proposal.model.with_values(start), evidence.data_sets, held, limits)
     claimed = {proposal.name: evidence.chi_square - proposal.score for proposal in proposed}
     least = min((candidate.evidence.chi_square for candidate in known), default=np.inf)
-    running = list(runners)
+    running = list(fits)
     while running:
         for name in running:
-            runners[name] = runners[name].stepped()
-        least = min(least, *(runners[name].chi_square for name in running))
-        running = [name for name in running if hopeful(runners[name], least + PLAIN, claimed[name])]
-    fitted = [
+            fits[name] = fits[name].stepped()
+        least = min(least, *(fits[name].chi_square for name in running))
+        running = [name for name in running if can_reach(fits[name], least + EXCLUDED, claimed[name])]
+    refitted = [
         Candidate(
             name,
-            Evidence(runner.solution, evidence.data_sets),
-            evidence.chi_square - runner.chi_square,
-            left=not runner.settled and runner.evaluations < EVALUATIONS,
+            Evidence(fit.solution, evidence.data_sets),
+            evidence.chi_square - fit.chi_square,
+            left=not _ended(fit),
         )
-        for name, runner in runners.items()
+        for name, fit in fits.items()
     ]
-    return sorted([*known, *fitted], key=lambda candidate: candidate.evidence.bic)
+    return sorted([*known, *refitted], key=lambda candidate: candidate.evidence.bic)
 
 
-def hopeful(descent: Descent, goal: float, claimed: float = np.inf) -> bool:
-    """Whether a fit may yet bring chi-square below a goal; early on what was claimed for it counts too."""
-    if descent.settled or descent.evaluations >= EVALUATIONS:
+def can_reach(fit: Descent, goal: float, claimed: float = np.inf) -> bool:
+    """Whether a fit that goes on may yet bring chi-square below a goal.
+
+    Args:
+        fit: under way.
+        goal: chi-square to come below.
+        claimed: chi-square that its proposal expects; it counts in the first evaluations.
+    """
+    if _ended(fit):
         return False
-    early = descent.evaluations < _EARLY and claimed < goal
-    return early or descent.evaluations < _FIRST or descent.chi_square - _HOPE * descent.promise < goal
+    early = fit.evaluations < _FIRST_EVALUATIONS or (fit.evaluations < _CLAIM_HOLDS and claimed < goal)
+    return early or fit.chi_square - _MOST_FALL * fit.expected_fall < goal
+
+
+def _ended(fit: Descent) -> bool:
+    return fit.converged or fit.evaluations >= EVALUATIONS
 
 
 def _within_stroke(data_sets: Sequence[DataSet], name: str) -> Bounds:
-    """Limits of an effect's displacements to what the tests can show: a stop that is always met is no stop."""
+    """Limits of an effect's displacements [m] to what the tests can show: a stop that is always met is no stop."""
     effect = LIBRARY[name]
     scaled = [parameter for parameter in effect.parameters if parameter.scale == "displacement"]
     return {qualified(effect, parameter): stroke(data_sets) for parameter in scaled}

@@ -11,10 +11,10 @@ from functools import cached_property
 
 import numpy as np
 
-from bushfit.diagnosis.evidence import Evidence, begun, fit
+from bushfit.diagnosis.evidence import Evidence, fit, fit_from
 from bushfit.diagnosis.propose import Proposal, proposals
 from bushfit.diagnosis.record import Settings
-from bushfit.diagnosis.refit import PLAIN, Candidate, hopeful, race
+from bushfit.diagnosis.refit import EXCLUDED, Candidate, can_reach, refits
 from bushfit.diagnosis.score_test import SENSITIVITY_LEFT, ScoreTest
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data_sets import DataSet
@@ -141,7 +141,7 @@ class Search:
             fitted = {candidate.name for candidate in known}
             best = [claim for claim in proposed[:_MOST_REFITTED] if claim.score > least and claim.name not in fitted]
             start = self.start if not added and evidence.reduced > _BENT else {}
-            tried = race(evidence, best, known, start, self.held, self.bounds)
+            tried = refits(evidence, best, known, start, self.held, self.bounds)
             self.rounds[key] = Round(evidence, proposed, tuple(tried))
         return self.rounds[key]
 
@@ -195,7 +195,7 @@ class Search:
         rivals, richer = [], []
         clean = [data_set.noise_free(current.model) for data_set in current.data_sets]
         for rival in place.tried:
-            if rival.name == name or rival.evidence.chi_square - current.chi_square > PLAIN:
+            if rival.name == name or rival.evidence.chi_square - current.chi_square > EXCLUDED:
                 continue
             distance = self._distance(clean, rival)
             if distance < _CONTAINS and rival.evidence.parameters > current.parameters:
@@ -221,10 +221,10 @@ class Search:
         """Chi-square of the rival, fitted to what the model itself would have measured without noise; no further than
         it takes to see whether that is far or next to nothing."""
         try:
-            descent = begun(rival.evidence.model, clean, self.held, self.bounds)
+            descent = fit_from(rival.evidence.model, clean, self.held, self.bounds)
         except (FitError, ModelError):
             return float("inf")
-        while descent.chi_square > _CONTAINS and hopeful(descent, APART):
+        while descent.chi_square > _CONTAINS and can_reach(descent, APART):
             descent = descent.stepped()
         return descent.chi_square
 

@@ -1,4 +1,4 @@
-"""What a solution is worth: covariance and quality."""
+"""The uncertainty of a fit and how well it meets the data: covariance, quality, range measured, lack of fit."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ from bushfit.model.model import Model
 from bushfit.model.result import Quality, Range
 from bushfit.units import number
 
-#: Reduced chi-square beyond which noise alone is no explanation, in standard deviations.
+#: Distance of the reduced chi-square from 1 beyond which noise alone is no explanation, in standard deviations.
 _LACK_OF_FIT = 5.0
-#: Largest standard error of a combination of parameters, in a fit's coordinates, which are of order one.
-_OPEN = 1e3
+#: Standard error given to a combination of parameters that the data leave open, in coordinates, which are of order
+#: one: beyond all bounds, and small enough to cancel where a quantity does not depend on the combination.
+_LARGEST_ERROR = 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,16 +32,23 @@ class Stage:
 
 
 def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = None) -> Covariance:
-    """Covariance of everything a procedure estimated, each stage holding what the others found.
+    """Covariance of all parameters that a procedure estimated, each stage holding what the others found.
 
-    Each stage solves J_own (J_own^T d_own + J_rest^T d_rest + noise) = 0 for its own parameters while the rest
-    carry their own errors. With J_own^T = Q R this is Q^T J^T d = b, cov(b) = 1, which never squares the Jacobian.
-    Stacked over the stages it is M d = b, so that cov(d) = (M^-1 B) (M^-1 B)^T with cov(b) = B B^T. A joint fit is
-    the one-stage case, cov = (J J^T)^-1. Parameters `held` with a known covariance enter as they are. Where a
-    stage's residuals exceed its noise, its share is inflated by the reduced chi-square. The noise that weighs the
-    data is itself an estimate: what its error adds is counted as Kenward and Roger (1997) do, and how far the
-    covariance may be off for it goes along as `spread`. A combination that the data leave wholly open has a standard
-    error of _OPEN coordinates: beyond all bounds, and small enough to cancel where a quantity does not depend on it.
+    Args:
+        model: with the values found.
+        stages: the fits of the procedure; a joint fit is one stage, with the covariance (J J^T)^-1.
+        held: covariance of parameters that all stages held; they enter as they are.
+
+    Returns:
+        By parameter value. Where the residuals of a stage exceed its noise, its share is inflated by its reduced
+        chi-square. What the error of an estimated noise adds is counted as Kenward and Roger (1997) do, and how far
+        the covariance may be off for it goes along as `spread`.
+
+    Notes:
+        Each stage solves J_own (J_own^T d_own + J_rest^T d_rest + noise) = 0 for its own parameters while the rest
+        carry their own errors. With J_own^T = Q R this is Q^T J^T d = b, cov(b) = 1, which never squares the Jacobian.
+        Stacked over the stages it is M d = b, so that cov(d) = (M^-1 B) (M^-1 B)^T with cov(b) = B B^T. Singular values
+        of M below 1/_LARGEST_ERROR are lifted to it.
     """
     held = held or Covariance()
     names = (*held.names, *(name for stage in stages for name in stage.names))
@@ -71,19 +79,30 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
 
 
 def _inverse(system: Array) -> Array:
+    """Inverse of a square matrix, what is open limited to _LARGEST_ERROR."""
     left, values, right = np.linalg.svd(system)
-    return (right.T / np.maximum(values, 1.0 / _OPEN)) @ left.T
+    return (right.T / np.maximum(values, 1.0 / _LARGEST_ERROR)) @ left.T
 
 
 def linear_errors(slope: Array) -> Array:
-    """Standard errors (k,) of parameters from the derivatives (k, n) of whitened residuals, as `covariance` takes
-    them; in coordinates."""
+    """Standard errors of parameters in coordinates, (k,), from the derivatives of whitened residuals, (k, n).
+
+    The noise counts as known, and the data as met: `covariance` adds what these leave out.
+    """
     return np.linalg.norm(_inverse(np.linalg.qr(slope.T)[1]), axis=1)
 
 
 def _unsure(stages: Sequence[Stage], reactions: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
-    """Per estimated variance of the noise: how far the covariance moves with its standard error, and the covariance
-    that its error adds by giving the data wrong weights. The same variance may act in many data sets."""
+    """What each estimated variance of the noise does to the covariance, (k, k) each.
+
+    Args:
+        stages: the fits of a procedure.
+        reactions: of the parameters to the stage's own equations, (k, own), and the stage's basis, (own, n).
+
+    Returns:
+        Per variance, which may act in many data sets: how far the covariance moves with the standard error of the
+        variance, and the covariance that this error adds by giving the data wrong weights.
+    """
     parts: dict[Hashable, tuple[Array, Array]] = {}
     for stage, (reaction, basis) in zip(stages, reactions, strict=True):
         influence = reaction @ basis
@@ -110,11 +129,12 @@ def _reduced(model: Model, data_sets: Sequence[DataSet], parameters: int) -> tup
 
 
 def _inflation(reduced: float, freedom: int) -> float:
+    """Factor on the covariance: the reduced chi-square where noise alone does not explain it, else 1."""
     return reduced if reduced > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else 1.0
 
 
 def quality(model: Model, data_sets: Sequence[DataSet], parameters: int) -> Quality:
-    """NRMSE, reduced chi-square, number of residuals and relative noise over some data sets."""
+    """How well a model meets data sets: NRMSE, reduced chi-square, number of residuals, relative noise."""
     relative = np.concatenate([np.abs(data_set.relative(model)) for data_set in data_sets])
     noise = np.repeat([data_set.relative_noise for data_set in data_sets], [data_set.counted for data_set in data_sets])
     return Quality(
@@ -126,7 +146,7 @@ def quality(model: Model, data_sets: Sequence[DataSet], parameters: int) -> Qual
 
 
 def measured_range(model: Model, data_sets: Sequence[DataSet]) -> Range:
-    """Frequencies, equivalent strains and directions that the data sets reach."""
+    """Frequencies [Hz], equivalent strains and directions that the data sets reach."""
     f = np.concatenate([data_set.frequency for data_set in data_sets])
     e = np.concatenate([data_set.amplitude * model.bushing.unit_strain(data_set.direction) for data_set in data_sets])
     directions = tuple(
@@ -142,7 +162,7 @@ def lack_of_fit(model: Model, data_sets: Sequence[DataSet], parameters: int) -> 
 
 
 def misfit(model: Model, data_sets: Sequence[DataSet], parameters: int, advice: str = "") -> list[str]:
-    """A sentence where the model misses the data by more than their noise, with advice."""
+    """A sentence, with advice, where the model misses the data by more than their noise; else none."""
     reduced = lack_of_fit(model, data_sets, parameters)
     if reduced is None:
         return []

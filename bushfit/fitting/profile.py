@@ -15,19 +15,28 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.assess import linear_errors, quality
 from bushfit.fitting.data_sets import DataSet
-from bushfit.fitting.solve import Bounds, Coordinates, Solution, solve, walls
+from bushfit.fitting.solve import Bounds, Coordinates, Solution, coordinate_bounds, solve
 from bushfit.model.covariance import Z95, Covariance
-from bushfit.model.model import Model
 
-#: Longest step of the search, in coordinates, which are of order one.
-_STEP = 0.5
-#: Most evaluations for the fit of the others at one point, and the relative change at which it stops.
-_EVALUATIONS, _TOLERANCE = 100, 1e-7
-#: Noise that was itself estimated widens an interval by no more than this (Student's t of two degrees of freedom).
+#: Longest step of the search, in coordinates, which are of order one: one that the fit of the others follows.
+_LONGEST_STEP = 0.5
+#: First step of the search over the distance at which a parabola would end: the first step then passes most ends.
+_FIRST_REACH = 1.1
+#: Steps of the search to either side at most: beyond a hundred factors e a side counts as open.
+_MOST_STEPS = 200
+#: How closely an end is found, in steps: far closer than the three digits that are printed.
+_PRECISION = 1e-4
+#: Evaluations of the model for the fit of the others at one point at most: chosen, five to ten are the rule.
+_EVALUATIONS = 100
+#: Relative change of chi-square at which the fit of the others stops: far less than what the rise is compared with.
+_TOLERANCE = 1e-7
+#: Noise that was itself estimated widens an interval by no more than this factor (Student's t of two degrees of
+#: freedom).
 _WIDEST = 2.2
-#: Where more than this share of the rise is due to the bounds of others, and the end lies more than a coordinate
-#: away (a factor e), it is these bounds that hold it and not the data.
-_OTHERS, _FAR = 0.1, 1.0
+#: Share of the allowed rise that is due to the bounds of others from which on these may be what holds an end: chosen.
+_HELD_BY_OTHERS = 0.1
+#: Distance of such an end from the best value, in coordinates, from which on it is open: a factor e.
+_FAR = 1.0
 
 Interval = tuple[float | None, float | None]
 
@@ -36,61 +45,75 @@ Interval = tuple[float | None, float | None]
 class _Profile:
     """The rise of chi-square by the coordinate of one parameter, the others fitted anew.
 
-    Each fit starts from the nearest model that is known already.
+    Args:
+        name: the parameter.
+        best: the fit of all parameters.
+        data_sets: the data.
+        bounds: limits inside the parameters' own.
+        known: the fits made so far by coordinate, the best one among them; each new one starts from the nearest.
     """
 
     name: str
     best: Solution
     data_sets: Sequence[DataSet]
     bounds: Bounds
-    known: dict[float, Model]
+    known: dict[float, Solution]
 
     def value(self, at: float) -> float:
-        """Of the parameter."""
+        """Value of the parameter at a coordinate."""
         least, most = self.best.model.parameters[self.name].bounds  # exp(log(bound)) may lie beyond it
         return float(np.clip(Coordinates.of(self.best.model, [self.name]).values([at])[self.name], least, most))
 
     def fitted(self, at: float) -> Solution:
-        """The fit of the others, with the parameter held there."""
-        near = self.known[min(self.known, key=lambda known: abs(known - at))]
-        others = [name for name in self.best.coordinates.names if name != self.name]
-        found = solve(
-            near.with_values({self.name: self.value(at)}),
-            self.data_sets,
-            others,
-            self.bounds,
-            evaluations=_EVALUATIONS,
-            tolerance=_TOLERANCE,
-            strict=False,
-        )
-        self.known[at] = found.model
-        return found
+        """The fit of the others, with the parameter held at a coordinate."""
+        if at not in self.known:
+            near = self.known[min(self.known, key=lambda known: abs(known - at))].model
+            self.known[at] = solve(
+                near.with_values({self.name: self.value(at)}),
+                self.data_sets,
+                [name for name in self.best.coordinates.names if name != self.name],
+                self.bounds,
+                evaluations=_EVALUATIONS,
+                tolerance=_TOLERANCE,
+                strict=False,
+            )
+        return self.known[at]
 
     def root_rise(self, at: float) -> float:
         """Root of the rise over the least chi-square."""
         return float(np.sqrt(max(self.fitted(at).chi_square - self.best.chi_square, 0.0)))
 
-    def interval(self, start: float, walls: Array, step: float, allowed: float) -> Interval:
-        """Where the root of the rise reaches what is allowed, to either side of the best value; lmfit searches, in
-        steps that suit the parameter."""
-        from bushfit.fitting.interval import ends
+    def end(self, start: float, bound: float, step: float, allowed: float) -> float | None:
+        """Value at which the root of the rise reaches what is allowed; None where that side is open.
 
-        def at(steps: float) -> float:
-            return float(np.clip(start + step * steps, *walls))
+        The search goes from the best value towards the bound in steps, and then looks between the last two.
 
-        found = ends(lambda steps: self.root_rise(at(steps)) / allowed, *(walls - start) / step)
-        low, high = (
-            None if end is None or self._held_far(start, at(end), allowed) else self.value(at(end)) for end in found
-        )
-        return low, high
+        Args:
+            start: coordinate of the best value.
+            bound: coordinate of the lower or of the upper bound.
+            step: in coordinates.
+            allowed: root of the rise at the end.
+        """
+        from scipy.optimize import brentq
+
+        here = start
+        for _ in range(_MOST_STEPS):
+            ahead = bound if abs(bound - here) <= step else here + float(np.copysign(step, bound - here))
+            if self.root_rise(ahead) >= allowed:
+                end = brentq(lambda at: self.root_rise(at) - allowed, here, ahead, xtol=_PRECISION * step)
+                return None if self._held_far(start, end, allowed) else self.value(end)
+            if ahead == bound:
+                break
+            here = ahead
+        return None
 
     def _held_far(self, start: float, end: float, allowed: float) -> bool:
         """Whether it is the bounds of others that hold an end, and that far away."""
-        return abs(end - start) > _FAR and self._walled(end) > _OTHERS * allowed**2
+        return abs(end - start) > _FAR and self._bounded(end) > _HELD_BY_OTHERS * allowed**2
 
-    def _walled(self, end: float) -> float:
+    def _bounded(self, at: float) -> float:
         """How far chi-square would fall there if others could leave the bounds that they met on the way."""
-        found = self.fitted(end)
+        found = self.fitted(at)
         return 0.0 if set(found.at_bound) <= set(self.best.at_bound) else found.gain(self.best.at_bound)
 
 
@@ -129,14 +152,15 @@ def profile95(
             found=f"{len(names)} fitted",
             hint="leave out --profile, or hold fewer parameters in [fit]",
         )
-    start, walled = best.coordinates.point(best.model.values), np.transpose(walls(best.coordinates, bounds))
+    start, limits = best.coordinates.point(best.model.values), np.transpose(coordinate_bounds(best.coordinates, bounds))
     linear = linear_errors(best.jacobian)
     allowed = _allowed(best, data_sets, covariance, linear)
     found: dict[str, Interval] = {}
     for i, name in enumerate(names):
-        profile = _Profile(name, best, data_sets, bounds, {start[i]: best.model})
-        step = min(1.1 * allowed[i] * linear[i], _STEP)
-        found[name] = profile.interval(start[i], walled[i], step, allowed[i])
+        profile = _Profile(name, best, data_sets, bounds, {start[i]: best})
+        step = min(_FIRST_REACH * allowed[i] * linear[i], _LONGEST_STEP)
+        low, high = (profile.end(start[i], bound, step, allowed[i]) for bound in limits[i])
+        found[name] = low, high
         advance(name, len(names) - len(found))
     return found
 

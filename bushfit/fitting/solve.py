@@ -1,4 +1,4 @@
-"""The least-squares problem and its solution by lmfit: Levenberg-Marquardt, with walls where it meets a bound.
+"""Least-squares fits of a model's parameters to data sets, within bounds, by lmfit.
 
 A fit moves the logarithm of strictly positive parameters and the others in units of their typical size, so
 that every coordinate is of order one and two decades are a step like any other.
@@ -6,7 +6,7 @@ that every coordinate is of order one and two decades are a step like any other.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, lru_cache
@@ -27,12 +27,16 @@ if TYPE_CHECKING:
 
 Bounds = Mapping[str, tuple[float | None, float | None]]
 
+#: Relative change of chi-square, and of the point, at which a fit stops: far below what noise lets one see.
 _TOLERANCE = 1e-9
+#: Evaluations of the model in one fit at most: chosen, ten to forty are the rule.
 _MOST_EVALUATIONS = 400
-#: A combination of parameters that moves the residuals by less, relative to the most, is the noise of derivatives.
-_SEEN = 1e-10
+#: Smallest singular value of the derivatives that counts, relative to the largest: below it is their rounding.
+_LEAST_SINGULAR_VALUE = 1e-10
 #: A parameter this close to a bound rests on it, in coordinates, which are of order one however wide the bounds.
 _AT_BOUND = 1e-3
+#: How far inside the bounds a fit starts, relative to the room between them: the trust-region method needs some.
+_START_INSIDE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -69,8 +73,17 @@ class Coordinates:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where a fit ended: the model, whitened residuals (n,), their derivatives by coordinate (k, n),
-    model evaluations, the parameters that ended at a bound, with the end, and whether it was stopped on the way."""
+    """Where a fit ended.
+
+    Args:
+        model: the model with the values found.
+        coordinates: of the parameters that were fitted.
+        residual: whitened residuals, model less measured, (n,).
+        jacobian: their derivatives by coordinate, (k, n).
+        evaluations: of the model.
+        at_bound: the parameters that ended at a bound, and at which.
+        stopped: whether it was stopped before it had converged.
+    """
 
     model: Model
     coordinates: Coordinates
@@ -85,15 +98,16 @@ class Solution:
         return float(self.residual @ self.residual)
 
     def gain(self, beside: Collection[str]) -> float:
-        """How far a Gauss-Newton step of all parameters but those would lower chi-square."""
+        """By how much one Gauss-Newton step would lower chi-square, the parameters `beside` held."""
         free = [i for i, name in enumerate(self.coordinates.names) if name not in beside]
         left, values, _ = np.linalg.svd(self.jacobian[free].T, full_matrices=False)
-        seen = values > _SEEN * values.max(initial=0.0)
+        seen = values > _LEAST_SINGULAR_VALUE * values.max(initial=0.0)
         return float(np.sum(np.square(left[:, seen].T @ self.residual)))
 
     @property
     def flat(self) -> bool:
-        """Whether no step takes chi-square, in units of the misfit's variance, further down than chance does."""
+        """Whether the next step would lower chi-square by no more than chance does, in units of the misfit's
+        variance."""
         return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
 
 
@@ -119,76 +133,35 @@ def solve(
     tolerance: float = _TOLERANCE,
     strict: bool = True,
 ) -> Solution:
-    """Least squares over the named parameters, the others held, from the model's own values.
-
-    Bounds are walls, not a transformation, so a parameter may come to rest on one: the trust-region reflective
-    method. The paper's branches alone have one minimum and seldom meet a wall; they go MINPACK's shorter way, and
-    back to the start and the other method where a step leaves the bounds.
+    """Fit the named parameters by least squares, from the model's own values, the others held.
 
     Args:
         model: where to start.
         data_sets: the data.
         names: parameters to move.
-        bounds: limits inside the parameters' own.
+        bounds: limits inside the parameters' own; a parameter may come to rest on one.
         evaluations: most evaluations of the model.
         tolerance: relative change of chi-square and of the point at which the fit stops.
-        strict: False takes the best point reached as it is when those are used up. Else chi-square has to be
-            flat there.
+        strict: whether a fit that has used up its evaluations is an error, unless chi-square is flat where it is.
 
     Raises:
-        FitError: fewer data than parameters, or no convergence.
+        FitError: fewer data than parameters, no finite response, or no convergence.
+
+    Notes:
+        The paper's branches alone have one minimum and seldom meet a bound: they are fitted by MINPACK's
+        Levenberg-Marquardt, the shorter way, which knows no bounds. Where a step leaves the bounds, and for every
+        other model, the trust-region reflective method starts from the model's own values.
     """
-    import lmfit
-
-    coordinates, start, low, high = opening(model, data_sets, names, bounds or {})
-    inside = 1e-6 * (high - low)
-    start = np.clip(start, low + inside, high - inside)
-
-    @lru_cache(maxsize=2)  # data sets know again the model they answered last: the best so far, and the one tried
-    def model_at(point: tuple[float, ...]) -> Model:
-        return model.with_values(coordinates.values(point))
-
-    def at(parameters: lmfit.Parameters) -> Model:
-        return model_at(tuple(parameter.value for parameter in parameters.values()))
-
-    def misfit(parameters: lmfit.Parameters) -> Array:
-        return residual(at(parameters), data_sets)
-
-    def slopes(parameters: lmfit.Parameters) -> Array:
-        return jacobian(at(parameters), data_sets, coordinates.names)
-
-    ends = list(zip(low.tolist(), high.tolist(), strict=True))
-
-    def within(parameters: lmfit.Parameters) -> Array:
-        if not all(least <= u.value <= most for u, (least, most) in zip(parameters.values(), ends, strict=True)):
-            raise _WallMetError
-        return misfit(parameters)
-
-    common: dict[str, Any] = {"max_nfev": evaluations, "ftol": tolerance, "xtol": tolerance, "calc_covar": False}
-    fit = None
+    problem = _Problem.of(model, data_sets, names, bounds or {})
+    limits = {"max_nfev": evaluations, "ftol": tolerance, "xtol": tolerance, "calc_covar": False}
     try:
         with np.errstate(invalid="ignore", divide="ignore"):  # lmfit takes roots of a covariance nobody asked for
-            if set(model.effects) <= set(BASE):
-                with suppress(_WallMetError, ValueError):
-                    free = list(_lmfit_parameters(start).values())  # which lmfit takes as they are, without a copy
-                    fit = lmfit.minimize(within, free, "leastsq", Dfun=slopes, col_deriv=True, gtol=0.0, **common)
+            fit = problem.levenberg_marquardt(limits) if set(model.effects) <= set(BASE) else None
             if fit is None or fit.aborted:
-                walled = _lmfit_parameters(start, low, high)
-                by_point = {"jac": lambda parameters: slopes(parameters).T, "x_scale": "jac", "gtol": None}
-                fit = lmfit.minimize(misfit, walled, "least_squares", **by_point, **common)
+                fit = problem.trust_region(limits)
     except ValueError as error:  # lmfit's word for a residual that is not finite
         raise no_finite_response(model) from error
-    end = np.array([parameter.value for parameter in fit.params.values()])
-    best = model_at(tuple(end))
-    found = Solution(
-        best,
-        coordinates,
-        residual(best, data_sets),
-        jacobian(best, data_sets, coordinates.names),
-        int(fit.nfev),
-        at_bound(coordinates.names, end, low, high),
-        bool(fit.aborted),
-    )
+    found = problem.solution(fit)
     if found.stopped and strict and not found.flat:
         raise FitError(
             "the fit did not converge",
@@ -198,14 +171,92 @@ def solve(
     return found
 
 
-class _WallMetError(Exception):
+class _OutOfBoundsError(Exception):
     """A step leaves the bounds."""
 
 
-def opening(
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """A fit as lmfit asks for it: residuals and their derivatives by lmfit's parameters, which are coordinates.
+
+    Args:
+        data_sets: the data.
+        coordinates: in which the fit moves.
+        start, low, high: where it starts, and its bounds, (k,) each.
+        model_at: the model at a point.
+    """
+
+    data_sets: Sequence[DataSet]
+    coordinates: Coordinates
+    start: Array
+    low: Array
+    high: Array
+    model_at: Callable[[tuple[float, ...]], Model]
+
+    @classmethod
+    def of(cls, model: Model, data_sets: Sequence[DataSet], names: Sequence[str], bounds: Bounds) -> _Problem:
+        coordinates, start, low, high = starting_point(model, data_sets, names, bounds)
+        inside = _START_INSIDE * (high - low)
+
+        @lru_cache(maxsize=2)  # data sets know again the model they answered last: the best so far, and the one tried
+        def model_at(point: tuple[float, ...]) -> Model:
+            return model.with_values(coordinates.values(point))
+
+        return cls(data_sets, coordinates, np.clip(start, low + inside, high - inside), low, high, model_at)
+
+    def levenberg_marquardt(self, limits: Mapping[str, Any]) -> lmfit.minimizer.MinimizerResult | None:
+        """The fit by MINPACK, without bounds; None where a step leaves them or has no finite response."""
+        import lmfit
+
+        ends = list(zip(self.low.tolist(), self.high.tolist(), strict=True))
+
+        def residual_inside(parameters: lmfit.Parameters) -> Array:
+            if not all(low <= u.value <= high for u, (low, high) in zip(parameters.values(), ends, strict=True)):
+                raise _OutOfBoundsError
+            return self._residual(parameters)
+
+        free = list(_lmfit_parameters(self.start).values())  # which lmfit takes as they are, without a copy
+        with suppress(_OutOfBoundsError, ValueError):
+            slopes = {"Dfun": self._jacobian, "col_deriv": True, "gtol": 0.0}
+            return lmfit.minimize(residual_inside, free, "leastsq", **slopes, **limits)
+        return None
+
+    def trust_region(self, limits: Mapping[str, Any]) -> lmfit.minimizer.MinimizerResult:
+        """The fit within its bounds."""
+        import lmfit
+
+        bounded = _lmfit_parameters(self.start, self.low, self.high)
+        slopes = {"jac": lambda parameters: self._jacobian(parameters).T, "x_scale": "jac", "gtol": None}
+        return lmfit.minimize(self._residual, bounded, "least_squares", **slopes, **limits)
+
+    def solution(self, fit: lmfit.minimizer.MinimizerResult) -> Solution:
+        """Where lmfit ended."""
+        end = np.array([parameter.value for parameter in fit.params.values()])
+        model, names = self.model_at(tuple(end)), self.coordinates.names
+        return Solution(
+            model,
+            self.coordinates,
+            residual(model, self.data_sets),
+            jacobian(model, self.data_sets, names),
+            int(fit.nfev),
+            at_bound(names, end, self.low, self.high),
+            bool(fit.aborted),
+        )
+
+    def _model(self, parameters: lmfit.Parameters) -> Model:
+        return self.model_at(tuple(parameter.value for parameter in parameters.values()))
+
+    def _residual(self, parameters: lmfit.Parameters) -> Array:
+        return residual(self._model(parameters), self.data_sets)
+
+    def _jacobian(self, parameters: lmfit.Parameters) -> Array:
+        return jacobian(self._model(parameters), self.data_sets, self.coordinates.names)
+
+
+def starting_point(
     model: Model, data_sets: Sequence[DataSet], names: Sequence[str], bounds: Bounds
 ) -> tuple[Coordinates, Array, Array, Array]:
-    """The coordinates of a fit, where in them the model's own values lie, and the walls, (k,) each.
+    """The coordinates of a fit, where in them the model's own values lie, and the lower and upper bounds, (k,) each.
 
     Raises:
         FitError: fewer data than parameters.
@@ -216,11 +267,11 @@ def opening(
     coordinates = Coordinates.of(model, names)
     least = {name: parameter.bounds[0] for name, parameter in model.parameters.items() if parameter.log}
     lifted = {name: value or least.get(name, 0.0) for name, value in model.values.items()}
-    return coordinates, coordinates.point(lifted), *walls(coordinates, bounds)
+    return coordinates, coordinates.point(lifted), *coordinate_bounds(coordinates, bounds)
 
 
 def no_finite_response(model: Model) -> FitError:
-    """The error of a fit that cannot begin."""
+    """The error of a fit whose model has no finite response to the tests."""
     return FitError(
         "the model has no finite response to these tests",
         found=", ".join(f"{name} = {value:.4g}" for name, value in model.values.items()),
@@ -228,7 +279,7 @@ def no_finite_response(model: Model) -> FitError:
     )
 
 
-def walls(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, Array]:
+def coordinate_bounds(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, Array]:
     """Lower and upper bound of each coordinate, (k,) each."""
     ends = []
     for name, parameter in zip(coordinates.names, coordinates.parameters, strict=True):
@@ -238,19 +289,19 @@ def walls(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, Array]:
     return low, high
 
 
-def _lmfit_parameters(start: Array, low: Array | None = None, high: Array | None = None) -> Any:
+def _lmfit_parameters(start: Array, low: Array | None = None, high: Array | None = None) -> lmfit.Parameters:
+    """lmfit's parameters at a point, within bounds or without."""
     parameters = _blank_parameters(start.size)
-    lows, highs = (
-        np.full(start.shape, end) if wall is None else wall for wall, end in ((low, -np.inf), (high, np.inf))
-    )
+    lows = np.full(start.shape, -np.inf) if low is None else low
+    highs = np.full(start.shape, np.inf) if high is None else high
     for parameter, value, least, most in zip(parameters.values(), start, lows, highs, strict=True):
         parameter.set(value=float(value), min=float(least), max=float(most))
     return parameters
 
 
 @cache
-def _blank_parameters(count: int) -> Any:
-    """Parameters for one fit after the other: to make them takes as long as to evaluate a model."""
+def _blank_parameters(count: int) -> lmfit.Parameters:
+    """lmfit's parameters, kept for one fit after the other: to make them takes as long as to evaluate a model."""
     import lmfit
 
     parameters = lmfit.Parameters()
@@ -260,7 +311,7 @@ def _blank_parameters(count: int) -> Any:
 
 
 def at_bound(names: Sequence[str], point: Array, low: Array, high: Array) -> dict[str, End]:
-    """Coordinates that rest on a wall, and on which."""
+    """The parameters that rest on a bound at a point, and on which, "min" or "max"."""
     near = _AT_BOUND * np.minimum(high - low, 1.0)
     ends: dict[str, End] = {name: "min" for name, met in zip(names, point - low < near, strict=True) if met}
     return ends | {name: "max" for name, met in zip(names, high - point < near, strict=True) if met}

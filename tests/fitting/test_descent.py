@@ -1,4 +1,4 @@
-"""The fit that goes step by step: it ends where lmfit ends, on walls too, and never climbs."""
+"""The fit that goes step by step: it ends where lmfit ends, on bounds too, and never climbs."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_it_ends_where_lmfit_ends(
     points = [end.coordinates.point(end.model.values) for end in (found.solution, known)]
     off = np.abs(points[0] - points[1]) / errors
     print(f"{found.evaluations} evaluations, lmfit {known.evaluations}, apart by {off.max():.2g} standard errors")
-    assert found.settled
+    assert found.converged
     assert found.chi_square == pytest.approx(known.chi_square, abs=1e-2)
     assert off.max() < 0.05
     assert found.solution.at_bound == known.at_bound
@@ -57,7 +57,7 @@ def test_it_never_climbs_and_counts_its_evaluations(paper_model: Model, data_set
     model = started(paper_model, data_sets)
     here = Descent.start(model, data_sets, tuple(model.parameters), {})
     path = [here]
-    while not here.settled:
+    while not here.converged:
         here = here.stepped()
         path.append(here)
     chi_square = [float(np.sum(residual(step.model, data_sets) ** 2)) for step in path]
@@ -65,14 +65,14 @@ def test_it_never_climbs_and_counts_its_evaluations(paper_model: Model, data_set
     assert chi_square == pytest.approx([step.chi_square for step in path], rel=1e-12)
     assert all(np.diff(chi_square) <= 0.0)
     assert [step.evaluations for step in path] == list(range(1, len(path) + 1))
-    assert path[-1].promise < 0.01 < path[0].promise
+    assert path[-1].expected_fall < 0.01 < path[0].expected_fall
 
 
 def test_it_can_be_left_anywhere(paper_model: Model, data_sets: list[DataSet]) -> None:
     model = started(paper_model, data_sets)
     left = Descent.start(model, data_sets, tuple(model.parameters), {}).finished(3)
     assert left.evaluations == left.solution.evaluations == 3
-    assert not left.settled
+    assert not left.converged
 
 
 def test_what_is_not_seen_stays(paper_model: Model, data_sets: list[DataSet]) -> None:
