@@ -123,6 +123,8 @@ class Effect:
         harmonic_error: relative error of the first-harmonic face against the time face; 0 where exact.
         settles: True where the response changes from cycle to cycle, so that a loop must be followed
             through all its cycles.
+        corrects: the direction whose stiffness formula it scales by a fitted factor; where the effect is in a model,
+            that formula's own error needs no warning. None where it scales no formula.
     """
 
     name: str
@@ -134,6 +136,7 @@ class Effect:
     confirmed_by: str = ""
     harmonic_error: float = 0.0
     settles: bool = False
+    corrects: Direction | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

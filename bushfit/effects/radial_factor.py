@@ -39,6 +39,7 @@ EFFECT = Layer(
     ),
     source="Eqs. 11, 12 against finite elements: -0.7 to +9.7 % over 14 shapes",
     confirmed_by="a finite element solution of this shape, or the radial rig's load cell against a known weight",
+    corrects=Direction.RADIAL,
     stiffness=stiffness,
     force=force,
 )

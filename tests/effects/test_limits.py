@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from bushfit.effects import BASE, History
+from bushfit.effects import BASE, LIBRARY, Effect, History, qualified
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
 from bushfit.effects.maxwell import relaxed
 from bushfit.geometry import Bushing, Direction
@@ -219,3 +219,13 @@ def test_play_bends_the_waveform_and_friction_answers_to_it(direction: Direction
     error = np.abs(found / exact - 1.0).max()
     print(f"{direction}, delta/X = {ratio}: {error:.1e}; at the peak alone {np.abs(peak / exact - 1.0).max():.1e}")
     assert error < model.records[-1].harmonic_error
+
+
+@pytest.mark.parametrize("effect", [effect for effect in LIBRARY.values() if effect.corrects], ids=lambda one: one.name)
+def test_what_corrects_a_formula_scales_that_direction_and_no_other(effect: Effect) -> None:
+    (parameter,) = effect.parameters
+    model = PLAIN.with_effect(effect.name, {qualified(effect, parameter): parameter.typical})
+    for direction in Direction:
+        ratio = model.stiffness(direction, FREQUENCY, AMPLITUDE) / PLAIN.stiffness(direction, FREQUENCY, AMPLITUDE)
+        assert np.ptp(np.abs(ratio)) < 1e-12, "a factor"
+        assert (abs(ratio[0] - 1.0) > 1e-6) == (direction is effect.corrects)
