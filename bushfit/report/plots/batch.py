@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from bushfit.effects.contract import Array
 from bushfit.reduction.scatter import scatter
-from bushfit.report.plots.style import DOT, FRAME, GREY, INK, POINT, ROW, SMALL, dress, explain, fonts, new_figure
+from bushfit.report.plots.style import CM, DOT, FRAME, GREY, INK, POINT, ROW, SMALL, dress, explain, fonts, new_figure
 from bushfit.units import number
 
 #: Colour of limits and of what is out of them.
@@ -30,6 +30,10 @@ _MOST_NAMED = 4
 _MOST_ALONG = 40
 #: Most letters of a name along x: longer ones are higher than their panel.
 _MOST_LETTERS_ALONG = 32
+#: Letters of a name along x for which a figure has room as it is.
+_SHORT_NAME = 16
+#: Height that each further letter of the longest name takes [inch].
+_ALONG_LETTER = 0.12 / CM
 #: Most letters of a name within a panel: longer ones are half as wide as the panel.
 _MOST_LETTERS = 24
 #: Width of a letter, as a share of the panel's.
@@ -78,6 +82,7 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> F
     along = [_short(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
     lines = math.ceil(len(panels) / _COLUMNS)
     height = ROW * (0.9 + 0.1 * bool(along)) * lines + 0.35 * FRAME
+    height += _ALONG_LETTER * max(0, max(map(len, along), default=0) - _SHORT_NAME)
     figure = new_figure(f"{title}: {len(names)} bushings", height)
     grid = figure.subplots(lines, _COLUMNS, sharex=True, squeeze=False)
     for axes, panel in zip(grid.flat, panels, strict=False):

@@ -154,7 +154,7 @@ def _loops_height(data_sets: Sequence[LoopData], sides: int) -> float:
 def _legend_columns(labels: Sequence[str], sides: int) -> int:
     """Columns of the loops' legend above one of so many panels side by side."""
     longest = max(len(line) for label in labels for line in label.splitlines())
-    return min(_LEGEND_COLUMNS // sides, _LEGEND_LETTERS // (longest + _HANDLE_LETTERS))
+    return math.ceil(min(_LEGEND_COLUMNS, _LEGEND_LETTERS // (longest + _HANDLE_LETTERS)) / sides)
 
 
 def _scale(sides: Sequence[Side]) -> _Scale:

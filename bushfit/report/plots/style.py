@@ -46,8 +46,8 @@ OUTLIER = "#c1121f"
 _DPI = 150
 #: Most lines that a legend names: more do not fit beside a panel, and more colours are not told apart.
 MOST_NAMED = 8
-#: Most letters of a file's name in a legend: longer ones leave no room for the panel.
-_NAME_LETTERS = 24
+#: Most letters of a file's name in a legend: three legend columns of such names fill the width of a figure.
+_NAME_LETTERS = 20
 #: Right of the panel, in matplotlib's words.
 _LEGEND: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5), "frameon": False, "handlelength": 3.2}
 #: Colours of what a figure tells apart: a scale each, so that no colour means two things. Loops stay off black.
@@ -59,7 +59,9 @@ _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1.2,
 #: An axis that spans more than this ratio is logarithmic: chosen, a decade and a half.
 _LOG_RATIO = 40.0
 #: Letters in a line of the title, as many as the width of a figure holds.
-_TITLE_LETTERS = 84
+_TITLE_LETTERS = 64
+#: Height of each further line of the title [inch].
+_TITLE_LINE = 0.42 / CM
 #: Letters in a line of the explanation, as many as the width of a figure holds.
 _NOTE_LETTERS = 112
 #: Fonts that help out for names beyond Latin, Greek and Cyrillic, where they are installed.
@@ -87,9 +89,10 @@ def styles(count: int, what: str) -> list[Style]:
 
 def new_figure(title: str, height: float) -> Figure:
     """An empty figure as wide as a page, of so many inches for its panels, under a title of any letters."""
-    figure = Figure(figsize=(WIDTH, height + FRAME), dpi=_DPI, layout=ConstrainedLayoutEngine(wspace=0.05))
-    text = textwrap.fill(title, _TITLE_LETTERS)
-    figure.suptitle(text, fontsize=TEXT + 1.5, weight="bold", family=fonts(), parse_math=False)
+    lines = textwrap.wrap(title, _TITLE_LETTERS)
+    height += FRAME + _TITLE_LINE * max(0, len(lines) - 1)
+    figure = Figure(figsize=(WIDTH, height), dpi=_DPI, layout=ConstrainedLayoutEngine(wspace=0.05))
+    figure.suptitle("\n".join(lines), fontsize=TEXT + 1.5, weight="bold", family=fonts(), parse_math=False)
     return figure
 
 
