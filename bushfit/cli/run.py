@@ -49,7 +49,7 @@ def command(campaign: Path, loss: str | None, max_nrmse: float | None, options: 
     from bushfit.jobs.diagnose import Diagnose
     from bushfit.jobs.fits import Fit, FitStatic, tests_of
     from bushfit.jobs.predict import Predict
-    from bushfit.report.artifacts import artifact_names, diagnosis_files, loop_files, sweep_files
+    from bushfit.report.artifacts import artifact_names, diagnosis_files, fit_files
     from bushfit.report.folder import to_json
 
     loaded = open_campaign(campaign, loss)
@@ -82,8 +82,8 @@ def command(campaign: Path, loss: str | None, max_nrmse: float | None, options: 
     documents = {**{name: result.to_document() for name, result in results.items()}, "diagnosis": diagnosed.document}
     files = {
         **{f"{name}.json": to_json(document) for name, document in documents.items()},
-        **loop_files(final.model, marked.loops, options.formats),
-        **sweep_files(final.model, marked.sweeps, options.formats),
+        **fit_files("loops", final.model, marked.loops, options.formats),
+        **fit_files("sweeps", final.model, marked.sweeps, options.formats),
         **diagnosis_files(diagnosed.diagnosis, loaded.name, options.formats),
         **predicted.files(options.formats),
     }

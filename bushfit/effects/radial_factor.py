@@ -8,6 +8,7 @@ from bushfit.geometry import Direction
 
 
 def _factor(p: Values, setting: Setting) -> Value:
+    """1 + excess radially, 1 in the other directions."""
     return 1.0 + p["excess"] if setting.direction is Direction.RADIAL else 1.0
 
 

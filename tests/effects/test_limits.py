@@ -18,7 +18,9 @@ PLAIN = Model(
     BASE,
     {"mu": 1.09e6, "m": 2.0e5, "alpha": 0.24, "sigma_fmax": 1.46e4, "eps_half": 1.3e-2},
 )
-FREQUENCY, AMPLITUDE = np.array([5.0, 55.0, 155.0]), np.array([1e-4, 2e-4, 5e-4])
+#: Operating points [Hz] and [m].
+FREQUENCY = np.array([5.0, 55.0, 155.0])
+AMPLITUDE = np.array([1e-4, 2e-4, 5e-4])
 LOOP = History.steady(5e-4 * np.cos(2.0 * np.pi * np.arange(512) / 512), 5.0)
 STARTED = History(5e-4 * np.sin(2.0 * np.pi * np.arange(20480) / 2048), 1.0 / (20.0 * 2048), False, 20.0)
 
