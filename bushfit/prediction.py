@@ -1,4 +1,4 @@
-"""Prediction: stiffness tables with 95 % bands, for the car and not for the rig.
+"""Dynamic stiffness with 95 % bands at any frequency and amplitude, of the bushing as the car will have it.
 
 Material and component effects are kept, instrument effects are left out: the car does not have the rig's faults.
 """
@@ -19,12 +19,19 @@ from bushfit.model.sensitivity import stiffness_jacobian
 from bushfit.reading.measurement import Sweep
 from bushfit.units import number
 
-#: The paper's grid: frequencies [Hz], amplitudes [m], and for torsion [rad].
+#: Frequencies of the paper's tables [Hz].
 PAPER_FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
+#: Amplitudes of the paper's tables [m].
 PAPER_AMPLITUDES = (1e-4, 2e-4, 5e-4)
+#: Amplitudes for torsion, which the paper did not measure [rad]: chosen, strains like those of the other directions.
 _TORSION_AMPLITUDES = tuple(float(np.radians(x)) for x in (0.5, 1.0, 2.0))
-#: Beyond the fitted range by more than this share, a prediction is an extrapolation.
+#: Beyond the fitted range by more than this, relative to its end, a prediction is an extrapolation: rigs miss their
+#: set points by less.
 _MARGIN = 0.01
+#: Frequencies of a grid where the paper's were not measured.
+_FREQUENCIES = 9
+#: Amplitudes of a grid where the paper's were not measured.
+_AMPLITUDES = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +55,7 @@ class Prediction:
         loss_factor: K''/K'.
         storage_stiffness: K'.
         loss_stiffness: K''.
-        warnings: what leaves what was fitted: its directions, frequencies and strains.
+        warnings: sentences on directions, frequencies and strains that were not fitted.
     """
 
     direction: Direction
@@ -62,10 +69,11 @@ class Prediction:
 
 
 def default_grid(result: Result, direction: Direction, sweeps: Sequence[Sweep] = ()) -> tuple[Array, Array]:
-    """Frequencies [Hz] and amplitudes [m or rad] to predict at where none are asked for.
+    """Frequencies [Hz] and amplitudes [m or rad] to predict at where none are asked for, rising.
 
-    Those of the sweeps in this direction, so that prediction and measurement stand side by side. Without any: the
-    paper's as far as they were measured, or an even grid over the measured range where they were not.
+    They are those of the sweeps in this direction, so that prediction and measurement stand side by side. Without any
+    sweep they are the paper's as far as they lie in the measured range, or an even grid over that range where fewer
+    than two do.
     """
     mine = [sweep for sweep in sweeps if sweep.direction is direction]
     if mine:
@@ -80,19 +88,19 @@ def default_grid(result: Result, direction: Direction, sweeps: Sequence[Sweep] =
     low, high = result.measured.frequency
     inside = frequencies[(frequencies >= low * (1 - _MARGIN)) & (frequencies <= high * (1 + _MARGIN))]
     if inside.size < 2:
-        inside = _distinct(np.geomspace(low, high, 9))
+        inside = _distinct(np.geomspace(low, high, _FREQUENCIES))
     if direction.is_rotation:
         return inside, amplitudes
     per_displacement = result.model.bushing.unit_strain(Direction.AXIAL)
     least, most = (strain / per_displacement for strain in result.measured.strain)
     reached = amplitudes[(amplitudes >= least * (1 - _MARGIN)) & (amplitudes <= most * (1 + _MARGIN))]
     if reached.size < 2:
-        reached = _distinct(np.array([float(f"{x:.3g}") for x in np.geomspace(least, most, 3)]))
+        reached = _distinct(np.array([float(f"{x:.3g}") for x in np.geomspace(least, most, _AMPLITUDES)]))
     return inside, reached
 
 
 def _distinct(values: Array) -> Array:
-    """Rising, without those that differ from the last by no more than a rig that misses its set point does."""
+    """The values, rising, each further above the last than a rig that misses its set point would be."""
     kept: list[float] = []
     for value in np.unique(values):
         if not kept or value > kept[-1] * (1.0 + _MARGIN):
@@ -130,9 +138,9 @@ def predict(
     stiffness = model.stiffness(direction, frequency, amplitude)
     names = [name for name in result.covariance.names if name in model.values]
     covariance = result.covariance.restricted(names)
-    slopes = np.zeros((0, frequency.size), dtype=complex)
-    if names:
-        slopes = stiffness_jacobian(model, direction, frequency, amplitude, names)
+    slopes = (
+        stiffness_jacobian(model, direction, frequency, amplitude, names) if names else np.zeros((0, *stiffness.shape))
+    )
 
     def band(value: Array, slope: Array) -> Band:
         half = covariance.half_width(slope)
@@ -171,23 +179,24 @@ def rig_effects(result: Result) -> list[str]:
 
 
 def _unfitted(result: Result, direction: Direction) -> Iterator[str]:
-    """What the band of a direction does not hold where only others were fitted: the formula that leads there."""
+    """A warning where a direction was not fitted: its band lacks the error of the formula that leads there."""
     fitted = result.measured.directions if result.measured else ()
     if not fitted or direction in fitted:
         return
     radially = direction is Direction.RADIAL or (Direction.AXIAL not in fitted and Direction.RADIAL in fitted)
-    if radially and "radial_factor" in result.model.effects:
-        return
     formula, compared = (
-        ("radial", "-0.7 to +9.7 % against finite elements")
+        (Direction.RADIAL, "-0.7 to +9.7 % against finite elements")
         if radially
-        else ("torsion", "which was not compared with finite elements")
+        else (Direction.TORSION, "which was not compared with finite elements")
     )
+    if any(effect_named(name).corrects is formula for name in result.model.effects):
+        return
     scatter = f"its band holds the scatter of the {' and '.join(fitted)} tests"
     yield f"{direction}: not fitted; {scatter}, not the error of the {formula} formula, {compared}"
 
 
 def _extrapolations(result: Result, direction: Direction, frequency: Array, amplitude: Array) -> Iterator[str]:
+    """A warning for the frequencies and one for the strains where they leave what was fitted."""
     if result.measured is None:
         return
     strain = amplitude * result.model.bushing.unit_strain(direction)
@@ -202,5 +211,6 @@ def _extrapolations(result: Result, direction: Direction, frequency: Array, ampl
 
 
 def _span(low: float, high: float, unit: str) -> str:
+    """A range in words: "5 to 155 Hz", or one number where both ends read alike."""
     ends = [number(100 * end, 2) if unit == "%" else number(end, 3) for end in (low, high)]
     return f"{' to '.join(dict.fromkeys(ends))} {unit}"

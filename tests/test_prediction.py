@@ -22,7 +22,9 @@ from bushfit.reading.measurement import Sweep
 from bushfit.report.tables import prediction_table
 from bushfit.simulation import measure, undisturbed
 
-FREQUENCIES, AMPLITUDES = np.array([155.0, 5.0, 55.0]), np.array([5e-4, 1e-4])
+#: A grid, not in order [Hz] and [m].
+FREQUENCIES = np.array([155.0, 5.0, 55.0])
+AMPLITUDES = np.array([5e-4, 1e-4])
 FOUR = ("stiffness [N/mm]", "loss factor [-]", "storage stiffness [N/mm]", "loss stiffness [N/mm]")
 
 

@@ -33,6 +33,10 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_
 #: Widest text of a help, in characters: longer lines are hard to read.
 _HELP_WIDTH = 110
 
+#: matplotlib reads the name of a backend when lmfit or a plot first imports it, and fails where it does not know it:
+#: notebooks set one that is not installed everywhere. Pictures go to files, so any backend without windows will do.
+_BACKEND = "agg"
+
 
 class _Commands(click.Group):
     """Commands that are imported when called."""
@@ -71,6 +75,7 @@ def cli() -> None:
 def main() -> None:
     """Entry point: one clear error and exit status 2 for whatever the user can put right."""
     os.environ.update(dict.fromkeys(_THREADS, "1"))
+    os.environ["MPLBACKEND"] = _BACKEND
     try:
         sys.exit(cli.main(standalone_mode=False))
     except click.exceptions.Abort:

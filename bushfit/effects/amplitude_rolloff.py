@@ -7,8 +7,9 @@ import numpy as np
 from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
 from bushfit.effects.history import History
 
-#: Frequency at which the amplitude has lost the share c [Hz], and the least share that is left.
+#: Frequency at which the amplitude has lost the share c [Hz]: the highest of the paper's sweeps.
 REFERENCE_FREQUENCY = 155.0
+#: Least share of the amplitude that is left, at whatever frequency: the law must not reverse the motion.
 LEAST_SHARE = 0.05
 
 

@@ -1,13 +1,17 @@
-"""The record that describes one physics, and what it may do: branch, modifier or layer.
+"""The record that describes one effect, in one of three kinds: branch, modifier or layer.
 
-The measured response is an onion. Inside is the rubber: *branches* in parallel, each adding a stress.
-Around it lie *layers*: each takes the response below it and returns the response above it. A *modifier*
-only changes values that the branches use, by operating condition, and is asked before them. Layers are
-ordered by level (material, component, instrument), never by the order of adding.
+The measured response is built from the rubber outward. Inside are *branches* in parallel, each adding a stress.
+Around them lie *layers*: each takes the response below it and returns the response above it. A *modifier* changes
+values that the branches use, by operating condition, and is asked before them. Layers are ordered by level (material,
+component, instrument), never by the order in which they were added.
 
-Every face broadcasts. The last axis holds operating points (frequency face) or samples (time face);
-parameter values are numbers, or arrays whose last axis has length 1, so that a Jacobian by differences
-or a bootstrap is one call with the values laid along a leading axis.
+Each effect answers in two ways: as complex stiffness over frequency and amplitude (the frequency face), and as force
+over time (the time face).
+
+Notes:
+    Every face broadcasts. The last axis holds operating points (frequency face) or samples (time face). Parameter
+    values are numbers, or arrays whose last axis has length 1: a Jacobian by differences or a bootstrap is then one
+    call with the values along a leading axis.
 """
 
 from __future__ import annotations
@@ -25,10 +29,12 @@ from bushfit.geometry import Bushing, Direction
 
 #: A number, or an array that broadcasts against operating points or samples.
 Value = Any
+#: Parameter values by name.
 Values = Mapping[str, Value]
+#: An array of numbers.
 Array = NDArray[Any]
 
-#: displacement history -> force [N or N m].
+#: Force [N or N m] that answers a displacement history.
 ForceBelow = Callable[[History], Array]
 
 
@@ -88,7 +94,13 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Setting:
-    """The test a response belongs to."""
+    """The test that a response belongs to.
+
+    Args:
+        bushing: the body under test.
+        direction: of the motion.
+        kind: of the test: some effects belong to the rig that makes one of the two.
+    """
 
     bushing: Bushing
     direction: Direction
@@ -97,8 +109,14 @@ class Setting:
 
 @dataclass(frozen=True)
 class Condition:
-    """Operating condition a modifier may depend on: omega [rad/s], displacement amplitude [m or rad],
-    equivalent strain amplitude, and the complex stiffness of the bushing with the values as they came in.
+    """The operating condition that a modifier may depend on.
+
+    Args:
+        setting: the test.
+        omega: angular frequency [rad/s].
+        amplitude: of the displacement [m or rad].
+        strain: equivalent strain amplitude [1].
+        stiffness: complex stiffness of the bushing [N/m or N m/rad] by parameter values.
     """
 
     setting: Setting
@@ -110,7 +128,7 @@ class Condition:
 
 @dataclass(frozen=True, kw_only=True)
 class Effect:
-    """What every physics states about itself.
+    """What every effect states about itself.
 
     Args:
         name: the file's stem; the name in files, reports and options.
@@ -123,6 +141,8 @@ class Effect:
         harmonic_error: relative error of the first-harmonic face against the time face; 0 where exact.
         settles: True where the response changes from cycle to cycle, so that a loop must be followed
             through all its cycles.
+        corrects: the direction whose stiffness formula it scales by a fitted factor; where the effect is in a model,
+            that formula's own error needs no warning. None where it scales no formula.
     """
 
     name: str
@@ -134,15 +154,20 @@ class Effect:
     confirmed_by: str = ""
     harmonic_error: float = 0.0
     settles: bool = False
+    corrects: Direction | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Branch(Effect):
-    """A stress in parallel with the others: modulus = s~ / (2 e~) [Pa], stress [Pa].
+    """A stress in parallel with the others.
 
-    `uses` names the paper's parameters that it reads besides its own.
-    modulus_sensitivities and stress_sensitivities return the derivative with respect to each own
-    parameter; where they are None the model differentiates numerically.
+    Args:
+        modulus: (values, omega [rad/s], strain amplitude) -> complex modulus s~ / (2 e~) of the first harmonic [Pa].
+        stress: (values, strain history) -> stress [Pa].
+        modulus_sensitivities: derivative of the modulus by each of its own parameters; where there is none, the model
+            differentiates numerically.
+        stress_sensitivities: the same of the stress.
+        uses: the paper's parameters that it reads besides its own.
     """
 
     modulus: Callable[[Values, Array, Array], Array]
@@ -154,14 +179,23 @@ class Branch(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Modifier(Effect):
-    """Changes values of other effects by operating condition; returns the changed ones only."""
+    """Changes values that other effects use, by operating condition.
+
+    Args:
+        adjust: (values, condition) -> the changed values only.
+    """
 
     adjust: Callable[[Values, Condition], dict[str, Value]]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Layer(Effect):
-    """Wraps the response below it, in both faces alike."""
+    """Wraps the response below it, in both faces alike.
+
+    Args:
+        stiffness: (values, response below, omega [rad/s], amplitude [m or rad], setting) -> complex stiffness above.
+        force: (values, force below, displacement history, setting) -> force above [N or N m].
+    """
 
     stiffness: Callable[[Values, StiffnessBelow, Array, Array, Setting], Array]
     force: Callable[[Values, ForceBelow, History, Setting], Array]

@@ -6,8 +6,9 @@ import numpy as np
 
 from bushfit.effects.contract import Condition, Level, Modifier, Parameter, Value, Values, scaled_values
 
-#: Strain amplitude at which m is as it stands, and the one below which it grows no more.
+#: Strain amplitude at which m is unchanged [1]: within the range of most tests.
 REFERENCE_STRAIN = 0.01
+#: Strain amplitude below which m grows no more [1]: less than any test reaches, and more than 0.
 SMALLEST_STRAIN = 1e-9
 
 

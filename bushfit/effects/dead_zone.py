@@ -8,22 +8,23 @@ import numpy as np
 
 from bushfit.effects.contract import Array, Value
 
-#: t - sin t = t^3 (1/3! - t^2/5! + ...): enough terms for t up to 2 pi/3.
+#: (t - sin t)/t^3 as a power series in t^2, 1/3! - t^2/5! + ...: enough terms for all digits up to t = 2 pi/3.
 _SERIES = np.array([(-1.0) ** k / math.factorial(2 * k + 3) for k in range(12)])
 
 
 def dead_zone(value: Array, half_width: Value) -> Array:
-    """What reaches beyond +-half_width, 0 within; a half_width of 0 gives the value back."""
+    """What of the values lies beyond +-half_width, and 0 within; all of them where half_width is 0."""
     return value - np.clip(value, -np.asarray(half_width), half_width)
 
 
 def first_harmonic(amplitude: Array, half_width: Value) -> Array:
-    """First harmonic of a dead-zoned sine over the sine's amplitude: N(r), r = half_width/amplitude.
-
-    N = 1 - 2/pi (asin r + r sqrt(1 - r^2)) for r < 1, and 0 beyond. With cos(t/2) = r the same is
-    (t - sin t)/pi, a series that keeps its digits where N vanishes like (1 - r)^(3/2).
+    """First harmonic of what a sine reaches beyond a dead zone, over the amplitude of the sine: N(r).
 
     Source: A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B.
+
+    Notes:
+        With r = half_width/amplitude, N = 1 - 2/pi (asin r + r sqrt(1 - r^2)) for r < 1, and 0 beyond. With
+        cos(t/2) = r the same is (t - sin t)/pi, whose series keeps its digits where N vanishes like (1 - r)^(3/2).
     """
     reach = np.maximum(np.asarray(amplitude) - half_width, 0.0)
     safe = np.where(reach > 0.0, amplitude, 1.0)

@@ -7,6 +7,7 @@ from bushfit.effects.history import History
 
 
 def _factor(p: Values, setting: Setting) -> Value:
+    """1 + gain in loops, 1 in sweeps."""
     return 1.0 + p["gain"] if setting.kind == "loop" else 1.0
 
 

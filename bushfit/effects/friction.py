@@ -1,10 +1,11 @@
-"""Friction branch: rate-independent filler friction between turning points (Berg's element).
-
-With u = s_f / sigma_fmax, sgn = sign(de/dt) and d = |e - e_s| / eps_half counted from the last turning
-point (e_s, u_s), Eq. (5) reads u = u_s + sgn d v / (v + d), v = 1 - sgn u_s. Only d holds eps_half, and
-sigma_fmax is a factor, so the walk over turning points is short and differentiates in closed form.
+"""Friction branch: friction between filler particles, of whatever rate, which depends on where the motion last turned.
 
 Source: Garcia Tarrago et al. 2007, Eq. 5; M. Berg, Vehicle System Dynamics 30 (1998) 197-212.
+
+Notes:
+    With u = s_f / sigma_fmax, sgn = sign(de/dt) and d = |e - e_s| / eps_half counted from the last turning point
+    (e_s, u_s), Eq. (5) reads u = u_s + sgn d v / (v + d), v = 1 - sgn u_s. Only d holds eps_half, and sigma_fmax is a
+    factor. So u is computed from one turning point to the next, with its derivative by eps_half in closed form.
 """
 
 from __future__ import annotations
@@ -16,32 +17,44 @@ import numpy as np
 from bushfit.effects.contract import Array, Branch, Level, Parameter, Values
 from bushfit.effects.history import History
 
-#: Below this z = 2x/(1 + y) the logarithm of the quadrature is replaced by its series.
+#: Below this z = 2x/(1 + y), Im h of `harmonic_shape` is taken from a series: the logarithm loses digits there.
 _SERIES_BELOW = 0.05
-#: Less than any x at which the logarithm serves, and more than 0, so that nothing is divided by 0.
-_FAR = 0.01
+#: Least x at which the logarithm is evaluated: smaller ones use the series, and must not divide by 0 meanwhile.
+_LEAST_X = 0.01
+#: Most rounds of Newton's method for a steady loop: chosen, many more than it takes.
+_ROUNDS = 50
+#: Change of u at which a steady loop is found, relative to its largest value 1: rounding.
+_SETTLED = 1e-14
+#: T(z) = (ln(1 + z) - z + z^2/2)/z^3 as a power series in z: enough terms for all digits below _SERIES_BELOW.
 _SERIES = np.array([(-1.0) ** k / (k + 3.0) for k in range(12)])
+#: dT/dz as a power series in z.
 _SERIES_SLOPE = np.array([(k + 1) * (-1.0) ** (k + 1) / (k + 4.0) for k in range(11)])
 
 
 def harmonic_shape(x: Array) -> Array:
-    """First harmonic of the steady friction loop as a function of x, complex.
+    """First harmonic h of the steady friction loop at the strain amplitude x = e0/eps_half, complex.
 
-    The friction modulus is (A + iB)/(2 e0) = sigma_fmax/eps_half h(x) with x = e0/eps_half;
-    h(0) = 1/2 and h -> 0 for large x. The terms that cancel in model form are written so that h keeps
-    ten digits from x = 1e-8 to 1e6.
+    Args:
+        x: strain amplitude over eps_half, not negative, any shape.
 
-        y = 2x/D, D = s + x + 1, s = sqrt(x^2 + 6x + 1)       friction amplitude over sigma_fmax
-        p = 1 + y, q = sqrt(p (p + 2x)), z = 2x/p
-        Re h = p^2 / ((x + p + q) q)
-        Im h = (2 - p^2/x ln(1 + z)) / (pi x)
-             = (2 (D - 2)/D - 8x/p T(z)) / pi,  T = 1/3 - z/4 + z^2/5 - ...   (small z)
+    Returns:
+        h of the same shape: the friction modulus is (A + iB)/(2 e0) = sigma_fmax/eps_half h(x).
+
+    Notes:
+        h(0) = 1/2, and h -> 0 for large x. Differences of nearly equal terms are rearranged, so that h keeps ten digits
+        from x = 1e-8 to 1e6.
+
+            y = 2x/D, D = s + x + 1, s = sqrt(x^2 + 6x + 1)       friction amplitude over sigma_fmax
+            p = 1 + y, q = sqrt(p (p + 2x)), z = 2x/p
+            Re h = p^2 / ((x + p + q) q)
+            Im h = (2 - p^2/x ln(1 + z)) / (pi x)
+                 = (2 (D - 2)/D - 8x/p T(z)) / pi,  T = 1/3 - z/4 + z^2/5 - ...   (small z)
     """
     _, big, p, q, z = _roots(x)
     shape = np.empty(x.shape, dtype=complex)
     square = p * p
     shape.real = square / ((x + p + q) * q)
-    far = np.maximum(x, _FAR)
+    far = np.maximum(x, _LEAST_X)
     shape.imag = (2.0 - square / far * np.log1p(z)) / (np.pi * far)
     small = z < _SERIES_BELOW
     if small.any():
@@ -52,13 +65,13 @@ def harmonic_shape(x: Array) -> Array:
 
 
 def harmonic_slope(x: Array, shape: Array) -> Array:
-    """dh/dx of `harmonic_shape`, whose value at x is given."""
+    """dh/dx of `harmonic_shape`, whose value at x is `shape`."""
     s, big, p, q, z = _roots(x)
     slope = np.empty(x.shape, dtype=complex)
     slope_p = 4.0 / (s * (x + 3.0 + s))
     slope_q = (slope_p * (p + x) + p) / q
     slope.real = shape.real * (2.0 * slope_p / p - (1.0 + slope_p + slope_q) / (x + p + q) - slope_q / q)
-    far = np.maximum(x, _FAR)
+    far = np.maximum(x, _LEAST_X)
     ratio = p * p / far
     slope_ratio = (2.0 * p * slope_p - ratio) / far
     slope_z = (2.0 - z * slope_p) / p
@@ -104,7 +117,7 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
 
 
 def _move(start: Array, sign: float, distance: Array) -> tuple[Array, Array, Array]:
-    """Eq. (5) from u_s over the scaled distance d: u, du/du_s and du/dd."""
+    """Eq. (5) from u_s = `start` over the distance d: u, du/du_s and du/dd."""
     room = 1.0 - sign * start
     reach = room + distance
     return (
@@ -115,7 +128,7 @@ def _move(start: Array, sign: float, distance: Array) -> tuple[Array, Array, Arr
 
 
 def _follow(strain: Array, turns: Array, start: Array, slope: Array, eps_half: Array) -> tuple[Array, Array]:
-    """u and du/deps_half of every sample, from the value `start` (and its slope) of the first one."""
+    """u and du/deps_half at every sample of a motion, from their values `start` and `slope` at the first one."""
     pieces, slopes = [start], [slope]
     for begin, end in pairwise([0, *turns, strain.shape[-1] - 1]):
         travel = strain[..., begin + 1 : end + 1] - strain[..., begin : begin + 1]
@@ -129,10 +142,15 @@ def _follow(strain: Array, turns: Array, start: Array, slope: Array, eps_half: A
 
 
 def _steady_start(levels: Array, eps_half: Array) -> tuple[Array, Array]:
-    """u and du/deps_half at the first of the closed sequence of turning points, once it repeats itself.
+    """u and du/deps_half at the first turning point of a cycle that repeats itself.
 
-    Two turning points have the closed form of `harmonic_shape`, u = y. More take Newton on the map of one cycle,
-    whose slope is the product of the du/du_s of the pieces.
+    Args:
+        levels: strain at the turning points of the cycle, the first one its top, (..., k).
+        eps_half: (..., 1).
+
+    Notes:
+        With two turning points u = y of `harmonic_shape`. With more, Newton's method finds the u that one cycle leads
+        back to; the slope of one cycle is the product of the du/du_s of its pieces.
     """
     if levels.shape[-1] == 2:
         x = (levels[..., :1] - levels[..., 1:]) / (2.0 * eps_half)
@@ -142,7 +160,7 @@ def _steady_start(levels: Array, eps_half: Array) -> tuple[Array, Array]:
     senses, distances = np.sign(travel), np.abs(travel) / eps_half
     u = np.zeros((*distances.shape[:-1], 1))
     forced = np.zeros_like(u)
-    for _ in range(50):
+    for _ in range(_ROUNDS):
         end, contraction, forced = u, np.ones_like(u), np.zeros_like(u)
         for i in range(levels.shape[-1]):
             distance = distances[..., i : i + 1]
@@ -151,15 +169,19 @@ def _steady_start(levels: Array, eps_half: Array) -> tuple[Array, Array]:
             contraction = contraction * by_start
         change = (end - u) / (1.0 - contraction)
         u = np.clip(u + change, -1.0, 1.0)
-        if np.all(np.abs(change) < 1e-14):
+        if np.all(np.abs(change) < _SETTLED):
             break
     return u, forced / (1.0 - contraction)
 
 
 def _walk(strain: Array, turns: Array, periodic: bool, eps_half: Array) -> tuple[Array, Array]:
-    """u = s_f/sigma_fmax and du/deps_half along histories that share their turning points, (..., n).
+    """u = s_f/sigma_fmax and du/deps_half along histories that turn at the same samples, (..., n).
 
-    A steady history is closed (its first sample again at the end) and begins at its top.
+    Args:
+        strain: (..., n); one cycle of a steady state begins at its top and ends with its first sample again.
+        turns: the samples at which all of them turn, (k,).
+        periodic: whether they are steady, or start from rest.
+        eps_half: (..., 1).
     """
     zero = np.zeros((*np.broadcast_shapes(strain.shape[:-1], np.shape(eps_half)[:-1]), 1))
     if not periodic:
@@ -172,7 +194,7 @@ def _walk(strain: Array, turns: Array, periodic: bool, eps_half: Array) -> tuple
 
 
 def _walk_all(eps_half: Array, history: History) -> tuple[Array, Array]:
-    """The walk for one history under many values, or for a stack of histories: those that turn alike at once."""
+    """`_walk` for one history and many values of eps_half, or for many histories: all that turn alike in one call."""
     eps_half = np.atleast_1d(np.asarray(eps_half, dtype=float))
     turning, count = history.turning, history.value.shape[-1]
     if history.value.ndim == 1:
@@ -196,6 +218,7 @@ def stress(p: Values, history: History) -> Array:
 
 
 def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
+    """d/dsigma_fmax = u and d/deps_half = sigma_fmax du/deps_half."""
     u, slope = _walk_all(p["eps_half"], history)
     return {"sigma_fmax": u, "eps_half": p["sigma_fmax"] * slope}
 

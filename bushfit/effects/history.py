@@ -14,15 +14,15 @@ Array = NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """Evenly sampled displacement or strain.
+    """A displacement or strain over time, evenly sampled.
 
     Args:
-        value: samples along the last axis; a leading axis holds variants.
+        value: samples [m, rad or 1] along the last axis; leading axes hold other motions or other parameter values.
         step: time between samples [s].
-        periodic: True where the samples are whole cycles of a steady state (the next sample is the
-            first again), False where the motion starts from rest before the first sample.
-        frequency: frequency of the excitation [Hz]; like the step, it may differ between variants, (..., 1).
-        driver: the motion that drives this one, where something that yields lies between the two.
+        periodic: True where the samples are whole cycles of a steady state, after which the first sample comes again;
+            False where the motion starts from rest before the first sample.
+        frequency: of the excitation [Hz]; like the step, it may differ between motions, (..., 1).
+        driver: the imposed motion, where something that gives way lies between it and this one.
     """
 
     value: Array
@@ -58,7 +58,7 @@ class History:
 
     @cached_property
     def turning(self) -> Turning:
-        """Where the motion turns."""
+        """The turning points of each row."""
         count = self.value.shape[-1]
         rows = self.value.reshape(-1, count)
         if self.periodic:
@@ -92,33 +92,33 @@ class History:
 
     @property
     def sense(self) -> Array:
-        """Sign of the rate, 0 at rest: of the driver's, where another motion drives this one."""
+        """Sign of the rate, 0 at rest; that of the imposed motion, where this one is driven by it."""
         leading = self if self.driver is None else self.with_value(self.driver)
         return np.sign(leading.rate)
 
     @property
     def acceleration(self) -> Array:
-        """Second time derivative by differences; the ends repeat their neighbours', so no kick at the start."""
+        """Second time derivative by differences; each end takes its neighbour's, so that the start gets no kick."""
         inner = np.diff(self.value, n=2, axis=-1) / self.step**2
         return np.concatenate([inner[..., :1], inner, inner[..., -1:]], axis=-1)
 
     def with_value(self, value: Array) -> History:
-        """The same clock with other values."""
+        """Other values at the same times."""
         return replace(self, value=value)
 
     def driven(self) -> History:
-        """The same motion, remembered as the driver of whatever follows it."""
+        """The same motion, kept as the driver of those that are made from it."""
         return replace(self, driver=self.value)
 
     def scaled(self, factor: float) -> History:
-        """All values times a factor, such as strain per displacement."""
+        """All values times a factor, such as strain per displacement; computed once, as a fit asks for it often."""
         if factor not in self._by_factor:
             self._by_factor[factor] = self.with_value(self.value * factor)
         return self._by_factor[factor]
 
     @cached_property
     def _by_factor(self) -> dict[float, History]:
-        """A fit asks for the same strain again and again."""
+        """The scaled histories by their factor."""
         return {}
 
 
@@ -127,11 +127,11 @@ class Turning:
     """The turning points of a history's rows.
 
     Args:
-        path: each row from where its memory begins, (rows, n + 1): from the rest before the first sample, or once
-            around the steady cycle from its top.
-        place: where on the path each sample lies, (rows, n), or (1, n) where it is the same for all rows.
-        label: which set of turning points a row has, (rows,).
-        turns: the sets, as places on the path.
+        path: the values of each row in the order in which friction follows them, (rows, n + 1): from the rest before
+            the first sample on, or once around the steady cycle from its top.
+        place: index on the path of each sample, (rows, n), or (1, n) where it is the same for all rows.
+        label: number of the set of turning points that a row has, (rows,).
+        turns: the sets, as indices on the path.
     """
 
     path: Array
@@ -140,14 +140,17 @@ class Turning:
     turns: tuple[Array, ...]
 
     def at_samples(self, along: Array, rows: Array) -> Array:
-        """What was followed along the paths of some rows, at their samples."""
+        """Values along the paths of some rows, (k, n + 1), at the samples of these rows, (k, n)."""
         if len(self.place) == 1:
             return along.take(self.place[0], axis=-1)
         return np.take_along_axis(along, self.place[rows], axis=-1)
 
 
 def reversals(value: Array) -> Array:
-    """Whether the motion reverses at a sample, (..., n - 1); of level stretches the last sample counts."""
+    """Whether the motion reverses at each sample but the last, (..., n) -> (..., n - 1).
+
+    Where it rests before it turns, the last sample of the rest counts.
+    """
     step = np.sign(np.diff(value, axis=-1))
     if step.all():
         return np.concatenate([np.zeros((*step.shape[:-1], 1), dtype=bool), step[..., 1:] != step[..., :-1]], axis=-1)

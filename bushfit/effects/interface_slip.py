@@ -7,7 +7,7 @@ import numpy as np
 from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
 from bushfit.effects.history import History
 
-#: Amplitude below which the slip stiffness grows no more [m or rad].
+#: Amplitude below which the slip stiffness grows no more [m or rad]: less than any test reaches, and more than 0.
 SMALLEST_AMPLITUDE = 1e-12
 
 

@@ -8,6 +8,7 @@ from bushfit.geometry import Direction
 
 
 def _factor(p: Values, setting: Setting) -> Value:
+    """1 + excess radially, 1 in the other directions."""
     return 1.0 + p["excess"] if setting.direction is Direction.RADIAL else 1.0
 
 
@@ -39,6 +40,7 @@ EFFECT = Layer(
     ),
     source="Eqs. 11, 12 against finite elements: -0.7 to +9.7 % over 14 shapes",
     confirmed_by="a finite element solution of this shape, or the radial rig's load cell against a known weight",
+    corrects=Direction.RADIAL,
     stiffness=stiffness,
     force=force,
 )

@@ -6,7 +6,7 @@ import numpy as np
 
 from bushfit.effects.contract import Condition, Level, Modifier, Parameter, Value, Values, scaled_values
 
-#: Frequency at which sigma_fmax is as it stands [Hz].
+#: Frequency at which sigma_fmax is unchanged [Hz]: within the range of most sweeps.
 REFERENCE_FREQUENCY = 25.0
 
 

@@ -9,11 +9,17 @@ from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter,
 from bushfit.effects.history import History
 from bushfit.errors import ModelError
 
-#: The iterations stop when the motions balance to this share of the imposed one, or after so many rounds.
+#: The iterations stop when what is missing of the motion is less than this, relative to the imposed motion: rounding.
 TOLERANCE = 1e-14
-#: And what of it may be left when the rounds are used up.
-_UNSETTLED = 1e-3
+#: Most rounds of an iteration: chosen, many more than a rig takes that is stiffer than the bushing.
 ROUNDS = 60
+#: What may be missing of the motion when all rounds are used up, relative to the imposed motion: less than any test
+#: resolves.
+_UNSETTLED = 1e-3
+#: Largest motion of the bushing that an iteration may try, relative to the imposed motion.
+_LARGEST_MOTION = 2.0
+#: Sample at which the pulse stands that measures a stiffness: a few after the start, for the force before it.
+_PULSE_AT = 4
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
@@ -26,9 +32,10 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 
 def _log_share(compliance: Value, below: StiffnessBelow, omega: Array, amplitude: Array) -> Array:
-    """v = ln(amplitude at the bushing over the imposed one): v + ln|1 + c K(X e^v)| = 0, by secants."""
+    """Logarithm v of the share of the amplitude that reaches the bushing: v + ln|1 + c K(X e^v)| = 0, by secants."""
 
     def lost(v: Array) -> Array:
+        """ln|1 + c K| at the amplitude X e^v."""
         given = compliance * below(omega, amplitude * np.exp(v))
         return 0.5 * np.log1p(2.0 * given.real + given.real**2 + given.imag**2)
 
@@ -46,11 +53,13 @@ def _log_share(compliance: Value, below: StiffnessBelow, omega: Array, amplitude
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """F(x_b) of the motion x_b = x - c F(x_b) that reaches the bushing [N], over the whole history at once.
+    """Force [N] of the motion x_b = x - c F(x_b) that reaches the bushing.
 
-    The residual of x_b is sent back through 1/(1 + c K) harmonic by harmonic, with K measured once on a
-    pulse; how good that K is decides the pace, not the result. Dry friction inside turns with the imposed
-    motion: the moment for which it sticks is left out.
+    Notes:
+        Solved for the whole history at once. Each round computes what is missing of the motion, x - x_b - c F(x_b), and
+        adds it to x_b times 1/(1 + c K), harmonic by harmonic. K is measured once with a pulse: a poor K costs rounds,
+        not accuracy. Where a round does not bring x_b nearer, the next steps are halved. Dry friction below turns its
+        sense with the imposed motion: that it sticks for a moment is neglected.
     """
     compliance = p["compliance"]
     if setting.direction.is_rotation or not np.any(compliance):
@@ -69,7 +78,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
             break
         pace, last = np.where(off < last, pace, 0.5 * pace), off
         change = np.fft.irfft(yielding * np.fft.rfft(missing, n=length), n=length)[..., :count]
-        reached = np.clip(reached + pace * change, -2.0 * size, 2.0 * size)
+        reached = np.clip(reached + pace * change, -_LARGEST_MOTION * size, _LARGEST_MOTION * size)
         felt = below(history.with_value(reached))
     else:
         if not history.periodic and np.any(off > _UNSETTLED * size):
@@ -83,13 +92,13 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
 
 
 def _pulse_stiffness(below: ForceBelow, history: History, length: int) -> Array:
-    """Force over displacement of a pulse as high as the motion's amplitude, per harmonic of `length` samples.
+    """Complex stiffness [N/m] at each harmonic of `length` samples: force over displacement of a single pulse.
 
-    Counted from the force before the pulse, which friction does not let return to zero; never negative.
+    The pulse is as high as the amplitude of the motion. Its force counts from the one before it, to which friction does
+    not let it return; the real part is never negative.
     """
-    at = 4
     pulse = np.zeros(history.value.shape)
-    pulse[..., at : at + 1] = history.amplitude
+    pulse[..., _PULSE_AT : _PULSE_AT + 1] = history.amplitude
     answer = below(history.with_value(pulse).driven())
     measured = np.fft.rfft(answer - answer[..., :1], n=length) / np.fft.rfft(pulse, n=length)
     return np.maximum(measured.real, 0.0) + 1j * measured.imag

@@ -10,7 +10,7 @@ from scipy.fft import next_fast_len
 from bushfit.effects.contract import Array, Branch, Level, Parameter, Values, linear_stress
 from bushfit.effects.history import History
 
-#: Step of the order in differences of the Gruenwald-Letnikov sum.
+#: Step of alpha in differences of the Gruenwald-Letnikov sum [1]: the cube root of rounding, which errs least.
 _ORDER_STEP = 1e-5
 
 

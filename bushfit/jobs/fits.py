@@ -11,7 +11,7 @@ from bushfit.effects import BASE
 from bushfit.errors import FitError
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, given_static
 from bushfit.model.file import to_document
-from bushfit.report.artifacts import artifact_names, loop_files, sweep_files
+from bushfit.report.artifacts import artifact_names, fit_files
 from bushfit.report.folder import to_json
 
 if TYPE_CHECKING:
@@ -49,9 +49,9 @@ class Fitted:
         model, data = self.result.model, self.data.without(self.result.outliers)
         files = {f"{self.stem}.json": to_json(self.document)}
         if "loops" in self.kinds:
-            files |= loop_files(model, data.loops, formats)
+            files |= fit_files("loops", model, data.loops, formats)
         if "sweeps" in self.kinds:
-            files |= sweep_files(model, data.sweeps, formats)
+            files |= fit_files("sweeps", model, data.sweeps, formats)
         return files
 
 

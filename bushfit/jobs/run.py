@@ -14,7 +14,7 @@ from bushfit.jobs.fits import Fit, FitStatic, Fitted, tests_of
 from bushfit.jobs.predict import Predict, Predicted
 from bushfit.model.file import to_document
 from bushfit.model.model import FIVE
-from bushfit.report.artifacts import artifact_names, diagnosis_files, loop_files, sweep_files
+from bushfit.report.artifacts import artifact_names, diagnosis_files, fit_files
 from bushfit.report.folder import to_json
 
 if TYPE_CHECKING:
@@ -67,8 +67,8 @@ class Ran:
         found, title = self.diagnosed, self.data.campaign.name
         return {
             **{f"{name}.json": to_json(document) for name, document in self.document.items()},
-            **loop_files(model, marked.loops, formats),
-            **sweep_files(model, marked.sweeps, formats),
+            **fit_files("loops", model, marked.loops, formats),
+            **fit_files("sweeps", model, marked.sweeps, formats),
             **(diagnosis_files(found.diagnosis, title, formats) if found else {}),
             **self.predicted.files(formats),
         }

@@ -1,14 +1,17 @@
-"""The tables and plots of a result, as bytes by file name; `formats` says which to make: csv, png."""
+"""The tables and plots of a result, as the bytes of each file; `formats` says which to make: csv, png."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal
 
 from bushfit.reading.csvfile import to_csv
 from bushfit.report import tables
 
 if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
     from bushfit.diagnosis.record import Diagnosis
     from bushfit.fitting.data_sets import LoopData, SweepData
     from bushfit.model.model import Model
@@ -16,31 +19,28 @@ if TYPE_CHECKING:
     from bushfit.prediction import Prediction
 
 
-def loop_files(model: Model, data_sets: Sequence[LoopData], formats: Collection[str]) -> dict[str, bytes]:
-    """`loops.csv` and `loops.png`; nothing where there are no loops."""
-    if not data_sets:
-        return {}
-    files = {}
-    if "csv" in formats:
-        files["loops.csv"] = to_csv(tables.loops_table(model, data_sets))
-    if "png" in formats:
-        from bushfit.report.plots import loops_figure, to_png
-
-        files["loops.png"] = to_png(loops_figure(model, data_sets, model.bushing.name))
-    return files
+#: The table of each kind of test.
+_TABLES: Mapping[str, Callable[[Model, Any], pd.DataFrame]] = {
+    "loops": tables.loops_table,
+    "sweeps": tables.sweeps_table,
+}
 
 
-def sweep_files(model: Model, data_sets: Sequence[SweepData], formats: Collection[str]) -> dict[str, bytes]:
-    """`sweeps.csv` and `sweeps.png`; nothing where there are no sweeps."""
-    if not data_sets:
-        return {}
-    files = {}
-    if "csv" in formats:
-        files["sweeps.csv"] = to_csv(tables.sweeps_table(model, data_sets))
-    if "png" in formats:
-        from bushfit.report.plots import sweeps_figure, to_png
+def fit_files(
+    kind: Literal["loops", "sweeps"],
+    model: Model,
+    data_sets: Sequence[LoopData] | Sequence[SweepData],
+    formats: Collection[str],
+) -> dict[str, bytes]:
+    """`loops.csv` and `loops.png` of a fit, or `sweeps.csv` and `sweeps.png`; nothing where there are no such tests."""
+    files: dict[str, bytes] = {}
+    if data_sets and "csv" in formats:
+        files[f"{kind}.csv"] = to_csv(_TABLES[kind](model, data_sets))
+    if data_sets and "png" in formats:
+        from bushfit.report.plots import loops_figure, sweeps_figure, to_png
 
-        files["sweeps.png"] = to_png(sweeps_figure(model, data_sets, model.bushing.name))
+        draw: Mapping[str, Callable[[Model, Any, str], Figure]] = {"loops": loops_figure, "sweeps": sweeps_figure}
+        files[f"{kind}.png"] = to_png(draw[kind](model, data_sets, model.bushing.name))
     return files
 
 

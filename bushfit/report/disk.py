@@ -1,8 +1,9 @@
-"""What POSIX and Linux offer so that a set of files changes at once: folders exchanged, locked and flushed."""
+"""Calls of the operating system that a set of files needs to change at once: exchange, lock and flush a folder."""
 
 from __future__ import annotations
 
 import ctypes
+import errno
 import os
 import sys
 from collections.abc import Iterator
@@ -12,7 +13,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+#: Linux' word for the working folder, in calls that take a folder and a path (fcntl.h).
 _AT_FDCWD = -100
+#: Linux' flag of renameat2 that swaps two paths (linux/fs.h).
 _RENAME_EXCHANGE = 2
 
 
@@ -26,14 +29,16 @@ def exchange(one: Path, other: Path) -> None:
     arguments = [part for name in names for part in (ctypes.c_int(_AT_FDCWD), ctypes.c_char_p(name))]
     rename = getattr(_libc(), "renameat2", None)
     if rename is None:
-        raise OSError(38, "folders cannot be exchanged here")
+        raise OSError(errno.ENOSYS, "folders cannot be exchanged here")
     if rename(*arguments, ctypes.c_uint(_RENAME_EXCHANGE)) != 0:
         number = ctypes.get_errno()
         raise OSError(number, os.strerror(number), str(other))
 
 
 def flush(files: list[int]) -> None:
-    """Put open files on the disk; in one go where the system can, because one by one costs several times as much.
+    """Make sure that open files are on the disk and not only in memory.
+
+    In one go where the system can: one by one costs several times as much.
 
     Raises:
         OSError: the disk is full or fails.
@@ -47,9 +52,10 @@ def flush(files: list[int]) -> None:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold a folder against other runs of bushfit; the lock leaves no file and ends with the process.
+    """Let no other run of bushfit work on a folder while the body runs; wait until none does.
 
-    Where the system or the file system knows no such lock, the body runs without.
+    The lock is no file, and ends with the process. Where the system or the file system has no such locks, the body runs
+    without.
     """
     held = claim(folder)
     try:
@@ -59,7 +65,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def claim(folder: Path, *, wait: bool = True) -> Claim:
-    """Show other runs that a folder is in use, until the claim is closed or this process ends.
+    """Mark a folder as in use, for other runs to see, until the claim is closed or this process ends.
 
     Raises:
         BlockingIOError: another holds it, and `wait` is False.
@@ -68,7 +74,7 @@ def claim(folder: Path, *, wait: bool = True) -> Claim:
 
 
 def is_abandoned(folder: Path) -> bool:
-    """Whether nobody claims a folder; False where that cannot be told."""
+    """Whether no run claims a folder any more; False where that cannot be told."""
     try:
         descriptor = _lock(folder, wait=False)
     except BlockingIOError:
@@ -79,17 +85,22 @@ def is_abandoned(folder: Path) -> bool:
 
 @dataclass(frozen=True)
 class Claim:
-    """A lock that is held."""
+    """A folder marked as in use.
+
+    Args:
+        descriptor: the open folder that holds the lock; None where there are no locks.
+    """
 
     descriptor: int | None
 
     def close(self) -> None:
+        """End the claim."""
         if self.descriptor is not None:
             os.close(self.descriptor)
 
 
 def _lock(folder: Path, *, wait: bool) -> int | None:
-    """A descriptor that holds the folder; None where it cannot be held.
+    """Open a folder and lock it; the descriptor, or None where it cannot be locked.
 
     Raises:
         BlockingIOError: another holds it, and `wait` is False.
@@ -114,4 +125,5 @@ def _lock(folder: Path, *, wait: bool) -> int | None:
 
 @cache
 def _libc() -> Any:
+    """Linux' C library; None on other systems."""
     return ctypes.CDLL(None, use_errno=True) if sys.platform.startswith("linux") else None

@@ -1,7 +1,18 @@
-"""Results on disk: a set of files comes whole or not at all, and never over others unasked."""
+"""Writes the files of a result into a folder: all of them or none, and over existing ones only where that is asked.
+
+How `write_files` does it:
+
+1. The files are written into a hidden folder beside the target (the stage) and flushed to the disk.
+2. If the target does not exist, the stage is renamed to it: one step of the file system.
+3. If it exists, links to its other files are added to the stage, and the two folders are exchanged in one step.
+4. If they cannot be exchanged (the working folder, a network drive), the stage is renamed to a fixed name inside the
+   target, which means "decided", and its files are then moved into place one by one. A run that is killed in between
+   leaves the decided folder, and the next run that writes there finishes the moves first.
+"""
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shutil
@@ -15,9 +26,12 @@ from typing import Any
 from bushfit.errors import OutputError
 from bushfit.report import disk
 
-#: Where a set of files is made ready, and where one waits that is decided but not yet in place.
-_STAGE, _DECIDED = ".bushfit-", ".bushfit-decided"
-#: A folder that holds more than this is no folder of results: its files are replaced one by one.
+#: Start of the name of a stage, the hidden folder in which a set of files is written.
+_STAGE = ".bushfit-"
+#: Name of a set of files that is complete and waits to be moved into the folder around it.
+_DECIDED = ".bushfit-decided"
+#: Most files of a folder that is exchanged [files]; one that holds more is no folder of results, and linking its files
+#: would take longer than moving the new ones in.
 _MOST_LINKED = 2000
 
 
@@ -27,7 +41,7 @@ def to_json(document: Mapping[str, Any]) -> bytes:
 
 
 def check_free(folder: Path, names: list[str], *, force: bool) -> None:
-    """Refuse what could not be written, before the work.
+    """Refuse a folder that the results could not be written to; called before the work begins, too.
 
     Raises:
         OutputError: the folder is a file or allows no writing, holds a folder of one of the names, or holds one of
@@ -58,23 +72,25 @@ def check_free(folder: Path, names: list[str], *, force: bool) -> None:
 
 
 def _check_writable(folder: Path) -> None:
-    """The folder, or the nearest one above it that exists, must take new files."""
+    """Raise OSError unless the folder, or the nearest one above it that exists, takes new files."""
     place = folder.absolute()
     nearest = next(path for path in (place, *place.parents) if os.path.lexists(path))
     if nearest.exists() and not nearest.is_dir():
-        raise NotADirectoryError(20, "Not a directory", str(nearest))
+        raise NotADirectoryError(errno.ENOTDIR, "Not a directory", str(nearest))
     if not os.access(nearest, os.W_OK | os.X_OK):
-        raise PermissionError(13, "no right to write there", str(nearest))
+        raise PermissionError(errno.EACCES, "no right to write there", str(nearest))
 
 
 def write_files(folder: Path, files: Mapping[str, bytes], *, force: bool) -> None:
-    """Write a set of files into a folder, all of them or none, whatever else happens to run or fail meanwhile.
+    """Write a set of files into a folder: all of them or none, even if this run is killed or another writes there.
 
-    They are made ready in a hidden folder. A new folder is then put in place by one renaming. One that stands is
-    exchanged in one step for a folder with the new files and links to all other files of the old. Where that cannot
-    be (`-o .`, a network drive), the set is first marked as decided and then moved file by file; if the run is killed
-    in between, the next one that writes there ends the work. Runs into one folder take turns: whole sets, the last
-    one stands. What a killed run left is removed by the next.
+    The steps stand at the top of this module. Runs that write into one folder take turns, and the last one's files
+    stay. What a killed run left behind is removed by the next.
+
+    Args:
+        folder: made where it does not exist.
+        files: content by file name.
+        force: whether files of these names may be replaced.
 
     Raises:
         OutputError: the folder cannot be written, or holds results and `force` is False.
@@ -98,7 +114,7 @@ def write_files(folder: Path, files: Mapping[str, bytes], *, force: bool) -> Non
 
 @contextmanager
 def _parents(folder: Path) -> Iterator[None]:
-    """Make a folder and what is missing above it; remove that again if the body fails."""
+    """Make a folder and the missing ones above it; remove them again if the body fails."""
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     try:
@@ -112,7 +128,7 @@ def _parents(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def _staged(home: Path, files: Mapping[str, bytes]) -> Iterator[Path]:
-    """The files in a folder of their own, on the disk; what is left of it is removed afterwards."""
+    """Write the files to a stage in `home` and give the folder they are in; the stage is removed in the end."""
     with disk.locked(home):
         _clear_abandoned(home)
         stage = Path(tempfile.mkdtemp(prefix=_STAGE, dir=home))
@@ -128,6 +144,7 @@ def _staged(home: Path, files: Mapping[str, bytes]) -> Iterator[Path]:
 
 
 def _write(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write new files into a folder and flush them to the disk."""
     streams = []
     try:
         for name, content in files.items():
@@ -143,33 +160,44 @@ def _write(folder: Path, files: Mapping[str, bytes]) -> None:
 
 @cache  # once a run is enough: a batch writes into one folder a thousand times
 def _clear_abandoned(home: Path) -> None:
-    """Remove what killed runs left: stages that nobody claims any more."""
+    """Remove the stages of runs that were killed, which nobody claims any more."""
     for stage in home.glob(_STAGE + "????????"):
         if disk.is_abandoned(stage):
             shutil.rmtree(stage, ignore_errors=True)
 
 
 def _exchangeable(place: Path) -> bool:
-    """Whether a folder may be exchanged for another: not where this process, and its user, stand in it."""
+    """Whether a folder may be exchanged for another: not the working folder or one above it, nor a mounted drive."""
     here = Path.cwd()
     return place not in (here, *here.parents) and not place.is_mount() and os.access(place.parent, os.W_OK)
 
 
 def _exchanged(ready: Path, place: Path) -> bool:
-    """Exchange the folder for one with the new files and the others that stand there; False where that cannot be."""
+    """Exchange a folder for one that holds the new files and its own other ones; False where that cannot be done."""
     whole = ready.with_name("whole")
     try:
         shutil.copytree(ready, whole, copy_function=os.link)
         _link_others(place, whole, _MOST_LINKED)
         _keep_rights(place, whole)
         disk.exchange(whole, place)
-    except OSError:  # no links, no exchange, rights that a copy would lose: the other way asks for none of these
+    except OSError:  # no links, no exchange, or rights that a copy would lose: moving the files needs none of these
         return False
     return True
 
 
 def _link_others(source: Path, target: Path, left: int) -> int:
-    """Link every file below a folder to its place below another, except where one stands; how many more may come."""
+    """Link every file below `source` to the same place below `target`, except where a file stands already.
+
+    Args:
+        source, target: folders of one file system.
+        left: how many files and folders may be linked at most.
+
+    Returns:
+        How many more may be linked.
+
+    Raises:
+        OSError: there are more.
+    """
     for entry in os.scandir(source):
         left -= 1
         if left < 0:
@@ -186,6 +214,7 @@ def _link_others(source: Path, target: Path, left: int) -> int:
 
 
 def _keep_rights(source: Path, target: Path) -> None:
+    """Give a folder the owner, the rights and the times of another."""
     old, new = source.stat(), target.stat()
     if (old.st_uid, old.st_gid) != (new.st_uid, new.st_gid):
         os.chown(target, old.st_uid, old.st_gid)
@@ -193,7 +222,7 @@ def _keep_rights(source: Path, target: Path) -> None:
 
 
 def _end_decided(place: Path) -> None:
-    """Move files that are decided into their place: those of this run, or of one that was killed meanwhile."""
+    """Move the files of a decided set into the folder: those of this run, or of one that was killed before it could."""
     decided = place / _DECIDED
     if decided.is_dir():
         for file in decided.iterdir():
@@ -202,6 +231,7 @@ def _end_decided(place: Path) -> None:
 
 
 def _unwritable(folder: Path, error: OSError) -> OutputError:
+    """What is told of a failure of the disk."""
     return OutputError(
         "the results cannot be written",
         file=folder,

@@ -47,70 +47,64 @@ def loops_table(model: Model, data_sets: Sequence[LoopData]) -> pd.DataFrame:
     """Measured and modelled force of every loop, row by row (or by bin of phase where a loop is long)."""
     import pandas as pd
 
-    frames = []
-    for data_set in data_sets:
-        units = data_set.direction.display
-        (length, length_factor), (force, force_factor) = units.displacement, units.force
+    def rows(data_set: LoopData) -> pd.DataFrame:
+        (length, length_factor), (force, force_factor), _ = data_set.direction.display
         drive = data_set.drive
-        frames.append(
-            pd.DataFrame(
-                {
-                    "loop": data_set.test.name,
-                    "direction": str(data_set.direction),
-                    "time [s]": drive.phase / drive.frequency,
-                    f"displacement [{length}]": drive.displacement(drive.phase) * length_factor,
-                    f"force [{force}]": drive.force * force_factor,
-                    f"model force [{force}]": data_set.force(model) * force_factor,
-                    "residual [noise]": data_set.shown(model),
-                }
-            )
+        return pd.DataFrame(
+            {
+                "loop": data_set.name,
+                "direction": str(data_set.direction),
+                "time [s]": drive.phase / drive.frequency,
+                f"displacement [{length}]": drive.displacement(drive.phase) * length_factor,
+                f"force [{force}]": drive.force * force_factor,
+                f"model force [{force}]": data_set.force(model) * force_factor,
+                "residual [noise]": data_set.shown(model),
+            }
         )
-    return pd.concat(frames, ignore_index=True)
+
+    return pd.concat([rows(data_set) for data_set in data_sets], ignore_index=True)
 
 
 def sweeps_table(model: Model, data_sets: Sequence[SweepData]) -> pd.DataFrame:
     """Measured and modelled dynamic stiffness of every sweep, sorted by amplitude, repeat and frequency."""
     import pandas as pd
 
-    frames = []
-    for data_set in data_sets:
-        units = data_set.direction.display
-        (length, length_factor), (stiffness, factor) = units.displacement, units.stiffness
+    def rows(data_set: SweepData) -> pd.DataFrame:
+        (length, length_factor), _, (stiffness, factor) = data_set.direction.display
         modelled = data_set.stiffness(model)
         gain, phase = np.split(data_set.shown(model), 2)
-        frames.append(
-            pd.DataFrame(
-                {
-                    "sweep": data_set.sweep.name,
-                    "direction": str(data_set.direction),
-                    "frequency [Hz]": data_set.frequency,
-                    f"amplitude [{length}]": data_set.amplitude * length_factor,
-                    "repeat": data_set.repeat,
-                    f"stiffness [{stiffness}]": np.abs(data_set.measured) * factor,
-                    "loss factor [-]": loss_factor(data_set.measured),
-                    f"model stiffness [{stiffness}]": np.abs(modelled) * factor,
-                    "model loss factor [-]": loss_factor(modelled),
-                    "stiffness residual [noise]": gain,
-                    "loss residual [noise]": phase,
-                }
-            )
+        return pd.DataFrame(
+            {
+                "sweep": data_set.sweep.name,
+                "direction": str(data_set.direction),
+                "frequency [Hz]": data_set.frequency,
+                f"amplitude [{length}]": data_set.amplitude * length_factor,
+                "repeat": data_set.repeat,
+                f"stiffness [{stiffness}]": np.abs(data_set.measured) * factor,
+                "loss factor [-]": loss_factor(data_set.measured),
+                f"model stiffness [{stiffness}]": np.abs(modelled) * factor,
+                "model loss factor [-]": loss_factor(modelled),
+                "stiffness residual [noise]": gain,
+                "loss residual [noise]": phase,
+            }
         )
-    return pd.concat(frames, ignore_index=True)
+
+    return pd.concat([rows(data_set) for data_set in data_sets], ignore_index=True)
 
 
 def gap_table(before: Model, after: Model, data_sets: Sequence[DataSet]) -> pd.DataFrame:
-    """Every residual of a diagnosis, before and after, in units of noise: a row a sweep point, or a loop's row."""
+    """Every residual of a diagnosis, before and after, in units of noise: a row per sweep point or loop row."""
     import pandas as pd
 
-    frames = []
-    for data_set in data_sets:
+    def rows(data_set: DataSet) -> pd.DataFrame:
         columns: dict[str, Any] = {"test": data_set.name, "kind": data_set.kind, "direction": str(data_set.direction)}
         columns |= data_set.columns()
         for name, model in (("before", before), ("after", after)):
             parts = data_set.components(data_set.residual(model))
             columns |= {f"{part} {name} [noise]": values for part, values in parts.items()}
-        frames.append(pd.DataFrame(columns))
-    return pd.concat(frames, ignore_index=True)
+        return pd.DataFrame(columns)
+
+    return pd.concat([rows(data_set) for data_set in data_sets], ignore_index=True)
 
 
 def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:

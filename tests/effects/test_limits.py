@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from bushfit.effects import BASE, History
+from bushfit.effects import BASE, LIBRARY, Effect, History, qualified
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
 from bushfit.effects.maxwell import relaxed
 from bushfit.geometry import Bushing, Direction
@@ -18,7 +18,9 @@ PLAIN = Model(
     BASE,
     {"mu": 1.09e6, "m": 2.0e5, "alpha": 0.24, "sigma_fmax": 1.46e4, "eps_half": 1.3e-2},
 )
-FREQUENCY, AMPLITUDE = np.array([5.0, 55.0, 155.0]), np.array([1e-4, 2e-4, 5e-4])
+#: Operating points [Hz] and [m].
+FREQUENCY = np.array([5.0, 55.0, 155.0])
+AMPLITUDE = np.array([1e-4, 2e-4, 5e-4])
 LOOP = History.steady(5e-4 * np.cos(2.0 * np.pi * np.arange(512) / 512), 5.0)
 STARTED = History(5e-4 * np.sin(2.0 * np.pi * np.arange(20480) / 2048), 1.0 / (20.0 * 2048), False, 20.0)
 
@@ -219,3 +221,13 @@ def test_play_bends_the_waveform_and_friction_answers_to_it(direction: Direction
     error = np.abs(found / exact - 1.0).max()
     print(f"{direction}, delta/X = {ratio}: {error:.1e}; at the peak alone {np.abs(peak / exact - 1.0).max():.1e}")
     assert error < model.records[-1].harmonic_error
+
+
+@pytest.mark.parametrize("effect", [effect for effect in LIBRARY.values() if effect.corrects], ids=lambda one: one.name)
+def test_what_corrects_a_formula_scales_that_direction_and_no_other(effect: Effect) -> None:
+    (parameter,) = effect.parameters
+    model = PLAIN.with_effect(effect.name, {qualified(effect, parameter): parameter.typical})
+    for direction in Direction:
+        ratio = model.stiffness(direction, FREQUENCY, AMPLITUDE) / PLAIN.stiffness(direction, FREQUENCY, AMPLITUDE)
+        assert np.ptp(np.abs(ratio)) < 1e-12, "a factor"
+        assert (abs(ratio[0] - 1.0) > 1e-6) == (direction is effect.corrects)

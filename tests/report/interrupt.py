@@ -23,7 +23,10 @@ from bushfit.report import folder as output
 OLD = {name: b"old " + name.encode() for name in ("axial.csv", "model.json", "radial.csv")}
 NEW = {name: b"new " + name.encode() for name in OLD}
 OTHERS = {"notes.txt": b"of the user", "pictures/one.png": b"of the user too"}
-WRITTEN, REFUSED = 0, 3
+#: Exit status of a run that wrote its files.
+WRITTEN = 0
+#: Exit status of a run that was refused.
+REFUSED = 3
 
 
 def prepare(folder: Path, where: str) -> None:

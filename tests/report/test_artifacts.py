@@ -14,7 +14,7 @@ from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.prediction import predict
-from bushfit.report.artifacts import artifact_names, loop_files, prediction_files, sweep_files
+from bushfit.report.artifacts import artifact_names, fit_files, prediction_files
 
 PNG = b"\x89PNG"
 
@@ -26,13 +26,15 @@ def data(root: Path) -> Data:
 
 @pytest.mark.parametrize("formats", [("csv",), ("png",), ("csv", "png"), ()])
 def test_a_fit_has_the_files_of_the_formats_asked_for(data: Data, paper_model: Model, formats: tuple[str, ...]) -> None:
-    loops, sweeps = loop_files(paper_model, data.loops, formats), sweep_files(paper_model, data.sweeps, formats)
+    loops = fit_files("loops", paper_model, data.loops, formats)
+    sweeps = fit_files("sweeps", paper_model, data.sweeps, formats)
     assert sorted(loops | sweeps) == sorted(artifact_names(["loops", "sweeps"], formats))
     assert all(content.startswith(PNG) == name.endswith("png") for name, content in (loops | sweeps).items())
 
 
 def test_without_tests_there_are_no_files(paper_model: Model) -> None:
-    assert loop_files(paper_model, [], ("csv", "png")) == sweep_files(paper_model, [], ("csv", "png")) == {}
+    formats = ("csv", "png")
+    assert fit_files("loops", paper_model, [], formats) == fit_files("sweeps", paper_model, [], formats) == {}
 
 
 def test_a_prediction_has_a_table_and_a_plot_a_direction(data: Data, paper_model: Model) -> None:

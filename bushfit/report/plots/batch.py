@@ -13,30 +13,54 @@ from matplotlib.ticker import MaxNLocator
 
 from bushfit.effects.contract import Array
 from bushfit.reduction.scatter import scatter
-from bushfit.report.plots.style import DOT, FRAME, GREY, INK, POINT, ROW, SMALL, dress, explain, fonts, new_figure
+from bushfit.report.plots.style import CM, DOT, FRAME, GREY, INK, POINT, ROW, SMALL, dress, explain, fonts, new_figure
 from bushfit.units import number
 
-_MISS, _LIMIT, _GOOD = "#c1272d", "#c1272d", "#31688e"
+#: Colour of limits and of what is out of them.
+_OUT = "#c1272d"
+#: Colour of what is within the limits.
+_GOOD = "#31688e"
 #: Up to this many bushings are drawn as single points; beyond, as a cloud with its histogram.
 _CLOUD = 200
+#: Points of a cloud that cover each other as much as is still read, of this many at full strength.
+_OPAQUE = 1500
+#: Most bushings that a panel names: more names cover the points.
 _MOST_NAMED = 4
-#: More names do not fit along a panel.
+#: Most bushings whose names stand along x: more do not fit along a panel.
 _MOST_ALONG = 40
+#: Most letters of a name along x: longer ones are higher than their panel.
+_MOST_LETTERS_ALONG = 32
+#: Letters of a name along x for which a figure has room as it is.
+_SHORT_NAME = 16
+#: Height that each further letter of the longest name takes [inch].
+_ALONG_LETTER = 0.12 / CM
+#: Most letters of a name within a panel: longer ones are half as wide as the panel.
 _MOST_LETTERS = 24
-#: Room of a letter, as a share of the panel's width, and of a line [points].
-_LETTER, _LINE = 0.021, 8.5
+#: Width of a letter, as a share of the panel's.
+_LETTER = 0.021
+#: Height of a line [point].
+_LINE = 8.5
 #: Values further out than this many robust standard deviations are drawn at the edge.
 _FURTHEST = 12.0
-#: A panel shows at least this share of the median on either side.
+#: A panel shows at least this share of the median on either side: less is rounding.
 _LEAST = 5e-4
+#: Panels side by side.
 _COLUMNS = 2
+#: Most panels of a picture: it is then a metre high.
+_MOST_PANELS = 40
 
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One quantity: its header, values over the bushings (n,) with NaN where there is none, the lowest and highest
-    allowed value where there is a limit, the places of bushings that miss it, and the ends of the 95 % intervals
-    (2, n) where they are known."""
+    """One quantity of a batch.
+
+    Args:
+        title: what it is, with its unit.
+        values: one per bushing, NaN where there is none, (n,).
+        allowed: the lowest and the highest allowed value; empty where there is no limit.
+        missed: places of the bushings that miss it.
+        intervals: ends of the 95 % intervals, (2, n), where they are known.
+    """
 
     title: str
     values: Array
@@ -46,16 +70,19 @@ class Panel:
 
 
 def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> Figure:
-    """Two columns of panels, the bushings along x in the manifest's order.
+    """Two columns of panels, the bushings along x in the manifest's order; of more than forty quantities the first.
 
     Args:
         panels: the quantities.
         title: of the batch.
         names: of all bushings, (n,); they stand along x too where they are few.
     """
-    along = names if len(names) <= _MOST_ALONG else ()
+    count = len(panels)
+    panels = panels[:_MOST_PANELS]
+    along = [_short(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
     lines = math.ceil(len(panels) / _COLUMNS)
     height = ROW * (0.9 + 0.1 * bool(along)) * lines + 0.35 * FRAME
+    height += _ALONG_LETTER * max(0, max(map(len, along), default=0) - _SHORT_NAME)
     figure = new_figure(f"{title}: {len(names)} bushings", height)
     grid = figure.subplots(lines, _COLUMNS, sharex=True, squeeze=False)
     for axes, panel in zip(grid.flat, panels, strict=False):
@@ -75,11 +102,18 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> F
     limits = "Dashed: limits; red: out of them, the worst by name." if any(panel.allowed for panel in panels) else ""
     beyond = "Triangles: further out than the panel reaches, the furthest by name and value."
     few = len(names) <= _CLOUD and any(panel.intervals is not None for panel in panels)
-    explain(figure, "Grey line: median of the batch.", "Bars: 95 % intervals." * few, limits, beyond)
+    more = f"The first {len(panels)} of {count} quantities." * (count > len(panels))
+    explain(figure, "Grey line: median of the batch.", "Bars: 95 % intervals." * few, limits, beyond, more)
     return figure
 
 
+def _short(name: str, letters: int) -> str:
+    """A name of at most so many letters."""
+    return name if len(name) <= letters else name[: letters - 1] + "…"
+
+
 def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
+    """One quantity over all bushings, with its limits and the names of those that miss them."""
     there = np.isfinite(panel.values)
     place, values = np.flatnonzero(there), panel.values[there]
     ends = None if panel.intervals is None else panel.intervals[:, there]
@@ -88,33 +122,35 @@ def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     inside = shown == values
     bad = np.isin(place, list(panel.missed))
     cloud = values.size > _CLOUD
-    good_style = {**DOT, "ms": 1.6, "alpha": max(0.15, min(1.0, 1500 / values.size))} if cloud else POINT
+    good_style = {**DOT, "ms": 1.6, "alpha": max(0.15, min(1.0, _OPAQUE / values.size))} if cloud else POINT
     if ends is not None and not cloud:
-        colors = [_MISS if out else _GOOD for out in bad]
+        colors = [_OUT if out else _GOOD for out in bad]
         axes.vlines(place + 1, *ends, color=colors, lw=0.8, alpha=0.6, zorder=2)
-    for chosen, color, style, order in ((~bad, _GOOD, good_style, 2), (bad, _MISS, POINT if not cloud else DOT, 4)):
+    for chosen, color, style, order in ((~bad, _GOOD, good_style, 2), (bad, _OUT, POINT if not cloud else DOT, 4)):
         for marker, which in (("o", inside), ("^", shown < values), ("v", shown > values)):
             x, y = place[chosen & which] + 1, shown[chosen & which]
             axes.plot(x, y, marker, color=color, zorder=order, rasterized=cloud, **(style if marker == "o" else POINT))
     axes.axhline(float(np.median(values)), color=GREY, lw=0.9, zorder=1)
     for limit in panel.allowed:
         if math.isfinite(limit):
-            axes.axhline(limit, color=_LIMIT, lw=0.9, ls=(0, (5, 2)), zorder=3)
+            axes.axhline(limit, color=_OUT, lw=0.9, ls=(0, (5, 2)), zorder=3)
     dress(axes, "", "")
     margin = 0.08 * (high - low)
     axes.set_ylim(low - margin, high + margin)
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes.yaxis.get_offset_text().set_fontsize(SMALL)
     count = f": {len(panel.missed)} out" if panel.missed else ""
-    axes.set_title(panel.title + count, fontsize=SMALL, loc="left", color=_MISS if count else INK, pad=3)
+    axes.set_title(panel.title + count, fontsize=SMALL, loc="left", color=_OUT if count else INK, pad=3)
     _name(axes, panel, (low, high), names)
     if cloud:
         _histogram(axes, shown)
 
 
 def _reach(values: Array, allowed: Sequence[float], ends: Array | None) -> tuple[float, float]:
-    """Lowest and highest value to show: all but the far out, the limits, and a usual 95 % interval, below which no
-    difference means anything."""
+    """Lowest and highest value to show.
+
+    They hold all values but those far out, the limits, and a usual 95 % interval: no smaller difference means anything.
+    """
     middle, sigma = scatter(values)
     spread = _FURTHEST * sigma
     limits = [limit for limit in allowed if math.isfinite(limit)]
@@ -126,8 +162,10 @@ def _reach(values: Array, allowed: Sequence[float], ends: Array | None) -> tuple
 
 
 def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[str]) -> None:
-    """The bushings that miss a limit or lie beyond the panel, furthest out first, where their names do not cover each
-    other; beyond the panel with the value that it does not show."""
+    """Name the bushings that miss a limit or lie beyond the panel, furthest out first, so that no name covers another.
+
+    What lies beyond the panel bears the value that it does not show.
+    """
     low, high = panel.allowed if panel.allowed else (-math.inf, math.inf)
     middle = float(np.nanmedian(panel.values))
     beyond = set(np.flatnonzero((panel.values < reach[0]) | (panel.values > reach[1])).tolist())
@@ -139,7 +177,7 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
     taken: list[tuple[float, float, int, bool]] = []
     for k in sorted(beyond.union(panel.missed), key=order)[:_MOST_NAMED]:
         value = float(np.clip(panel.values[k], *reach))
-        text = names[k] if len(names[k]) <= _MOST_LETTERS else names[k][: _MOST_LETTERS - 1] + "…"
+        text = _short(names[k], _MOST_LETTERS)
         if k in beyond:
             text = f"{text}: {number(panel.values[k], 3)}"
         place, above = (k + 0.5) / panel.values.size, value < (reach[0] + reach[1]) / 2.0
@@ -160,7 +198,7 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
             va="center",
             bbox={"facecolor": "white", "alpha": 0.7, "lw": 0, "pad": 0.3},
             fontsize=SMALL - 1,
-            color=_MISS if k in panel.missed else GREY,
+            color=_OUT if k in panel.missed else GREY,
             family=fonts(),
             parse_math=False,
             zorder=5,
@@ -168,7 +206,7 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
 
 
 def _histogram(axes: Axes, values: Array) -> None:
-    """How many bushings lie where, at the right edge."""
+    """Draw how many bushings lie where, at the right edge."""
     counts, edges = np.histogram(values, bins=60, range=axes.get_ylim())
     side = axes.inset_axes((1.005, 0.0, 0.13, 1.0), sharey=axes)
     side.barh(edges[:-1], counts, height=np.diff(edges), align="edge", color=_GOOD, alpha=0.5, lw=0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -19,12 +20,14 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import DataSet, LoopData, parted
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
-from bushfit.report.plots.fits import loops_legend
-from bushfit.report.plots.misfit import Curve, Map, Side, by_direction, columns, has_holes, side_of
-from bushfit.report.plots.points import SECTORS, Repeats
+from bushfit.report.plots.fits import loop_labels, loops_legend
+from bushfit.report.plots.misfit import Curve, Map, Side, columns, has_holes, side_of
+from bushfit.report.plots.points import SECTORS, Repeats, by_direction
 from bushfit.report.plots.style import (
+    CM,
     GREY,
     INK,
+    MOST_NAMED,
     SMALL,
     TEXT,
     dress,
@@ -36,25 +39,56 @@ from bushfit.report.plots.style import (
     styles,
 )
 
-#: Heights in inches: a level's row in a map, the least and the largest map, the loops' panels, the colour scale, a
-#: line of the summary.
-_LEVEL, _LEAST_MAP, _LARGEST_MAP, _LOOPS, _SCALE, _LINE = (cm / 2.54 for cm in (0.6, 1.7, 4.2, 4.4, 2.6, 0.42))
-#: Where the colour changes, in units of noise; the scale ends where 2 % of the points are left beyond.
+#: Height of a row of a map [inch].
+_LEVEL = 0.6 / CM
+#: Least height of a map [inch]: its name needs two lines.
+_LEAST_MAP = 1.7 / CM
+#: Largest height of a map [inch]: six of them, of three directions, just fill a page.
+_LARGEST_MAP = 4.2 / CM
+#: Height of the panels of loops, with their legend [inch].
+_LOOPS = 4.4 / CM
+#: Height of a line of the loops' legend [inch].
+_LEGEND_LINE = 0.42 / CM
+#: Lines of legend for which the panels of loops have room.
+_LEGEND_LINES = 4
+#: Most columns of the loops' legend over the width of a figure.
+_LEGEND_COLUMNS = 4
+#: Letters of the loops' legend over the width of a figure.
+_LEGEND_LETTERS = 96
+#: Letters for which the handle of a legend's entry has room.
+_HANDLE_LETTERS = 7
+#: Height of the scale of colours [inch].
+_SCALE = 2.6 / CM
+#: Height of a line of the summary [inch].
+_LINE = 0.42 / CM
+#: Where the colour changes, in units of noise: about 1, 2, 5 in each decade.
 _EDGES = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
-_LEAST_EDGES, _BEYOND = 4, 0.02
+#: Fewest edges of a scale, so that what lies within the noise never looks like a find.
+_LEAST_EDGES = 4
+#: Share of the points that may lie beyond the end of the scale: some outliers, so that they do not stretch it.
+_BEYOND = 0.02
 #: Of more edges, below and above, every other one bears its number: all would run together.
 _MOST_EDGES = 14
-#: The first colour off white, as a share of the way to the darkest.
+#: The first colour off white, as a share of the way to the darkest: it is just seen.
 _FAINT = 0.12
-#: Cells this far below the model bear a bar: red and blue are one grey in a print without colours.
+#: Cells this far below the model bear a bar, in units of noise: red and blue are one grey in a print without colours.
 _BARRED = 3.0
+#: Share of a cell's width that a bar leaves free on either side.
+_BAR_INSET = 0.3
 #: A step this many times its neighbour is a point that was left out, not a coarse grid.
 _HOLE = 1.75
-#: Loops further off than the first are drawn on a scale that is logarithmic beyond the second.
-_FAR, _NEAR = 40.0, 5.0
+#: Loops further off than this, in units of noise, are drawn on a scale that is logarithmic in the end.
+_FAR = 40.0
+#: Up to where that scale is linear, in units of noise: a little more than a right model scatters.
+_NEAR = 5.0
+#: Colour of what was not measured.
 _ABSENT = "#c8c8c8"
+#: Most labels of a map's rows.
 _MOST_LABELS = 10
-_SUMMARY_LETTERS, _COLUMN_LETTERS = 92, 40
+#: Letters in a line of the summary, as many as the width of a figure holds.
+_SUMMARY_LETTERS = 92
+#: Letters in a line of a column's heading, as many as half the width holds.
+_COLUMN_LETTERS = 40
 
 
 class _Scale(NamedTuple):
@@ -66,7 +100,7 @@ class _Scale(NamedTuple):
 
 
 def gap_figure(before: Model, after: Model, data_sets: Sequence[DataSet], title: str, summary: str) -> Figure:
-    """Where measurement and model part, before and after: sweeps over frequency and amplitude, loops over phase.
+    """How far measurement and model are apart, before and after: sweeps over frequency and amplitude, loops over phase.
 
     Every value is measured less model, the mean of the repeats or of a sector of the cycle, in units of the noise of
     that mean. All maps share one scale of colours, the loops of a direction one axis. Models that respond alike make
@@ -83,7 +117,8 @@ def gap_figure(before: Model, after: Model, data_sets: Sequence[DataSet], title:
     loops, sweeps = by_direction(every_loop), by_direction(every_sweep)
     sides = [side_of(model, name, data_sets, sweeps, loops) for model, name in columns(before, after, data_sets)]
     rows = [(direction, part) for direction in sweeps for part in ("storage", "loss")]
-    heights = [_map_height(sides[0].maps[direction]) for direction, _ in rows] + [_LOOPS] * len(loops)
+    heights = [_map_height(sides[0].maps[direction]) for direction, _ in rows]
+    heights += [_loops_height(mine, len(sides)) for mine in loops.values()]
     lines = textwrap.wrap(summary, _SUMMARY_LETTERS)
     figure = new_figure(title, sum(heights) + _SCALE * bool(rows) + _LINE * (len(lines) + 2))
     body: SubFigure = figure.subfigures(1, 1, squeeze=False)[0, 0]
@@ -104,12 +139,32 @@ def gap_figure(before: Model, after: Model, data_sets: Sequence[DataSet], title:
 
 
 def _map_height(drawn: Map) -> float:
+    """Height of a map [inch]."""
     return float(np.clip(_LEVEL * np.unique(drawn.points.amplitude).size, _LEAST_MAP, _LARGEST_MAP))
 
 
+def _loops_height(data_sets: Sequence[LoopData], sides: int) -> float:
+    """Height of the panels of one direction's loops with their legend [inch]."""
+    labels = loop_labels(data_sets)
+    entries = min(len(labels), MOST_NAMED + 1)  # one more says how many are not named
+    lines = math.ceil(entries / _legend_columns(labels, sides)) * len(labels[0].splitlines())
+    return _LOOPS + _LEGEND_LINE * max(0, lines - _LEGEND_LINES)
+
+
+def _legend_columns(labels: Sequence[str], sides: int) -> int:
+    """Columns of the loops' legend above one of so many panels side by side."""
+    longest = max(len(line) for label in labels for line in label.splitlines())
+    return math.ceil(min(_LEGEND_COLUMNS, _LEGEND_LETTERS // (longest + _HANDLE_LETTERS)) / sides)
+
+
 def _scale(sides: Sequence[Side]) -> _Scale:
-    """Steps from white (within the noise) to dark; blue where the measurement is below the model, red above."""
-    values = np.abs(np.concatenate([part for side in sides for drawn in side.maps.values() for part in drawn[1:]]))
+    """Steps from white (within the noise) to dark, blue where the measurement is below the model and red above.
+
+    It ends where 2 % of the points are left beyond.
+    """
+    values = np.abs(
+        np.concatenate([part for side in sides for drawn in side.maps.values() for part in (drawn.storage, drawn.loss)])
+    )
     needed = int(np.searchsorted(_EDGES, np.quantile(values, 1.0 - _BEYOND))) + 1
     edges = np.array(_EDGES[: max(needed, _LEAST_EDGES)])
     shades = np.linspace(_FAINT, 1.0, edges.size) / 2.0
@@ -120,7 +175,7 @@ def _scale(sides: Sequence[Side]) -> _Scale:
 
 
 def _draw_map(axes: Axes, drawn: Map, part: str, scale: _Scale) -> None:
-    """A row of cells a level, as wide as the steps of frequency; what was left out stays grey."""
+    """Draw a row of cells per amplitude, each as wide as the step of frequency; what was not measured stays grey."""
     values: Array = getattr(drawn, part)
     points = drawn.points
     even = _evenly(points)
@@ -136,7 +191,7 @@ def _draw_map(axes: Axes, drawn: Map, part: str, scale: _Scale) -> None:
         PolyCollection(list(cells), array=values, norm=scale.norm, cmap=scale.cmap, ec="face", lw=0.2), autolim=False
     )
     below = values < -_BARRED
-    inset = 0.3 * (high - low)[below]
+    inset = _BAR_INSET * (high - low)[below]
     axes.hlines(row[below], low[below] + inset, high[below] - inset, color="white", lw=1.1)
     axes.hlines(np.arange(1, levels.size) - 0.5, low.min(), high.max(), color="white", lw=1.5)
     axes.set(facecolor=_ABSENT, ylim=(-0.5, levels.size - 0.5))
@@ -159,7 +214,11 @@ def _evenly(points: Repeats) -> bool:
 
 
 def _cells(frequency: Array, *, logarithmic: bool) -> tuple[Array, Array]:
-    """Edges half way to the neighbours; where one is much further off than the other, as far as to the other."""
+    """Lower and upper edge of the cell of each frequency [Hz], (n,) each.
+
+    They lie half way to the neighbours; where one of them is much further off than the other, as far off as on the
+    other's side.
+    """
     x = np.log(frequency) if logarithmic else frequency
     if x.size == 1:
         width = 0.1 if logarithmic else 0.1 * x[0]
@@ -183,12 +242,12 @@ def _label_maps(row: Sequence[Axes], direction: Direction, part: str, drawn: Map
 
 
 def _name(axes: Axes, words: str) -> None:
-    """What a row shows, in lines left of its ticks."""
+    """Write what a row shows left of its ticks."""
     axes.set_ylabel(words, fontsize=TEXT, color=INK, rotation=0, ha="right", va="center", ma="center")
 
 
 def _head(row: Sequence[Axes], sides: Sequence[Side]) -> None:
-    """Says above the first row, and above its legend if it has one, what each column shows."""
+    """Write above the first row, and above its legend if it has one, what each column shows."""
     legend = row[0].get_legend()
     height = legend.get_window_extent().height * 72.0 / row[0].figure.dpi if legend else 0.0
     for axes, side in zip(row, sides, strict=True):
@@ -198,6 +257,7 @@ def _head(row: Sequence[Axes], sides: Sequence[Side]) -> None:
 
 
 def _draw_scale(figure: SubFigure, maps: Sequence[Axes], scale: _Scale) -> None:
+    """Draw the scale of colours below the maps."""
     colors = ScalarMappable(scale.norm, scale.cmap)
     bar = figure.colorbar(colors, ax=maps, location="bottom", shrink=0.76, aspect=42, pad=0.03, extendfrac=0.04)
     edges, every = scale.edges, 1 if scale.edges.size <= _MOST_EDGES else 2
@@ -217,6 +277,7 @@ def _draw_scale(figure: SubFigure, maps: Sequence[Axes], scale: _Scale) -> None:
 def _draw_loops(
     row: Sequence[Axes], direction: Direction, data_sets: Sequence[LoopData], sides: Sequence[Sequence[Curve]]
 ) -> None:
+    """Draw what is left of one direction's loops over the phase of the cycle, before and after on one scale."""
     furthest = max(float(np.abs(curve.values).max()) for curves in sides for curve in curves)
     for axes, curves in zip(row, sides, strict=True):
         dress(axes, "phase after the upper turn [deg]", "")
@@ -238,7 +299,8 @@ def _draw_loops(
     loops_legend(
         row[0],
         data_sets,
-        ncols=4 // len(row),
+        title="",
+        ncols=_legend_columns(loop_labels(data_sets), len(row)),
         loc="lower left",
         bbox_to_anchor=(-0.02, 1.0),
         handlelength=2.4,
@@ -247,13 +309,16 @@ def _draw_loops(
 
 
 def _words(side: Side) -> list[str]:
+    """The sentences below the panels."""
     maps, loops = bool(side.maps), bool(side.loops)
-    repeated = any(drawn.points.count.max() > 1 for drawn in side.maps.values())
+    repeated = any(drawn.repeated for drawn in side.maps.values())
     within = " and ".join(["within 2 (maps)"] * maps + ["in the grey (loops)"] * loops)
+    merged = max((drawn.merged for drawn in side.maps.values()), default=1)
+    of = [*["its repeats"] * repeated, *[f"up to {merged} neighbouring amplitudes"] * (merged > 1)]
     return [
         "Maps: frequency across, amplitude upwards; white: model and measurement agree within the noise. A bar in a "
         "cell: 3 and more below." * maps,
-        "A cell is the mean of its repeats, in units of the noise of that mean." * repeated,
+        f"A cell is the mean of {' and of '.join(of)}, in units of the noise of that mean." * bool(of),
         "Grey: not measured." * any(has_holes(drawn) for drawn in side.maps.values()),
         f"Loops: measured less model over the cycle, means over {360 // SECTORS} deg, in units of the noise of that "
         "mean." * loops,

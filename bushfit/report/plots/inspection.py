@@ -12,14 +12,30 @@ from matplotlib.gridspec import SubplotSpec
 from bushfit.effects.contract import Array
 from bushfit.inspection.record import Inspected
 from bushfit.reading.measurement import Floats, Loop, Sweep
-from bushfit.report.plots.style import GREY, POINT, ROW, dress, explain, legend, new_figure, readable, styles
+from bushfit.report.plots.points import BINS, held_beside, ranges, stepped_axis
+from bushfit.report.plots.style import (
+    CM,
+    GREY,
+    POINT,
+    ROW,
+    dress,
+    explain,
+    file_name,
+    legend,
+    new_figure,
+    readable,
+    styles,
+)
 from bushfit.units import for_people
 
+#: Colour of a history.
 _COLOR = "#3b528b"
-#: Rows of a loop drawn as they are; of more, the least and largest of so many bins of time.
-_MOST_ROWS, _BINS = 6000, 1500
-_TITLE = 0.7 / 2.54
-_MOST_LEVELS = 8
+#: Most rows of a loop that are drawn over the displacement: more are not told apart.
+_MOST_ROWS = 6000
+#: Height of a row's title [inch].
+_TITLE = 0.7 / CM
+#: Most letters of a file's name in a row's title: what is said of the file follows it on the same line.
+_NAME_LETTERS = 48
 
 
 def inspection_figure(files: Sequence[Inspected]) -> Figure:
@@ -28,7 +44,7 @@ def inspection_figure(files: Sequence[Inspected]) -> Figure:
     grid = figure.add_gridspec(len(files), 1)
     for row, seen in enumerate(files):
         place = grid[row, 0]
-        name = seen.file.name.replace("$", r"\$")
+        name = file_name(seen.file.name, _NAME_LETTERS)
         words = f"{seen.kind}, {seen.direction or 'direction unknown'}"
         words += ", force turned" * (seen.entry.get("force_sign") == -1)
         title = f"{name}: {words}" + (f", {len(seen.looked.odd)} odd" if seen.looked.odd else "")
@@ -43,6 +59,7 @@ def inspection_figure(files: Sequence[Inspected]) -> Figure:
 
 
 def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bool) -> Axes:
+    """Both channels over time, and force over displacement where it is a loop; the first panel is returned."""
     units = history.direction.display
     (length, to_length), unit_force = units.displacement, units.force
     force, to_force = for_people(*unit_force, float(np.abs(history.force).max()))
@@ -69,40 +86,43 @@ def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bo
 
 
 def _draw_over_time(axes: Axes, time: Floats, values: Floats) -> None:
-    if time.size <= 2 * _BINS:
+    """A channel over time, long ones as the range in each bin of time."""
+    if time.size <= 2 * BINS:
         axes.plot(time, values, lw=0.8, color=_COLOR)
-        return
-    first = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], _BINS + 1)[:-1]))
-    low, high = np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
-    axes.fill_between(time[first], low, high, step="post", color=_COLOR, lw=0.6)
+    else:
+        axes.fill_between(*ranges(time, values), step="post", color=_COLOR, lw=0.6)
 
 
 def _draw_sweep(figure: Figure, place: SubplotSpec, sweep: Sweep) -> Axes:
+    """Stiffness and loss factor over what the sweep steps through; the first panel is returned."""
     units = sweep.direction.display
-    unit, length = units.displacement
     stiffness, factor = for_people(*units.stiffness, float(np.abs(sweep.stiffness).max()))
     grid = place.subgridspec(1, 2)
     pair = [figure.add_subplot(grid[0, column]) for column in range(2)]
-    levels = np.unique(sweep.amplitude)
-    levels = levels[np.unique(np.linspace(0, levels.size - 1, min(levels.size, _MOST_LEVELS)).round().astype(int))]
-    drawn = styles(levels.size, "amplitude")
+    axis = stepped_axis(sweep.frequency, sweep.amplitude)
+    held = held_beside(axis)
+    scales = {"frequency": ("Hz", 1.0), "amplitude": sweep.direction.display.displacement}
+    (x_unit, x_factor), (unit, length) = scales[axis], scales[held]
+    x, at_level = x_factor * getattr(sweep, axis), getattr(sweep, held)
+    levels = np.unique(at_level)
+    drawn = styles(levels.size, held)
     kinds = (
         (factor * np.abs(sweep.stiffness), f"|K| [{stiffness}]"),
         (sweep.stiffness.imag / sweep.stiffness.real, "loss factor [-]"),
     )
     for axes, (values, label) in zip(pair, kinds, strict=True):
         for level, style in zip(levels, drawn, strict=True):
-            at = sweep.amplitude == level
-            frequency, mean = _means(sweep.frequency[at], values[at])
-            axes.plot(frequency, mean, color=style.color, ls=style.dashes, lw=0.8)
-            axes.plot(sweep.frequency[at], values[at], style.marker, color=style.color, alpha=0.75, **POINT)
-        dress(axes, "frequency [Hz]", label)
-        readable(axes, sweep.frequency)
+            at = at_level == level
+            axes.plot(*_means(x[at], values[at]), color=style.color, ls=style.dashes, lw=0.8)
+            axes.plot(x[at], values[at], style.marker, color=style.color, alpha=0.75, **POINT)
+        dress(axes, f"{axis} [{x_unit}]", label)
+        readable(axes, x)
     handles = [style.handle(True) for style in drawn]
-    legend(pair[-1], handles, [f"{length * level:.3g} {unit}" for level in levels], "amplitude")
+    legend(pair[-1], handles, [f"{length * level:.3g} {unit}" for level in levels], held)
     return pair[0]
 
 
-def _means(frequency: Array, values: Array) -> tuple[Array, Array]:
-    distinct, place = np.unique(frequency, return_inverse=True)
+def _means(x: Array, values: Array) -> tuple[Array, Array]:
+    """The distinct x and the mean of the values at each."""
+    distinct, place = np.unique(x, return_inverse=True)
     return distinct, np.bincount(place, weights=values) / np.bincount(place)

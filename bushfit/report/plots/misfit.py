@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,15 +13,26 @@ from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.report.plots.points import Repeats, over_sectors
 
-_T = TypeVar("_T", SweepData, LoopData)
+#: Most rows of a map: each is then 1.7 mm high, and its bars and the lines between rows are still seen.
+_MOST_ROWS = 24
 
 
 class Map(NamedTuple):
-    """Measured less model at each operating point of a direction, over the noise of its mean."""
+    """Measured less model at each operating point of a direction, over the noise of its mean.
+
+    Args:
+        points: the operating points; neighbouring amplitudes count as one where there are more than rows, (k,).
+        storage: the real part of what is left, (k,).
+        loss: the imaginary part, (k,).
+        repeated: whether an operating point was measured more than once.
+        merged: how many amplitudes a row stands for at most.
+    """
 
     points: Repeats
     storage: Array
     loss: Array
+    repeated: bool
+    merged: int
 
 
 class Curve(NamedTuple):
@@ -40,16 +51,8 @@ class Side(NamedTuple):
     loops: Mapping[Direction, Sequence[Curve]]
 
 
-def by_direction(data_sets: Sequence[_T]) -> dict[Direction, list[_T]]:
-    """In the order of the tests."""
-    directions = dict.fromkeys(data_set.direction for data_set in data_sets)
-    return {
-        direction: [data_set for data_set in data_sets if data_set.direction is direction] for direction in directions
-    }
-
-
 def columns(before: Model, after: Model, data_sets: Sequence[DataSet]) -> list[tuple[Model, str]]:
-    """What stands side by side, and its title: one model where both respond alike."""
+    """The models that stand side by side, and their titles: one model where both respond alike."""
     if all(np.array_equal(data_set.residual(before), data_set.residual(after)) for data_set in data_sets):
         return [(before, "nothing added")]
     added = [name for name in after.effects if name not in before.effects]
@@ -63,7 +66,7 @@ def side_of(
     sweeps: Mapping[Direction, Sequence[SweepData]],
     loops: Mapping[Direction, Sequence[LoopData]],
 ) -> Side:
-    """A model against all tests."""
+    """What is drawn of a model against all tests."""
     gap = float(np.sqrt(np.mean(np.square(np.concatenate([data_set.residual(model) for data_set in data_sets])))))
     return Side(
         name,
@@ -74,8 +77,17 @@ def side_of(
 
 
 def _map(model: Model, data_sets: Sequence[SweepData]) -> Map:
-    """Repeats differ by what scatters from point to point and by what each block shares: both average out."""
-    points = Repeats.of(data_sets)
+    """Mean deviation of each cell over the noise of that mean, of sweeps of one direction.
+
+    Repeats differ by what scatters from point to point and by what each block shares: both average out.
+    """
+    repeated = bool(Repeats.of(data_sets).count.max() > 1)
+    frequency, amplitude = (
+        np.concatenate([getattr(data_set, name) for data_set in data_sets]) for name in ("frequency", "amplitude")
+    )
+    row = map_rows(amplitude)
+    points = Repeats.at(frequency, row)
+    merged = max(np.unique(amplitude[row == level]).size for level in np.unique(row))
     deviation = -np.concatenate([data_set.deviation(model) for data_set in data_sets])
     noise = np.array(
         [data_set.noise.random[data_set.name, float(x)] for data_set in data_sets for x in data_set.amplitude]
@@ -86,10 +98,27 @@ def _map(model: Model, data_sets: Sequence[SweepData]) -> Map:
         points.summed(part) / np.sqrt(points.summed(square))
         for part, square in zip((deviation.real, deviation.imag), variance.T, strict=True)
     )
-    return Map(points, storage, loss)
+    return Map(points, storage, loss, repeated, merged)
+
+
+def map_rows(amplitude: Array) -> Array:
+    """The amplitude of each point's row in a map, (n,) -> (n,).
+
+    Its own, but where there are more amplitudes than rows: then the geometric mean of those in its row, one of as many
+    equal steps of the logarithm as there are rows.
+    """
+    levels, place = np.unique(amplitude, return_inverse=True)
+    if levels.size <= _MOST_ROWS:
+        return amplitude
+    size = np.log(levels)
+    row = np.minimum((_MOST_ROWS * (size - size[0]) / (size[-1] - size[0])).astype(int), _MOST_ROWS - 1)
+    _, row = np.unique(row, return_inverse=True)
+    means = np.exp(np.bincount(row, size) / np.bincount(row))
+    return means[row[place]]
 
 
 def _curve(model: Model, data_set: LoopData) -> Curve:
+    """Mean residual of each sector of a loop's cycle over the noise of that mean."""
     phase, mean, count = over_sectors(data_set, -data_set.residual(model))
     return Curve(phase, mean * np.sqrt(count))
 

@@ -4,20 +4,60 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal, TypeVar
 
 import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import LoopData, SweepData
+from bushfit.geometry import Direction
 from bushfit.prediction import Band
+from bushfit.report.plots.style import MOST_NAMED
 
-#: Parts of a cycle over which a loop's residuals are averaged.
+_T = TypeVar("_T", SweepData, LoopData)
+
+#: Parts of a cycle over which a loop's residuals are averaged: 10 deg each, in which a slow loop has dozens of rows.
 SECTORS = 36
+
+#: Bins of time in which a long record is drawn, from its least to its largest value: more than a figure has pixels.
+BINS = 1500
+#: What is drawn along the x axis: what a test steps through while it holds the other.
+Axis = Literal["frequency", "amplitude"]
+
+
+def by_direction(data_sets: Sequence[_T]) -> dict[Direction, list[_T]]:
+    """The tests of each direction, in the order of the tests."""
+    directions = dict.fromkeys(data_set.direction for data_set in data_sets)
+    return {
+        direction: [data_set for data_set in data_sets if data_set.direction is direction] for direction in directions
+    }
+
+
+def stepped_axis(frequency: Array, amplitude: Array) -> Axis:
+    """What sweeps step through, and so what lies along x: a line stands for each value that they hold meanwhile.
+
+    The frequency, except where there are more amplitudes than frequencies, and more than a legend can name: a sweep
+    of the amplitude, or one whose amplitudes are given as each point reached them.
+    """
+    amplitudes = np.unique(amplitude).size
+    return "amplitude" if amplitudes > max(MOST_NAMED, np.unique(frequency).size) else "frequency"
+
+
+def held_beside(axis: Axis) -> Axis:
+    """What is held while the other is stepped through."""
+    return "amplitude" if axis == "frequency" else "frequency"
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Stiffness over operating points: means of repeats, or a model's lines."""
+    """Dynamic stiffness over operating points: means of repeats, or a model's lines.
+
+    Args:
+        frequency: [Hz], (n,).
+        amplitude: zero-to-peak [m or rad], (n,).
+        stiffness: |K| [N/m or N m/rad], (n,).
+        loss_factor: K''/K', (n,).
+    """
 
     frequency: Array
     amplitude: Array
@@ -48,6 +88,11 @@ class Repeats:
             np.concatenate([np.empty(0), *(getattr(data_set, name) for data_set in data_sets)])
             for name in ("amplitude", "frequency")
         )
+        return cls.at(frequency, amplitude)
+
+    @classmethod
+    def at(cls, frequency: Array, amplitude: Array) -> Repeats:
+        """The points of some rows, each (n,)."""
         spots, place = np.unique(np.stack((amplitude, frequency)), axis=1, return_inverse=True)
         place = place.ravel()
         return cls(spots[1], spots[0], np.bincount(place), np.argsort(place, kind="stable"))
@@ -57,12 +102,12 @@ class Repeats:
         return function.reduceat(values[self.rows], np.cumsum(self.count) - self.count)
 
     def mean(self, values: Array) -> Array:
-        """(n,) -> (k,)"""
+        """Mean of a row's values at each point, (n,) -> (k,)."""
         return self.summed(values) / self.count
 
 
 def means(data_sets: Sequence[SweepData]) -> Points:
-    """Mean, least and largest of the repeats of each operating point, those without weight aside."""
+    """Mean, least and largest value over the repeats of each operating point; rows without weight do not count."""
     data_sets = [data_set.standing() for data_set in data_sets]
     repeats = Repeats.of(data_sets)
     stiffness = np.concatenate([np.empty(0, dtype=complex), *(data_set.measured for data_set in data_sets)])
@@ -74,10 +119,16 @@ def means(data_sets: Sequence[SweepData]) -> Points:
     return Points(repeats.frequency, repeats.amplitude, band(np.abs), band(lambda k: k.imag / k.real))
 
 
-def wild_points(data_set: LoopData) -> tuple[Array, Array]:
-    """Phase [cycles] and force [N or N m] of a loop's rows that are faults of the record, (k,) each."""
+def outliers(data_set: LoopData) -> tuple[Array, Array]:
+    """Phase [cycles] and force [N or N m] of a loop's outliers, the rows that are faults of the record, (k,) each."""
     loop, rows = data_set.test, data_set.drive.outliers["force"].rows
     return (loop.time[rows] - loop.time[0]) * data_set.drive.frequency, loop.force[rows]
+
+
+def ranges(time: Array, values: Array) -> tuple[Array, Array, Array]:
+    """Start of each bin of time that holds rows, and the least and the largest value there, (k,) each, k <= BINS."""
+    first = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], BINS + 1)[:-1]))
+    return time[first], np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
 
 
 def turn(data_set: LoopData) -> Array:

@@ -13,21 +13,48 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import SweepData
 from bushfit.geometry import Direction
 from bushfit.prediction import Band, Prediction
-from bushfit.report.plots.points import Points, means
-from bushfit.report.plots.style import INK, POINT, ROW, dress, explain, least_span, legend, new_figure, readable, styles
+from bushfit.report.plots.points import Axis, Points, held_beside, means
+from bushfit.report.plots.style import (
+    INK,
+    POINT,
+    ROW,
+    Style,
+    dress,
+    explain,
+    least_span,
+    legend,
+    new_figure,
+    readable,
+    spread,
+    styles,
+)
 from bushfit.units import for_people
 
-#: Points of a model's line.
+#: Points of a model's line: chosen, no corner is seen at the size of a panel.
 FINE = 60
-#: Width of a line with the rig's effects.
+#: Most amplitudes over the frequency, as lines: more bands cover each other.
+_MOST_AMPLITUDES = 6
+#: Most frequencies over the amplitude, as lines: the curves of near frequencies lie on each other.
+_MOST_FREQUENCIES = 4
+#: Width of a model's line [point].
+_LINE = 1.3
+#: Width of the stroke that stands for a line of one point [point].
+_STROKE = 14.0
+#: Width of a line with the rig's effects [point].
 _THIN = 0.6
-#: A measured point belongs to a predicted level that is as near as this, relative and absolute.
-_SAME = (0.01, 0.0)
+#: A measured point belongs to a predicted level that is as near as this, relative: a rig that misses its set point.
+_SAME = 0.01
+#: Least span of the axis of stiffness, relative to the largest: a flat curve shall look flat.
+_LEAST_STIFFNESS_SPAN = 0.04
+#: Least span of the axis of the loss factor [-].
+_LEAST_LOSS_SPAN = 0.01
 
 
 def fine_grid(prediction: Prediction) -> tuple[Array, Array]:
-    """Frequencies [Hz] and amplitudes [m or rad] that hold a prediction's own and enough between them for smooth
-    lines: what `prediction_figure` takes as `curves`."""
+    """Frequencies [Hz] and amplitudes [m or rad] of a prediction, and enough between them for smooth lines.
+
+    A prediction there is what `prediction_figure` takes as `curves`.
+    """
     frequencies, amplitudes = (
         own if own.size < 2 else np.union1d(own, np.geomspace(own[0], own[-1], FINE))
         for own in map(np.unique, (prediction.frequency, prediction.amplitude))
@@ -58,12 +85,13 @@ def prediction_figure(
     mine = [data_set for data_set in measured if data_set.direction is prediction.direction]
     points = means(mine)
     frequencies, amplitudes = np.unique(prediction.frequency), np.unique(prediction.amplitude)
-    rows: list[tuple[str, Array]] = []
+    rows: list[tuple[Axis, Array]] = []
     if frequencies.size > 1 or amplitudes.size == 1:
-        rows.append(("frequency", _spread(amplitudes, 6)))
+        rows.append(("frequency", amplitudes[spread(amplitudes.size, _MOST_AMPLITUDES)]))
     if amplitudes.size > 1:
-        known = frequencies[[np.isclose(points.frequency, f, *_SAME).any() for f in frequencies]]
-        rows.append(("amplitude", _spread(known if known.size > 1 else frequencies, 4)))
+        known = frequencies[[np.isclose(points.frequency, f, _SAME, 0.0).any() for f in frequencies]]
+        levels = known if known.size > 1 else frequencies
+        rows.append(("amplitude", levels[spread(levels.size, _MOST_FREQUENCIES)]))
     figure = new_figure(title, len(rows) * ROW)
     pairs = zip(figure.subplots(len(rows), 2, squeeze=False), rows, strict=True)
     drawn = [draw(pair, prediction.direction, lines, points, *row, rig) for pair, row in pairs]
@@ -80,62 +108,103 @@ def draw(
     direction: Direction,
     lines: Prediction | Points,
     points: Points,
-    along: str,
+    axis: Axis,
     levels: Array,
     rig: Prediction | None = None,
 ) -> bool:
-    """Stiffness left, loss factor right, a line and its points per level, through these a thin line of the `rig`;
-    returns whether there were points."""
-    other = "amplitude" if along == "frequency" else "frequency"
-    units = direction.display
+    """Draw stiffness left and loss factor right, a line and its points per level.
+
+    Args:
+        pair: the two panels.
+        direction: of motion.
+        lines: the model.
+        points: as measured.
+        axis: what lies along x.
+        levels: what is held, (k,): amplitudes [m or rad] or frequencies [Hz].
+        rig: the model with what belongs to the rig, as thin lines where there are points.
+
+    Returns:
+        Whether there were points.
+    """
+    held, units = held_beside(axis), direction.display
     scales = {"frequency": ("Hz", 1.0), "amplitude": units.displacement}
-    unit, scale = scales[along]
-    x, where = scale * getattr(lines, along), scale * getattr(points, along)
-    inside = (where >= x.min() * (1 - _SAME[0])) & (where <= x.max() * (1 + _SAME[0]))
-    marked = [inside & np.isclose(getattr(points, other), level, *_SAME) for level in levels]
-    drawn = styles(levels.size, other)
+    unit, scale = scales[axis]
+    x, where = scale * getattr(lines, axis), scale * getattr(points, axis)
+    marked = _spots(getattr(points, held), levels, (where >= x.min() * (1 - _SAME)) & (where <= x.max() * (1 + _SAME)))
+    laid = any(spots.any() for spots in marked)
+    looks = styles(levels.size, held)
     stiffness_unit, factor = for_people(*units.stiffness, float(lines.stiffness.value.max()))
     kinds = (
         ("stiffness", factor, f"{direction} stiffness |K| [{stiffness_unit}]"),
         ("loss_factor", 1.0, f"{direction} loss factor [-]"),
     )
     for axes, (kind, factor, name) in zip(pair, kinds, strict=True):
-        bands: tuple[Band, Band] = getattr(lines, kind), getattr(points, kind)
-        line, point = (factor * np.stack((band.value, band.low, band.high)) for band in bands)
-        for style, level, spots in zip(drawn, levels, marked, strict=True):
-            at = getattr(lines, other) == level
-            value, low, high = line[:, at]
-            axes.plot(
-                x[at], value, color=style.color, ls=style.dashes, lw=1.3, marker="" if at.sum() > 1 else "_", ms=14
-            )
-            axes.fill_between(x[at], low, high, color=style.color, alpha=0.22, lw=0)
+        line, point = (_scaled(getattr(one, kind), factor) for one in (lines, points))
+        for look, level, spots in zip(looks, levels, marked, strict=True):
+            at = getattr(lines, held) == level
+            _draw_line(axes, look, x, line, at)
             if spots.any():
                 if rig is not None:
-                    axes.plot(x[at], factor * getattr(rig, kind).value[at], color=style.color, lw=_THIN)
-                mean, low, high = point[:, spots]
-                axes.vlines(where[spots], low, high, color=style.color, lw=0.7, alpha=0.7)
-                axes.plot(where[spots], mean, style.marker, color=style.color, **POINT)
-        dress(axes, f"{along} [{unit}]", name)
+                    axes.plot(x[at], factor * getattr(rig, kind).value[at], color=look.color, lw=_THIN)
+                _draw_points(axes, look, where, point, spots)
+        dress(axes, f"{axis} [{unit}]", name)
         readable(axes, x)
-        least_span(axes, 0.04 * line.max() if kind == "stiffness" else 0.01)
-    unit, scale = scales[other]
-    handles = [style.handle(bool(spots.any())) for style, spots in zip(drawn, marked, strict=True)]
-    labels = [f"{scale * level:.3g} {unit}" for level in levels]
-    order = slice(None, None, 1 if other == "amplitude" else -1)  # as the lines lie, the stiffest on top
-    handles, labels, laid = handles[order], labels[order], any(spots.any() for spots in marked)
-    if laid and rig is not None:
-        handles += [Line2D([], [], color=INK, lw=1.3), Line2D([], [], color=INK, lw=_THIN, marker="o", **POINT)]
-        labels += ["bushing", "with the rig"]
-    legend(pair[-1], handles, labels, other)
+        least_span(axes, _LEAST_STIFFNESS_SPAN * line.high.max() if kind == "stiffness" else _LEAST_LOSS_SPAN)
+    _name_levels(pair[-1], levels, held, scales[held], [bool(spots.any()) for spots in marked], rig=laid and bool(rig))
     return laid
 
 
+def _spots(held: Array, levels: Array, inside: Array) -> list[Array]:
+    """Whether each point is near a level and nearest to it, an (n,) per level; only those that are inside count."""
+    off = np.abs(held[:, None] / levels - 1.0)
+    nearest = off == np.min(off, axis=1, keepdims=True)
+    return list((inside[:, None] & nearest & (off <= _SAME)).T)
+
+
+def _scaled(band: Band, factor: float) -> Band:
+    return Band(factor * band.value, factor * band.low, factor * band.high)
+
+
+def _draw_line(axes: Axes, look: Style, x: Array, band: Band, at: Array) -> None:
+    """A line with its band; a stroke where it has but one point."""
+    alone = at.sum() == 1
+    axes.plot(
+        x[at], band.value[at], color=look.color, ls=look.dashes, lw=_LINE, marker="_" if alone else "", ms=_STROKE
+    )
+    axes.fill_between(x[at], band.low[at], band.high[at], color=look.color, alpha=0.22, lw=0)
+
+
+def _draw_points(axes: Axes, look: Style, x: Array, band: Band, at: Array) -> None:
+    """Measured points, with bars from the lowest to the highest repeat."""
+    axes.vlines(x[at], band.low[at], band.high[at], color=look.color, lw=0.7, alpha=0.7)
+    axes.plot(x[at], band.value[at], look.marker, color=look.color, **POINT)
+
+
+def _name_levels(
+    axes: Axes, levels: Array, held: Axis, display: tuple[str, float], marked: Sequence[bool], *, rig: bool
+) -> None:
+    """The legend: levels as the lines lie, the stiffest on top; and what the lines are where the rig's are among them.
+
+    Args:
+        axes: the panel.
+        levels: amplitudes or frequencies, (k,).
+        held: which of the two.
+        display: their unit and the factor from SI to it.
+        marked: whether each has points, (k,).
+        rig: whether there are lines of the rig.
+    """
+    unit, factor = display
+    handles = [look.handle(points) for look, points in zip(styles(levels.size, held), marked, strict=True)]
+    labels = [f"{factor * level:.3g} {unit}" for level in levels]
+    order = 1 if held == "amplitude" else -1
+    besides = {
+        "bushing": Line2D([], [], color=INK, lw=_LINE),
+        "with the rig": Line2D([], [], color=INK, lw=_THIN, marker="o", **POINT),
+    }
+    legend(axes, handles[::order], labels[::order], held, besides=besides if rig else None)
+
+
 def points_note(data_sets: Sequence[SweepData]) -> str:
-    """What the points of sweeps are."""
+    """A sentence on what the points of sweeps are."""
     repeated = any(np.unique(data_set.sweep.repeat).size > 1 for data_set in data_sets)
     return f"Points: measured{', mean of the repeats, with bars from the lowest to the highest' if repeated else ''}."
-
-
-def _spread(levels: Array, most: int) -> Array:
-    """At most that many levels, evenly picked from first to last."""
-    return levels[np.unique(np.linspace(0, levels.size - 1, min(most, levels.size)).round().astype(int))]

@@ -11,13 +11,17 @@ from matplotlib.figure import Figure
 from bushfit.effects.contract import Array
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.result import Reduction, Step
+from bushfit.report.plots.points import ranges
 from bushfit.report.plots.style import (
+    CM,
     GREY,
     POINT,
     ROW,
+    SMALL,
     Style,
     dress,
     explain,
+    file_name,
     legend,
     new_figure,
     readable,
@@ -25,10 +29,16 @@ from bushfit.report.plots.style import (
 )
 from bushfit.units import for_people
 
-_STRIP, _NOISE_ROW = 2.7 / 2.54, 4.2 / 2.54
-#: Bins of time in which a history is drawn, from its least to its largest value.
-_BINS = 1500
+#: Height of a history [inch].
+_STRIP = 2.7 / CM
+#: Height of the panels of noise and distortion [inch].
+_NOISE_ROW = 4.2 / CM
+#: Most histories that are drawn: with more the figure leaves the page.
 _MOST_HISTORIES = 4
+#: Most letters of a history's name above its panel, as many as fit on a line.
+_NAME_LETTERS = 100
+#: Colour of what was not used.
+_UNUSED = "#c8c8c8"
 
 
 def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str) -> Figure:
@@ -45,7 +55,7 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
         strip = figure.add_subplot(grid[row, :])
         _draw_history(strip, history, reduction, looks)
         if len(histories) > 1:  # the title names one
-            strip.set_title(history.name.replace("$", r"\$"), fontsize=7.5, loc="left", color=GREY, pad=2)
+            strip.set_title(file_name(history.name, _NAME_LETTERS), fontsize=SMALL, loc="left", color=GREY, pad=2)
     points = [figure.add_subplot(grid[len(shown), column]) for column in range(2)]
     _draw_points(points, reduction, looks)
     quality = [figure.add_subplot(grid[len(shown) + 1, column], sharex=points[0]) for column in range(2)]
@@ -61,25 +71,24 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
 
 
 def _draw_history(axes: Axes, history: Loop, reduction: Reduction, looks: dict[float, Style]) -> None:
+    """Displacement over time; what was used has the colour of its level."""
     unit, factor = reduction.direction.display.displacement
     mine = [step for step in reduction.steps if step.name == history.name]
-    edges = np.linspace(history.time[0], history.time[-1], _BINS + 1)
-    first = np.unique(np.searchsorted(history.time, edges[:-1]))
-    low, high = (factor * extreme.reduceat(history.displacement, first) for extreme in (np.minimum, np.maximum))
-    middle = history.time[first]
-    axes.fill_between(middle, low, high, color="#c8c8c8", lw=0.4, step="post")
+    time, low, high = ranges(history.time, factor * history.displacement)
+    axes.fill_between(time, low, high, color=_UNUSED, lw=0.4, step="post")
     for level, look in looks.items():
-        inside = np.zeros(middle.size, dtype=bool)
+        inside = np.zeros(time.size, dtype=bool)
         for step in mine:
             if step.level == level:
-                inside |= (middle >= step.start) & (middle <= step.end)
-        axes.fill_between(middle, low, high, where=inside, color=look.color, lw=0.4, step="post")
+                inside |= (time >= step.start) & (time <= step.end)
+        axes.fill_between(time, low, high, where=inside, color=look.color, lw=0.4, step="post")
     motion = reduction.direction.motion.words[0]
     dress(axes, "time [s]", f"{motion}\n[{unit}]")
     axes.margins(x=0.01)
 
 
 def _draw_points(pair: Sequence[Axes], reduction: Reduction, looks: dict[float, Style]) -> None:
+    """Stiffness and loss factor over frequency, with bars of twice the standard error."""
     units = reduction.direction.display
     unit, length = units.displacement
     steps = reduction.steps
@@ -102,6 +111,7 @@ def _draw_points(pair: Sequence[Axes], reduction: Reduction, looks: dict[float, 
 
 
 def _draw_quality(pair: Sequence[Axes], reduction: Reduction, looks: dict[float, Style]) -> None:
+    """Noise and distortion of the points over frequency."""
     for level, look in looks.items():
         mine = [step for step in reduction.steps if step.level == level]
         frequency = np.array([step.frequency for step in mine])
@@ -118,10 +128,12 @@ def _draw_quality(pair: Sequence[Axes], reduction: Reduction, looks: dict[float,
 
 
 def _stiffness(steps: Sequence[Step], factor: float) -> tuple[Array, Array]:
+    """|K| of the steps times a factor, and its standard error, (n,) each."""
     magnitude = factor * np.abs([step.stiffness for step in steps])
     return magnitude, magnitude * np.array([step.gain_error for step in steps])
 
 
 def _loss(steps: Sequence[Step]) -> tuple[Array, Array]:
+    """Loss factor of the steps, and its standard error, (n,) each."""
     loss_factor = np.array([step.loss_factor for step in steps])
     return loss_factor, (1.0 + loss_factor**2) * np.array([step.phase_error for step in steps])

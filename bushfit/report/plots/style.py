@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import textwrap
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,21 +20,50 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, ScalarFo
 from bushfit.effects.contract import Array
 from bushfit.model.covariance import Z95
 
-#: Inches: a figure's width, a panel's height, what title and explanation take.
-WIDTH, ROW, FRAME = (cm / 2.54 for cm in (16.0, 5.4, 2.0))
-TEXT, SMALL = 8.5, 7.5
+#: Centimetres in an inch: lengths are written in centimetres, and matplotlib takes inches.
+CM = 2.54
+#: Width of a figure [inch]: the text of a page of A4.
+WIDTH = 16.0 / CM
+#: Height of a panel [inch]: two in a row are a little wider than high.
+ROW = 5.4 / CM
+#: Height that title and explanation take [inch].
+FRAME = 2.0 / CM
+#: Size of the labels of axes [point].
+TEXT = 8.5
+#: Size of ticks, legends and explanations [point]: the smallest that still reads well in print.
+SMALL = 7.5
+#: How a measured point is drawn.
 POINT: dict[str, Any] = {"ms": 4.2, "mec": "white", "mew": 0.4}
+#: How a measured point is drawn where there are thousands.
 DOT: dict[str, Any] = {"ms": 2.4, "mew": 0}
-INK, GREY, WILD = "#1a1a1a", "#595959", "#c1121f"
+#: Colour of text and of lines that stand for no level.
+INK = "#1a1a1a"
+#: Colour of what explains.
+GREY = "#595959"
+#: Colour of outliers.
+OUTLIER = "#c1121f"
+#: Resolution of a picture [dots per inch]: sharp in a report, and small enough to be mailed.
 _DPI = 150
+#: Most lines that a legend names: more do not fit beside a panel, and more colours are not told apart.
+MOST_NAMED = 8
+#: Most letters of a file's name in a legend: three legend columns of such names fill the width of a figure.
+_NAME_LETTERS = 20
+#: Right of the panel, in matplotlib's words.
 _LEGEND: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5), "frameon": False, "handlelength": 3.2}
 #: Colours of what a figure tells apart: a scale each, so that no colour means two things. Loops stay off black.
 _SCALES = {"amplitude": ("viridis", 0.0, 0.8), "frequency": ("inferno", 0.1, 0.76), "loop": ("plasma", 0.4, 0.85)}
+#: Markers of levels, one after the other.
 _MARKERS = "os^Dv<p>"
+#: Dashes of levels, one after the other: five, so that marker and dashes together repeat after forty levels.
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1.2, 1.2)), (0, (9, 2)))
-#: An axis that spans more than this ratio is logarithmic.
+#: An axis that spans more than this ratio is logarithmic: chosen, a decade and a half.
 _LOG_RATIO = 40.0
-_TITLE_LETTERS, _NOTE_LETTERS = 84, 112
+#: Letters in a line of the title, as many as the width of a figure holds.
+_TITLE_LETTERS = 64
+#: Height of each further line of the title [inch].
+_TITLE_LINE = 0.42 / CM
+#: Letters in a line of the explanation, as many as the width of a figure holds.
+_NOTE_LETTERS = 112
 #: Fonts that help out for names beyond Latin, Greek and Cyrillic, where they are installed.
 _WIDER_FONTS = {"Noto Sans CJK SC", "Noto Sans CJK JP", "WenQuanYi Zen Hei", "Microsoft YaHei", "SimHei", "PingFang SC"}
 
@@ -47,7 +76,7 @@ class Style(NamedTuple):
     marker: str
 
     def handle(self, marked: bool) -> Line2D:
-        """The line of a legend."""
+        """The line that stands for it in a legend, with its marker or without."""
         return Line2D([], [], color=self.color, ls=self.dashes, lw=1.3, marker=self.marker * marked, **POINT)
 
 
@@ -59,20 +88,21 @@ def styles(count: int, what: str) -> list[Style]:
 
 
 def new_figure(title: str, height: float) -> Figure:
-    """As wide as a report's page, under a title of any letters."""
-    figure = Figure(figsize=(WIDTH, height + FRAME), dpi=_DPI, layout=ConstrainedLayoutEngine(wspace=0.05))
-    text = textwrap.fill(title, _TITLE_LETTERS)
-    figure.suptitle(text, fontsize=TEXT + 1.5, weight="bold", family=fonts(), parse_math=False)
+    """An empty figure as wide as a page, of so many inches for its panels, under a title of any letters."""
+    lines = textwrap.wrap(title, _TITLE_LETTERS)
+    height += FRAME + _TITLE_LINE * max(0, len(lines) - 1)
+    figure = Figure(figsize=(WIDTH, height), dpi=_DPI, layout=ConstrainedLayoutEngine(wspace=0.05))
+    figure.suptitle("\n".join(lines), fontsize=TEXT + 1.5, weight="bold", family=fonts(), parse_math=False)
     return figure
 
 
 def fonts() -> list[str]:
-    """For text that may hold any letters."""
+    """Fonts for text that may hold any letters."""
     return ["DejaVu Sans", *sorted({font.name for font in fontManager.ttflist} & _WIDER_FONTS)]
 
 
 def dress(axes: Axes, x_label: str, y_label: str) -> None:
-    """Labels, ticks and a grid that stays behind."""
+    """Give a panel its labels, ticks and a grid behind all that is drawn."""
     axes.set_xlabel(x_label, fontsize=TEXT, color=INK)
     axes.set_ylabel(y_label, fontsize=TEXT, color=INK)
     axes.tick_params(labelsize=SMALL, colors=INK)
@@ -83,13 +113,13 @@ def dress(axes: Axes, x_label: str, y_label: str) -> None:
 
 
 def readable(axes: Axes, values: Array) -> None:
-    """A logarithmic x axis where the values span decades."""
+    """Make the x axis logarithmic where the values span decades."""
     if values.max() > _LOG_RATIO * values.min():
         logarithmic(axes, values)
 
 
 def logarithmic(axes: Axes, values: Array) -> None:
-    """A logarithmic x axis with plain numbers."""
+    """Make the x axis logarithmic, with plain numbers."""
     axes.set_xscale("log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1, 3) if values.max() < _LOG_RATIO**2 * values.min() else (1,)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -97,34 +127,67 @@ def logarithmic(axes: Axes, values: Array) -> None:
 
 
 def least_span(axes: Axes, least: float) -> None:
-    """Keeps what is constant from filling the panel with rounding errors."""
+    """Widen a y axis to at least this span, so that rounding errors of a constant do not fill the panel."""
     low, high = axes.get_ylim()
     if high - low < least:
         axes.set_ylim((low + high - least) / 2.0, (low + high + least) / 2.0)
 
 
 def noise_band(axes: Axes) -> None:
-    """Grey where 95 % of the residuals should lie."""
+    """Shade in grey where 95 % of the residuals should lie."""
     axes.axhspan(-Z95, Z95, color="#ebebeb", lw=0, zorder=0)
     axes.axhline(0.0, color=GREY, lw=0.6, zorder=1)
     least_span(axes, 7.0)
 
 
-def mark_wild(axes: Axes, x: Array, y: Array) -> None:
-    """Crosses at points that lie far off, drawn at the edge where they lie beyond it."""
+def mark_outliers(axes: Axes, x: Array, y: Array) -> None:
+    """Draw crosses at outliers, at the edge of the panel where they lie beyond it."""
     low, high = axes.get_ylim()
     if x.size:
-        axes.plot(x, np.clip(y, low, high), "x", color=WILD, ms=4.5, mew=1.2, zorder=5, clip_on=False)
+        axes.plot(x, np.clip(y, low, high), "x", color=OUTLIER, ms=4.5, mew=1.2, zorder=5, clip_on=False)
     axes.set_ylim(low, high)
 
 
-def legend(axes: Axes, handles: Sequence[Line2D], labels: Sequence[str], title: str, **place: Any) -> None:
-    """Right of the panel, or where `place` says in matplotlib's words."""
-    axes.legend(handles, labels, fontsize=SMALL, title_fontsize=SMALL, **(_LEGEND | {"title": title} | place))
+def spread(count: int, most: int) -> Array:
+    """Places of at most so many of `count` things, evenly from the first to the last, (min(count, most),)."""
+    return np.linspace(0, count - 1, min(most, count)).round().astype(int)
+
+
+def legend(
+    axes: Axes,
+    handles: Sequence[Line2D],
+    labels: Sequence[str],
+    title: str,
+    *,
+    besides: Mapping[str, Line2D] | None = None,
+    **place: Any,
+) -> None:
+    """Name the lines of a panel; of more than eight name eight, spread from first to last, and say how many more.
+
+    Args:
+        axes: the panel.
+        handles, labels: of all levels.
+        title: of the legend.
+        besides: what is named after the levels, by its label.
+        place: where the legend stands, in matplotlib's words; right of the panel where nothing is said.
+    """
+    named = spread(len(handles), MOST_NAMED)
+    lines, texts = [handles[place] for place in named], [labels[place] for place in named]
+    if left := len(handles) - len(named):
+        lines, texts = [*lines, Line2D([], [], ls="")], [*texts, f"and {left} more"]
+    lines, texts = [*lines, *(besides or {}).values()], [*texts, *(besides or {})]
+    axes.legend(lines, texts, fontsize=SMALL, title_fontsize=SMALL, **(_LEGEND | {"title": title} | place))
+
+
+def file_name(name: str, letters: int = _NAME_LETTERS) -> str:
+    """The name of a file as text of a figure: its dollars are no formulas, and what is too long loses its middle."""
+    if len(name) > letters:
+        name = f"{name[: letters // 2 - 1]}…{name[-letters // 2 :]}"
+    return name.replace("$", r"\$")
 
 
 def explain(figure: Figure, *sentences: str) -> None:
-    """Below the panels: what lines, shades and points are."""
+    """Say below the panels what lines, shades and points are."""
     text = textwrap.fill(" ".join(filter(None, sentences)), _NOTE_LETTERS)
     figure.supxlabel(text, x=0.01, ha="left", fontsize=SMALL, color=GREY, parse_math=False)
 

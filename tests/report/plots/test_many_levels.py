@@ -1,0 +1,183 @@
+"""Many levels, loops or quantities, and long names: every picture stays on its page and says what it leaves unnamed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bushfit.fitting.data_sets import LoopData, SweepData, loop_data, sweep_data
+from bushfit.geometry import Direction
+from bushfit.inspection.record import Inspected, Looked
+from bushfit.model.model import Model
+from bushfit.model.result import Result
+from bushfit.prediction import predict
+from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reduction.steps import Reduction, Step
+from bushfit.report.plots import (
+    fine_grid,
+    gap_figure,
+    inspection_figure,
+    loops_figure,
+    prediction_figure,
+    reduction_figure,
+    sweeps_figure,
+    to_png,
+)
+from bushfit.report.plots.batch import Panel, batch_figure
+from bushfit.report.plots.misfit import map_rows
+
+Swept = Callable[..., SweepData]
+Looped = Callable[..., LoopData]
+#: A picture that is higher does not fit on three pages of A4 [inch].
+HIGHEST = 33.0
+LONG_NAME = "a file whose name tells all that is known of the test " * 3
+
+
+def checked(figure: Figure) -> Figure:
+    """The figure, after a look at whether anything leaves it or is too small; warnings are errors while it is drawn."""
+    assert to_png(figure)
+    width, height = figure.get_size_inches()
+    assert height < HIGHEST
+    canvas = figure.bbox
+    legends = [box for axes in figure.axes if (box := axes.get_legend())]
+    boxes = [box.get_window_extent() for box in legends] + [axes.get_tightbbox() for axes in figure.axes]
+    assert all(
+        box.x0 >= -1 and box.y0 >= -1 and box.x1 <= canvas.x1 + 1 and box.y1 <= canvas.y1 + 1 for box in boxes if box
+    )
+    panels = [axes for axes in figure.axes if not hasattr(axes, "_colorbar")]
+    assert all(axes.get_position().height * height > 0.5 for axes in panels)
+    assert all(axes.get_position().width * width > 1.2 for axes in panels)
+    return figure
+
+
+def named(axes: Axes) -> list[str]:
+    box = axes.get_legend()
+    assert box is not None
+    return [text.get_text() for text in box.get_texts()]
+
+
+@pytest.fixture(scope="module")
+def loops(paper_model: Model, looped: Looped) -> Callable[..., list[LoopData]]:
+    def make(count: int, name: str = "loop") -> list[LoopData]:
+        one = looped(paper_model, 1e-3, cycles=2).loop
+        scales = np.linspace(0.5, 2.0, count)
+        return loop_data(
+            [
+                Loop(f"{name} {k}.csv", one.direction, one.time, scale * one.displacement, scale * one.force)
+                for k, scale in enumerate(scales)
+            ]
+        )
+
+    return make
+
+
+@pytest.mark.parametrize("count", [2, 8, 40, 300])
+def test_sweeps_of_many_amplitudes(paper_model: Model, swept: Swept, count: int) -> None:
+    """Over the frequency as long as a legend can name the amplitudes, else over what there is more of."""
+    data_sets = [swept(paper_model, amplitudes=np.geomspace(2e-5, 1e-3, count), repeats=1)]
+    figure = checked(sweeps_figure(paper_model, data_sets, "mount"))
+    over_amplitude = count > 16
+    assert figure.axes[2].get_xlabel() == ("amplitude [mm]" if over_amplitude else "frequency [Hz]")
+    names = named(figure.axes[1])
+    if over_amplitude:
+        assert len(names) == 9
+        assert names[0] == "155 Hz"
+        assert names[-2:] == ["5 Hz", "and 8 more"]
+    else:
+        assert len(names) == count
+    checked(gap_figure(paper_model, paper_model, data_sets, "mount", ""))
+    prediction = predict(Result(paper_model), Direction.AXIAL, [5.0, 50.0], np.geomspace(2e-5, 1e-3, count))
+    curves = predict(Result(paper_model), Direction.AXIAL, *fine_grid(prediction))
+    checked(prediction_figure(prediction, data_sets, "mount", curves=curves))
+    seen = Inspected(Path(f"{LONG_NAME}.csv"), "sweep", Direction.AXIAL, {}, (), Looked({}), {}, data_sets[0].sweep)
+    (left, right) = checked(inspection_figure([seen])).axes
+    assert len([line for line in left.lines if line.get_linestyle() == "None"]) == (16 if over_amplitude else count)
+    assert len(named(right)) <= 9
+
+
+def test_amplitudes_as_each_point_reached_them(paper_model: Model) -> None:
+    """A level per point: lines stand for what was held, the frequency."""
+    random = np.random.default_rng(1)
+    frequency, level = (axis.ravel() for axis in np.meshgrid(np.geomspace(5.0, 155.0, 15), [1e-4, 2e-4, 5e-4]))
+    amplitude = level * (1.0 + 0.02 * random.standard_normal(level.size))
+    stiffness = paper_model.stiffness("axial", frequency, amplitude) * (1.0 + 0.01 * random.standard_normal(level.size))
+    data_sets = sweep_data([Sweep("reached.csv", Direction.AXIAL, frequency, amplitude, stiffness)])
+    figure = checked(sweeps_figure(paper_model, data_sets, "reached"))
+    lines = [line for line in figure.axes[0].lines if line.get_linestyle() != "None"]
+    assert len(lines) == 15
+    points = [line for line in figure.axes[0].lines if line.get_linestyle() == "None"]
+    assert sum(len(line.get_xdata()) for line in points) == 45, "each point once, however near the levels are"
+    rows = map_rows(amplitude)
+    assert np.unique(rows).size <= 24
+    np.testing.assert_allclose(rows, amplitude, rtol=0.1)
+    assert "neighbouring amplitudes" in checked(
+        gap_figure(paper_model, paper_model, data_sets, "reached", "")
+    ).get_supxlabel().replace("\n", " ")
+
+
+def test_rows_of_a_map_are_the_amplitudes_as_long_as_they_fit() -> None:
+    few = np.repeat(np.geomspace(1e-5, 1e-3, 24), 3)
+    assert map_rows(few) is few
+    many = map_rows(np.geomspace(1e-5, 1e-3, 300))
+    assert np.unique(many).size == 24
+    assert np.all(np.diff(many) >= 0.0)
+
+
+@pytest.mark.parametrize("count", [2, 8, 40, 300])
+def test_many_loops(paper_model: Model, loops: Callable[..., list[LoopData]], count: int) -> None:
+    data_sets = loops(count)
+    figure = checked(loops_figure(paper_model, data_sets, "mount"))
+    names = named(figure.axes[1])
+    assert names[-1] == "model"
+    assert len(names) == min(count, 8) + (count > 8) + 1
+    assert (f"and {count - 8} more" in names) is (count > 8)
+    other = paper_model.with_values({"mu": 1.2 * paper_model.values["mu"]})
+    for after in (paper_model, other):
+        checked(gap_figure(paper_model, after, data_sets, "mount", "A word."))
+
+
+@pytest.mark.parametrize("count", [3, 40])
+def test_twins_of_long_names(paper_model: Model, loops: Callable[..., list[LoopData]], count: int) -> None:
+    first = loops(2)[0].loop
+    data_sets = loop_data([replace(first, name=f"{LONG_NAME}{k}.csv") for k in range(count)])
+    names = named(checked(loops_figure(paper_model, data_sets, LONG_NAME)).axes[1])
+    assert len(set(names)) == len(names), "a name that loses its middle is still told from others"
+    other = paper_model.with_values({"mu": 1.2 * paper_model.values["mu"]})
+    for after in (paper_model, other):
+        checked(gap_figure(paper_model, after, data_sets, LONG_NAME, LONG_NAME))
+
+
+@pytest.mark.parametrize(("levels", "histories"), [(2, 1), (8, 40), (300, 2)])
+def test_reduction_of_many_levels(levels: int, histories: int) -> None:
+    time = np.linspace(0.0, 2.0 * levels, 4000)
+    motion = 1e-3 * np.sin(20.0 * time)
+    records = [Loop(f"{LONG_NAME}{k}", Direction.AXIAL, time, motion, 1e6 * motion) for k in range(histories)]
+    steps = tuple(
+        Step(record.name, 2.0 * k, 2.0 * k + 1.0, 10, 12, 50.0, f, a, 1e6 + 1e5j, 3e-3, 3e-3, 0.01, 0.02, f, a)
+        for record in records
+        for k, a in enumerate(np.geomspace(1e-5, 1e-3, levels))
+        for f in (5.0, 50.0)
+    )
+    figure = checked(reduction_figure(Reduction(Direction.AXIAL, steps, ()), records, "raw.csv"))
+    (box,) = (axes for axes in figure.axes if axes.get_legend())
+    assert len(named(box)) == min(levels, 8) + (levels > 8)
+
+
+@pytest.mark.parametrize(("bushings", "quantities"), [(10, 2), (40, 60), (300, 300)])
+def test_batch_of_many_quantities(bushings: int, quantities: int) -> None:
+    values = np.random.default_rng(2).normal(1.0, 0.02, bushings)
+    panels = [Panel("axial |K| at 25 Hz, 0.1 mm [N/mm]", values, (0.9, 1.1), [0])] * quantities
+    names = [f"{LONG_NAME}{k}" for k in range(bushings)]
+    figure = batch_figure(panels, LONG_NAME, names)
+    assert len(figure.axes) == min(quantities, 40)
+    assert figure.get_size_inches()[1] < 45.0
+    said = "The first 40 of" in " ".join(figure.get_supxlabel().split())
+    assert said is (quantities > 40)
+    if quantities == 2:
+        checked(figure)
