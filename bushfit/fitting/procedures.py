@@ -12,7 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import Stage, covariance, measured_range, misfit, quality
 from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.identify import left_open
 from bushfit.fitting.plausible import implausible, unfitted
 from bushfit.fitting.profile import profile95
