@@ -12,7 +12,7 @@ from bushfit.reading.measurement import Loop
 
 #: Harmonics by which a frequency is refined at most; chosen: what a triangle has beyond them shifts no phase.
 _MOST_HARMONICS = 15
-#: Rounds of Gauss-Newton at most; chosen: a frequency takes four or five.
+#: Rounds of Gauss-Newton at most; chosen: nearly all frequencies take three to six.
 _MOST_ROUNDS = 10
 #: Step relative to the frequency below which Gauss-Newton has ended: rounding.
 _SETTLED = 1e-12

@@ -21,7 +21,7 @@ from bushfit.reading.measurement import Loop, Sweep
 
 #: Rate of a proposed loop where there is none [Hz]: quasi-static on most rigs.
 _NEW_RATE = 0.1
-#: Its cycles: one to settle, one to fit.
+#: Its cycles, from rest: the first shows how it settles.
 _NEW_CYCLES = 2.0
 #: Its rows.
 _NEW_ROWS = 400

@@ -15,7 +15,9 @@ from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 
 #: Share of the amplitude, over the number of harmonics, by which these may miss a corner of the motion.
 _CORNER = 0.5
-#: Rounds of reweighting, and of leaving outliers out, at most; chosen: most records settle in two or three.
+#: Rounds in which rows are weighted down by their distance; chosen.
+_REWEIGHTINGS = 10
+#: Rounds of leaving outliers out at most; chosen: nearly all records settle in two.
 _MOST_ROUNDS = 10
 
 
@@ -59,7 +61,7 @@ def fit_without_outliers(columns: Array, values: Array, solution: Array) -> tupl
     stuck[stuck_rows(values)] = True
     if np.array_equal(_inliers(columns, values, solution, stuck), every):
         return solution, every
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(_REWEIGHTINGS):
         residual = values - columns @ solution
         weight = ~stuck / np.sqrt(1.0 + np.square(residual / _noise(solution, residual[~stuck])))
         solution = least_squares(columns, values, weight)

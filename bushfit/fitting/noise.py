@@ -33,7 +33,8 @@ _OUTLIER = 6.0
 #: Shared variance of an outlying pair of repeats over the median of all pairs: noise alone reaches it once in 500
 #: campaigns.
 _OUTLYING_PAIR = 100.0
-#: Rounds of reweighting towards the least sum of distances; chosen: more of them change nothing that counts.
+#: Rounds of reweighting towards the least sum of distances; chosen: nine of ten curves have then come within a third
+#: of the noise of where they end.
 _ROUNDS = 25
 #: Least distance relative to the median distance, so that no point takes all the weight.
 _LEAST_DISTANCE = 1e-3

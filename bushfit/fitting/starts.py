@@ -14,7 +14,7 @@ from bushfit.effects.friction import harmonic_shape
 from bushfit.fitting.data_sets import DataSet
 from bushfit.geometry import Bushing
 
-#: Strain amplitude of the largest test over eps_half, before anything is known: most tests reach into sliding.
+#: Strain amplitude of the largest test over eps_half, before anything is known; chosen: the fit finds the rest.
 _SCALED_STRAIN = 3.0
 #: Share of a modulus, or of a loss, that a start leaves to a branch, whatever the other branches claim.
 _LEAST_SHARE = 0.1
