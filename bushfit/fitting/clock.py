@@ -6,124 +6,168 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.harmonics import basis, order, reach, sample, solve, turned
+from bushfit.fitting.fourier import basis, derivative, least_squares, resolved_order, spread_rows
+from bushfit.fitting.loop_outliers import residual_limit
 from bushfit.reading.measurement import Loop
 
-_HARMONICS, _MOST_ROUNDS, _SETTLED = 15, 10, 1e-12
+#: Harmonics by which a frequency is refined at most; chosen: what a triangle has beyond them shifts no phase.
+_MOST_HARMONICS = 15
+#: Rounds of Gauss-Newton at most; chosen: nearly all frequencies take three to six.
+_MOST_ROUNDS = 10
+#: Step relative to the frequency below which Gauss-Newton has ended: rounding.
+_SETTLED = 1e-12
+#: Step relative to the frequency that Gauss-Newton takes at most: farther off it is not linear.
+_LARGEST_STEP = 0.05
 #: Rows that are enough to refine a frequency.
-_ENOUGH = 2000
-#: Share of the range on either side of the middle within which the motion is not yet across.
+_ENOUGH_ROWS = 2000
+#: Share of the range on either side of the middle within which the motion is not yet across: more than any noise.
 _BAND = 0.1
-#: A closed cycle ends where it began within this share of it, or of its amplitude; part of it by which its ends are
-#: drawn.
-_CLOSED, _END = 0.04, 0.02
-#: Cycles, counted by one stroke, from which on a record is no single closed one, and where its ends meet all the same:
-#: standing still at an extreme they may, and a motion may take longer one way than the other.
-_MORE_THAN_ONE, _MEETS_ALL_THE_SAME = 1.01, 1.1
-#: An end whose line is no better known than this share of its length stands still.
-_STANDS = 0.25
+#: Distance between the ends of a closed cycle at most, as a share of it or of its amplitude.
+_CLOSED = 0.04
+#: Share of the record at either end through which a line is drawn.
+_END = 0.02
+#: Cycles, counted by one stroke, from which on a record is no single closed one.
+_MORE_THAN_ONE = 1.01
+#: The same where the ends of the record meet all the same: standing still at an extreme they may, and a motion may
+#: take longer one way than the other.
+_MORE_THAN_ONE_THAT_MEETS = 1.1
+#: Error of an end's line relative to its length from which on the motion stands still there.
+_STANDS_STILL = 0.25
 #: Standard deviations within which a period is taken for that of the record.
 _SAME = 4.0
-#: Share of the amplitude, and scatter, within which what comes after one cycle repeats its start.
-_REPEATS, _REPEATS_SCATTER = 0.02, 6.0
+#: Root mean square by which what comes after one cycle may differ from its start, relative to the amplitude.
+_REPEATS = 0.02
+#: The same in units of the scatter of neighbouring rows, where that is more.
+_REPEATS_SCATTER = 6.0
 
 
-def fundamental(loop: Loop, clock: Array, x: Array) -> tuple[float, float]:
+def fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, float]:
     """Frequency [Hz] and number of cycles of a loop.
-
-    Several cycles are counted by crossings in one sense, and their frequency is refined by Gauss-Newton on the motion.
-    A single one is known by its ends, which meet going the same way.
 
     Args:
         loop: periodic, without run-in.
-        clock: and
-        x: time and displacement of rows that are enough to find the cycles, gross ones left out.
+        clock: time of rows that are enough to find the cycles, gross outliers left out [s], (n,).
+        displacement: of the same rows [m or rad], (n,).
+
+    Raises:
+        FitError: the loop does not hold a whole cycle.
+
+    Notes:
+        Several cycles are counted by crossings of the middle in one sense, and their frequency is refined by
+        Gauss-Newton on the motion. A single one is known by its ends, which meet going the same way.
+    """
+    x, clock = displacement - (displacement.max() + displacement.min()) / 2.0, clock - loop.time[0]
+    times, sense = _crossings(clock, x)
+    rows = loop.time.size
+    closed = float(loop.time[-1] - loop.time[0]) * rows / (rows - 1)
+    same_sense = max((times[sense == one] for one in (1, -1)), key=len)
+    if same_sense.size > 1:
+        counted = (same_sense.size - 1) / float(same_sense[-1] - same_sense[0])
+        frequency = _refined(clock, x, counted, rows / (closed * counted))
+        return frequency, closed * frequency
+    return _of_one_cycle(loop, clock, x, times)
+
+
+def _crossings(clock: Array, x: Array) -> tuple[Array, Array]:
+    """When the motion crosses its middle, (k,), and on which side it then is, 1 or -1, (k,)."""
+    band = _BAND * np.ptp(x)
+    side = np.where(x > band, 1, np.where(x < -band, -1, 0))
+    marks = np.flatnonzero(side)
+    across = np.flatnonzero(side[marks[1:]] != side[marks[:-1]])
+    before, after = marks[across], marks[across + 1]
+    times = clock[before] - x[before] * (clock[after] - clock[before]) / (x[after] - x[before])
+    return times, side[after]
+
+
+def _of_one_cycle(loop: Loop, clock: Array, x: Array, crossings: Array) -> tuple[float, float]:
+    """Frequency [Hz] and number of cycles of a loop that crosses its middle but once in either sense.
+
+    Args:
+        loop: the whole loop.
+        clock: time since its first row [s], (n,).
+        x: displacement about its middle, (n,).
+        crossings: when it crosses the middle [s], one or two.
 
     Raises:
         FitError: the loop does not hold a whole cycle.
     """
-    x, clock = x - (x.max() + x.min()) / 2.0, clock - loop.time[0]
-    band = _BAND * np.ptp(x)
-    state = np.where(x > band, 1, np.where(x < -band, -1, 0))
-    marks = np.flatnonzero(state)
-    across = np.flatnonzero(state[marks[1:]] != state[marks[:-1]])
-    before, after = marks[across], marks[across + 1]
-    times = clock[before] - x[before] * (clock[after] - clock[before]) / (x[after] - x[before])
-    crossings = max((times[state[after] == sense] for sense in (1, -1)), key=len)
-    rows = loop.time.size
+    rows, motion = loop.time.size, loop.displacement
     duration = float(loop.time[-1] - loop.time[0])
     closed = duration * rows / (rows - 1)
-    if crossings.size > 1:
-        counted = (crossings.size - 1) / float(crossings[-1] - crossings[0])
-        frequency = _refined(clock, x, counted, rows / (closed * counted))
-        return frequency, closed * frequency
-    apart = abs(loop.displacement[-1] - loop.displacement[0])
-    stride = np.abs(np.diff(loop.displacement[[0, 1, -2, -1]]))[[0, 2]].mean()
+    apart = abs(motion[-1] - motion[0])
+    stride = np.abs(np.diff(motion[[0, 1, -2, -1]]))[[0, 2]].mean()
     whole = duration if apart < 0.5 * stride else closed
-    period = _met(clock, x, duration, whole)
-    if period is None and times.size == 2:
-        stroke = float(times[1] - times[0])
+    period = _period_by_ends(clock, x, duration, whole)
+    if period is not None:
+        return 1.0 / period, closed / period
+    if crossings.size == 2:
+        stroke = float(crossings[1] - crossings[0])
         meets = apart < _CLOSED * np.ptp(x) / 2.0 + 1.5 * stride
-        least = _MEETS_ALL_THE_SAME if meets else _MORE_THAN_ONE
-        if closed > least * 2.0 * stroke:
+        if closed > (_MORE_THAN_ONE_THAT_MEETS if meets else _MORE_THAN_ONE) * 2.0 * stroke:
             frequency = _refined(clock, x, 0.5 / stroke, rows)
             if closed * frequency > 1.0 and _repeats(clock, x, 1.0 / frequency):
                 return frequency, closed * frequency
-    if period is None and apart > band:
+    if apart > _BAND * np.ptp(x):
         unit = loop.direction.motion.displacement_unit
         raise FitError(
             "the loop does not hold a whole cycle",
             file=loop.source.file if loop.source else None,
-            found=f"displacement from {loop.displacement[0]:.4g} to {loop.displacement[-1]:.4g} {unit}",
+            found=f"displacement from {motion[0]:.4g} to {motion[-1]:.4g} {unit}",
             expected="at least one closed cycle",
             hint="export the whole cycle, or several",
         )
-    period = period or whole
-    return 1.0 / period, closed / period
+    return 1.0 / whole, closed / whole
 
 
-def _met(clock: Array, x: Array, duration: float, whole: float) -> float | None:
+def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> float | None:
     """Period of a motion whose last rows meet its first, going the same way; None where they do not, or stand still.
 
-    Both ends are drawn as straight lines. They tell how far beyond one cycle the record goes, or how short of it it
-    stops; within their error it is the whole record.
+    Args:
+        clock: time [s], (n,).
+        x: displacement, (n,).
+        duration: from the first row to the last [s].
+        whole: period where the record is just one cycle [s].
+
+    Notes:
+        Both ends are drawn as straight lines. They tell how far beyond one cycle the record goes, or how short of it
+        it stops; within their error it is the whole record.
     """
     few = max(3, int(_END * x.size))
-    first, one, scatter = _end(clock[:few] - clock[0], x[:few])
-    last, other, more = _end(clock[-few:] - clock[-1], x[-few:])
-    slope, step = (one + other) / 2.0, duration / (x.size - 1)
-    if one * other <= 0.0 or abs(last - first) > _CLOSED * duration * abs(slope):
+    first, first_slope, first_scatter = _line(clock[:few] - clock[0], x[:few])
+    last, last_slope, last_scatter = _line(clock[-few:] - clock[-1], x[-few:])
+    slope, step = (first_slope + last_slope) / 2.0, duration / (x.size - 1)
+    if first_slope * last_slope <= 0.0 or abs(last - first) > _CLOSED * duration * abs(slope):
         return None
-    error = np.hypot(scatter, more) * np.sqrt(4.0 / few) / abs(slope)
-    if error > _STANDS * few * step:
+    error = np.hypot(first_scatter, last_scatter) * np.sqrt(4.0 / few) / abs(slope)
+    if error > _STANDS_STILL * few * step:
         return None
     period = duration - (last - first) / slope
     return period if period < whole - max(1.5 * step, _SAME * error) else whole
 
 
-def _end(time: Array, x: Array) -> tuple[float, float, float]:
+def _line(time: Array, x: Array) -> tuple[float, float, float]:
     """Value at time 0, slope, and scatter about them, of the line through some rows."""
     line = np.polynomial.Polynomial.fit(time, x, 1)
     return float(line(0.0)), float(line.deriv()(0.0)), float(np.std(x - line(time)))
 
 
 def _refined(clock: Array, x: Array, frequency: float, rows_per_cycle: float) -> float:
-    """Gauss-Newton on the motion's harmonics and their frequency together."""
-    chosen = sample(x.size, _ENOUGH)
+    """Frequency [Hz] of several cycles, by Gauss-Newton on the motion's harmonics and their frequency together."""
+    chosen = spread_rows(x.size, _ENOUGH_ROWS)
     time, motion = clock[chosen], x[chosen]
-    number = order(rows_per_cycle * chosen.size / x.size, _HARMONICS)
-    columns = basis(time * frequency, number)
-    shape = solve(columns, motion)
+    order = resolved_order(rows_per_cycle * chosen.size / x.size, _MOST_HARMONICS)
+    columns = basis(time * frequency, order)
+    solution = least_squares(columns, motion)
     for _ in range(_MOST_ROUNDS):
-        left = motion - columns @ shape
-        sound = np.abs(left) <= reach(shape, left, left.size)
-        angle_slope = 2.0 * np.pi * time * (columns @ turned(shape))
-        solution = solve(np.column_stack((columns, angle_slope)), motion, sound)
-        step = float(np.clip(solution[-1], -0.05 * frequency, 0.05 * frequency))
+        residual = motion - columns @ solution
+        kept = np.abs(residual) <= residual_limit(solution, residual, residual.size)
+        by_frequency = 2.0 * np.pi * time * (columns @ derivative(solution))
+        found = least_squares(np.column_stack((columns, by_frequency)), motion, kept)
+        step = float(np.clip(found[-1], -_LARGEST_STEP * frequency, _LARGEST_STEP * frequency))
         frequency += step
         if abs(step) < _SETTLED * frequency:
             break
-        columns, shape = basis(time * frequency, number), solution[:-1]
+        columns, solution = basis(time * frequency, order), found[:-1]
     return frequency
 
 

@@ -16,12 +16,22 @@ from bushfit.fitting.solve import Bounds
 from bushfit.geometry import Direction
 from bushfit.model.result import Outlier
 
+#: Difference of two amplitudes relative to their size up to which they are the same level.
+_SAME_LEVEL = 1e-3
+
 _Kind = TypeVar("_Kind", LoopData, SweepData)
 
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """A campaign made ready to fit: one data set per loop and per sweep, and the user's settings."""
+    """A campaign made ready to fit: one data set per loop and per sweep, and the user's settings.
+
+    Args:
+        campaign: as read.
+        loops: a data set per loop, in the order of the campaign.
+        sweeps: a data set per sweep, in the order of the campaign.
+        bounds: least and largest value of each parameter that [fit] names; None for none.
+    """
 
     campaign: Campaign
     loops: tuple[LoopData, ...]
@@ -30,6 +40,11 @@ class Data:
 
     @classmethod
     def of(cls, campaign: Campaign) -> Data:
+        """The data sets of a campaign as its [fit] asks for them.
+
+        Raises:
+            FitError: a loop is not one whole cycle or more, rows of it are missing, or it gives energy.
+        """
         settings = campaign.fit.parameters
         return cls(
             campaign,
@@ -44,7 +59,10 @@ class Data:
         return self.campaign.fit.loss != "linear"
 
     def without(self, outliers: Sequence[Outlier]) -> Data:
-        """The same data, those points of the sweeps without weight; outliers of loops have none where `robust`."""
+        """The same data with no weight on these outliers of the sweeps.
+
+        Those of loops have none from the start where `robust`.
+        """
         sweeps = []
         for data_set in self.sweeps:
             rows = [outlier.row - 1 for outlier in outliers if outlier.test == data_set.name]
@@ -65,7 +83,7 @@ class Data:
     def chosen(self, directions: Sequence[Direction] | None) -> list[DataSet]:
         """Data sets of the given directions; by default the axial loops and sweeps, as in the paper.
 
-        Of a kind of test that has none that is axial, all are taken.
+        Where no loop is axial, all loops are taken by default, and so with sweeps.
 
         Raises:
             FitError: there is none.
@@ -125,7 +143,9 @@ class Data:
             sweep = min(sweeps, key=lambda data_set: float(data_set.amplitude.min()))
             return sweep.at_amplitudes((float(sweep.amplitude.min()),))
         for sweep in sweeps:
-            there = tuple(float(x) for x in np.unique(sweep.amplitude) if np.any(np.isclose(x, wanted, rtol=1e-3)))
+            there = tuple(
+                float(x) for x in np.unique(sweep.amplitude) if np.any(np.isclose(x, wanted, rtol=_SAME_LEVEL))
+            )
             if there:
                 return sweep.at_amplitudes(there)
         levels = sorted({float(x) for sweep in sweeps for x in sweep.amplitude})

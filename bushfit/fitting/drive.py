@@ -17,34 +17,38 @@ from bushfit.effects.contract import Array
 from bushfit.effects.history import History, reversals
 from bushfit.errors import FitError
 from bushfit.fitting.clock import fundamental
-from bushfit.fitting.harmonics import (
-    GRID,
-    MOST_ROWS,
-    OutlierRows,
-    basis,
-    harmonics,
-    series,
-    solve,
-)
+from bushfit.fitting.fourier import GRID, basis, least_squares, series
+from bushfit.fitting.loop_harmonics import MOST_ROWS, loop_harmonics
+from bushfit.fitting.loop_outliers import OutlierRows
 from bushfit.fitting.noise import FLOOR
+from bushfit.fitting.phase_bins import phase_bins
 from bushfit.fitting.runin import steady_part, thinned
 from bushfit.fitting.waveform import wrong_clock
 from bushfit.reading.measurement import Loop
-from bushfit.reading.parallel import CHUNK, by_chunks
+from bushfit.reading.parallel import by_chunks
 from bushfit.reduction.cycles import HOLE
 
-#: Cycles whose bins are kept apart, and how fast the groups of later ones grow.
-_APART, _GROWTH = 4, 1.5
-#: Steps of the grid about a turning point in which rows carry no weight.
+#: Distance from a turning point up to which rows carry no weight [steps of the grid]: one step, and the half by which
+#: the point may lie beside its sample.
 _JUMP = 1.5
-#: Share of the half range below which both first displacement and first force count as a start from rest.
+#: Share of the half range up to which both first displacement and first force count as a start from rest.
 _AT_REST = 0.02
-#: Share of a cycle at its start, and of the half range of the force by which it is another a cycle later.
-_FIRST, _OTHER = 0.02, 5e-3
-#: Standard deviations, and loss factor, by which a loop may give energy for its noise and the rig's delay.
-_CERTAIN, _NO_LOSS = 5.0, 2e-3
+#: Standard deviations of the noise by which the first force may be off zero besides.
+_FIRST_ROW = 3.0
+#: Share of a cycle at its start that is held against the same a cycle later.
+_START = 0.02
+#: Change of the force over the first cycle, relative to half its range, from which on the loop began at rest.
+_SETTLES = 5e-3
+#: Standard deviations of the noise from which on a change, or energy that a loop gives, is no chance.
+_CERTAIN = 5.0
+#: Standard error of a median over that of a mean: sqrt(pi/2).
+_MEDIAN_OVER_MEAN = 1.25
+#: Loss factor up to which a loop may give energy, for the delay of a rig.
+_NO_LOSS = 2e-3
 #: Share of the amplitude by which a motion may lie off zero before its middle is taken for unknown.
 _CENTRED = 0.01
+#: Share of a cycle by which a record may go on after its last whole one and still count as whole: rounding.
+_WHOLE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +65,7 @@ class Drive:
         weight: rows behind each entry of force, 0 at the turning points, (n,).
         noise: standard deviation of one row's force [N or N m].
         coefficients: complex harmonics of the displacement, mean first.
-        half_range: half of the range of the measured force, wild rows aside [N or N m].
+        half_range: half of the range of the measured force, outliers aside [N or N m].
         datum: mean of the measured force where the motion lies off zero, else None. Whether a sensor's zero or
             a preload put it there is not known, so such a loop counts from its own middle.
         notes: sentences on what of the record was left out, and on a time that does not go with its rows.
@@ -90,17 +94,20 @@ class Drive:
         return float(self.history(settles=False).amplitude[0])
 
     def displacement(self, phase: Array) -> Array:
-        """The motion at any phase [cycles], noise removed."""
+        """The motion at any phase [cycles], noise removed [m or rad], (n,)."""
         return series(self.coefficients, phase)
 
     def first_harmonic(self) -> complex:
         """Complex stiffness of the loop's fundamental, force over displacement [N/m or N m/rad]."""
         columns = basis(self.phase, 1)
-        _, real, imag = solve(columns * np.sqrt(self.weight)[:, None], self.force * np.sqrt(self.weight))
+        _, real, imag = least_squares(columns * np.sqrt(self.weight)[:, None], self.force * np.sqrt(self.weight))
         return complex(complex(real, imag) / self.coefficients[1])
 
     def history(self, settles: bool) -> History:
-        """The motion as the model wants it: one settled cycle, or the whole record where it must be."""
+        """The motion as the model wants it, GRID samples a cycle.
+
+        One settled cycle, or the whole record where it begins at rest or the model `settles` over the cycles.
+        """
         return self._settling if settles and not self.from_rest else self._motion
 
     @cached_property
@@ -115,7 +122,7 @@ class Drive:
 
     @cached_property
     def _settling(self) -> History:
-        count = int(np.ceil(self.cycles - 1e-6))
+        count = int(np.ceil(self.cycles - _WHOLE))
         return History.steady(np.tile(self._motion.value, count), self.frequency, cycles=count)
 
     def from_datum(self, response: Array) -> Array:
@@ -123,7 +130,7 @@ class Drive:
         return response if self.datum is None else response - response.mean(axis=-1, keepdims=True)
 
     def at_rows(self, response: Array) -> Array:
-        """A response over `history`, linearly interpolated at the rows: (..., n)."""
+        """A response over `history`, (..., samples), linearly interpolated at the rows, (..., n)."""
         length = response.shape[-1]
         if length not in self._places:
             position = self.phase * GRID
@@ -140,56 +147,47 @@ class Drive:
 
 
 def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
-    """Find the cycles of a loop and clear its displacement of noise; wild rows of either column do not disturb that.
+    """The cycles of a loop, its displacement cleared of noise, and its force with weights.
+
+    Outliers of either column do not disturb that.
 
     Args:
         loop: the measured loop.
-        without_outliers: whether rows whose force is wild carry no weight; else they count like any other.
+        without_outliers: whether rows whose force is an outlier carry no weight; else they count like any other.
 
     Raises:
         FitError: the displacement is not one whole cycle or more of a periodic motion, rows are missing, or the loop
             gives energy.
     """
     whole, thin = loop, thinned(loop)
-    loop, cut = steady_part(whole, *thin)
-    first = int(np.searchsorted(whole.time, loop.time[0]))
+    loop, left_out = steady_part(whole, *thin)
+    first_row = int(np.searchsorted(whole.time, loop.time[0]))
     thin = thin if loop is whole else thinned(loop)
     frequency, cycles = fundamental(loop, *thin)
     _check_no_hole(loop, thin[0], frequency)
-    motion, force_mean, force_noise, outliers = harmonics(loop, frequency, cycles)
-    rows = outliers["force"].rows
-    sound = np.delete(loop.force, rows) if rows.size else loop.force
-    ends = np.array(by_chunks(lambda part: (sound[part].min(), sound[part].max()), sound.size))
-    half_motion, half_force = np.ptp(series(motion, np.arange(GRID) / GRID)) / 2.0, float(np.ptp(ends)) / 2.0
-    noise = loop.noise * half_force if loop.noise is not None else force_noise
-    from_rest = first == 0 and _from_rest(loop, frequency, half_motion, half_force, noise)
-    clock, force = (loop.time - loop.time[0] if loop.time[0] else loop.time), loop.force
-    if force.size > MOST_ROWS:
-        if without_outliers and rows.size:
-            clock, force = np.delete(clock, rows), sound
-        phase, force, weight = _binned(clock, force, frequency, cycles, each_cycle=from_rest)
-    else:
-        phase, weight = clock * frequency, np.ones(force.size)
-        weight[rows] = 0.0 if without_outliers else 1.0
-    noise = max(noise, FLOOR * half_force)
-    off_zero = not from_rest and abs(motion[0]) > _CENTRED * half_motion
-    datum = force_mean if off_zero else None
-    notes = tuple(filter(None, (cut, wrong_clock(loop, motion))))
+    found = loop_harmonics(loop, frequency, cycles)
+    outliers = found.outliers["force"].rows
+    half_motion = float(np.ptp(series(found.motion, np.arange(GRID) / GRID))) / 2.0
+    half_force = _half_range(_without(loop.force, outliers))
+    noise = loop.noise * half_force if loop.noise is not None else found.force_noise
+    from_rest = first_row == 0 and _from_rest(loop, frequency, half_motion, half_force, noise)
+    unweighted = outliers if without_outliers else outliers[:0]
+    phase, force, weight = _points(loop, frequency, cycles, unweighted, each_cycle=from_rest)
     drive = Drive(
-        loop,
-        frequency,
-        cycles,
-        from_rest,
-        phase,
-        force,
-        weight,
-        noise,
-        motion,
-        half_force,
-        datum,
-        notes,
-        outliers,
-        first,
+        loop=loop,
+        frequency=frequency,
+        cycles=cycles,
+        from_rest=from_rest,
+        phase=phase,
+        force=force,
+        weight=weight,
+        noise=max(noise, FLOOR * half_force),
+        coefficients=found.motion,
+        half_range=half_force,
+        datum=found.force_mean if not from_rest and abs(found.motion[0]) > _CENTRED * half_motion else None,
+        notes=tuple(filter(None, (left_out, wrong_clock(loop, found.motion)))),
+        outliers=found.outliers,
+        first_row=first_row,
     )
     drive = replace(drive, weight=np.where(_at_reversal(drive), 0.0, weight))
     _check_loses_energy(drive)
@@ -197,7 +195,11 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
 
 
 def _check_no_hole(loop: Loop, clock: Array, frequency: float) -> None:
-    """Across rows that are missing nothing tells how many turns the motion made, nor so its frequency."""
+    """Across rows that are missing nothing tells how many turns the motion made, nor so its frequency.
+
+    Raises:
+        FitError: rows are missing over more than a part of a cycle.
+    """
     steps = np.diff(clock)
     widest = int(np.argmax(steps))
     if steps[widest] > HOLE / frequency:
@@ -212,7 +214,11 @@ def _check_no_hole(loop: Loop, clock: Array, frequency: float) -> None:
 
 
 def _check_loses_energy(drive: Drive) -> None:
-    """A bushing loses energy: its force runs ahead of its displacement, beyond noise."""
+    """A bushing loses energy: its force runs ahead of its displacement.
+
+    Raises:
+        FitError: it lags behind, beyond noise and what the delay of a rig makes.
+    """
     stiffness = drive.first_harmonic()
     chance = drive.noise * np.sqrt(2.0 / drive.weight.sum()) / abs(drive.coefficients[1])
     if stiffness.imag < -max(_CERTAIN * chance, _NO_LOSS * abs(stiffness)):
@@ -226,9 +232,43 @@ def _check_loses_energy(drive: Drive) -> None:
         )
 
 
+def _without(values: Array, rows: Array) -> Array:
+    """Values less those of some rows; a long record is not copied in vain."""
+    return np.delete(values, rows) if rows.size else values
+
+
+def _half_range(values: Array) -> float:
+    """Half of the range of a long array."""
+    ends = np.array(by_chunks(lambda part: (values[part].min(), values[part].max()), values.size))
+    return float(np.ptp(ends)) / 2.0
+
+
+def _points(
+    loop: Loop, frequency: float, cycles: float, unweighted: Array, *, each_cycle: bool
+) -> tuple[Array, Array, Array]:
+    """Phase [cycles], force and weight of each row of a loop, or of each bin of phase where it is long, (n,) each.
+
+    Args:
+        loop: without run-in.
+        frequency: [Hz].
+        cycles: in the loop.
+        unweighted: rows that carry no weight.
+        each_cycle: whether every cycle has bins of its own.
+    """
+    clock = loop.time - loop.time[0] if loop.time[0] else loop.time
+    if loop.force.size > MOST_ROWS:
+        clock, force = _without(clock, unweighted), _without(loop.force, unweighted)
+        return phase_bins(clock, force, frequency, cycles, each_cycle=each_cycle)
+    weight = np.ones(loop.force.size)
+    weight[unweighted] = 0.0
+    return clock * frequency, loop.force, weight
+
+
 def _at_reversal(drive: Drive) -> Array:
-    """Rows within a step of the model's grid from a turning point, where dry friction jumps and no grid can tell when;
-    they carry no weight."""
+    """Rows within a step of the model's grid from a turning point, (n,).
+
+    Dry friction jumps there, and no grid can tell when.
+    """
     motion = drive.history(settles=False).value
     cycle = motion if drive.from_rest else np.concatenate((motion[-1:], motion, motion[:1]))
     turns = np.flatnonzero(reversals(cycle)) - (0 if drive.from_rest else 1)
@@ -248,47 +288,22 @@ def _from_rest(loop: Loop, frequency: float, half_motion: float, half_force: flo
     """Whether the record begins with nothing moved, no force, and a force that is another a cycle later.
 
     A settled loop may pass the origin too, where its load cell is off zero, but then it passes it every cycle.
+
+    Args:
+        loop: the whole record.
+        frequency: [Hz].
+        half_motion: half of the range of the displacement [m or rad].
+        half_force: half of the range of the force [N or N m].
+        noise: standard deviation of one row's force [N or N m].
     """
-    if abs(loop.displacement[0]) > _AT_REST * half_motion or abs(loop.force[0]) > _AT_REST * half_force + 3.0 * noise:
+    if (
+        abs(loop.displacement[0]) > _AT_REST * half_motion
+        or abs(loop.force[0]) > _AT_REST * half_force + _FIRST_ROW * noise
+    ):
         return False
     end = np.searchsorted(loop.time, loop.time[0] + 2.0 / frequency)
     clock, force = loop.time[:end] - loop.time[0], loop.force[:end]
-    first = clock[: np.searchsorted(clock, _FIRST / frequency)]
+    first = clock[: np.searchsorted(clock, _START / frequency)]
     change = np.interp(first + 1.0 / frequency, clock, force) - force[: first.size]
-    chance = 5.0 * noise * np.sqrt(2.0 / first.size)
-    return bool(abs(np.median(change)) > max(1.25 * chance, _OTHER * half_force))
-
-
-def _binned(
-    clock: Array, force: Array, frequency: float, cycles: float, each_cycle: bool
-) -> tuple[Array, Array, Array]:
-    """Mean phase, mean force and number of rows of each filled bin of every cycle, or of cycles taken together: the
-    first few are kept apart, because a loop settles over them, and later ones go into ever larger groups."""
-    number = np.arange(int(cycles) + 2)
-    starts = number
-    if not each_cycle:
-        later = _APART * _GROWTH ** np.arange(np.log(number.size / _APART) / np.log(_GROWTH))
-        starts = np.union1d(np.arange(_APART), later.astype(np.intp))
-    group = np.searchsorted(starts, number, side="right") - 1
-    middle = np.round(np.bincount(group, weights=number) / np.bincount(group))
-    edges = np.append(np.arange(int(cycles * GRID) + 1) / (frequency * GRID), np.inf)
-
-    def sums(bins: slice) -> Array:
-        """Of some bins the filled ones, (k,), their rows, and sums of phase in bins and of force over these, (4, k)."""
-        start, stop = np.searchsorted(clock, edges[[bins.start, bins.stop]])
-        first = np.searchsorted(clock[start:stop], edges[bins])
-        filled = np.flatnonzero(np.diff(first, append=stop - start))
-        number, first = filled + bins.start, first[filled]
-        count = np.diff(first, append=stop - start)
-        in_bins = np.add.reduceat(clock[start:stop], first) * (frequency * GRID) - count * number
-        return np.stack((number, count, in_bins, np.add.reduceat(force[start:stop], first)))
-
-    chunks = by_chunks(sums, edges.size - 1, 1 + CHUNK * edges.size // clock.size)
-    bins, *parts = np.concatenate(chunks, axis=1)
-    bins = bins.astype(np.intp)
-    place = GRID * group[bins // GRID] + bins % GRID
-    rows, inside, total = (np.bincount(place, weights=part) for part in parts)
-    filled = np.flatnonzero(rows)
-    rows, inside, total = rows[filled], inside[filled], total[filled]
-    phase = middle[filled // GRID] + (filled % GRID + inside / rows) / GRID
-    return phase, total / rows, rows
+    chance = _CERTAIN * noise * np.sqrt(2.0 / first.size)
+    return bool(abs(np.median(change)) > max(_MEDIAN_OVER_MEAN * chance, _SETTLES * half_force))

@@ -1,83 +1,98 @@
-"""What tests leave open, in words: from the singular values of the Jacobian, scaled by noise and parameter size.
+"""What tests leave open, in words.
 
-A singular value s is the inverse of the relative standard error along its direction. Directions that noise leaves open
-are named by the parameters in them, with the reason that lies in the tests, the combination that is known all the same,
-and the further test that would help most.
+Directions that noise leaves open are named by the parameters in them, with the reason that lies in the tests, the
+combination that is known all the same, and the further test that would help most.
+
+Notes:
+    A direction is an eigenvector of the Fisher information, with parameters scaled by their size; its standard error is
+    one over the root of the eigenvalue, which is a singular value of the Jacobian scaled by noise and size.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from bushfit.effects.contract import Array
 from bushfit.fitting.assess import measured_range
-from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, parted
-from bushfit.fitting.drive import Drive
-from bushfit.fitting.solve import Coordinates, jacobian
+from bushfit.fitting.data_sets import DataSet, parted
+from bushfit.fitting.further_test import further_test
+from bushfit.fitting.information import Information, percent, relative_sizes
+from bushfit.fitting.solve import Coordinates
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model
-from bushfit.reading.measurement import Loop, Sweep
 from bushfit.units import modulus
 
 #: Relative standard error beyond which a direction counts as open, and a parameter as not determined.
 _OPEN = 0.15
 #: Share of the worst error from which on a parameter is open with it, however well it is known.
 _PARTNER = 0.3
-#: Frequencies, or strains, that differ by less than this factor are one; by less than those, they tell little.
-_ONE, _NARROW_RATE, _NARROW_STRAIN = 1.05, 5.0, 2.0
-#: A combination is known where its error is below this, and below this share of that of its parts.
-_KNOWN, _BETTER = 0.1, 0.34
-#: A loop that is proposed where there is none: its rate [Hz], rows, and noise over half its force range.
-_NEW_RATE, _ROWS, _FORCE_NOISE = 0.1, 400, 5e-3
-#: Strain that a bushing can be asked to bear in a test.
-_BEARABLE = 0.5
-#: Relative standard error that is as good as none: a test that leaves so much is not worth its time.
-_HOPELESS = 10.0
-_FRICTION, _RATE = ("sigma_fmax", "eps_half"), ("mu", "m", "alpha")
+#: Ratio of the largest frequency, or strain, to the smallest up to which they are one.
+_ONE = 1.05
+#: Ratio of frequencies up to which they tell little of a slope.
+_NARROW_BAND = 5.0
+#: Ratio of strains up to which they tell little of friction.
+_NARROW_STRAIN = 2.0
+#: Relative standard error below which a combination is known.
+_KNOWN = 0.1
+#: Error of a combination over the least of its parts', up to which it is worth naming.
+_BETTER = 0.34
+#: Relative step of a parameter into the complex plane: a derivative so taken is exact to rounding.
+_COMPLEX_STEP = 1e-30
+_FRICTION = ("sigma_fmax", "eps_half")
+_SPRINGPOT = ("m", "alpha")
 
 
-@dataclass(frozen=True, eq=False)
-class _Information:
-    """What tests tell about parameters, each relative to its size: J J^T, (k, k)."""
+@dataclass(frozen=True)
+class _Combination:
+    """A modulus that tests may tell without telling its parts.
 
+    Args:
+        formula: in words of the model.
+        value: of the modulus [Pa], from the parameters and omega [rad/s]; analytic, so that it takes complex numbers.
+        names: its parameters.
+        open_with: it is of interest where one of these is open.
+        remark: what it means.
+    """
+
+    formula: str
+    value: Callable[[Mapping[str, Any]], Any]
     names: tuple[str, ...]
-    matrix: Array
+    open_with: tuple[str, ...]
+    remark: str = ""
 
-    @classmethod
-    def of(cls, model: Model, data_sets: Sequence[DataSet], names: Sequence[str]) -> _Information:
-        slope = jacobian(model, data_sets, names) * _sizes(model, names)[:, None]
-        return cls(tuple(names), slope @ slope.T)
-
-    def with_more(self, model: Model, data_sets: Sequence[DataSet]) -> _Information:
-        return replace(self, matrix=self.matrix + _Information.of(model, data_sets, self.names).matrix)
-
-    def directions(self) -> tuple[Array, Array]:
-        """Relative standard error of each direction, (k,), and the directions, (k, k) by column."""
-        values, vectors = np.linalg.eigh(self.matrix)
-        return 1.0 / np.sqrt(np.maximum(values, np.finfo(float).eps * values.max())), vectors
-
-    def errors(self) -> Array:
-        """Relative standard error of each parameter, (k,)."""
-        errors, vectors = self.directions()
-        return np.linalg.norm(vectors * errors, axis=1)
-
-    def error(self, weights: dict[str, float]) -> float:
-        """Standard error of a sum of relative changes."""
-        errors, vectors = self.directions()
-        row = np.array([weights.get(name, 0.0) for name in self.names])
-        return float(np.linalg.norm(row @ vectors * errors))
+    def weights(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Relative change of the modulus per relative change of each of its parameters."""
+        step, value = 1j * _COMPLEX_STEP, self.value(values)
+        stepped = {name: self.value({**values, name: values[name] * (1.0 + step)}) for name in self.names}
+        return {name: float(changed.imag / _COMPLEX_STEP / value) for name, changed in stepped.items()}
 
 
-def _sizes(model: Model, names: Sequence[str]) -> Array:
-    """From a fit's coordinates to changes relative to a parameter's size, (k,)."""
-    sizes = []
-    for name in names:
-        parameter, value = model.parameters[name], abs(model.values[name])
-        sizes.append(1.0 if parameter.log else max(value / parameter.typical, 0.05))
-    return np.array(sizes)
+_COMBINATIONS = (
+    _Combination("sigma_fmax/eps_half", lambda p: p["sigma_fmax"] / p["eps_half"], _FRICTION, _FRICTION),
+    _Combination(
+        "mu + sigma_fmax/eps_half",
+        lambda p: p["mu"] + p["sigma_fmax"] / p["eps_half"],
+        ("mu", *_FRICTION),
+        ("mu", *_FRICTION),
+        " (the friction of small amplitudes)",
+    ),
+    _Combination("m omega^alpha", lambda p: p["m"] * p["omega"] ** p["alpha"], _SPRINGPOT, _SPRINGPOT),
+    _Combination(
+        "m/2 omega^alpha sin(pi alpha/2)",
+        lambda p: 0.5 * p["m"] * p["omega"] ** p["alpha"] * np.sin(np.pi * p["alpha"] / 2.0),
+        _SPRINGPOT,
+        _SPRINGPOT,
+    ),
+    _Combination(
+        "mu + m/2 omega^alpha cos(pi alpha/2)",
+        lambda p: p["mu"] + 0.5 * p["m"] * p["omega"] ** p["alpha"] * np.cos(np.pi * p["alpha"] / 2.0),
+        ("mu", *_SPRINGPOT),
+        _SPRINGPOT,
+    ),
+)
 
 
 def left_open(model: Model, data_sets: Sequence[DataSet], names: Sequence[str], covariance: Covariance) -> list[str]:
@@ -87,32 +102,39 @@ def left_open(model: Model, data_sets: Sequence[DataSet], names: Sequence[str], 
     """
     if not names:
         return []
-    known = _Information.of(model, data_sets, names)
-    slopes = Coordinates.of(model, names).slopes(model.values) * _sizes(model, names)
+    known = Information.of(model, data_sets, names)
+    slopes = Coordinates.of(model, names).slopes(model.values) * relative_sizes(model, names)
     stderr = np.array([covariance.stderr(name) or 0.0 for name in names])
     each = dict(zip(names, stderr / np.abs(slopes), strict=True))
     groups = _groups(known)
     zero = [name for group in groups for name in group if _is_zero(model, name, covariance)]
-    lines = [f"{name} is no different from zero: these tests do not show {name.partition('.')[0]}" for name in zero]
+    lines = [f"{name} is no different from zero: these tests do not show {_effect(name)}" for name in zero]
     if zero:
-        idle = {name.partition(".")[0] for name in zero}
-        rest = [name for name in names if name.partition(".")[0] not in idle]
+        idle = {_effect(name) for name in zero}
+        rest = [name for name in names if _effect(name) not in idle]
         if not rest:
             return lines
-        known = _Information.of(model, data_sets, rest)
+        known = Information.of(model, data_sets, rest)
         groups = _groups(known)
-    combinations: list[str] = []
+    if not groups:
+        return []
+    combinations: dict[str, None] = {}
     for group in groups:
-        told = ", ".join(f"{name} {_percent(float(each[name]))}" for name in group)
+        errors = ", ".join(f"{name} {percent(float(each[name]))}" for name in group)
         reasons = "; ".join(_reasons(model, data_sets, group)) or "these tests do not tell"
-        lines.append(f"{reasons}: {_meaning(known, group)} (standard errors: {told})")
-        combinations += [x for x in _combinations(model, data_sets, known, group) if x not in combinations]
+        lines.append(f"{reasons}: {_meaning(known, group)} (standard errors: {errors})")
+        combinations |= dict.fromkeys(_combinations(model, data_sets, known, group))
     if combinations:
         lines.append("what is known all the same: " + "; ".join(combinations))
-    return [*lines, *_next(model, data_sets, known)] if groups else []
+    return [*lines, *further_test(model, data_sets, known)]
 
 
-def _groups(known: _Information) -> list[list[str]]:
+def _effect(name: str) -> str:
+    """The effect that a parameter belongs to."""
+    return name.partition(".")[0]
+
+
+def _groups(known: Information) -> list[list[str]]:
     """Parameters of each open direction; directions that share one are one group."""
     errors, vectors = known.directions()
     groups: list[set[str]] = []
@@ -135,7 +157,8 @@ def _is_zero(model: Model, name: str, covariance: Covariance) -> bool:
     return abs(model.values[name] - neutral) < Z95 * (covariance.stderr(name) or 0.0)
 
 
-def _meaning(known: _Information, group: Sequence[str]) -> str:
+def _meaning(known: Information, group: Sequence[str]) -> str:
+    """What is not known about a group of parameters."""
     if set(group) == set(_FRICTION) and known.error(dict(zip(_FRICTION, (1.0, -1.0), strict=True))) < _KNOWN:
         return "sigma_fmax and eps_half are known only as a ratio"
     if len(group) > 1:
@@ -143,167 +166,43 @@ def _meaning(known: _Information, group: Sequence[str]) -> str:
     return f"{group[0]} is not determined"
 
 
-def _percent(error: float) -> str:
-    return f"{float(f'{100.0 * error:.2g}'):g} %" if error < 10.0 else "beyond 1000 %"
-
-
 def _reasons(model: Model, data_sets: Sequence[DataSet], involved: Sequence[str]) -> Iterator[str]:
+    """What the tests lack that would tell the parameters involved."""
     reach = measured_range(model, data_sets)
     (slow, fast), (small, large) = reach.frequency, reach.strain
     loops, _ = parted(data_sets)
     if set(involved) & set(_FRICTION) and "eps_half" in model.values:
-        ratio = large / model.values["eps_half"]
-        span = f"{small / model.values['eps_half']:.2g} to {ratio:.2g} of eps_half"
-        if ratio < 1.0:
-            yield f"amplitudes stop at {ratio:.2g} of eps_half"
+        first, last = (strain / model.values["eps_half"] for strain in (small, large))
+        if last < 1.0:
+            yield f"amplitudes stop at {last:.2g} of eps_half"
         elif large < _ONE * small:
             yield "one amplitude"
         elif large < _NARROW_STRAIN * small:
-            yield f"amplitudes span only {span}"
+            yield f"amplitudes span only {first:.2g} to {last:.2g} of eps_half"
         elif small > model.values["eps_half"]:
-            yield f"amplitudes begin at {small / model.values['eps_half']:.2g} of eps_half"
-    if set(involved) & set(_RATE) and "alpha" in model.values:
+            yield f"amplitudes begin at {first:.2g} of eps_half"
+    if set(involved) & {"mu", *_SPRINGPOT} and "alpha" in model.values:
         if fast < _ONE * slow:
             yield f"one {'loop rate' if len(loops) == len(data_sets) else 'frequency'}, {slow:.3g} Hz"
-        elif fast < _NARROW_RATE * slow:
+        elif fast < _NARROW_BAND * slow:
             yield f"frequencies span only {slow:.3g} to {fast:.3g} Hz"
     if not loops and set(involved) & {*_FRICTION, "mu"}:
         yield "there is no loop"
 
 
 def _combinations(
-    model: Model, data_sets: Sequence[DataSet], known: _Information, involved: Sequence[str]
+    model: Model, data_sets: Sequence[DataSet], known: Information, involved: Sequence[str]
 ) -> Iterator[str]:
     """Combinations of what is open that are known well, with their errors."""
-    values, worst = model.values, known.errors()
-    least = min(float(worst[known.names.index(name)]) for name in involved)
+    errors = dict(zip(known.names, known.errors(), strict=True))
+    enough = min(_KNOWN, _BETTER * min(float(errors[name]) for name in involved))
     slow = measured_range(model, data_sets).frequency[0]
-    if set(_FRICTION) <= set(known.names) and set(_FRICTION) & set(involved):
-        error = known.error({"sigma_fmax": 1.0, "eps_half": -1.0})
-        if error < min(_KNOWN, _BETTER * least):
-            yield f"sigma_fmax/eps_half = {modulus(values['sigma_fmax'] / values['eps_half'], 4)} to {_percent(error)}"
-    if {"mu", *_FRICTION} <= set(known.names) and {"mu", *_FRICTION} & set(involved):
-        ratio = values["sigma_fmax"] / values["eps_half"]
-        total = values["mu"] + ratio
-        weights = {"mu": values["mu"] / total, "sigma_fmax": ratio / total, "eps_half": -ratio / total}
-        error = known.error(weights)
-        if error < min(_KNOWN, _BETTER * least):
-            known_as = "the friction of small amplitudes"
-            yield f"mu + sigma_fmax/eps_half = {modulus(total, 4)} to {_percent(error)} ({known_as})"
-    if not {"m", "alpha"} & set(involved) or "alpha" not in values:
-        return
-    omega = 2.0 * np.pi * slow
-    power, turn = omega ** values["alpha"], np.pi * values["alpha"] / 2.0
-    if {"m", "alpha"} <= set(known.names):
-        error = known.error({"m": 1.0, "alpha": values["alpha"] * float(np.log(omega))})
-        if error < min(_KNOWN, _BETTER * least):
-            yield f"m omega^alpha at {slow:.3g} Hz = {modulus(values['m'] * power, 4)} to {_percent(error)}"
-        loss = 0.5 * values["m"] * power * np.sin(turn)
-        slope = values["alpha"] * (np.log(omega) + np.pi / 2.0 / np.tan(turn))
-        error = known.error({"m": 1.0, "alpha": float(slope)})
-        if error < min(_KNOWN, _BETTER * least):
-            yield f"m/2 omega^alpha sin(pi alpha/2) at {slow:.3g} Hz = {modulus(loss, 4)} to {_percent(error)}"
-    if {"mu", "m", "alpha"} <= set(known.names):
-        storage = values["mu"] + 0.5 * values["m"] * power * np.cos(turn)
-        share = 0.5 * values["m"] * power / storage
-        slope = values["alpha"] * (np.log(omega) * np.cos(turn) - np.pi / 2.0 * np.sin(turn))
-        error = known.error({"mu": values["mu"] / storage, "m": share * np.cos(turn), "alpha": float(share * slope)})
-        if error < min(_KNOWN, _BETTER * least):
-            yield f"mu + m/2 omega^alpha cos(pi alpha/2) at {slow:.3g} Hz = {modulus(storage, 4)} to {_percent(error)}"
-
-
-def _next(model: Model, data_sets: Sequence[DataSet], known: _Information) -> list[str]:
-    """The further test that shrinks the worst error most, and to what."""
-    before = known.errors()
-    worst = int(np.argmax(before))
-    bearable = max(_BEARABLE, measured_range(model, data_sets).strain[1])
-    after = {
-        words: known.with_more(model, more).errors()
-        for words, more in _further(model, data_sets)
-        if measured_range(model, more).strain[1] <= bearable
-    }
-    best = min(after, key=lambda words: float(after[words].max()))
-    if after[best].max() > min(0.8 * before[worst], _HOPELESS):
-        return []
-    return [
-        f"the further test that would help most: {best}; the standard error of {known.names[worst]} would fall from "
-        f"{_percent(float(before[worst]))} to {_percent(float(after[best][worst]))}"
-    ]
-
-
-def _further(model: Model, data_sets: Sequence[DataSet]) -> Iterator[tuple[str, list[DataSet]]]:
-    """Tests a lab could add, each as the data sets it would make, with the campaign's own noise."""
-    loops, sweeps = parted(data_sets)
-    yield "every test once more", list(data_sets)
-    if loops:
-        largest = max(
-            loops, key=lambda data_set: data_set.drive.amplitude * model.bushing.unit_strain(data_set.direction)
-        )
-        for factor in (3.0, 10.0):
-            yield f"a loop of {factor:g} times the largest amplitude", [_loop(largest, model, amplitude=factor)]
-        for words, factor in (("a tenth of", 0.1), ("ten times", 10.0)):
-            yield f"a loop at {words} the rate", [_loop(largest, model, rate=factor)]
-    else:
-        for times, words in ((1.0, ""), (3.0, "three times "), (10.0, "ten times ")):
-            yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", [_new_loop(model, data_sets, times)]
-    reach = measured_range(model, data_sets)
-    direction = data_sets[0].direction
-    strain = model.bushing.unit_strain(direction)
-    small, large = (x / strain for x in reach.strain)
-    slow, fast = reach.frequency
-    band = (5.0, 150.0) if fast < 2.0 else (slow, fast)
-    if sweeps:
-        yield (
-            f"a sweep to {2.0 * fast:.3g} Hz",
-            [_sweep(model, sweeps, data_sets[-1], (fast, 2.0 * fast), (small, large))],
-        )
-        yield (
-            f"a sweep down to {slow / 10.0:.3g} Hz",
-            [_sweep(model, sweeps, data_sets[-1], (slow / 10.0, slow), (small, large))],
-        )
-    yield (
-        f"a sweep from {band[0]:.3g} to {band[1]:.3g} Hz at a tenth and all of the largest amplitude",
-        [_sweep(model, sweeps, data_sets[-1], band, (0.1 * large, large))],
-    )
-    yield (
-        f"a sweep from {band[0]:.3g} to {band[1]:.3g} Hz at three times the largest amplitude",
-        [_sweep(model, sweeps, data_sets[-1], band, (3.0 * large,))],
-    )
-
-
-def _loop(data_set: LoopData, model: Model, *, amplitude: float = 1.0, rate: float = 1.0) -> LoopData:
-    drive = data_set.drive
-    moved = replace(drive, coefficients=drive.coefficients * amplitude, frequency=drive.frequency * rate)
-    fresh = LoopData(moved).noise_free(model)
-    noise = drive.noise / drive.half_range * fresh.drive.half_range
-    return LoopData(replace(fresh.drive, noise=noise))
-
-
-def _new_loop(model: Model, data_sets: Sequence[DataSet], times: float) -> LoopData:
-    """Two cycles of a slow sine where the campaign has no loop, with the noise of most force sensors."""
-    direction = data_sets[0].direction
-    amplitude = times * max(
-        float(data_set.amplitude.max()) for data_set in data_sets if data_set.direction is direction
-    )
-    phase = 2.0 * np.arange(_ROWS) / _ROWS
-    motion, nil = amplitude * np.sin(2.0 * np.pi * phase), np.zeros(_ROWS)
-    loop = Loop("new", direction, phase / _NEW_RATE, motion, nil)
-    coefficients = np.array([0.0, -1j * amplitude])
-    silent = Drive(loop, _NEW_RATE, 2.0, True, phase, nil, np.ones(_ROWS), 1.0, coefficients, 1.0)
-    fresh = LoopData(silent).noise_free(model)
-    return LoopData(replace(fresh.drive, noise=_FORCE_NOISE * fresh.drive.half_range))
-
-
-def _sweep(
-    model: Model, sweeps: Sequence[SweepData], like: DataSet, band: tuple[float, float], amplitudes: Sequence[float]
-) -> SweepData:
-    """Nine frequencies at each amplitude, with the noise of the campaign's sweeps, or that of most rigs."""
-    from bushfit.fitting.noise import ASSUMED_SHARED, SweepNoise
-
-    frequency, amplitude = (x.ravel() for x in np.meshgrid(np.geomspace(*band, 9), amplitudes))
-    direction = sweeps[0].direction if sweeps else like.direction
-    stiffness = model.stiffness(direction, frequency, amplitude)
-    shared = sweeps[0].noise.shared if sweeps else ASSUMED_SHARED
-    random = sweeps[0].relative_noise if sweeps else ASSUMED_SHARED[0]
-    noise = SweepNoise({("new", float(x)): (random, random) for x in amplitudes}, shared, "stated", 0)
-    return SweepData(Sweep("new", direction, frequency, amplitude, stiffness), noise)
+    values = {**model.values, "omega": 2.0 * np.pi * slow}
+    for combination in _COMBINATIONS:
+        if not (set(combination.names) <= set(known.names) and set(combination.open_with) & set(involved)):
+            continue
+        error = known.error(combination.weights(values))
+        if error < enough:
+            at = f" at {slow:.3g} Hz" if "omega" in combination.formula else ""
+            value = modulus(combination.value(values), 4)
+            yield f"{combination.formula}{at} = {value} to {percent(error)}{combination.remark}"

@@ -1,4 +1,4 @@
-"""Measurement noise: what scatters from point to point, and what a whole block shares.
+"""Measurement noise of sweeps: what scatters from point to point, and what a whole block shares.
 
 A block is one run of the rig: one direction, amplitude and repeat. Its points share a gain and a phase error.
 Everything is counted on ln K = ln|K| + i phase, so gain errors are real and phase errors imaginary, both
@@ -7,7 +7,7 @@ relative to |K|.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -18,20 +18,26 @@ from bushfit.effects.contract import Array
 from bushfit.reading.measurement import Sweep
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 
-#: No rig measures better than this, relative to the largest force or to |K|.
+#: Least noise of any rig, relative to the largest force or to |K|.
 FLOOR = 1e-4
-#: Shared errors of a block where nothing was repeated: relative gain and phase [rad].
+#: Errors that a block shares where nothing was repeated, relative gain and phase [rad]; chosen: those of most rigs.
 ASSUMED_SHARED = (5e-3, float(np.radians(0.25)))
-#: Levels get noise of their own where equal noise is this unlikely.
+#: Probability of unequal variances by chance, below which levels get noise of their own.
 _EQUAL_NOISE_P = 1e-3
-#: Degree in ln f of the smooth curve that stands in for repeats.
+#: Degree in ln f of the smooth curve that stands in for repeats; chosen: it follows stiffness over two decades.
 _SMOOTH_DEGREE = 4
-#: A point this many (robust) standard deviations off is wild, and so is a pair of repeats whose shared variance is
-#: this many times the median: noise alone makes the one once in 1e9, the other once in 500 campaigns.
-_WILD_POINT, _WILD_PAIR = 6.0, 100.0
-
-#: Rounds of reweighting towards the least sum of distances.
+#: Common frequencies of two repeats from which on their difference tells a variance and a mean.
+_FEWEST_FREQUENCIES = 3
+#: Distance of an outlier from the other points [robust standard deviations]: noise alone reaches it once in 1e9.
+_OUTLIER = 6.0
+#: Shared variance of an outlying pair of repeats over the median of all pairs: noise alone reaches it once in 500
+#: campaigns.
+_OUTLYING_PAIR = 100.0
+#: Rounds of reweighting towards the least sum of distances; chosen: nine of ten curves have then come within a third
+#: of the noise of where they end.
 _ROUNDS = 25
+#: Least distance relative to the median distance, so that no point takes all the weight.
+_LEAST_DISTANCE = 1e-3
 
 LevelKey = tuple[str, float]
 _ORIGINS = {
@@ -70,8 +76,15 @@ class SweepNoise:
 
 @dataclass(frozen=True)
 class _Level:
-    """What one amplitude of one sweep tells: scatter (k, 2) with its degrees of freedom, and the variances
-    its repeats share, (pairs, 2). Without repeats `calmer` is the scatter less the point that adds most to it."""
+    """What one amplitude of one sweep tells about the noise.
+
+    Args:
+        scatter: deviations of gain and phase from point to point, (k, 2).
+        freedom: degrees of freedom behind their sum of squares.
+        shared: variances of gain and phase that each pair of repeats shares, (pairs, 2).
+        repeats: number of them.
+        calmer: without repeats, the scatter less the point that adds most to it, (k - 1, 2).
+    """
 
     scatter: Array
     freedom: int
@@ -81,54 +94,69 @@ class _Level:
 
     @property
     def variance(self) -> Array:
+        """Of gain and phase from point to point, (2,)."""
         return np.asarray(np.square(self.scatter).sum(axis=0) / max(self.freedom, 1))
 
 
 def sweep_noise(sweeps: Sequence[Sweep]) -> SweepNoise:
-    """Noise of a campaign's sweeps: variance components from all pairs of repeats.
+    """Noise of a campaign's sweeps, estimated from their repeats.
 
-    With D_f the difference of ln K between two repeats at the frequency f, the variance of D_f over f is
-    twice the random variance, and the square of its mean estimates twice (shared variance + random variance
-    / number of frequencies). Pairs are pooled within a level and over levels; levels keep a random part of
-    their own where Bartlett's test finds them unequal. Without repeats the random part is the scatter about
-    a smooth curve in ln f, pooled in the same way, and the shared part is ASSUMED_SHARED. A `noise` stated in
-    the campaign replaces the random part.
+    Without repeats the random part is the scatter about a smooth curve in ln f, and the shared part is ASSUMED_SHARED.
+    A `noise` stated in the campaign replaces the random part.
+
+    Notes:
+        With D_f the difference of ln K between two repeats at the frequency f, the variance of D_f over f is twice
+        the random variance, and the square of its mean estimates twice (shared variance + random variance / number of
+        frequencies). Pairs are pooled within a level and over levels; levels keep a random part of their own where
+        Bartlett's test finds them unequal.
     """
     levels = {
         (sweep.name, float(amplitude)): _level(sweep, amplitude)
         for sweep in sweeps
         for amplitude in np.unique(sweep.amplitude)
     }
-    variances = {key: level.variance for key, level in levels.items()}
-    repeated = [key for key, level in levels.items() if level.repeats > 1]
-    scatter_freedom = min(level.freedom for level in levels.values())
-    measured = [level for level in levels.values() if level.repeats > 1 or (not repeated and level.calmer is not None)]
-    alike = _alike(measured)
-    if alike:
-        freedoms = np.array([level.freedom for level in alike], dtype=float)
-        pooled = np.average([level.variance for level in alike], axis=0, weights=freedoms)
-        variances = dict.fromkeys(levels, pooled)
-        scatter_freedom = int(freedoms.sum())
-    if any(sweep.noise is not None for sweep in sweeps):
-        scatter_freedom = 0
+    repeated = [level for level in levels.values() if level.repeats > 1]
+    measured = repeated or [level for level in levels.values() if level.calmer is not None]
+    variances, scatter_freedom = _pooled(levels, measured)
     stated = {sweep.name: sweep.noise for sweep in sweeps if sweep.noise is not None}
+    if stated:
+        scatter_freedom = 0
     random = {}
     for key, variance in variances.items():
         gain, phase = np.maximum(np.broadcast_to(stated.get(key[0], np.sqrt(variance)), 2), FLOOR)
         random[key] = (float(gain), float(phase))
     if repeated:
-        pairs = np.concatenate([levels[key].shared for key in repeated])
-        usual = np.abs(pairs) <= _WILD_PAIR * np.median(np.abs(pairs), axis=0)
-        shared = np.where(usual.any(axis=0), np.mean(pairs, axis=0, where=usual), 0.0)
-        gain, phase = np.sqrt(np.maximum(shared, 0.0))
-        freedom = sum(levels[key].repeats - 1 for key in repeated)
-        return SweepNoise(random, (float(gain), float(phase)), "repeats", freedom, scatter_freedom)
+        freedom = sum(level.repeats - 1 for level in repeated)
+        return SweepNoise(random, _shared(repeated), "repeats", freedom, scatter_freedom)
     if len(stated) == len(sweeps):
         return SweepNoise(random, (0.0, 0.0), "stated", 0, 0)
     return SweepNoise(random, ASSUMED_SHARED, "assumed", 0, scatter_freedom)
 
 
+def _pooled(levels: Mapping[LevelKey, _Level], measured: Sequence[_Level]) -> tuple[dict[LevelKey, Array], int]:
+    """Variance of gain and phase of each level, (2,), and the degrees of freedom behind it.
+
+    One variance for all where the levels that measure it agree, else each level's own.
+    """
+    alike = _of_equal_noise(measured)
+    if not alike:
+        return {key: level.variance for key, level in levels.items()}, min(level.freedom for level in levels.values())
+    freedoms = np.array([level.freedom for level in alike], dtype=float)
+    pooled = np.average([level.variance for level in alike], axis=0, weights=freedoms)
+    return dict.fromkeys(levels, pooled), int(freedoms.sum())
+
+
+def _shared(repeated: Sequence[_Level]) -> tuple[float, float]:
+    """Standard deviation of what a block shares in gain and phase, outlying pairs of repeats left out."""
+    pairs = np.concatenate([level.shared for level in repeated])
+    usual = np.abs(pairs) <= _OUTLYING_PAIR * np.median(np.abs(pairs), axis=0)
+    variance = np.where(usual.any(axis=0), np.mean(pairs, axis=0, where=usual), 0.0)
+    gain, phase = np.sqrt(np.maximum(variance, 0.0))
+    return float(gain), float(phase)
+
+
 def _level(sweep: Sweep, amplitude: float) -> _Level:
+    """What one amplitude of a sweep tells: by pairs of repeats, or about a smooth curve where there is no pair."""
     chosen = sweep.amplitude == amplitude
     frequencies, column = np.unique(sweep.frequency[chosen], return_inverse=True)
     numbers, row = np.unique(sweep.repeat[chosen], return_inverse=True)
@@ -137,8 +165,8 @@ def _level(sweep: Sweep, amplitude: float) -> _Level:
     scatter, shared = [], []
     for one, other in combinations(table, 2):
         difference = one - other
-        difference = _without_wild(difference[~np.isnan(difference.real)])
-        if difference.size < 3:
+        difference = _without_outliers(difference[~np.isnan(difference.real)])
+        if difference.size < _FEWEST_FREQUENCIES:
             continue
         mean, spread = _parts(difference).mean(axis=0), _parts(difference - difference.mean())
         variance = np.square(spread).sum(axis=0) / (difference.size - 1)
@@ -150,62 +178,78 @@ def _level(sweep: Sweep, amplitude: float) -> _Level:
     return _Level(np.concatenate(scatter), freedom, np.array(shared), int(numbers.size))
 
 
-def _without_wild(difference: Array) -> Array:
-    """Differences of two repeats less single wild points, which are faults and no measure of the noise."""
+def _without_outliers(difference: Array) -> Array:
+    """Differences of two repeats, complex (k,), less single outliers, which are faults and no measure of the noise."""
     if not difference.size:
         return difference
     parts = _parts(difference)
     off = np.abs(parts - np.median(parts, axis=0))
     scale = MEDIAN_TO_SIGMA * np.median(off, axis=0)
-    return difference[np.all((off <= _WILD_POINT * scale) | (scale == 0.0), axis=1)]
+    return difference[np.all((off <= _OUTLIER * scale) | (scale == 0.0), axis=1)]
 
 
 def _about_smooth_curve(log_frequency: Array, log_stiffness: Array) -> _Level:
+    """What one amplitude without repeats tells: its scatter about a smooth curve, outliers left out.
+
+    Of one or two points the scatter is assumed.
+    """
     degree = min(_SMOOTH_DEGREE, log_frequency.size - 2)
     if degree < 1:
         return _Level(np.full((1, 2), ASSUMED_SHARED[0]), 1, np.empty((0, 2)), 1)
     values = _parts(log_stiffness)
     basis = np.polynomial.legendre.legvander(_unit_interval(log_frequency), degree)
-    left = np.abs(values - basis @ _least_absolute(basis, values))
-    usual = np.median(np.sort(left, axis=0)[degree + 1 :], axis=0)  # the curve goes through as many as it has freedoms
-    sound = np.all(left <= np.maximum(_WILD_POINT * MEDIAN_TO_SIGMA * usual, FLOOR), axis=1)
-    freedom = int(np.count_nonzero(sound)) - degree - 1
+    residual = np.abs(values - basis @ _least_absolute(basis, values))
+    usual = np.median(np.sort(residual, axis=0)[degree + 1 :], axis=0)  # the curve goes through degree + 1 points
+    inliers = np.all(residual <= np.maximum(_OUTLIER * MEDIAN_TO_SIGMA * usual, FLOOR), axis=1)
+    freedom = int(np.count_nonzero(inliers)) - degree - 1
     if freedom < 1:
-        sound, freedom = np.ones_like(sound), log_frequency.size - degree - 1
-    beside = _beside(basis)
-    adds = np.square(beside @ (beside.T @ values)).sum(axis=1) / np.maximum(np.square(beside).sum(axis=1), FLOOR**2)
-    worst = int(np.argmax(adds))
-    calmer = _beside(np.delete(basis, worst, axis=0)).T @ np.delete(values, worst, axis=0)
-    return _Level(_beside(basis[sound]).T @ values[sound], freedom, np.empty((0, 2)), 1, calmer)
+        inliers, freedom = np.ones_like(inliers), log_frequency.size - degree - 1
+    worst = _worst_point(basis, values)
+    calmer = _complement(np.delete(basis, worst, axis=0)).T @ np.delete(values, worst, axis=0)
+    return _Level(_complement(basis[inliers]).T @ values[inliers], freedom, np.empty((0, 2)), 1, calmer)
 
 
-def _beside(basis: Array) -> Array:
-    """Orthonormal basis of what a curve (n, k) leaves free, (n, n - k): its coordinates scatter independently."""
+def _worst_point(basis: Array, values: Array) -> int:
+    """The point without which the sum of squares about a curve, (n, k), of gain and phase, (n, 2), falls most."""
+    free = _complement(basis)
+    falls = np.square(free @ (free.T @ values)).sum(axis=1) / np.maximum(np.square(free).sum(axis=1), FLOOR**2)
+    return int(np.argmax(falls))
+
+
+def _complement(basis: Array) -> Array:
+    """Orthonormal basis of what a curve, (n, k), leaves free, (n, n - k): coordinates in it scatter independently."""
     return np.linalg.qr(basis, mode="complete")[0][:, basis.shape[1] :]
 
 
 def _least_absolute(basis: Array, values: Array) -> Array:
-    """Coefficients with the least sum of distances |residual| of complex points, (n, 2) -> (k, 2), which wild points
-    do not bend: least squares, weighted anew by one over the distance."""
+    """Coefficients of a curve, (n, k), with the least sum of distances to gain and phase, (n, 2) -> (k, 2).
+
+    Outliers do not bend it.
+
+    Notes:
+        Least squares, weighted anew by one over the distance.
+    """
     weight = np.ones(values.shape[0])
     for _ in range(_ROUNDS):
         root = np.sqrt(weight)[:, None]
         solution = np.linalg.lstsq(basis * root, values * root, rcond=None)[0]
         distance = np.linalg.norm(values - basis @ solution, axis=1)
-        weight = 1.0 / np.maximum(distance, 1e-3 * np.median(distance) + FLOOR**2)
+        weight = 1.0 / np.maximum(distance, _LEAST_DISTANCE * np.median(distance) + FLOOR**2)
     return np.asarray(solution)
 
 
 def _unit_interval(x: Array) -> Array:
+    """Values mapped to -1 ... 1."""
     return 2.0 * (x - x.min()) / max(float(np.ptp(x)), 1e-300) - 1.0
 
 
 def _parts(values: Array) -> Array:
+    """Gain and phase of ln K, complex (n,) -> (n, 2)."""
     return np.stack([np.real(values), np.imag(values)], axis=-1)
 
 
-def _alike(levels: Sequence[_Level]) -> list[_Level]:
-    """Levels of equal noise, those that a single wild point sets apart without it; none where they are unequal."""
+def _of_equal_noise(levels: Sequence[_Level]) -> list[_Level]:
+    """Levels of equal noise, those that a single outlier sets apart without it; none where they are unequal."""
     alike = sorted(levels, key=lambda level: -float(level.variance.sum()))
     variance = np.array([level.variance.mean() for level in alike])
     freedom = np.array([level.freedom for level in alike], dtype=float)

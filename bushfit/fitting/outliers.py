@@ -1,4 +1,4 @@
-"""Wild points: rows that stand out from the model, or from a smooth curve, and from their own neighbours as well.
+"""Outliers: rows that stand out from a smooth curve or a model, and from their own neighbours as well.
 
 Physics that a model lacks misses whole stretches of a test and leaves neighbours alike; only a fault of the record
 puts one row far from the rows beside it. So a misfit, however large, makes no outliers.
@@ -13,32 +13,40 @@ from scipy.special import fdtri
 from bushfit.effects.contract import Array
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 
-#: Probability that noise alone makes one outlier among all rows of a test.
+#: Probability that noise alone makes an outlier among all rows of a test; chosen: one test in a hundred.
 _CHANCE = 0.01
-#: Rows over which neighbours are taken together, and equal values in a row that count as a stuck channel.
-WINDOW, _STUCK = 11, 4
-#: Most rows of a burst.
-_BURST = 8
-#: Rows from which the bends of a record are taken, and the noise relative to its range beyond which it has any.
-_MOST_BENDS, _NOISY = 100_000, 1e-4
-#: Share of the half range that a gross row lies off its neighbours, and share of all rows beyond which none is gross.
-_GROSS, _MOST_GROSS = 0.3, 0.1
+#: Rows over which the median of neighbours is taken; chosen: wider than a burst, narrower than a bend of the motion.
+NEIGHBOURS = 11
+#: Rows of the median that is tried where the motion turns within NEIGHBOURS rows.
+_FEWER_NEIGHBOURS = 5
+#: Equal values in a row from which on a channel may be stuck.
+_STUCK = 4
+#: Rows of a burst of outliers at most; longer runs far off are a misfit.
+_LONGEST_BURST = 8
+#: Rows from which the noise of a channel is estimated: enough for a median, whatever the length of the record.
+_NOISE_ROWS = 100_000
+#: Noise of a channel relative to its range from which on equal values in a row are suspicious.
+_LEAST_NOISE = 1e-4
+#: Distance of a gross outlier from the median of its neighbours, relative to half the range of these medians.
+_GROSS = 0.3
+#: Share of all rows up to which rows so far off are outliers; more of them are the motion itself.
+_MOST_GROSS = 0.1
 #: Degrees of freedom of a noise that is as good as known.
 _KNOWN = 1e6
 
 
-def limit(rows: int, parts: int, freedom: float) -> float:
-    """Distance, in units of noise, that noise alone reaches once in a hundred tests of so many rows.
+def outlier_limit(rows: int, parts: int, freedom: float) -> float:
+    """Distance from the truth, in units of noise, that noise alone reaches in one test of a hundred.
 
     Args:
         rows: of the test.
         parts: numbers in a row: 1 for a force, 2 for a complex stiffness.
-        freedom: degrees of freedom behind the noise.
+        freedom: degrees of freedom behind the noise; infinite where it is known.
     """
     return float(np.sqrt(parts * fdtri(parts, min(freedom, _KNOWN), 1.0 - _CHANCE / max(rows, 1))))
 
 
-def from_neighbours(values: Array, rows: Array, window: int = WINDOW) -> Array:
+def from_neighbours(values: Array, rows: Array, window: int = NEIGHBOURS) -> Array:
     """Distance of some rows from the median over their neighbours and themselves, (len(rows),)."""
     width = min(window, values.size)
     first = np.clip(rows - width // 2, 0, values.size - width)
@@ -46,28 +54,33 @@ def from_neighbours(values: Array, rows: Array, window: int = WINDOW) -> Array:
     return values[rows] - np.median(around, axis=1)
 
 
-def outlier_rows(left: Array, recorded: Array, reach: float) -> Array:
-    """Rows farther than `reach` off a curve that are as far off their neighbours, or where the channel is stuck.
+def outlier_rows(residual: Array, recorded: Array, limit: float) -> Array:
+    """Rows farther than a limit off a curve that are as far off their neighbours, or where the channel is stuck.
 
     Args:
-        left: what the curve leaves of each row, (n,).
+        residual: recorded less the curve, (n,).
         recorded: what was recorded, (n,).
-        reach: in the units of `left`.
+        limit: in the units of the residual.
+
+    Returns:
+        Numbers of the rows, in order, (k,).
     """
-    far = np.abs(left) > reach
+    far = np.abs(residual) > limit
     rows = np.flatnonzero(far)
     if not rows.size:
         return rows
-    alone = np.abs(from_neighbours(left, rows)) > reach
-    stuck = _run_lengths(recorded[1:] == recorded[:-1])
-    stuck = np.maximum(np.append(stuck, 0), np.append(0, stuck))[rows] >= _STUCK - 1
-    return rows[alone | stuck | _burst(left, far, reach)[rows]]
+    alone = np.abs(from_neighbours(residual, rows)) > limit
+    repeats = _run_lengths(recorded[1:] == recorded[:-1])
+    stuck = np.maximum(np.append(repeats, 0), np.append(0, repeats))[rows] >= _STUCK - 1
+    return rows[alone | stuck | _in_burst(residual, far, limit)[rows]]
 
 
 def stuck_rows(recorded: Array) -> Array:
-    """Rows that repeat the one before them over and over, where the channel has noise that forbids it.
+    """Rows that repeat the one before them over and over, where the channel has noise that forbids it, (k,).
 
-    How often two neighbours are equal by the resolution of the record is counted outside such runs.
+    Notes:
+        The chance that two neighbours are equal, by the resolution of the record, is counted outside such runs. A run
+        of r repeats somewhere in n rows then has the probability n chance^r.
     """
     equal = recorded[1:] == recorded[:-1]
     runs = _run_lengths(equal)
@@ -75,12 +88,26 @@ def stuck_rows(recorded: Array) -> Array:
     unlikely = (runs >= _STUCK - 1) & (recorded.size * by_chance ** np.minimum(runs, 99) < _CHANCE)
     if not unlikely.any():
         return np.empty(0, dtype=np.intp)
-    bends = float(np.median(np.abs(np.diff(recorded[:_MOST_BENDS], 2)))) / np.sqrt(6.0)
-    noisy = MEDIAN_TO_SIGMA * bends > _NOISY * float(np.ptp(recorded))
+    bends = np.diff(recorded[:_NOISE_ROWS], 2)  # of white noise they have six times the variance
+    noise = MEDIAN_TO_SIGMA * (float(np.median(np.abs(bends))) / np.sqrt(6.0))
+    noisy = noise > _LEAST_NOISE * float(np.ptp(recorded))
     return np.flatnonzero(unlikely) + 1 if noisy else np.empty(0, dtype=np.intp)
 
 
-def _burst(left: Array, far: Array, reach: float) -> Array:
+def gross_rows(values: Array) -> Array:
+    """Rows of a periodic motion that lie far off the median of those around them, before its period is known, (k,).
+
+    None where these are many, even with a median over few rows: then the motion turns within so few rows.
+    """
+    for width in (NEIGHBOURS, _FEWER_NEIGHBOURS):
+        level = median_filter(values, width, mode="nearest")
+        off = np.abs(values - level) > _GROSS / 2.0 * float(np.ptp(level))
+        if np.mean(off) < _MOST_GROSS:
+            return np.flatnonzero(off)
+    return np.empty(0, dtype=np.intp)
+
+
+def _in_burst(residual: Array, far: Array, limit: float) -> Array:
     """Rows of short runs of far rows that lie as far off the rows before and after the run, (n,)."""
     runs = np.where(far, _run_lengths(far), 0)
     near = np.flatnonzero(~far)
@@ -89,24 +116,11 @@ def _burst(left: Array, far: Array, reach: float) -> Array:
     index = np.arange(far.size)
     after = np.minimum(np.searchsorted(near, index), near.size - 1)
     before = np.maximum(np.searchsorted(near, index) - 1, 0)
-    beside = np.minimum(np.abs(left - left[near[before]]), np.abs(left - left[near[after]]))
-    return (runs > 0) & (runs <= _BURST) & (beside > reach)
+    beside = np.minimum(np.abs(residual - residual[near[before]]), np.abs(residual - residual[near[after]]))
+    return (runs > 0) & (runs <= _LONGEST_BURST) & (beside > limit)
 
 
 def _run_lengths(mask: Array) -> Array:
-    """Length of the run of equal entries that each entry belongs to, (n,)."""
+    """Length of the run of true entries that each entry belongs to, 0 for false ones, (n,)."""
     edges = np.flatnonzero(np.concatenate(([True], mask[1:] != mask[:-1], [True])))
     return np.where(mask, np.repeat(np.diff(edges), np.diff(edges)), 0)
-
-
-def gross_rows(values: Array) -> Array:
-    """Rows of a periodic motion that lie far off the median of those around them, before its period is known.
-
-    None where these are many, down to a median of five: then the motion turns within so few rows.
-    """
-    for width in (WINDOW, 5):
-        level = median_filter(values, width, mode="nearest")
-        off = np.abs(values - level) > _GROSS / 2.0 * float(np.ptp(level))
-        if np.mean(off) < _MOST_GROSS:
-            return np.flatnonzero(off)
-    return np.empty(0, dtype=np.intp)

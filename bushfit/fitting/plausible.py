@@ -1,4 +1,4 @@
-"""What a fit says of tests that no rubber could have given, and of tests that it left out."""
+"""Sentences on tests that no rubber could have given, and on tests that were left out of a fit and are missed by it."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ from bushfit.geometry import Bushing
 from bushfit.model.model import Model
 from bushfit.units import modulus, number
 
-#: Shear modulus of a rubber [Pa]: the softest gel of a mount, the hardest compound at small strain, with room.
-_SOFTEST, _HARDEST = 5e4, 1e8
-#: Rubber stiffens less than this from the slowest and largest test to the fastest and smallest.
+#: Least shear modulus of a rubber [Pa]: that of the softest gel of a mount, with room.
+_SOFTEST = 5e4
+#: Largest shear modulus of a rubber [Pa]: that of the hardest compound at small strain, with room.
+_HARDEST = 1e8
+#: Modulus of the fastest and smallest test over that of the slowest and largest, at most, for any rubber.
 _MOST_STIFFENING = 20.0
 _CHECK = "check the units of displacement and force, and the dimensions of the bushing"
 
@@ -42,7 +44,6 @@ def unfitted(model: Model, data_sets: Sequence[DataSet], advice: str) -> list[st
             nrmse = np.sqrt(np.mean(np.square(np.abs(data_set.relative(model)))))
             lines.append(
                 f"{data_set.name}, {data_set.direction}, was not fitted, and the model misses it by "
-                f"{number(100 * nrmse, 2)} % "
-                f"(NRMSE), {number(np.sqrt(misfit), 2)} times its noise{advice}"
+                f"{number(100 * nrmse, 2)} % (NRMSE), {number(np.sqrt(misfit), 2)} times its noise{advice}"
             )
     return lines

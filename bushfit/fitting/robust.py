@@ -18,7 +18,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.data_set import DataSet
 from bushfit.fitting.solve import Bounds, Solution, solve
-from bushfit.fitting.sweep_outliers import misfit
+from bushfit.fitting.sweep_outliers import misfit_scale
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 
@@ -107,7 +107,7 @@ def estimate(
 
 def _softened(data_set: DataSet, model: Model) -> DataSet:
     distance = data_set.distance(model)
-    scale = _SOFT * misfit(distance[distance > 0.0] * np.sqrt(data_set.parts), data_set.parts)
+    scale = _SOFT * misfit_scale(distance[distance > 0.0] * np.sqrt(data_set.parts), data_set.parts)
     return data_set.weighted(1.0 / np.sqrt(1.0 + (distance / scale) ** 2))
 
 

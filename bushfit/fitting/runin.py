@@ -1,8 +1,8 @@
-"""The steady cycles of a loop: what comes before them (a ramp, a hold, smaller cycles) and after them is left out, and
-what lies beyond a hole in the record, because nobody knows how many cycles went by there.
+"""The steady cycles of a loop: what comes before them (a ramp, a hold, smaller cycles) and after them is left out.
 
 A motion is steady where it comes again a period later. The longest stretch that does so is kept; without a stretch that
-does not, nothing is touched, so a record may start and end anywhere in its cycle.
+does not, nothing is touched, so a record may start and end anywhere in its cycle. What lies beyond a hole in the record
+is left out too, because nobody knows how many cycles went by there.
 """
 
 from __future__ import annotations
@@ -12,26 +12,31 @@ from dataclasses import replace
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.harmonics import ENOUGH_ROWS
 from bushfit.fitting.outliers import gross_rows
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.cycles import HOLE
 
-#: The motion comes again where it is the same a period later within this share of its range, for all but this share
-#: of a period.
-_SAME, _BRIEF = 0.05, 0.02
-#: The ends of the stretch are drawn in, by half a period at most, to where the difference is within so many times its
-#: median and this share of the range.
-_WITHIN, _LEAST, _EDGE = 8.0, 5e-4, 0.5
-#: Cycles, for what noise may take off them, from which on the first one can go.
+#: Rows that are enough to find the cycles.
+_ENOUGH_ROWS = 200_000
+#: Difference from the motion a period later up to which it comes again, relative to its range.
+_SAME = 0.05
+#: Share of a period up to which a break in the steady motion, or what is left out, is too short to count.
+_BRIEF = 0.02
+#: Difference from the motion a period later, in units of its median, beyond which an end is drawn in.
+_MOST_OFF = 8.0
+#: The same relative to the range of the motion, which is added for motions without noise.
+_LEAST_OFF = 5e-4
+#: Periods by which an end is drawn in at most.
+_EDGE = 0.5
+#: Cycles from which on the first one can go: three, for what noise may take off them.
 _THREE = 2.95
-#: Share of the range by which the motion passes its middle, before that counts as a crossing.
+#: Share of the range by which the motion passes its middle, before that counts as a crossing: more than any noise.
 _BAND = 0.1
 
 
 def thinned(loop: Loop) -> tuple[Array, Array]:
-    """Time and displacement of rows that are enough to find the cycles, gross ones left out."""
-    every = slice(None, None, -(-loop.time.size // ENOUGH_ROWS))
+    """Time [s] and displacement [m or rad] of rows that are enough to find the cycles, gross outliers left out."""
+    every = slice(None, None, -(-loop.time.size // _ENOUGH_ROWS))
     time, motion = loop.time[every], loop.displacement[every]
     rows = gross_rows(motion)
     return np.delete(time, rows), np.delete(motion, rows)
@@ -44,33 +49,19 @@ def steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | Non
 
     Args:
         loop: the whole record.
-        time: and
-        motion: of the loop `thinned`.
+        time: of the rows of `thinned` [s], (n,).
+        motion: displacement of the same rows [m or rad], (n,).
     """
     period = _period(time, motion)
     if period is None or time[-1] - time[0] <= period:
         return loop, None
     holes = np.flatnonzero(np.diff(time) > HOLE * period)
     if holes.size:
-        whole, first, last = _between(loop, time, holes)
-        part, note = steady_part(whole, *thinned(whole))
-        said = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
-        return part, said if note is None else f"{said}, and of these {note}"
-    again = np.interp(time + period, time, motion)
-    comparable = time + period <= time[-1]
-    off, clock = np.abs(again - motion)[comparable], time[comparable]
-    start, end = _longest(off < _SAME * np.ptp(motion), clock, _BRIEF * period)
-    before, after = start > 0, end < off.size
-    if start == end or not (before or after):
+        return _steady_part_between(loop, time, holes)
+    ends = _steady_ends(time, motion, period)
+    if ends is None:
         return loop, None
-    other = np.flatnonzero(off[start:end] > _WITHIN * np.median(off[start:end]) + _LEAST * np.ptp(motion)) + start
-    if before:
-        start = max(other[clock[other] < clock[start] + _EDGE * period], default=start - 1) + 1
-    if after:
-        end = min(other[clock[other] > clock[end - 1] - _EDGE * period], default=end)
-    first, last = float(time[start]), float(time[end - 1]) + period
-    if before and last - first > _THREE * period:
-        first += period
+    first, last, after = ends
     left_out = [
         f"{duration:.3g} s {where} its steady cycles"
         for duration, where in ((first - time[0], "before"), (time[-1] - last, "after"))
@@ -80,25 +71,50 @@ def steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | Non
     return _cut(loop, first, last if after else None), note
 
 
-def _between(loop: Loop, time: Array, holes: Array) -> tuple[Loop, float, float]:
-    """The longest part of a loop without a hole, and its first and last time; `holes` are the steps of `time` that
-    are one."""
+def _steady_ends(time: Array, motion: Array, period: float) -> tuple[float, float, bool] | None:
+    """First and last time of the steady cycles [s], and whether anything follows; None where all or none are steady."""
+    again = np.interp(time + period, time, motion)
+    comparable = time + period <= time[-1]
+    off, clock = np.abs(again - motion)[comparable], time[comparable]
+    start, end = _longest_stretch(off < _SAME * np.ptp(motion), clock, _BRIEF * period)
+    before, after = start > 0, end < off.size
+    if start == end or not (before or after):
+        return None
+    most_off = _MOST_OFF * np.median(off[start:end]) + _LEAST_OFF * np.ptp(motion)
+    other = np.flatnonzero(off[start:end] > most_off) + start
+    if before:
+        start = max(other[clock[other] < clock[start] + _EDGE * period], default=start - 1) + 1
+    if after:
+        end = min(other[clock[other] > clock[end - 1] - _EDGE * period], default=end)
+    first, last = float(time[start]), float(time[end - 1]) + period
+    if before and last - first > _THREE * period:
+        first += period
+    return first, last, bool(after)
+
+
+def _steady_part_between(loop: Loop, time: Array, holes: Array) -> tuple[Loop, str]:
+    """As `steady_part`, of the longest part of a loop without a hole; `holes` are the steps of `time` that are one."""
     starts, ends = time[np.append(0, holes + 1)], time[np.append(holes, time.size - 1)]
     longest = int(np.argmax(ends - starts))
     first, last = float(starts[longest]), float(ends[longest])
-    return _cut(loop, first, last), first, last
+    whole = _cut(loop, first, last)
+    part, note = steady_part(whole, *thinned(whole))
+    said = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
+    return part, said if note is None else f"{said}, and of these {note}"
 
 
 def _cut(loop: Loop, first: float, last: float | None) -> Loop:
-    """The rows between two times, both counted in; to the end where there is no last."""
+    """The rows between two times [s], both counted in; to the end where there is no last."""
     end = None if last is None else np.searchsorted(loop.time, last, side="right")
     kept = slice(np.searchsorted(loop.time, first), end)
     return replace(loop, **{name: getattr(loop, name)[kept] for name in ("time", "displacement", "force")})
 
 
 def _period(time: Array, motion: Array) -> float | None:
-    """Usual time between crossings in one sense of the middle in the later half; twice a stroke where there is one
-    cycle. What holds a hole does not count."""
+    """Usual time between crossings of the middle in one sense, in the later half of the record [s].
+
+    Twice a stroke where there is one cycle. What holds a hole does not count; None where nothing is left.
+    """
     centred = motion - (motion.max() + motion.min()) / 2.0
     band = _BAND * np.ptp(motion)
     marks = np.flatnonzero(np.abs(centred) > band)
@@ -117,8 +133,8 @@ def _period(time: Array, motion: Array) -> float | None:
     return float(np.median(intervals[intervals.size // 2 :]))
 
 
-def _longest(alike: Array, time: Array, brief: float) -> tuple[int, int]:
-    """Start and end of the longest stretch of rows that are alike; brief breaks count as alike."""
+def _longest_stretch(alike: Array, time: Array, brief: float) -> tuple[int, int]:
+    """Start and end of the longest stretch of rows that are alike; breaks no longer than `brief` [s] count as alike."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], (~alike).astype(np.int8), [0]))))
     breaks = [(start, end) for start, end in edges.reshape(-1, 2) if time[end - 1] - time[start] > brief]
     starts = [0, *(end for _, end in breaks)]

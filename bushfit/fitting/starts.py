@@ -1,4 +1,4 @@
-"""Start values read off the data: secant slope, loop area, slope over log f.
+"""Start values of a fit, read off the data: secant slope, loop area, slope over log f.
 
 They need only be of the right order; the fits end at one minimum from anywhere within two decades.
 """
@@ -9,54 +9,79 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from bushfit.effects.contract import Array
 from bushfit.effects.friction import harmonic_shape
 from bushfit.fitting.data_sets import DataSet
 from bushfit.geometry import Bushing
 
-#: The strain amplitude of the largest test over eps_half, before anything is known.
+#: Strain amplitude of the largest test over eps_half, before anything is known; chosen: the fit finds the rest.
 _SCALED_STRAIN = 3.0
-#: Share of the smallest loss that a start leaves to a branch, whatever the other branches claim.
+#: Share of a modulus, or of a loss, that a start leaves to a branch, whatever the other branches claim.
 _LEAST_SHARE = 0.1
+#: Least loss relative to |K|, where the measured one is no more than noise.
+_LEAST_LOSS = 1e-3
+#: Least growth of K' with ln omega relative to mu.
+_LEAST_GROWTH = 1e-3
+#: Share of mu that keeps a loss above zero, for its logarithm.
+_ABOVE_ZERO = 1e-9
+#: Frequency over the slowest up to which a test counts as slow.
+_SLOW = 1.5
+#: Strain over the smallest of the sweeps up to which a point counts as of their smallest level.
+_SMALLEST = 1.01
+#: Range of ln omega from which on it tells a slope.
+_LEAST_RANGE = 0.1
+#: Start of alpha where the data tell no slope: that of a usual filled rubber.
+_USUAL_ALPHA = 0.25
+#: Start of m over mu in that case.
+_USUAL_M = 0.2
+#: Start of alpha at least and at most: slopes that filled rubbers have.
+_ALPHA_RANGE = (0.1, 0.6)
 
 
 def start_values(bushing: Bushing, data_sets: Sequence[DataSet], known: Mapping[str, float]) -> dict[str, float]:
     """Values of mu, m, alpha, sigma_fmax, eps_half to start from; `known` ones are kept and allowed for.
 
-    - eps_half from the largest strain reached;
-    - sigma_fmax from the loss of the slowest test, which is a loop's area: W = pi X^2 K'';
-    - mu from the slope (secant of a loop's fundamental) of the slowest test, less what friction adds;
-    - alpha from the slope of ln K'' over ln f, m from the growth of K' over ln f.
+    Notes:
+        - eps_half from the largest strain reached;
+        - sigma_fmax from the loss of the slowest test, which is a loop's area: W = pi X^2 K'';
+        - mu from the slope (secant of a loop's fundamental) of the slowest test, less what friction adds;
+        - alpha from the slope of ln K'' over ln f, m from the growth of K' over ln f.
     """
     strain, frequency, modulus = _points(bushing, data_sets)
-    slowest = frequency <= 1.5 * frequency.min()
-    largest = int(np.argmax(np.where(slowest, strain, 0.0)))
+    slow = frequency <= _SLOW * frequency.min()
+    largest = int(np.argmax(np.where(slow, strain, 0.0)))
     eps_half = known.get("eps_half", float(strain.max()) / _SCALED_STRAIN)
     shape = harmonic_shape(strain / eps_half)
-    loss = max(modulus[largest].imag, 1e-3 * abs(modulus[largest]))
+    loss = max(modulus[largest].imag, _LEAST_LOSS * abs(modulus[largest]))
     sigma_fmax = known.get("sigma_fmax", loss * eps_half / shape[largest].imag)
     friction = sigma_fmax / eps_half * shape
     mu = known.get("mu", max(modulus[largest].real - friction[largest].real, _LEAST_SHARE * abs(modulus[largest])))
-    swept = ~slowest
-    smallest = strain <= 1.01 * strain[swept].min(initial=np.inf)
+    m, alpha = _USUAL_M * mu, _USUAL_ALPHA
+    smallest = strain <= _SMALLEST * strain[~slow].min(initial=np.inf)
     log_omega = np.log(2.0 * np.pi * frequency[smallest])
-    if not swept.any() or np.ptp(log_omega) < 0.1:
-        return {"mu": mu, "m": 0.2 * mu, "alpha": 0.25, "sigma_fmax": sigma_fmax, "eps_half": eps_half, **known}
-    viscous_loss = np.maximum(modulus.imag - friction.imag, _LEAST_SHARE * modulus.imag.clip(min=0.0) + 1e-9 * mu)
-    alpha = float(np.clip(_slope(log_omega, np.log(viscous_loss[smallest])), 0.1, 0.6))
-    middle = float(np.exp(log_omega.mean()))
-    growth = max(_slope(log_omega, modulus.real[smallest]), 1e-3 * mu)
-    m = 2.0 * growth / (alpha * middle**alpha * np.cos(np.pi * alpha / 2.0))
+    if not slow.all() and np.ptp(log_omega) >= _LEAST_RANGE:
+        least = _LEAST_SHARE * modulus.imag.clip(min=0.0) + _ABOVE_ZERO * mu
+        viscous_loss = np.maximum(modulus.imag - friction.imag, least)
+        m, alpha = _springpot(log_omega, modulus.real[smallest], viscous_loss[smallest], _LEAST_GROWTH * mu)
     return {"mu": mu, "m": m, "alpha": alpha, "sigma_fmax": sigma_fmax, "eps_half": eps_half, **known}
 
 
-def _slope(x: np.ndarray, y: np.ndarray) -> float:
-    """Slope of the straight line through points."""
+def _springpot(log_omega: Array, storage: Array, loss: Array, least_growth: float) -> tuple[float, float]:
+    """m [Pa s^alpha] and alpha from the slopes of storage and loss modulus [Pa] over ln omega, (n,) each."""
+    alpha = float(np.clip(_slope(log_omega, np.log(loss)), *_ALPHA_RANGE))
+    middle = float(np.exp(log_omega.mean()))
+    growth = max(_slope(log_omega, storage), least_growth)
+    return 2.0 * growth / (alpha * middle**alpha * np.cos(np.pi * alpha / 2.0)), alpha
+
+
+def _slope(x: Array, y: Array) -> float:
+    """Slope of the straight line through points, (n,) each."""
     apart = x - x.mean()
     return float(apart @ y / (apart @ apart))
 
 
-def _points(bushing: Bushing, data_sets: Sequence[DataSet]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Strain amplitude, frequency [Hz] and complex modulus [Pa] of every operating point, loops included."""
+def _points(bushing: Bushing, data_sets: Sequence[DataSet]) -> tuple[Array, Array, Array]:
+    """Strain amplitude, frequency [Hz] and complex modulus [Pa] of every operating point, loops included, (n,) each."""
     factors = [bushing.stiffness_per_modulus(data_set.direction) for data_set in data_sets]
     return (
         np.concatenate([data_set.amplitude * bushing.unit_strain(data_set.direction) for data_set in data_sets]),

@@ -9,45 +9,47 @@ import numpy as np
 from scipy.special import chdtri
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.outliers import WINDOW, from_neighbours, limit
+from bushfit.fitting.outliers import NEIGHBOURS, from_neighbours, outlier_limit
 
 if TYPE_CHECKING:
     from bushfit.fitting.sweep_data import SweepData
     from bushfit.model.model import Model
 
-#: Points of a block that count as neighbours of one: few, since stiffness bends with frequency.
-_NEIGHBOURS = 5
+#: Points of a block that count as neighbours of one where a model was taken off: few, since stiffness that the model
+#: misses bends with frequency.
+_NEAR_NEIGHBOURS = 5
 
 
 def outlying_points(data_set: SweepData, model: Model) -> Array:
-    """Points that lie farther off the model than noise reaches, and as far off their neighbours, by number.
+    """Points that lie farther off the model than noise reaches, and as far off their neighbours, by number, (k,).
 
-    Where the same point was repeated, it must stand out from its repeats as well: what all of them do is no fault of
-    one row. Where two repeats or more agree against it that is enough, so that outliers side by side do not hide each
-    other.
+    A point that was repeated must stand out from its repeats as well: what all of them do is no fault of one row.
+    Where two repeats or more agree against it that is enough, so that outliers side by side do not hide each other.
     """
     deviation = data_set.deviation(model)
     distance = data_set.apart(deviation)
-    reach = limit(deviation.size, 2, data_set.noise.scatter_freedom or np.inf) * misfit(distance, 2)
-    far = distance > reach
+    scale = misfit_scale(distance, 2)
+    limit = outlier_limit(deviation.size, 2, data_set.noise.scatter_freedom or np.inf) * scale
+    far = distance > limit
     if not far.any():
         return np.flatnonzero(far)
-    local = _from_neighbours(data_set, deviation, _NEIGHBOURS)
+    local = _from_neighbours(data_set, deviation, _NEAR_NEIGHBOURS)
     repeats, beside = _from_repeats(data_set, local)
     alone = np.minimum(
         data_set.apart(local, shared=False), np.where(repeats > 0, data_set.apart(beside, shared=False), np.inf)
     )
-    against = _from_neighbours(data_set, _from_repeats(data_set, deviation)[1], WINDOW)
+    against = _from_neighbours(data_set, _from_repeats(data_set, deviation)[1], NEIGHBOURS)
+    # the median of n repeats has pi/(2 n) of the variance of one
     agreed = data_set.apart(against, shared=False) / np.sqrt(1.0 + np.pi / 2.0 / np.maximum(repeats, 1))
-    return np.flatnonzero(far & (np.where(repeats > 1, agreed, alone) > reach))
+    return np.flatnonzero(far & (np.where(repeats > 1, agreed, alone) > limit))
 
 
-def misfit(distance: Array, parts: int) -> float:
-    """How far the bulk of all points lies off, over what noise alone makes; at least 1.
+def misfit_scale(distance: Array, parts: int) -> float:
+    """Median distance of all points from the model over the median that noise alone makes; at least 1.
 
     Args:
         distance: of each point, in units of noise, (n,).
-        parts: numbers that make up a point.
+        parts: numbers that make up a point: 1 for a force, 2 for a complex stiffness.
     """
     if not distance.size:
         return 1.0

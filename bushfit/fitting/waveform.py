@@ -7,10 +7,14 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.reading.measurement import Loop
 
-#: Third harmonic of a triangle over its first, and how near to it, or to none, a motion is called by its name.
-_TRIANGLE, _LIKE = 1.0 / 9.0, 0.03
-#: Of rows evenly spaced in time a triangle has a tenth beyond this share of its amplitude, a sine 29 %.
-_OUTER, _CROWDED = 0.9, 0.2
+#: Third harmonic of a triangle over its first.
+_TRIANGLE = 1.0 / 9.0
+#: Difference of a motion's third harmonic over its first up to which it is called by a name: a rounded triangle has it.
+_LIKE = 0.03
+#: Share of the amplitude beyond which rows are counted.
+_OUTER = 0.9
+#: Share of the rows beyond it that parts a sine from a triangle: evenly in time a triangle has 10 % there, a sine 29 %.
+_CROWDED = 0.2
 
 
 def waveform(coefficients: Array) -> str:
@@ -23,7 +27,12 @@ def waveform(coefficients: Array) -> str:
 
 
 def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
-    """A sentence where the time of a loop was made from its motion, but not as its rows lie; else None."""
+    """A sentence where the time of a loop was made from its motion, but not as its rows lie; else None.
+
+    Args:
+        loop: whose time it is.
+        coefficients: complex harmonics of its displacement over that time, mean first.
+    """
     if loop.timed:
         return None
     motion = loop.displacement

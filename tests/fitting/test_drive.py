@@ -10,7 +10,7 @@ import pytest
 from bushfit.errors import FitError
 from bushfit.fitting.data_sets import LoopData
 from bushfit.fitting.drive import drive_of
-from bushfit.fitting.harmonics import MOST_ROWS
+from bushfit.fitting.loop_harmonics import MOST_ROWS
 from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.model import Model

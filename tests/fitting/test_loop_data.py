@@ -21,7 +21,7 @@ def data_set(rig: Callable[..., Campaign], paper_noise: SimulateSettings, paper_
 def test_the_right_model_leaves_noise_alone(data_set: LoopData, paper_model: Model) -> None:
     residual = data_set.residual(paper_model)
     counted = data_set.drive.weight > 0.0
-    assert residual.size == data_set.size == data_set.loop.time.size
+    assert residual.size == data_set.size == data_set.test.time.size
     assert data_set.counted == np.count_nonzero(counted) > 0.99 * data_set.size
     assert np.std(residual[counted]) == pytest.approx(1.0, abs=0.05)
     assert abs(np.corrcoef(residual[1:], residual[:-1])[0, 1]) < 0.06

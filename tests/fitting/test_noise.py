@@ -111,7 +111,7 @@ def test_no_repeats_fall_back_to_a_smooth_curve_and_an_assumption(noisy_sweep: C
 def test_levels_without_repeats_are_pooled(noisy_sweep: Callable[..., Sweep]) -> None:
     noise = sweep_noise([noisy_sweep(0, repeats=1)])
     assert len(set(noise.random.values())) == 1
-    assert noise.scatter_freedom >= len(AMPLITUDES) * (FREQUENCIES.size - 5) - 1  # it may take one point for wild
+    assert noise.scatter_freedom >= len(AMPLITUDES) * (FREQUENCIES.size - 5) - 1  # it may take one point for an outlier
     quiet, loud = noisy_sweep(1, 1e-3, repeats=1), noisy_sweep(2, 2e-2, repeats=1)
     mixed = replace(quiet, stiffness=np.where(quiet.amplitude == 5e-4, loud.stiffness, quiet.stiffness))
     random = sweep_noise([mixed]).random

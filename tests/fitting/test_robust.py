@@ -1,4 +1,4 @@
-"""Robust fits: wild points are found and listed, move no parameter, and clean tests have none."""
+"""Robust fits: outliers are found and listed, move no parameter, and clean tests have none."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.fitting.data import Data
 from bushfit.fitting.drive import drive_of
-from bushfit.fitting.harmonics import MOST_ROWS
-from bushfit.fitting.outliers import limit
+from bushfit.fitting.loop_harmonics import MOST_ROWS
+from bushfit.fitting.outliers import outlier_limit
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, fit_two_step
 from bushfit.fitting.robust import told
 from bushfit.geometry import Direction
@@ -31,7 +31,7 @@ KINDS = (*FACTORS, "stuck", "bursts")
 
 
 def spoilt(values: np.ndarray, kind: str, rng: np.random.Generator) -> np.ndarray:
-    """3 % of a loop's rows made wild: one by one, three at a time, or as one stretch that repeats a value."""
+    """3 % of a loop's rows made outliers: one by one, three at a time, or as one stretch that repeats a value."""
     wrong, count = values.copy(), round(SHARE * values.size)
     if kind == "stuck":
         start = rng.integers(0, values.size - count)
@@ -45,7 +45,7 @@ def spoilt(values: np.ndarray, kind: str, rng: np.random.Generator) -> np.ndarra
 
 
 def spoilt_sweep(sweep: Sweep, kind: str, rng: np.random.Generator) -> Sweep:
-    """3 % of a sweep's points made wild; a stiffness of nothing at all is refused by the reader."""
+    """3 % of a sweep's points made outliers; a stiffness of nothing at all is refused by the reader."""
     wrong = sweep.stiffness.copy()
     rows = rng.choice(wrong.size, round(SHARE * wrong.size), replace=False)
     wrong[rows] = wrong[rows - 1] if kind == "stuck" else wrong[rows] * ({**FACTORS, "bursts": 0.3}[kind] or 1e-3)
@@ -70,7 +70,7 @@ def moved(one: Result, other: Result) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("shared", [False, True])
-def test_three_percent_wild_points_move_no_parameter_by_a_standard_error(
+def test_three_percent_outliers_move_no_parameter_by_a_standard_error(
     rig: Rig,
     paper_noise: SimulateSettings,
     shared_noise: SimulateSettings,
@@ -93,7 +93,7 @@ def test_three_percent_wild_points_move_no_parameter_by_a_standard_error(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_wild_rows_do_not_spoil_the_bins_of_a_long_loop(
+def test_outliers_do_not_spoil_the_bins_of_a_long_loop(
     rig: Rig, paper_noise: SimulateSettings, paper_model: Model, kind: str
 ) -> None:
     loops = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=12),)
@@ -106,7 +106,7 @@ def test_wild_rows_do_not_spoil_the_bins_of_a_long_loop(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_wild_displacement_does_not_disturb_the_motion(
+def test_an_outlier_of_the_displacement_does_not_disturb_the_motion(
     rig: Rig, paper_noise: SimulateSettings, paper_model: Model, kind: str
 ) -> None:
     for seed in range(4):
@@ -175,7 +175,7 @@ def test_outliers_are_listed_by_file_and_row_and_told(
     assert from_document(to_document(soft)).outliers == soft.outliers
 
 
-def test_without_repeats_a_wild_point_is_found(rig: Rig, paper_noise: SimulateSettings, paper_model: Model) -> None:
+def test_without_repeats_an_outlier_is_found(rig: Rig, paper_noise: SimulateSettings, paper_model: Model) -> None:
     campaign = rig(paper_model, replace(paper_noise, repeats=1), 2)
     stiffness = campaign.sweeps[0].stiffness.copy()
     stiffness[[5, 40]] *= np.array([3.0, 0.4])
@@ -185,22 +185,22 @@ def test_without_repeats_a_wild_point_is_found(rig: Rig, paper_noise: SimulateSe
     assert np.max(np.abs(shift)) < 1.0
 
 
-def test_a_wild_displacement_is_said_to_be_left_out_whatever_the_loss() -> None:
-    wild = [Outlier("loop", None, row, column, 9.0) for row, column in ((7, "force"), (9, "displacement"))]
-    followed, left = told(wild, robust=False)
+def test_an_outlier_of_the_displacement_is_said_to_be_left_out_whatever_the_loss() -> None:
+    both = [Outlier("loop", None, row, column, 9.0) for row, column in ((7, "force"), (9, "displacement"))]
+    followed, left = told(both, robust=False)
     assert followed.startswith("1 point lies")
     assert "follows them: loop, force row 7; --loss soft_l1" in followed
     assert left.endswith("left out of the fit: loop, displacement row 9")
-    (both,) = told(wild, robust=True)
-    assert "2 points lie" in both
-    assert "follows" not in both
+    (line,) = told(both, robust=True)
+    assert "2 points lie" in line
+    assert "follows" not in line
 
 
 @pytest.mark.parametrize(("factor", "missed"), [(0.7, 0), (1.1, 2)])
-def test_one_wild_point_of_a_short_sweep_without_repeats_is_found_at_any_row(
+def test_one_outlier_of_a_short_sweep_without_repeats_is_found_at_any_row(
     rig: Rig, paper_noise: SimulateSettings, paper_model: Model, factor: float, missed: int
 ) -> None:
-    """Nine points a level leave four degrees of freedom beside the smooth curve, which the wild one bends, at an end
+    """Nine points a level leave four degrees of freedom beside the smooth curve, which the outlier bends, at an end
     so far that a small one may hide."""
     short = SimulatedSweep(Direction.AXIAL, (1e-4, 2e-4, 5e-4), tuple(np.linspace(5.0, 125.0, 9)))
     settings = replace(paper_noise, repeats=1, sweeps=(short,))
@@ -217,7 +217,7 @@ def test_one_wild_point_of_a_short_sweep_without_repeats_is_found_at_any_row(
     assert found.count([]) <= missed
 
 
-def test_wild_neighbours_do_not_hide_each_other_from_their_repeats(
+def test_outliers_side_by_side_do_not_hide_each_other_from_their_repeats(
     rig: Rig, paper_noise: SimulateSettings, paper_model: Model
 ) -> None:
     for seed in range(4):
@@ -226,7 +226,7 @@ def test_wild_neighbours_do_not_hide_each_other_from_their_repeats(
         rows = 20 + seed + np.arange(3)
         stiffness[rows] *= 1.1
         found = robust(replace(campaign, sweeps=(replace(campaign.sweeps[0], stiffness=stiffness),))).outliers
-        print(f"rows {rows} wild, found {[entry.row - 1 for entry in found]}")
+        print(f"rows {rows} spoilt, found {[entry.row - 1 for entry in found]}")
         assert [entry.row - 1 for entry in found] == rows.tolist()
 
 
@@ -237,19 +237,19 @@ def test_a_fit_of_one_level_names_the_row_of_the_file(
     campaign = rig(paper_model, paper_noise, 0)
     sweep = campaign.sweeps[0]
     down = np.argsort(-sweep.amplitude, kind="stable")
-    wild = down.size - 7
+    spoilt_row = down.size - 7
     stiffness = sweep.stiffness[down]
-    stiffness[wild] *= 1.1
+    stiffness[spoilt_row] *= 1.1
     falling = replace(
         sweep, frequency=sweep.frequency[down], amplitude=sweep.amplitude[down], stiffness=stiffness,
         repeat=sweep.repeat[down], reached=None,
     )  # fmt: skip
     data = Data.of(replace(campaign, sweeps=(falling, *campaign.sweeps[1:]), fit=SOFT))
     dynamic, joint = fit_dynamic(data, fit_static(data)), fit_joint(data)
-    print(f"row {wild + 1}: fit-dynamic lists {dynamic.outliers}, fit {joint.outliers}")
-    assert [entry.row for entry in dynamic.outliers] == [entry.row for entry in joint.outliers] == [wild + 1]
+    print(f"row {spoilt_row + 1}: fit-dynamic lists {dynamic.outliers}, fit {joint.outliers}")
+    assert [entry.row for entry in dynamic.outliers] == [entry.row for entry in joint.outliers] == [spoilt_row + 1]
     marked = data.without(dynamic.outliers).sweeps[0]
-    assert marked.order[marked.weights == 0.0].tolist() == [wild]
+    assert marked.order[marked.weights == 0.0].tolist() == [spoilt_row]
 
 
 def test_the_two_step_procedure_is_robust_too(rig: Rig, paper_noise: SimulateSettings, paper_model: Model) -> None:
@@ -262,9 +262,9 @@ def test_the_two_step_procedure_is_robust_too(rig: Rig, paper_noise: SimulateSet
 
 
 def test_the_limit_grows_with_the_rows_and_with_what_is_not_known() -> None:
-    assert limit(1, 1, np.inf) == pytest.approx(2.5758, rel=1e-3)
-    assert limit(10_000, 2, np.inf) == pytest.approx(np.sqrt(2.0 * np.log(1e6)), rel=1e-3)
-    assert limit(100, 2, 10) > 1.5 * limit(100, 2, 1000)
+    assert outlier_limit(1, 1, np.inf) == pytest.approx(2.5758, rel=1e-3)
+    assert outlier_limit(10_000, 2, np.inf) == pytest.approx(np.sqrt(2.0 * np.log(1e6)), rel=1e-3)
+    assert outlier_limit(100, 2, 10) > 1.5 * outlier_limit(100, 2, 1000)
 
 
 def test_a_loop_of_few_rows_keeps_its_corners(paper_model: Model) -> None:

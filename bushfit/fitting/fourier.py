@@ -1,0 +1,86 @@
+"""Fourier series of a periodic record, fitted by least squares to its rows as they are.
+
+A series of order m has real coefficients (mean, m cosines, m negative sines), (2 m + 1,), or complex ones, mean first,
+(m + 1,): c_k stands for Re c_k exp(2 pi i k phase). Phase counts cycles.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bushfit.effects.contract import Array
+
+#: Samples of one cycle where a series is drawn as a curve and the model answers; chosen: rows between two samples are
+#: interpolated linearly, which is then off by 5e-6 of the amplitude.
+GRID = 1024
+#: Rows of a cycle behind each harmonic; two determine one, and more keep noise from being fitted.
+_ROWS_PER_HARMONIC = 5
+#: Golden ratio less 1; chosen: its multiples, less whole numbers, spread evenly and keep time with no cycle.
+_GOLDEN = 0.6180339887498949
+
+
+def spread_rows(rows: int, most: int) -> NDArray[np.intp]:
+    """Numbers of rows that stand for all: every one of few, else `most` spread evenly.
+
+    Their step varies, so that it cannot keep time with the cycles.
+    """
+    count = min(rows, most)
+    number = np.arange(count)
+    return (number if count == rows else (number + number * _GOLDEN % 1.0) * (rows / count)).astype(np.intp)
+
+
+def resolved_order(rows_per_cycle: float, most: int) -> int:
+    """As many harmonics as the rows of one cycle carry, from 1 to `most`."""
+    return int(np.clip(rows_per_cycle / _ROWS_PER_HARMONIC, 1, most))
+
+
+def basis(phase: Array, order: int) -> Array:
+    """Columns 1, cos(2 pi k phase) and -sin(2 pi k phase) for k = 1 ... order, (n, 2 order + 1)."""
+    turn = np.exp(2j * np.pi * phase)
+    powers = np.empty((order, phase.size), dtype=complex)
+    powers[0] = turn
+    for k in range(1, order):
+        np.multiply(powers[k - 1], turn, out=powers[k])
+    rows = np.empty((2 * order + 1, phase.size))
+    rows[0], rows[1 : order + 1] = 1.0, powers.real
+    np.negative(powers.imag, out=rows[order + 1 :])
+    return rows.T
+
+
+def least_squares(columns: Array, values: Array, weight: Array | None = None) -> Array:
+    """Real coefficients that fit `values`, (n,) or (n, channels), by normal equations.
+
+    Args:
+        columns: of `basis`, (n, k): nearly orthogonal over whole cycles, so that normal equations lose no digits.
+        values: to fit.
+        weight: of each row, (n,); 1 for None.
+    """
+    weighed = columns.T if weight is None or np.all(weight == 1.0) else columns.T * weight
+    return np.linalg.solve(weighed @ columns, weighed @ values)
+
+
+def as_complex(real: Array) -> Array:
+    """Complex coefficients of a series, (m + 1,), from its real ones."""
+    order = real.size // 2
+    return np.concatenate((real[:1], real[1 : order + 1] + 1j * real[order + 1 :]))
+
+
+def derivative(real: Array) -> Array:
+    """Real coefficients of the derivative of a series by its phase in radians."""
+    order = real.size // 2
+    number = np.arange(1, order + 1)
+    return np.concatenate(([0.0], number * -real[order + 1 :], number * real[1 : order + 1]))
+
+
+def first_amplitude(real: Array) -> float:
+    """Amplitude of the first harmonic of a series."""
+    return float(np.hypot(real[1], real[real.size // 2 + 1]))
+
+
+def series(coefficients: Array, phase: Array) -> Array:
+    """Values of a series with complex coefficients at any phase [cycles], (n,)."""
+    turn, value = np.exp(2j * np.pi * phase), np.zeros(phase.shape, dtype=complex)
+    for coefficient in coefficients[::-1]:
+        value = value * turn + coefficient
+    return value.real

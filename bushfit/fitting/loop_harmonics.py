@@ -1,0 +1,145 @@
+"""The harmonics of a loop: its displacement cleared of noise, the noise of its force, and the outliers of both.
+
+Harmonics are fitted by least squares at the rows as they are; outliers do not bend them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.fitting.fourier import GRID, as_complex, basis, least_squares, resolved_order, series, spread_rows
+from bushfit.fitting.loop_outliers import NO_OUTLIERS, OutlierRows, column_outliers, fit_without_outliers
+from bushfit.reading.measurement import Loop
+
+#: Rows of a loop that the harmonics are fitted to at most; longer ones are averaged into as many bins of phase.
+MOST_ROWS = 4 * GRID
+#: Rows of a loop up to which every one is held against the harmonics; of a longer loop only where those fitted to have
+#: outliers, to save time.
+_MOST_ROWS_CHECKED = 200_000
+#: Harmonics that are fitted at most; chosen: those of a triangle have then fallen to 3e-4 of the first.
+_MOST_HARMONICS = 60
+#: Standard errors from which on a harmonic of the displacement is no noise.
+_SIGNIFICANT = 4.0
+#: Harmonics of one cycle that count as slow change from cycle to cycle, which is settling or drift and no noise.
+_SLOW_HARMONICS = 3
+#: Rows behind each unknown of the slow change, fewer than which leave a cycle as it is.
+_ROWS_PER_UNKNOWN = 4
+#: Residual of a triangle over that of free harmonics up to which a motion counts as a triangle.
+_TRIANGLE_RATIO = 1.02
+#: Distance of the third harmonic from a triangle's [noise of a row] that rules a triangle out, without drawing one.
+_NO_TRIANGLE = 3.0
+
+
+class LoopHarmonics(NamedTuple):
+    """What the rows of a loop tell about its motion and its noise.
+
+    Args:
+        motion: complex harmonics of the displacement that rise above its noise, mean first.
+        force_mean: mean of the force [N or N m].
+        force_noise: standard deviation of one row's force [N or N m].
+        outliers: of the columns displacement and force.
+    """
+
+    motion: Array
+    force_mean: float
+    force_noise: float
+    outliers: Mapping[str, OutlierRows]
+
+
+def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics:
+    """Significant harmonics of the displacement, mean and noise of the force, and outliers.
+
+    The noise holds what does not repeat from cycle to cycle and what is too fast for the rubber, but not what changes
+    slowly from one cycle to the next, which is settling or drift.
+
+    Args:
+        loop: one cycle or more of a periodic motion.
+        frequency: [Hz].
+        cycles: in the loop.
+    """
+    chosen = spread_rows(loop.time.size, MOST_ROWS)
+    phase = (loop.time[chosen] - loop.time[0]) * frequency
+    order = resolved_order(loop.time.size / max(cycles, 1.0), _MOST_HARMONICS)
+    columns = basis(phase, order)
+    recorded = {"displacement": loop.displacement, "force": loop.force}
+    values = np.column_stack([column[chosen] for column in recorded.values()])
+    solution, inliers, outliers = least_squares(columns, values), [], {}
+    for which, (name, column) in enumerate(recorded.items()):
+        solution[:, which], kept = fit_without_outliers(columns, values[:, which], solution[:, which])
+        inliers.append(kept)
+        residual = values[:, which] - columns @ solution[:, which]
+        outliers[name] = (
+            column_outliers(loop, frequency, column, solution[:, which], residual)
+            if column.size <= _MOST_ROWS_CHECKED or not kept.all()
+            else NO_OUTLIERS
+        )
+    left = values - columns @ solution
+    of_motion, of_force = inliers
+    freedom = [max(int(np.count_nonzero(kept)) - 2 * order - 1, 1) for kept in inliers]
+    motion_noise = float(np.sqrt(np.sum(np.square(left[of_motion, 0])) / freedom[0]))
+    coefficients = as_complex(solution[:, 0])
+    triangle = _triangle(coefficients[0], coefficients[1])
+    alike = _is_triangle(triangle, coefficients, motion_noise, phase[of_motion], values[of_motion, 0])
+    motion = triangle if alike else _significant(coefficients, motion_noise, phase.size)
+    force_noise = _scatter(phase[of_force], left[of_force, 1], freedom[1])
+    return LoopHarmonics(motion, float(solution[0, 1]), force_noise, outliers)
+
+
+def _significant(coefficients: Array, noise: float, rows: int) -> Array:
+    """Complex harmonics with those that noise explains set to zero, up to the last that is not."""
+    keep = np.abs(coefficients) > _SIGNIFICANT * noise * np.sqrt(2.0 / rows)
+    keep[:2] = True
+    return np.where(keep, coefficients, 0.0)[: int(np.flatnonzero(keep)[-1]) + 1]
+
+
+def _is_triangle(triangle: Array, coefficients: Array, noise: float, phase: Array, displacement: Array) -> bool:
+    """Whether the rows of a motion agree with a triangle as well as with its own harmonics.
+
+    Args:
+        triangle: complex harmonics of the triangle, mean first.
+        coefficients: the motion's own.
+        noise: of one row about its own harmonics [m or rad].
+        phase: of the rows [cycles], (n,).
+        displacement: of the rows [m or rad], (n,).
+    """
+    if coefficients.size > 3 and abs(coefficients[3] - triangle[3]) >= _NO_TRIANGLE * noise:
+        return False
+    return bool(np.std(displacement - series(triangle, phase)) < _TRIANGLE_RATIO * noise)
+
+
+def _triangle(mean: complex, fundamental: complex) -> Array:
+    """Complex harmonics of the triangle of that mean and fundamental, as far as the grid goes.
+
+    Notes:
+        c_k falls as 1/k^2 over the odd k, so slowly that its corners need them all.
+    """
+    order = np.arange(1, GRID // 2, 2)
+    turn = 1j * fundamental / abs(fundamental)
+    coefficients = np.zeros(GRID // 2, dtype=complex)
+    coefficients[0] = mean
+    coefficients[order] = -1j * abs(fundamental) * (-1.0) ** (order // 2) / order**2 * turn**order
+    return coefficients
+
+
+def _scatter(phase: Array, residual: Array, freedom: int) -> float:
+    """Standard deviation of the force's residuals less the slow part of each cycle's own.
+
+    Args:
+        phase: of the rows [cycles], (n,).
+        residual: of the force, (n,).
+        freedom: degrees of freedom of these residuals.
+    """
+    number = np.floor(phase).astype(np.intp)
+    unknowns = 2 * _SLOW_HARMONICS + 1
+    left = residual.copy()
+    for cycle in np.unique(number):
+        rows = np.flatnonzero(number == cycle)
+        if rows.size > _ROWS_PER_UNKNOWN * unknowns:
+            slow = basis(phase[rows], _SLOW_HARMONICS)
+            left[rows] -= slow @ np.linalg.lstsq(slow, left[rows], rcond=None)[0]
+            freedom -= unknowns
+    return float(np.sqrt(np.sum(np.square(left)) / max(freedom, 1)))

@@ -1,0 +1,110 @@
+"""Outliers of a loop: rows that stand out from the harmonics of their column and from their neighbours."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.fitting.fourier import GRID, basis, first_amplitude, least_squares
+from bushfit.fitting.noise import FLOOR
+from bushfit.fitting.outliers import outlier_limit, outlier_rows, stuck_rows
+from bushfit.reading.measurement import Loop
+from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
+
+#: Share of the amplitude, over the number of harmonics, by which these may miss a corner of the motion.
+_CORNER = 0.5
+#: Rounds in which rows are weighted down by their distance; chosen.
+_REWEIGHTINGS = 10
+#: Rounds of leaving outliers out at most; chosen: nearly all records settle in two.
+_MOST_ROUNDS = 10
+
+
+class OutlierRows(NamedTuple):
+    """Outliers of one column: their rows, (k,), and how far each lies off the harmonics, in units of noise, (k,)."""
+
+    rows: Array
+    off: Array
+
+
+NO_OUTLIERS = OutlierRows(np.empty(0, dtype=np.intp), np.empty(0))
+
+
+def residual_limit(solution: Array, residual: Array, rows: int) -> float:
+    """Distance from its harmonics within which a row is no outlier, in units of the column.
+
+    Noise takes part of it, and the corners of a triangle, which so many harmonics round off, the rest.
+
+    Args:
+        solution: real coefficients of the harmonics, (2 order + 1,).
+        residual: of rows that stand for all, (n,).
+        rows: of the whole column.
+    """
+    corner = _CORNER / (solution.size // 2) * first_amplitude(solution)
+    return outlier_limit(rows, 1, np.inf) * _spread(residual) + corner
+
+
+def fit_without_outliers(columns: Array, values: Array, solution: Array) -> tuple[Array, Array]:
+    """Harmonics of a column fitted without its outliers, and which rows are none, (n,).
+
+    Args:
+        columns: of `basis`, (n, 2 order + 1).
+        values: of the column, (n,).
+        solution: coefficients of the least-squares fit to all rows, (2 order + 1,).
+
+    Notes:
+        Squares let so many harmonics follow a cluster of outliers. So rows are weighted down by their distance first;
+        then outliers are found and left out in turn until both agree.
+    """
+    every, stuck = np.ones(values.size, dtype=bool), np.zeros(values.size, dtype=bool)
+    stuck[stuck_rows(values)] = True
+    if np.array_equal(_inliers(columns, values, solution, stuck), every):
+        return solution, every
+    for _ in range(_REWEIGHTINGS):
+        residual = values - columns @ solution
+        weight = ~stuck / np.sqrt(1.0 + np.square(residual / _noise(solution, residual[~stuck])))
+        solution = least_squares(columns, values, weight)
+    inliers = every
+    for _ in range(_MOST_ROUNDS):
+        found = _inliers(columns, values, solution, stuck)
+        if np.array_equal(found, inliers) or np.count_nonzero(found) < 2 * solution.size:
+            break
+        inliers, solution = found, least_squares(columns, values, found)
+    return solution, inliers
+
+
+def column_outliers(loop: Loop, frequency: float, column: Array, solution: Array, residual: Array) -> OutlierRows:
+    """Outliers among all rows of a column, whose harmonics were fitted to rows that stand for all.
+
+    Args:
+        loop: whose column it is.
+        frequency: of the loop [Hz].
+        column: displacement or force, one value a row of the loop.
+        solution: real coefficients of its harmonics, (2 order + 1,).
+        residual: of the rows that stand for all, (n,).
+    """
+    grid = np.arange(GRID + 1) / GRID
+    cycle = basis(grid, solution.size // 2) @ solution
+    off = column - np.interp((loop.time - loop.time[0]) * frequency % 1.0, grid, cycle)
+    far = outlier_rows(off, column, residual_limit(solution, residual, column.size))
+    rows = np.union1d(far, stuck_rows(column))
+    return OutlierRows(rows, np.abs(off[rows]) / _noise(solution, residual))
+
+
+def _inliers(columns: Array, values: Array, solution: Array, stuck: Array) -> Array:
+    """Rows that are neither stuck nor far off these harmonics, (n,)."""
+    residual = values - columns @ solution
+    found = ~stuck
+    found[outlier_rows(residual, values, residual_limit(solution, residual, values.size))] = False
+    return found
+
+
+def _noise(solution: Array, residual: Array) -> float:
+    """Noise of one row: the spread of the residuals, and no less than any rig has."""
+    return max(_spread(residual), FLOOR * first_amplitude(solution))
+
+
+def _spread(residual: Array) -> float:
+    """Standard deviation of residuals about zero, which outliers hardly move."""
+    return MEDIAN_TO_SIGMA * float(np.median(np.abs(residual)))
