@@ -65,7 +65,7 @@ def named(axes: Axes) -> list[str]:
 @pytest.fixture(scope="module")
 def loops(paper_model: Model, looped: Looped) -> Callable[..., list[LoopData]]:
     def make(count: int, name: str = "loop") -> list[LoopData]:
-        one = looped(paper_model, 1e-3, cycles=2).loop
+        one = looped(paper_model, 1e-3, cycles=2).test
         scales = np.linspace(0.5, 2.0, count)
         return loop_data(
             [
@@ -144,7 +144,7 @@ def test_many_loops(paper_model: Model, loops: Callable[..., list[LoopData]], co
 
 @pytest.mark.parametrize("count", [3, 40])
 def test_twins_of_long_names(paper_model: Model, loops: Callable[..., list[LoopData]], count: int) -> None:
-    first = loops(2)[0].loop
+    first = loops(2)[0].test
     data_sets = loop_data([replace(first, name=f"{LONG_NAME}{k}.csv") for k in range(count)])
     names = named(checked(loops_figure(paper_model, data_sets, LONG_NAME)).axes[1])
     assert len(set(names)) == len(names), "a name that loses its middle is still told from others"
