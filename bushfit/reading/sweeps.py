@@ -115,8 +115,12 @@ def _check_positive(table: Table, wanted: Mapping[str, Column], values: Mapping[
     """Refuse a column of _POSITIVE with a value that is not."""
     for role in _POSITIVE:
         if role in values:
-            problem = f"the {role.replace('_', ' ')} is not positive"
-            table.refuse(values[role] <= 0.0, wanted[role], problem, "a number above zero")
+            table.refuse(
+                values[role] <= 0.0,
+                wanted[role],
+                f"the {role.replace('_', ' ')} is not positive",
+                "a number above zero",
+            )
 
 
 def _check_loss(table: Table, column: Column, loss_factor: Floats) -> None:
