@@ -52,7 +52,7 @@ def test_outliers_are_listed_with_their_neighbours_three_at_most(sound: Loop) ->
     force = sound.force.copy()
     force[[100, 900, 1700, 2500]] += 100.0
     (told,) = odd_channels(replace(sound, force=force))
-    assert told.startswith("the force has an outlier at data row 101 (")
+    assert told.startswith("the force has outliers at data row 101 (")
     assert "data row 1701 (" in told
     assert told.endswith(" and 1 more")
 
