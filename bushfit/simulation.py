@@ -160,8 +160,7 @@ def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Ar
     """Complex stiffness, (levels, frequencies)."""
     levels, steps = np.meshgrid(test.amplitudes, test.frequencies, indexing="ij")
     points = steps.ravel(), levels.ravel()
-    clean = rig.dynamic_stiffness(truth, test.direction, *points, steps_per_cycle=steps_per_cycle)
-    return clean.reshape(levels.shape)
+    return rig.dynamic_stiffness(truth, test.direction, *points, steps_per_cycle=steps_per_cycle).reshape(levels.shape)
 
 
 def _loop(test: SimulatedLoop, clean: rig.Record, number: int, plan: SimulateSettings, random: Generator) -> Loop:

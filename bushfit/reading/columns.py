@@ -49,13 +49,12 @@ class Columns(Cells):
             evidence = weigh(self._texts(), ways, all_cells=True)
         if evidence.contrary:
             (line, index), text = evidence.contrary
-            mark = "comma" if evidence.ways[0].decimal == "," else "point"
             raise self.error(
                 "this number is written in another way than those before it",
                 line=line,
                 column=self._column_at(index),
                 found=f'"{text}"',
-                expected=f"numbers with a decimal {mark}",
+                expected=f"numbers with a decimal {'comma' if evidence.ways[0].decimal == ',' else 'point'}",
                 hint='write all numbers in one way, or state decimal = "..." and thousands = "..." in the campaign',
             )
         if evidence.unclear:

@@ -250,8 +250,7 @@ def pieces(edges: Floats, log_amplitude: Floats) -> list[slice]:
         run is cut in two where two lines fit better than one by far more than the scatter allows, and each part again.
     """
     period = float(np.median(np.diff(edges)))
-    phase = (edges - edges[0]) / period
-    phase = phase - np.arange(phase.size)
+    phase = (edges - edges[0]) / period - np.arange(edges.size)
     # of white noise, squared weights of second differences sum up to 6, of first ones to 2
     jitter = max(_deviation(np.diff(phase, 2)) / 6.0**0.5, _LEAST_JITTER)
     spread = max(_deviation(np.diff(log_amplitude)) / 2.0**0.5, _LEAST_SCATTER)

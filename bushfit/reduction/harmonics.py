@@ -138,7 +138,7 @@ class HarmonicFit:
         return np.sqrt(variance) / abs(f)
 
     def distortion(self) -> Floats:
-        """Total harmonic distortion of displacement and force, relative to the fundamental, less noise's, (2,)."""
+        """Total harmonic distortion of displacement and force, over their fundamental, less that of noise, (2,)."""
         power = np.square(np.abs(self.coefficients[:, 1:]))
         noise = np.outer(np.diag(self.squares) / self.freedom, self.chance)
         overtones = np.maximum((power - noise)[:, 1:].sum(axis=1), 0.0)

@@ -203,8 +203,12 @@ def _creeps(values: Floats, least: float) -> bool:
     """Whether values, (n,), change steadily from first to last, by more than `least` and beyond their scatter."""
     if values.size < 3:
         return False
-    (slope, _), covariance = np.polyfit(np.arange(values.size), values, 1, cov=True)
-    return bool(abs(slope) * values.size > least and abs(slope) > _REAL_CHANGE * np.sqrt(covariance[0, 0]))
+    number = np.arange(values.size) - (values.size - 1) / 2.0
+    squares = float(number @ number)
+    slope = float(number @ values) / squares
+    left = values - values.mean() - slope * number
+    error = np.sqrt(float(left @ left) / (values.size - 2) / squares)
+    return bool(abs(slope) * values.size > least and abs(slope) > _REAL_CHANGE * error)
 
 
 def _check_reach(steps: Sequence[Step], levels: Sequence[float], direction: Direction) -> None:
@@ -229,7 +233,8 @@ def _grouped(steps: Sequence[Step], levels: Sequence[float]) -> list[Step]:
     groups = _clusters(np.log(frequency), _SAME_FREQUENCY)
     nominal = np.array([np.median(frequency[groups == group]) for group in groups])
     if levels:
-        level = np.array(levels)[np.argmin(np.abs(np.log(amplitude[:, None] / np.asarray(levels))), axis=1)]
+        stated = np.array(levels, dtype=float)
+        level = stated[np.argmin(np.abs(np.log(amplitude[:, None] / stated)), axis=1)]
     else:
         rank = _clusters(np.log(amplitude), _LEVEL_GAP)
         level = np.array([amplitude[rank == own].mean() for own in rank])
