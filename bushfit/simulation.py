@@ -164,13 +164,12 @@ def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Ar
 
 
 def _loop(test: SimulatedLoop, clean: rig.Record, number: int, plan: SimulateSettings, random: Generator) -> Loop:
-    half_range = np.ptp(clean.force) / 2.0
     return Loop(
         f"loop_{test.direction}_{number}",
         test.direction,
         clean.time,
         clean.displacement + plan.displacement_noise * test.amplitude * random.standard_normal(clean.time.size),
-        clean.force + plan.force_noise * half_range * random.standard_normal(clean.time.size),
+        clean.force + plan.force_noise * np.ptp(clean.force) / 2.0 * random.standard_normal(clean.time.size),
     )
 
 
