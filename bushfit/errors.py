@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 
 #: Characters of a quoted value at most: four lines of a terminal.
@@ -45,35 +47,35 @@ class BushfitError(Exception):
 
     def __str__(self) -> str:
         where = ", ".join(part for part in (str(self.file) if self.file else None, self.place) if part)
-        lines = [_printable(f"{where}: {self.problem}" if where else self.problem)]
-        for label, value in (("found", self.found), ("expected", self.expected), ("try", self.hint)):
-            if value:
-                lines.append(f"  {label}: {_printable(value)}")
-        return "\n".join(lines)
+        head = f"{where}: {self.problem}" if where else self.problem
+        lines = (("", head), ("  found: ", self.found), ("  expected: ", self.expected), ("  try: ", self.hint))
+        return "\n".join(label + _printable(text) for label, text in lines if text)
 
     def __reduce__(self) -> tuple[object, ...]:
+        """The error from its parts, for pickle: errors travel between the processes of a batch."""
         state = {key: getattr(self, key) for key in ("file", "place", "found", "expected", "hint")}
-        return _rebuild, (type(self), self.problem, state)
+        return partial(type(self), self.problem, **state), ()
 
 
 @contextmanager
-def naming(file: Path | None) -> Iterator[None]:
-    """Names the file in an error that is raised within, by what knows its content but not where it stands."""
+def naming(file: Path | None = None, place: str | None = None) -> Iterator[None]:
+    """Names file and place, as far as they are given, in an error that is raised within by what does not know them."""
     try:
         yield
     except BushfitError as error:
-        error.file = file
+        error.file, error.place = file or error.file, place or error.place
         raise
+
+
+def did_you_mean(name: str, known: Collection[str], *, likeness: float = 0.6) -> str | None:
+    """A hint at the known name that is most like another; None where none is, on difflib's scale from 0 to 1."""
+    near = get_close_matches(name, known, n=1, cutoff=likeness)
+    return f'did you mean "{near[0]}"?' if near else None
 
 
 def _printable(text: str) -> str:
     """A text with its control characters written as escapes, so that no file can steer the terminal that shows it."""
     return _CONTROL.sub(lambda character: character[0].encode("unicode_escape").decode(), text)
-
-
-def _rebuild(kind: type[BushfitError], problem: str, state: dict[str, str | None]) -> BushfitError:
-    """An error from its parts, for pickle: errors travel between the processes of a batch."""
-    return kind(problem, **state)
 
 
 class UnitError(BushfitError):

@@ -166,10 +166,8 @@ def _radial_strain(tube: Bushing) -> float:
     difference is summed as q^3/3 + q^5/5 + ..., because ln(b/a) = atanh(q).
     """
     q = _q(tube)
-    if q > _LARGEST_Q_OF_SERIES:
-        difference = tube.log_ratio - q
-    else:
-        difference = math.fsum(q ** (2 * j + 3) / (2 * j + 3) for j in range(_SERIES_TERMS))
+    series = (q ** (2 * j + 3) / (2 * j + 3) for j in range(_SERIES_TERMS))
+    difference = tube.log_ratio - q if q > _LARGEST_Q_OF_SERIES else math.fsum(series)
     return 1.0 / math.sqrt(_area(tube) * difference)
 
 

@@ -7,7 +7,6 @@ Noise is added as a rig has it: from point to point, and shared by a block (one 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -132,16 +131,12 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
     """What the rig writes with the plan's noise, repeats and seed; quick, so that many seeds can be drawn."""
     random = np.random.default_rng(plan.seed)
     loops = tuple(_loop(test, force, number, plan, random) for number, (test, force) in enumerate(clean.loops, start=1))
-    names = _names([f"sweep_{test.direction}" for test, _ in clean.sweeps])
+    stems = [f"sweep_{test.direction}" for test, _ in clean.sweeps]
+    names = [stem if stems.count(stem) == 1 else f"{stem}_{place}" for place, stem in enumerate(stems, start=1)]
     sweeps = tuple(
         _sweep(test, stiffness, name, plan, random) for name, (test, stiffness) in zip(names, clean.sweeps, strict=True)
     )
     return Simulated(clean.truth, plan, loops, sweeps)
-
-
-def _names(stems: Sequence[str]) -> list[str]:
-    """The stems, numbered where one is not alone."""
-    return [stem if stems.count(stem) == 1 else f"{stem}_{number}" for number, stem in enumerate(stems, start=1)]
 
 
 def _clean_loop(truth: Model, test: SimulatedLoop) -> rig.Record:
@@ -165,37 +160,24 @@ def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Ar
     """Complex stiffness, (levels, frequencies)."""
     levels, steps = np.meshgrid(test.amplitudes, test.frequencies, indexing="ij")
     points = steps.ravel(), levels.ravel()
-    clean = rig.dynamic_stiffness(truth, test.direction, *points, steps_per_cycle=steps_per_cycle)
-    return clean.reshape(levels.shape)
+    return rig.dynamic_stiffness(truth, test.direction, *points, steps_per_cycle=steps_per_cycle).reshape(levels.shape)
 
 
 def _loop(test: SimulatedLoop, clean: rig.Record, number: int, plan: SimulateSettings, random: Generator) -> Loop:
-    half_range = np.ptp(clean.force) / 2.0
     return Loop(
         f"loop_{test.direction}_{number}",
         test.direction,
         clean.time,
         clean.displacement + plan.displacement_noise * test.amplitude * random.standard_normal(clean.time.size),
-        clean.force + plan.force_noise * half_range * random.standard_normal(clean.time.size),
+        clean.force + plan.force_noise * np.ptp(clean.force) / 2.0 * random.standard_normal(clean.time.size),
     )
 
 
 def _sweep(test: SimulatedSweep, clean: Array, name: str, plan: SimulateSettings, random: Generator) -> Sweep:
     measured = np.stack([_with_noise(clean, plan, random) for _ in range(plan.repeats)], axis=1)
-    shape = measured.shape
-
-    def spread(values: Array, axis: int) -> Array:
-        placed = np.reshape(values, [-1 if i == axis else 1 for i in range(3)])
-        return np.broadcast_to(placed, shape).ravel()
-
-    return Sweep(
-        name,
-        test.direction,
-        spread(np.array(test.frequencies), 2),
-        spread(np.array(test.amplitudes), 0),
-        measured.ravel(),
-        spread(np.arange(1, plan.repeats + 1), 1),
-    )
+    axes = (test.amplitudes, np.arange(1, plan.repeats + 1), test.frequencies)
+    level, repeat, frequency = (np.ravel(axis) for axis in np.meshgrid(*axes, indexing="ij"))
+    return Sweep(name, test.direction, frequency, level, measured.ravel(), repeat)
 
 
 def _with_noise(clean: Array, plan: SimulateSettings, random: Generator) -> Array:

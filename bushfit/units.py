@@ -51,6 +51,8 @@ _LEAST_FORCE = 10.0
 _LEAST_PLAIN = 1e-4
 #: Numbers below this size are written without an exponent: 9999999, but 1e7.
 _LARGEST_PLAIN = 1e7
+#: Significant digits that every float keeps.
+_MOST_DIGITS = 15
 #: A decimal number with a decimal point, and perhaps a power of ten.
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 #: One unit and perhaps its power, such as kN, mm^2, s**-1 or m⁻¹.
@@ -149,11 +151,7 @@ def factor(text: str, expected: str) -> float:
 
 def is_unit(text: str) -> bool:
     """Whether `text` is a unit, of whatever dimension."""
-    try:
-        _resolve(text)
-    except UnitError:
-        return False
-    return True
+    return agrees(text, text)
 
 
 def agrees(text: str, expected: str) -> bool:
@@ -177,7 +175,8 @@ def quantity(value: object, *expected: str) -> float:
     """
     number, unit = _split_quantity(value, expected[0])
     fitting = next((choice for choice in expected if agrees(unit, choice)), expected[0])
-    return _si(number, factor(unit, fitting))
+    # to 15 digits: 18 mm are 0.018 m, and not 0.018000000000000002 m
+    return float(f"{number * factor(unit, fitting):.{_MOST_DIGITS}g}")
 
 
 def for_people(unit: str, factor: float, size: float) -> tuple[str, float]:
@@ -204,17 +203,16 @@ def number(value: float, digits: int, sign: str = "") -> str:
 
     Args:
         value: any number.
-        digits: significant ones.
+        digits: significant ones, up to 15.
         sign: "+" to have it said of positive numbers too.
     """
     rounded = float(f"{value:.{digits}g}")
     if rounded == 0.0 or not math.isfinite(rounded):
         return f"{rounded + 0.0:{sign}g}"  # no -0
     if _LEAST_PLAIN <= abs(rounded) < _LARGEST_PLAIN:
-        text = f"{rounded:{sign}.{_decimals(rounded, digits)}f}"
-        return text.rstrip("0").rstrip(".") if "." in text else text
-    mantissa, _, power = f"{rounded:{sign}.{digits - 1}e}".partition("e")
-    return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}e{int(power)}"
+        return f"{rounded:{sign}.{_MOST_DIGITS}g}"
+    mantissa, _, power = f"{rounded:.{digits - 1}e}".partition("e")
+    return f"{float(mantissa):{sign}.{_MOST_DIGITS}g}e{int(power)}"
 
 
 def alike(values: Sequence[float], digits: int, least: int = 0) -> list[str]:
@@ -241,10 +239,6 @@ def alike(values: Sequence[float], digits: int, least: int = 0) -> list[str]:
     return [text(value) for value in values]
 
 
-def _decimals(value: float, digits: int) -> int:
-    return max(digits - 1 - math.floor(math.log10(abs(value))), 0)
-
-
 def modulus(value: float, digits: int) -> str:
     """A modulus [Pa] with at most so many digits, as people read it: 1.09 MPa."""
     unit, factor = for_people("Pa", 1.0, value)
@@ -264,11 +258,6 @@ def example(expected: str) -> str:
 
 def _kind(expected: str) -> tuple[str, str]:
     return _KINDS.get(expected, ("a quantity", expected))
-
-
-def _si(number: float, scale: float) -> float:
-    """number * scale to 15 digits: 18 mm are 0.018 m, and not 0.018000000000000002 m."""
-    return float(f"{number * scale:.15g}")
 
 
 def _split_quantity(value: object, expected: str) -> tuple[float, str]:
@@ -299,11 +288,8 @@ def _resolve(text: str) -> tuple[float, str]:
         UnitError: an unknown unit.
     """
     text = text.strip().rstrip(".")
-    if text in ("", "-"):
-        text = "1"
-    if text in _EVERYDAY:
-        return _EVERYDAY[text]
-    return _by_pint(text)
+    unit = "1" if text in ("", "-") else text
+    return _EVERYDAY.get(unit) or _by_pint(unit)
 
 
 def _by_pint(text: str) -> tuple[float, str]:

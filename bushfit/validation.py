@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
-from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, cast, get_args, get_type_hints
@@ -17,7 +16,7 @@ from typing import Annotated, Any, TypeVar, cast, get_args, get_type_hints
 from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, ValidationInfo
 from pydantic_core import ErrorDetails
 
-from bushfit.errors import BushfitError, CampaignError
+from bushfit.errors import BushfitError, CampaignError, did_you_mean
 
 T = TypeVar("T")
 
@@ -62,8 +61,7 @@ Name = Annotated[str, Field(strict=True, min_length=1, max_length=200, pattern=r
 
 def unknown_key(key: str, known: Collection[str]) -> CampaignError:
     """The error for a key that is none of the known ones."""
-    near = get_close_matches(key, known, n=1, cutoff=_LEAST_SIMILARITY)
-    hint = f'did you mean "{near[0]}"?' if near else None
+    hint = did_you_mean(key, known, likeness=_LEAST_SIMILARITY)
     expected = "one of " + ", ".join([*known][:_MOST_LISTED]) + (", ..." if len(known) > _MOST_LISTED else "")
     return CampaignError("unknown key", found=f'"{key}"', expected=expected, hint=hint)
 
@@ -113,8 +111,7 @@ def check_tables(
         UnitError: a quantity without a unit, or with one that does not fit.
     """
     try:
-        checked: T = _adapter(cast(Hashable, schema)).validate_python(tables)
-        return checked
+        return cast(T, _adapter(cast(Hashable, schema)).validate_python(tables))
     except ValidationError as error:
         # a mistyped key is missing and unknown: the latter says more
         details = sorted(error.errors(include_url=False), key=lambda detail: detail["type"] != _UNKNOWN)

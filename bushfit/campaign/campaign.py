@@ -85,17 +85,16 @@ def load_campaign(path: str | Path) -> Campaign:
 
 def _refuse_tests(path: Path) -> None:
     """Raise a CampaignError where a test file or a folder was given in place of a campaign."""
-    if not (path.is_dir() or (path.suffix.lower() in TEST_FILES and path.exists())):
-        return
-    files = path / "*.csv" if path.is_dir() else path
-    raise CampaignError(
-        "a campaign is needed",
-        file=path,
-        found="a folder" if path.is_dir() else "a test file",
-        expected="a .toml file that names the bushing and its tests",
-        hint=f'bushfit init {files} --inner-radius "10 mm" --outer-radius "18 mm" --length "34 mm" makes one, with '
-        "the sizes of your rubber",
-    )
+    if path.is_dir() or (path.suffix.lower() in TEST_FILES and path.exists()):
+        files, found = (path / "*.csv", "a folder") if path.is_dir() else (path, "a test file")
+        raise CampaignError(
+            "a campaign is needed",
+            file=path,
+            found=found,
+            expected="a .toml file that names the bushing and its tests",
+            hint=f'bushfit init {files} --inner-radius "10 mm" --outer-radius "18 mm" --length "34 mm" makes one, with '
+            "the sizes of your rubber",
+        )
 
 
 def reader_keywords(campaign: Path, tests: Sequence[LoopFile | SweepFile]) -> Iterator[dict[str, Any]]:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo
+from pydantic import BeforeValidator, ConfigDict, Field
 
-from bushfit.errors import BushfitError, CampaignError
+from bushfit.errors import CampaignError, naming
 from bushfit.geometry import Direction
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
 from bushfit.reading.layout import FileFormat
@@ -43,20 +43,20 @@ def _si(*units: str) -> BeforeValidator:
     return converted(lambda raw, _: quantity(raw, *units))
 
 
-def _displacement(raw: object, info: ValidationInfo) -> float:
-    """A displacement [m], or a rotation [rad] in a table whose direction is a rotation."""
-    return quantity(raw, info.data.get("direction", Direction.AXIAL).motion.displacement_unit)
+def _motion(per: str = "") -> BeforeValidator:
+    """A validator as `_si("m")`, but for [rad] in a table whose direction is a rotation; with "/s" for a speed."""
+    return converted(
+        lambda raw, info: quantity(raw, info.data.get("direction", Direction.AXIAL).motion.displacement_unit + per)
+    )
 
 
-def _speed(raw: object, info: ValidationInfo) -> float:
-    """A speed [m/s], or [rad/s] in a table whose direction is a rotation."""
-    return quantity(raw, info.data.get("direction", Direction.AXIAL).motion.displacement_unit + "/s")
+def _table(convert: Callable[[dict[str, Any]], Any]) -> BeforeValidator:
+    """A validator that converts a table; what is none it leaves to pydantic."""
+    return converted(lambda raw, _: convert(raw) if isinstance(raw, dict) else raw)
 
 
-def _frequencies(raw: object, _: ValidationInfo) -> object:
-    """A list of frequencies as texts; { start, stop, step } becomes one, with both ends."""
-    if not isinstance(raw, dict):
-        return raw
+def _frequencies(raw: dict[str, Any]) -> list[str]:
+    """A list of frequencies as texts from { start, stop, step }, with both ends."""
     expected = '{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }, or a list such as ["5 Hz", "15 Hz"]'
     if set(raw) != {"start", "stop", "step"}:
         raise CampaignError("this is no range of frequencies", found=str(raw), expected=expected)
@@ -79,35 +79,28 @@ def _parameter_units() -> dict[str, str]:
     }
 
 
-def _parameter(name: str, raw: Any) -> float:
-    """The SI value of a model parameter; ratios, and parameters of added effects, may be plain numbers."""
+def parameter_value(place: str, name: str, raw: Any) -> float:
+    """The SI value of a model parameter by its name in files; an error names the place.
+
+    Ratios, and parameters of added effects, may be plain numbers.
+    """
     units = _parameter_units()
-    if name not in units:
-        raise unknown_key(name, units)
-    is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
-    if is_number and (units[name] == "1" or "." in name) and abs(raw) <= _LARGEST_NUMBER:
-        return float(raw)
-    return quantity(_S_TO_ALPHA.sub("", raw) if name == "m" and isinstance(raw, str) else raw, units[name])
+    with naming(place=place):
+        if name not in units:
+            raise unknown_key(name, units)
+        is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
+        if is_number and (units[name] == "1" or "." in name) and abs(raw) <= _LARGEST_NUMBER:
+            return float(raw)
+        return quantity(_S_TO_ALPHA.sub("", raw) if name == "m" and isinstance(raw, str) else raw, units[name])
 
 
-def parameter_value(place: str, name: str, raw: object) -> float:
-    """The SI value of a model parameter by its name in files; an error names the place."""
-    try:
-        return _parameter(name, raw)
-    except BushfitError as error:
-        error.place = place
-        raise
-
-
-def _parameters(raw: object, _: ValidationInfo) -> object:
+def _parameters(raw: dict[str, Any]) -> dict[str, float]:
     """Values by parameter, in SI."""
-    return {name: parameter_value(name, name, value) for name, value in raw.items()} if isinstance(raw, dict) else raw
+    return {name: parameter_value(name, name, value) for name, value in raw.items()}
 
 
-def _effects(raw: object, _: ValidationInfo) -> object:
+def _effects(raw: dict[str, Any]) -> dict[str, Any]:
     """Values by effect and parameter, in SI."""
-    if not isinstance(raw, dict):
-        return raw
     return {
         effect: {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in table.items()}
         if isinstance(table, dict)
@@ -116,10 +109,8 @@ def _effects(raw: object, _: ValidationInfo) -> object:
     }
 
 
-def _parameter_settings(raw: object, _: ValidationInfo) -> object:
+def _parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
     """Tables of value, min, max and vary by parameter, with the first three in SI."""
-    if not isinstance(raw, dict):
-        return raw
     settings = {}
     for name, table in raw.items():
         if isinstance(table, dict):
@@ -134,10 +125,8 @@ def _parameter_settings(raw: object, _: ValidationInfo) -> object:
     return settings
 
 
-def _fit_table(raw: object, _: ValidationInfo) -> object:
+def _fit_table(raw: dict[str, Any]) -> dict[str, Any]:
     """[fit] with its tables by parameter, such as [fit.mu] or [fit."inertia.mass"], under the key "parameters"."""
-    if not isinstance(raw, dict):
-        return raw
     if "parameters" in raw:
         raise unknown_key("parameters", known_keys(FitSettings))
     settings = {key: value for key, value in raw.items() if key not in _parameter_units()}
@@ -147,20 +136,20 @@ def _fit_table(raw: object, _: ValidationInfo) -> object:
 def _roles(known: Collection[str]) -> BeforeValidator:
     """A validator that refuses other keys than these roles of columns."""
 
-    def check_keys(raw: object, _: ValidationInfo) -> object:
-        for role in raw if isinstance(raw, dict) else ():
+    def check_keys(raw: dict[str, Any]) -> dict[str, Any]:
+        for role in raw:
             if role not in known:
                 raise unknown_key(role, known)
         return raw
 
-    return converted(check_keys)
+    return _table(check_keys)
 
 
 Length = Annotated[float, _si("m"), Field(gt=0)]
 Angle = Annotated[float, _si("rad"), Field(gt=0)]
 Frequency = Annotated[float, _si("Hz"), Field(gt=0)]
-Frequencies = Annotated[tuple[Frequency, ...], _FIRST_ERROR, converted(_frequencies), Field(min_length=1)]
-Displacement = Annotated[float, converted(_displacement), Field(gt=0)]
+Frequencies = Annotated[tuple[Frequency, ...], _FIRST_ERROR, _table(_frequencies), Field(min_length=1)]
+Displacement = Annotated[float, _motion(), Field(gt=0)]
 Share = Annotated[float, _si("1"), Field(ge=0, lt=1)]
 Count = Annotated[int, Field(strict=True, ge=1, le=_LARGEST_COUNT)]
 
@@ -184,7 +173,7 @@ class LoopFile(FileFormat):
     columns: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS)] = field(default_factory=dict)
     units: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS)] = field(default_factory=dict)
     force_sign: Literal[1, -1] = 1
-    rate: Annotated[float, converted(_speed), Field(gt=0)] | None = None
+    rate: Annotated[float, _motion("/s"), Field(gt=0)] | None = None
     frequency: Frequency | None = None
     waveform: Waveform | None = None
     noise: Share | None = None
@@ -236,7 +225,7 @@ class FitSettings:
     dynamic_amplitudes: Annotated[tuple[Annotated[float, _si("m", "rad"), Field(gt=0)], ...], _FIRST_ERROR] = ()
     residuals: Residuals = "complex"
     loss: Loss = "linear"
-    parameters: Annotated[Mapping[str, ParameterSetting], converted(_parameter_settings)] = field(
+    parameters: Annotated[Mapping[str, ParameterSetting], _table(_parameter_settings)] = field(
         default_factory=dict, metadata=standing_in_table(_parameter_units)
     )
 
@@ -287,8 +276,8 @@ class SimulateSettings:
         loops, sweeps: the tests; empty for the rig's own choice.
     """
 
-    parameters: Annotated[Mapping[str, float], converted(_parameters)] = field(default_factory=dict)
-    effects: Annotated[Mapping[str, Mapping[str, float]], converted(_effects)] = field(default_factory=dict)
+    parameters: Annotated[Mapping[str, float], _table(_parameters)] = field(default_factory=dict)
+    effects: Annotated[Mapping[str, Mapping[str, float]], _table(_effects)] = field(default_factory=dict)
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
     repeats: Count = 1
     noise: Share = 0.0
@@ -310,6 +299,6 @@ class CampaignFile:
     name: Name | None = None
     loops: tuple[LoopFile, ...] = ()
     sweeps: tuple[SweepFile, ...] = ()
-    fit: Annotated[FitSettings, converted(_fit_table)] = field(default_factory=FitSettings)
+    fit: Annotated[FitSettings, _table(_fit_table)] = field(default_factory=FitSettings)
     predict: PredictSettings = field(default_factory=PredictSettings)
     simulate: SimulateSettings | None = None

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from bushfit.errors import CampaignError
-from bushfit.reading.files import read_utf8
+from bushfit.reading.files import line_of, read_utf8
 from bushfit.validation import check_tables
 
 T = TypeVar("T")
@@ -38,11 +38,11 @@ def read_toml(path: Path, schema: type[T], *, what: str = "a campaign file", lar
 def _parse(path: Path, what: str, largest: int) -> dict[str, Any]:
     data = read_utf8(path, CampaignError, largest=largest, hint=f"give {what}, not a measurement")
     if chain := _DEEP_KEY.search(data):
-        line = data.count(b"\n", 0, chain.start()) + 1
-        raise _too_deep(path, f"line {line}")
+        raise _too_deep(path, line_of(data, chain.start()))
     try:
         tables = tomllib.loads(data.decode("utf-8-sig"))
         repr(tables)  # an error may have to quote any part of it
+        return tables
     except ValueError as error:
         reason = re.fullmatch(r"(?P<problem>.*) \(at (?P<place>.*)\)", str(error), re.DOTALL)
         raise CampaignError(
@@ -54,12 +54,14 @@ def _parse(path: Path, what: str, largest: int) -> dict[str, Any]:
             hint="put texts and quantities in quotes",
         ) from error
     except RecursionError:
-        tables = None
-    if tables is None:  # outside of `except`: an error of a thousand frames cannot be pickled
-        raise _too_deep(path, None)
-    return tables
+        pass
+    raise _too_deep(path, None)  # outside of `except`: an error of a thousand frames cannot be pickled
 
 
 def _too_deep(file: Path, place: str | None) -> CampaignError:
-    expected = "keys of a few parts, such as simulate.effects.inertia.mass"
-    return CampaignError("the tables are nested too deeply", file=file, place=place, expected=expected)
+    return CampaignError(
+        "the tables are nested too deeply",
+        file=file,
+        place=place,
+        expected="keys of a few parts, such as simulate.effects.inertia.mass",
+    )

@@ -72,13 +72,11 @@ class Channel(NamedTuple):
 
 def odd_channels(history: Loop) -> Iterator[str]:
     """A sentence for each fault in the channels of a loop or a raw history."""
-    names = history.direction.motion.words
-    units = history.direction.display
+    names, units = history.direction.motion.words, history.direction.display
     motion = Channel(names[0], *units.displacement, history.displacement)
     force = Channel(names[1], *units.force, history.force)
-    still = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
     yield from _gaps(history.time) if history.timed else _jumps(motion, history.time)
-    yield from _stuck(motion, force, still)
+    yield from _stuck(motion, force)
     for channel in (motion, force):
         yield from _cut_off(channel)
         yield from _outliers(channel, history.time)
@@ -113,13 +111,9 @@ def _jumps(motion: Channel, time: Floats) -> Iterator[str]:
         )
 
 
-def _stuck(motion: Channel, force: Channel, still: Flags) -> Iterator[str]:
-    """A sentence on rows in which the recorder stood still though the motion went on.
-
-    Args:
-        motion, force: the channels, n rows.
-        still: which rows the next one repeats, (n - 1,).
-    """
+def _stuck(motion: Channel, force: Channel) -> Iterator[str]:
+    """A sentence on rows in which the recorder stood still though the motion went on."""
+    still = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], still.astype(np.int8), [0]))))
     starts, ends = edges[::2], edges[1::2]
     moved = np.zeros(starts.size)

@@ -25,13 +25,15 @@ _MOST_LISTED = 4
 
 def labelled(file: Path, expected: str) -> list[tuple[str, float]]:
     """The quantities in a file's name whose unit has the dimension of `expected`: as a text, and in SI."""
-    found = []
-    for number, unit in _LABEL.findall(file.stem):
-        unit = _UNIT_SPELLINGS.get(unit.lower(), unit.lower())
-        if units.agrees(unit, expected):
-            value = float(re.sub("[,p]", ".", number))
-            found.append((f"{value:g} {unit}", value * units.factor(unit, expected)))
-    return found
+    found = [
+        (float(re.sub("[,p]", ".", number)), _UNIT_SPELLINGS.get(unit.lower(), unit.lower()))
+        for number, unit in _LABEL.findall(file.stem)
+    ]
+    return [
+        (f"{value:g} {unit}", value * units.factor(unit, expected))
+        for value, unit in found
+        if units.agrees(unit, expected)
+    ]
 
 
 def wrong_labels(

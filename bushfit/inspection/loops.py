@@ -44,13 +44,13 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
     (length, to_length), half_force = units.displacement, np.ptp(loop.force) / 2.0
     force, to_force = for_people(*units.force, float(half_force))
     names = loop.direction.motion.words
-    rows = loop.time.size / drive.cycles
     half_motion = np.ptp(loop.displacement) / 2.0
     amplitude, mean_motion, mean_force = drive.amplitude, drive.coefficients[0].real, float(drive.force.mean())
     facts = {
         "cycles": f"{drive.cycles:.3g}, {'the first from rest' if drive.from_rest else 'taken as steady'}",
         "frequency": f"{drive.frequency:.4g} Hz, {waveform(drive.coefficients)}",
-        "sampling": f"{clock(loop) if loop.timed else 'no time in the file'}, {rows:.4g} rows a cycle",
+        "sampling": f"{clock(loop) if loop.timed else 'no time in the file'}, "
+        f"{loop.time.size / drive.cycles:.4g} rows a cycle",
         "amplitude": f"{number(to_length * amplitude, 4)} {length} zero-to-peak",
         # as far down as the amplitude is told: what lies below is noise
         f"mean {names[0]}": f"{alike([to_length * amplitude, to_length * mean_motion], 4)[1]} {length}",

@@ -205,11 +205,10 @@ def _written(table: Table) -> dict[str, str]:
     if sheet:
         written = {"sheet": sheet, "header": f"row {layout.header_line}"}
     else:
-        mark = "comma" if table.numerals.decimal == "," else "point"
         written = {
             "encoding": table.source.encoding or "UTF-8",
             "columns parted by": _DELIMITER_NAMES.get(layout.delimiter, layout.delimiter),
-            "decimal mark": mark,
+            "decimal mark": "comma" if table.numerals.decimal == "," else "point",
             "header": f"line {layout.header_line}",
         }
     if table.numerals.thousands:

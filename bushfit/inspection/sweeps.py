@@ -174,8 +174,10 @@ def _odd_blocks(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
         line = linregress(repeat, gain)
         drift = line.slope * np.ptp(repeat)
         if line.pvalue < _DRIFT_P and abs(drift) > _LEAST_DRIFT:
-            share = number(100 * drift, 2, "+")
-            yield f"|K| drifts by {share} % from the first repeat to the last: warming up, or settling?"
+            yield (
+                f"|K| drifts by {number(100 * drift, 2, '+')} % from the first repeat to the last: warming up, or "
+                "settling?"
+            )
 
 
 def _missed(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:

@@ -32,6 +32,9 @@ _LARGEST_BYTES = 10_000_000
 #: Packages that the numbers rest on; a model file records their versions.
 _PACKAGES = ("numpy", "scipy", "lmfit")
 
+#: What JSON calls values that are no object.
+_KINDS = {list: "a list", str: "a text", bool: "true or false", int: "a number", float: "a number"}
+
 Matrix = tuple[tuple[Number, ...], ...]
 
 
@@ -148,7 +151,9 @@ def from_document(document: object, file: Path | None = None) -> Result:
         ModelError: another schema, a key that is missing or of the wrong kind, or values that are no model.
     """
     if not isinstance(document, dict):
-        raise ModelError("not a model", file=file, found=_kind(document), expected="a JSON object { ... }")
+        raise ModelError(
+            "not a model", file=file, found=_KINDS.get(type(document), "null"), expected="a JSON object { ... }"
+        )
     if document.get("schema") != SCHEMA:
         raise ModelError(
             "not a model this version reads",
@@ -298,8 +303,3 @@ def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _no_number(constant: str) -> NoReturn:
     raise ValueError(f"{constant}, which is no number")
-
-
-def _kind(value: object) -> str:
-    kinds = {list: "a list", str: "a text", bool: "true or false", int: "a number", float: "a number"}
-    return kinds.get(type(value), "null")

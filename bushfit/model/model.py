@@ -147,13 +147,8 @@ class Model:
 
     def without(self, level: Level) -> Model:
         """The model without the effects of a level."""
-        kept = [effect for effect in self.records if effect.level is not level]
-        names = {qualified(effect, parameter) for effect in kept for parameter in effect.parameters}
-        return Model(
-            self.bushing,
-            tuple(effect.name for effect in kept),
-            {name: value for name, value in self.values.items() if name in names},
-        )
+        kept = [effect.name for effect in self.records if effect.level is not level]
+        return Model.started(self.bushing, kept, self.values)
 
     def equation(self) -> str:
         """The model as text: the formula of its first-harmonic stiffness, other effects, and values in common units."""

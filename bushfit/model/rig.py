@@ -65,8 +65,7 @@ def record(
         The springpot is a Gruenwald-Letnikov sum, which is first order in the time step.
     """
     step = 1.0 / (frequency * steps_per_cycle)
-    count = (run_in + cycles) * steps_per_cycle + 1
-    index = np.arange(count)
+    index = np.arange((run_in + cycles) * steps_per_cycle + 1)
     motion = amplitude * wave(waveform, index / steps_per_cycle)
     history = History(motion, step, periodic=False, frequency=frequency)
     force = model.force(direction, history, kind=kind)

@@ -24,10 +24,9 @@ from bushfit.model.model import Kind, Model, seen_by
 #: chosen: the differences are good to about a millionth.
 _RELATIVE_STEP = 1e-6
 
-#: Gives the analytic derivatives of a branch at a test by its parameters' short names; None where it has none.
-Slopes = Callable[[Branch], dict[str, Array] | None]
-#: Gives the response of a branch at a test for any values.
-Response = Callable[[Branch, Values], Array]
+#: Gives the response of a branch by values and test, and its analytic derivatives by its parameters' short names; None
+#: in their place where it has none.
+Face = Callable[[Branch], tuple[Callable[..., Array], Callable[..., dict[str, Array]] | None]]
 
 
 def stiffness_jacobian(
@@ -49,16 +48,9 @@ def stiffness_jacobian(
         )
     omega = 2.0 * np.pi * frequency
     strain = amplitude * model.bushing.unit_strain(direction)
-
-    def slopes(branch: Branch) -> dict[str, Array] | None:
-        known = branch.modulus_sensitivities
-        return known(seen_by(branch, model.values, model.values), omega, strain) if known else None
-
-    def response(branch: Branch, values: Values) -> Array:
-        return branch.modulus(seen_by(branch, values, values), omega, strain)
-
-    summed = _summed(model, names, slopes, response, frequency.size, complex)
-    return model.bushing.stiffness_per_modulus(direction) * summed
+    total = np.zeros((len(names), frequency.size), dtype=complex)
+    _add(total, model, names, lambda branch: (branch.modulus, branch.modulus_sensitivities), (omega, strain))
+    return model.bushing.stiffness_per_modulus(direction) * total
 
 
 def force_jacobian(
@@ -76,24 +68,18 @@ def force_jacobian(
     if not model.only_branches:
         return differences(model, names, lambda values: model.force(direction, displacement, kind=kind, values=values))
     per_displacement = model.bushing.unit_strain(direction)
-    strain = displacement.scaled(per_displacement)
+    test = (displacement.scaled(per_displacement),)
+    total = np.zeros((len(names), displacement.value.shape[-1]))
+    _add(total, model, names, lambda branch: (branch.stress, branch.stress_sensitivities), test)
+    return model.bushing.stiffness_per_modulus(direction) / (2.0 * per_displacement) * total
 
-    def slopes(branch: Branch) -> dict[str, Array] | None:
-        known = branch.stress_sensitivities
-        return known(seen_by(branch, model.values, model.values), strain) if known else None
+
+def _add(total: Array, model: Model, names: Sequence[str], face: Face, test: tuple[object, ...]) -> None:
+    """Add the derivatives of all branches by parameters to `total`, (len(names), n); `test` follows the values."""
 
     def response(branch: Branch, values: Values) -> Array:
-        return branch.stress(seen_by(branch, values, values), strain)
+        return face(branch)[0](seen_by(branch, values, values), *test)
 
-    summed = _summed(model, names, slopes, response, displacement.value.shape[-1], float)
-    return model.bushing.stiffness_per_modulus(direction) / (2.0 * per_displacement) * summed
-
-
-def _summed(
-    model: Model, names: Sequence[str], slopes: Slopes, response: Response, size: int, kind: type[float] | type[complex]
-) -> Array:
-    """Sum of the derivatives of all branches by parameters, (len(names), size)."""
-    total = np.zeros((len(names), size), dtype=kind)
     row = {name: i for i, name in enumerate(names)}
     for branch in model.records:
         assert isinstance(branch, Branch)
@@ -101,15 +87,13 @@ def _summed(
         moved = [name for name in (*own.values(), *branch.uses) if name in row]
         if not moved:
             continue
-        known = slopes(branch)
-        if known is None:
-            for name, slope in zip(moved, differences(model, moved, partial(response, branch)), strict=True):
-                total[row[name]] += slope
+        if sensitivities := face(branch)[1]:
+            known = sensitivities(seen_by(branch, model.values, model.values), *test)
+            slopes = {name: known[short] for short, name in own.items() if name in row}
         else:
-            for short, name in own.items():
-                if name in row:
-                    total[row[name]] += known[short]
-    return total
+            slopes = dict(zip(moved, differences(model, moved, partial(response, branch)), strict=True))
+        for name, slope in slopes.items():
+            total[row[name]] += slope
 
 
 def differences(model: Model, names: Sequence[str], respond: Callable[[Values], Array]) -> Array:

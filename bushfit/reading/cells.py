@@ -68,10 +68,9 @@ class Cells:
     def place(self, line: int | None, column: Column | None) -> str | None:
         """A place in the file in words: its sheet, line and column, as far as there are such."""
         sheet = self.source.sheet
-        row = "row" if sheet else "line"
         parts = [
             f'sheet "{sheet}"' if sheet else None,
-            f"{row} {line}" if line else None,
+            f"{'row' if sheet else 'line'} {line}" if line else None,
             f'column "{column.header}"' if column else None,
         ]
         return ", ".join(part for part in parts if part) or None

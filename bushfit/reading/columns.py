@@ -10,7 +10,6 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from bushfit.errors import MeasurementError
 from bushfit.reading.cells import Cells
 from bushfit.reading.headers import Column
 from bushfit.reading.layout import fits
@@ -50,13 +49,12 @@ class Columns(Cells):
             evidence = weigh(self._texts(), ways, all_cells=True)
         if evidence.contrary:
             (line, index), text = evidence.contrary
-            mark = "comma" if evidence.ways[0].decimal == "," else "point"
             raise self.error(
                 "this number is written in another way than those before it",
                 line=line,
                 column=self._column_at(index),
                 found=f'"{text}"',
-                expected=f"numbers with a decimal {mark}",
+                expected=f"numbers with a decimal {'comma' if evidence.ways[0].decimal == ',' else 'point'}",
                 hint='write all numbers in one way, or state decimal = "..." and thousands = "..." in the campaign',
             )
         if evidence.unclear:
@@ -79,9 +77,7 @@ class Columns(Cells):
             MeasurementError: a row of another length, a cell that is no finite number, numbers that can be read in two
                 ways, or too few rows.
         """
-        values = self._by_library(wanted)
-        if values is None:
-            values = self._row_by_row(wanted)
+        values = self._by_library(wanted) or self._row_by_row(wanted)
         found = len(next(iter(values.values())))
         if found < fewest_rows:
             raise self.error("too few rows", found=f"{found}", expected=f"at least {fewest_rows}")
@@ -97,8 +93,9 @@ class Columns(Cells):
         """
         if bad.any():
             line, cells = next(islice(self.rows(), int(np.argmax(bad)), None))
-            found = f'"{cells[column.index]}"'
-            raise self.error(problem, line=line, column=column, found=found, expected=expected, hint=hint)
+            raise self.error(
+                problem, line=line, column=column, found=f'"{cells[column.index]}"', expected=expected, hint=hint
+            )
 
     def _open_ways(self) -> tuple[Numerals, ...]:
         """The ways to write numbers that the user leaves open."""
@@ -151,37 +148,30 @@ class Columns(Cells):
         while chunk := list(islice(remaining, _CHUNK_ROWS)):
             for line, cells in chunk:
                 if not fits(cells, width):
-                    raise self._mismatch(line, len(cells))
+                    wider = len(cells) > width
+                    raise self.error(
+                        "the row does not match the header",
+                        line=line,
+                        found=f"{len(cells)} cell" + "s" * (len(cells) != 1),
+                        expected=f"{width} cells",
+                        hint="part the columns by semicolons where numbers have a decimal comma" if wider else None,
+                    )
             for role, column in wanted.items():
                 numbers = [self._number(cells[column.index], column) for _, cells in chunk]
                 if None in numbers:
                     line, cells = chunk[numbers.index(None)]
-                    raise self._no_number(line, column, cells[column.index])
+                    cell = cells[column.index]
+                    raise self.error(
+                        "the cell is empty" if cell == "" else "this is no finite number",
+                        line=line,
+                        column=column,
+                        found=f'"{cell}"',
+                        expected=f"a number such as 12{self.numerals.decimal}5",
+                    )
                 parts[role].append(np.array(numbers, dtype=float))
         return {role: np.concatenate(chunks) for role, chunks in parts.items()}
 
     def _number(self, cell: str | float, column: Column) -> float | None:
         """The number in a cell in SI; None where it holds none, or one beyond LARGEST_VALUE."""
         number = self.numerals.value(cell) if isinstance(cell, str) else cell
-        if number is None or not abs(number * column.scale) <= LARGEST_VALUE:
-            return None
-        return number * column.scale
-
-    def _mismatch(self, line: int, found: int) -> MeasurementError:
-        width = len(self.headers)
-        return self.error(
-            "the row does not match the header",
-            line=line,
-            found=f"{found} cell" + "s" * (found != 1),
-            expected=f"{width} cells",
-            hint="part the columns by semicolons where numbers have a decimal comma" if found > width else None,
-        )
-
-    def _no_number(self, line: int, column: Column, cell: str | float) -> MeasurementError:
-        return self.error(
-            "the cell is empty" if cell == "" else "this is no finite number",
-            line=line,
-            column=column,
-            found=f'"{cell}"',
-            expected=f"a number such as 12{self.numerals.decimal}5",
-        )
+        return None if number is None or not abs(number * column.scale) <= LARGEST_VALUE else number * column.scale

@@ -71,8 +71,7 @@ def raw_loop_table(loop: Loop) -> pd.DataFrame:
     """A loop as a rig writes it: time, displacement and force in the units of engineers."""
     import pandas as pd
 
-    units = loop.direction.display
-    (length, length_factor), (force, force_factor) = units.displacement, units.force
+    (length, length_factor), (force, force_factor), _ = loop.direction.display
     return pd.DataFrame(
         {
             "time [s]": loop.time,
@@ -86,8 +85,7 @@ def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
     """A sweep as a rig writes it: frequency, amplitude, repeat, stiffness and loss factor in the units of engineers."""
     import pandas as pd
 
-    units = sweep.direction.display
-    (length, length_factor), (stiffness, factor) = units.displacement, units.stiffness
+    (length, length_factor), _, (stiffness, factor) = sweep.direction.display
     return pd.DataFrame(
         {
             "frequency [Hz]": sweep.frequency,

@@ -27,11 +27,9 @@ _WORD_STARTS = {
 
 def named_direction(texts: Iterable[str]) -> Direction | None:
     """The one direction that texts, such as headers, name; None where they name none or several."""
-    found = set()
-    for text in texts:
-        plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().casefold()
-        for word in re.findall(r"[a-z]+", plain):
-            found |= {direction for start, direction in _WORD_STARTS.items() if word.startswith(start)}
+    plain = unicodedata.normalize("NFKD", " ".join(texts)).encode("ascii", "ignore").decode().casefold()
+    words = re.findall(r"[a-z]+", plain)
+    found = {_WORD_STARTS[start] for start in _WORD_STARTS for word in words if word.startswith(start)}
     return found.pop() if len(found) == 1 else None
 
 
@@ -43,6 +41,4 @@ def direction_of_file(file: Path, headers: Iterable[str], *, turns: bool) -> Dir
         headers: of its columns; they count where the name says nothing.
         turns: whether the displacement is in units of angle, which means torsion whatever the words.
     """
-    if turns:
-        return Direction.TORSION
-    return named_direction([file.stem]) or named_direction(headers)
+    return Direction.TORSION if turns else named_direction([file.stem]) or named_direction(headers)

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from bushfit.errors import MeasurementError
-from bushfit.reading.files import Bytes
+from bushfit.reading.files import Bytes, line_of, not_utf8
 from bushfit.reading.parallel import by_chunks
 
 #: Byte order marks, and Python's name of the encoding that each tells. UTF-32's begins with UTF-16's.
@@ -57,7 +57,7 @@ def to_utf8(data: Bytes, file: Path, stated: str | None = None) -> tuple[Bytes, 
     encoding = stated or detect(data)
     if encoding in ("utf-8", "utf-8-sig"):
         without_mark = data.removeprefix(codecs.BOM_UTF8)
-        if (bad := _not_utf8(without_mark)) is None:
+        if (bad := not_utf8(without_mark)) is None:
             return without_mark, "utf-8"
         raise _undecodable(data, file, bad, "utf-8")
     try:
@@ -90,7 +90,7 @@ def detect(data: bytes) -> str:
         if max(even, odd) > _LEAST_ZERO_SHARE * len(head) / 2 and min(even, odd) == 0:
             return "utf-16-le" if odd else "utf-16-be"
         return "utf-8"
-    if _not_utf8(data) is None:
+    if not_utf8(data) is None:
         return "utf-8"
     runs = _HIGH_RUN.findall(data)[:_MOST_RUNS]
     chinese = sum(_COMMON_CHINESE.fullmatch(run) is not None for run in runs)
@@ -103,26 +103,12 @@ def detect(data: bytes) -> str:
     return "latin-1"
 
 
-def _not_utf8(data: bytes) -> int | None:
-    """Index of the first byte that no text in UTF-8 has there; None where there is none."""
-    if (zero := data.find(0)) >= 0:
-        return zero
-    decoder = codecs.getincrementaldecoder("utf-8")()
-    for start in range(0, len(data), _CHUNK_BYTES):
-        try:
-            decoder.decode(data[start : start + _CHUNK_BYTES], final=start + _CHUNK_BYTES >= len(data))
-        except UnicodeDecodeError as error:
-            return min(start + error.start, len(data) - 1)
-    return None
-
-
 def _undecodable(data: bytes, file: Path, bad: int, encoding: str) -> MeasurementError:
     """The error for a byte, by its index, that a text in this encoding does not have."""
-    line = data.count(b"\n", 0, bad) + 1
     return MeasurementError(
         "this is not text" if data[bad] == 0 else f"this is not {encoding.upper()} text",
         file=file,
-        place=f"line {line}",
+        place=line_of(data, bad),
         found=f"byte 0x{data[bad]:02x}",
         expected="a table as text (UTF-8, UTF-16, Latin-1 or GB18030), or an xlsx workbook",
         hint='export it as "CSV UTF-8", or state encoding = "..." in the campaign',

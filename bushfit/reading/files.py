@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import codecs
 import hashlib
 import mmap
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from difflib import get_close_matches
 from pathlib import Path
 from typing import TypeVar
 
-from bushfit.errors import BushfitError
+from bushfit.errors import BushfitError, did_you_mean
 
 #: Bytes of the largest file that is read: ten times a loop of 10 million rows.
 _LARGEST_BYTES = 4 << 30
@@ -19,6 +19,8 @@ _LARGEST_BYTES = 4 << 30
 _MAPPED_BYTES = 1 << 22
 #: Bytes at the start of a file in which anything but blanks is looked for first; chosen: nearly every file has some.
 _HEAD_BYTES = 1 << 16
+#: Bytes that are decoded at a time; chosen: few enough to be held beside the file, enough to be fast.
+_CHUNK_BYTES = 1 << 22
 
 #: The bytes of a file: copied, or where the system keeps those of a large one.
 Bytes = bytes | mmap.mmap
@@ -92,40 +94,46 @@ def read_utf8(
         kind: as `read_bytes`, or the file is not UTF-8 text.
     """
     data = read_bytes(file, kind, largest=largest, hint=hint)
-    _check_utf8(data, file, kind)
+    if (bad := not_utf8(data)) is not None:
+        raise kind(
+            "the file is not UTF-8 text",
+            file=file,
+            place=line_of(data, bad),
+            found=f"byte 0x{data[bad]:02x}",
+            expected="text in UTF-8, with or without byte order mark",
+            hint="save it as UTF-8, or convert it: iconv -f LATIN1 -t UTF-8 old > new",
+        )
     return data
 
 
 def _missing(file: Path, kind: type[BushfitError]) -> BushfitError:
     """The error for a file that is not there, with the name beside it that is most alike."""
     siblings = [path.name for path in file.parent.iterdir()] if file.parent.is_dir() else []
-    near = get_close_matches(file.name, siblings, n=1)
     return kind(
         "there is no such file",
         file=file,
         expected="an existing file; a relative path counts from the folder of the file that names it",
-        hint=f'did you mean "{near[0]}"?' if near else "check the path for a typing error",
+        hint=did_you_mean(file.name, siblings) or "check the path for a typing error",
     )
 
 
-def _check_utf8(data: bytes, file: Path, kind: type[BushfitError]) -> None:
-    """Refuse bytes that are no text in UTF-8, naming the line of the first."""
-    bad = data.find(b"\0")
-    if bad < 0 and not data.isascii():
+def not_utf8(data: bytes) -> int | None:
+    """Index of the first byte that no text in UTF-8 has there; None where there is none."""
+    if (zero := data.find(0)) >= 0:
+        return zero
+    decoder = codecs.getincrementaldecoder("utf-8")()
+    for start in range(0, len(data), _CHUNK_BYTES):
         try:
-            data.decode("utf-8")
+            decoder.decode(data[start : start + _CHUNK_BYTES], final=start + _CHUNK_BYTES >= len(data))
         except UnicodeDecodeError as error:
-            bad = error.start
-    if bad >= 0:
-        line = data.count(b"\n", 0, bad) + 1
-        raise kind(
-            "the file is not UTF-8 text",
-            file=file,
-            place=f"line {line}",
-            found=f"byte 0x{data[bad]:02x}",
-            expected="text in UTF-8, with or without byte order mark",
-            hint="save it as UTF-8, or convert it: iconv -f LATIN1 -t UTF-8 old > new",
-        )
+            return min(start + error.start, len(data) - 1)
+    return None
+
+
+def line_of(data: bytes, index: int) -> str:
+    """The line of a byte in words, from 1."""
+    number = data.count(b"\n", 0, index) + 1
+    return f"line {number}"
 
 
 def sha256(data: Bytes) -> Future[str]:

@@ -189,10 +189,14 @@ def _header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
 
 def _is_followed(lines: Sequence[Line], header: int, delimiter: str, width: int) -> bool:
     """Whether the first row of numbers below a header has as many cells."""
-    for line in lines[header + 1 : header + 1 + _LINES_BELOW_HEADER]:
-        if not is_comment(line.content, delimiter) and _is_row(cells := split(line.content, delimiter)):
-            return fits(cells, width)
-    return False
+    below = (split(line.content, delimiter) for line in _below(lines, header, delimiter))
+    return next((fits(cells, width) for cells in below if _is_row(cells)), False)
+
+
+def _below(lines: Sequence[Line], header: int, delimiter: str) -> Iterator[Line]:
+    """The lines just below a header that are no comments."""
+    below = lines[header + 1 : header + 1 + _LINES_BELOW_HEADER]
+    return (line for line in below if not is_comment(line.content, delimiter))
 
 
 def _is_row(cells: Sequence[str]) -> bool:
@@ -238,21 +242,16 @@ def _likeliest(
 
 def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence[str]) -> Layout:
     """The layout of a header, with the units row that may follow it."""
-    nothing = ("",) * len(headers)
-    for line in lines[index + 1 : index + 1 + _LINES_BELOW_HEADER]:
-        if is_comment(line.content, delimiter):
-            continue
+    units_line, row = None, ("",) * len(headers)
+    if line := next(_below(lines, index, delimiter), None):
         cells = [cell.strip("[]() ") for cell in split(line.content, delimiter)]
         if fits(cells, len(headers)) and _is_units_row(cells):
-            row = tuple(cells[: len(headers)])
-            return Layout(delimiter, tuple(headers), lines[index].number, row, line.number)
-        break
-    return Layout(delimiter, tuple(headers), lines[index].number, nothing, None)
+            units_line, row = line.number, tuple(cells[: len(headers)])
+    return Layout(delimiter, tuple(headers), lines[index].number, row, units_line)
 
 
 def _is_units_row(cells: Sequence[str]) -> bool:
     """Whether no cell is a number and half of the filled cells or more are units; a ratio may have the unit "1"."""
     filled = [split_convention(cell)[0] for cell in cells if cell]
-    if any(is_like_number(cell) and cell != "1" for cell in filled):
-        return False
-    return 0 < len(filled) <= 2 * sum(units.is_unit(cell) for cell in filled)
+    has_numbers = any(is_like_number(cell) and cell != "1" for cell in filled)
+    return not has_numbers and 0 < len(filled) <= 2 * sum(units.is_unit(cell) for cell in filled)

@@ -130,5 +130,4 @@ def _check_increases(table: Table, column: Column, time: Floats) -> None:
     """Refuse a time that does not increase from row to row."""
     after, before = time[1:], time[:-1]
     if any(by_chunks(lambda rows: bool((after[rows] <= before[rows]).any()), after.size)):
-        late = np.append(False, after <= before)
-        table.refuse(late, column, "time does not increase", "a later time on every row")
+        table.refuse(np.append(False, after <= before), column, "time does not increase", "a later time on every row")

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -37,54 +37,15 @@ _SEPARATORS = ("'", "\u2019", "\u00a0", "\u2009", "\u202f")
 _GROUP_BY_BLANK = re.compile(rb"\d \d{3}(?!\d)")
 
 
-class RowSource(Protocol):
-    """A file as rows of cells, with the line or row, from 1, that each stands on."""
-
-    @property
-    def encoding(self) -> str | None:
-        """The encoding of a text; None of a sheet."""
-
-    @property
-    def sheet(self) -> str | None:
-        """The name of a sheet; None of a text."""
-
-    def head(self) -> list[Line]:
-        """The filled lines at its start."""
-
-    def lines(self, after: int) -> Iterator[Line]:
-        """All filled lines after a line."""
-
-    def may_have_comma(self, layout: Layout) -> bool:
-        """Whether cells below the header may have a comma in them."""
-
-    def may_group(self, layout: Layout, decimal: str) -> bool:
-        """Whether numbers below the header may have thousands separators, if `decimal` is their decimal mark."""
-
-    def columns(
-        self, layout: Layout, width: int, scales: Mapping[int, float], numerals: Numerals
-    ) -> dict[int, Floats] | None:
-        """The values of columns, times their scale, if the rows are so tidy that a library reads them.
-
-        Args:
-            layout: where the table lies.
-            width: cells of a row.
-            scales: factors to SI, by the index of the column.
-            numerals: how the numbers are written.
-
-        Returns:
-            Values by the index of the column, each (n,); None where the rows are not tidy, or where a cell holds no
-            number, or one beyond LARGEST_VALUE.
-        """
-
-
 @dataclass(frozen=True, eq=False)
 class Text:
-    """A text as rows.
+    """A text as rows of cells, with the line, from 1, that each stands on.
 
     Args:
         file: where it lies.
         data: its bytes in UTF-8.
         encoding: which they had.
+        sheet: none, unlike a `Sheet`.
     """
 
     file: Path
@@ -116,16 +77,27 @@ class Text:
     def may_group(self, layout: Layout, decimal: str) -> bool:
         """Whether numbers below the header may have thousands separators, if `decimal` is their decimal mark."""
         offset = self._offset(layout.lines_before_data)
-        if self.may_have_comma(layout) if decimal == "." else self._has(".", offset):
-            return True
-        if any(self._has(sign, offset) for sign in _SEPARATORS):
-            return True
-        return layout.delimiter != " " and self._has(" ", offset) and bool(_GROUP_BY_BLANK.search(self.data, offset))
+        return (
+            (self.may_have_comma(layout) if decimal == "." else self._has(".", offset))
+            or any(self._has(sign, offset) for sign in _SEPARATORS)
+            or (layout.delimiter != " " and self._has(" ", offset) and bool(_GROUP_BY_BLANK.search(self.data, offset)))
+        )
 
     def columns(
         self, layout: Layout, width: int, scales: Mapping[int, float], numerals: Numerals
     ) -> dict[int, Floats] | None:
-        """The values of columns, times their scale, if the rows are so tidy that pandas reads them; see `RowSource`."""
+        """The values of columns, times their scale, if the rows are so tidy that pandas reads them.
+
+        Args:
+            layout: where the table lies.
+            width: cells of a row.
+            scales: factors to SI, by the index of the column.
+            numerals: how the numbers are written.
+
+        Returns:
+            Values by the index of the column, each (n,); None where the rows are not tidy, or where a cell holds no
+            number, or one beyond LARGEST_VALUE.
+        """
         frame = self._frame(layout, width, set(scales), numerals)
         if frame is None:
             return None
@@ -215,11 +187,12 @@ def _lines(data: io.BytesIO | io.BufferedReader, after: int) -> Iterator[Line]:
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """A sheet of a workbook as rows.
+    """A sheet of a workbook as rows of cells; it answers what a `Text` does.
 
     Args:
         sheet: its name.
         content: its rows of texts and numbers, "" where a cell is empty.
+        encoding: none, unlike a `Text`.
     """
 
     sheet: str
@@ -244,8 +217,13 @@ class Sheet:
         """Whether cells may be texts with thousands separators."""
         return True
 
-    def columns(self, *_: object) -> None:
+    def columns(self, *_: object) -> dict[int, Floats] | None:
         """None: no library is needed where cells come apart by themselves."""
+        return None
+
+
+#: The rows of a test file.
+RowSource = Text | Sheet
 
 
 def rows(source: RowSource, layout: Layout) -> Iterator[tuple[int, Sequence[str | float]]]:

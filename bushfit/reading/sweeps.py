@@ -102,9 +102,14 @@ def _sweep_columns(table: Table, direction: Direction, pair: tuple[str, str]) ->
     Beside those that are needed, the pairs that say the same are read, if their units fit.
     """
     length, stiffness = direction.motion.displacement_unit, direction.motion.stiffness_unit
-    si = {"frequency": "Hz", "amplitude": length, "amplitude_reached": length, "phase": "rad"}
-    si |= {"loss_factor": "1", "repeat": "1"}
-    units = {role: si.get(role, stiffness) for role in SWEEP_COLUMNS}
+    units = dict.fromkeys(SWEEP_COLUMNS, stiffness) | {
+        "frequency": "Hz",
+        "amplitude": length,
+        "amplitude_reached": length,
+        "phase": "rad",
+        "loss_factor": "1",
+        "repeat": "1",
+    }
     optional = [role for role in ("amplitude_reached", "repeat") if role in table.roles]
     again = [role for other in STIFFNESS_PAIRS if set(other) <= set(table.roles) for role in other]
     again = [role for role in again if units[role] == "1" or table.agrees(role, units[role])]
@@ -115,8 +120,12 @@ def _check_positive(table: Table, wanted: Mapping[str, Column], values: Mapping[
     """Refuse a column of _POSITIVE with a value that is not."""
     for role in _POSITIVE:
         if role in values:
-            problem = f"the {role.replace('_', ' ')} is not positive"
-            table.refuse(values[role] <= 0.0, wanted[role], problem, "a number above zero")
+            table.refuse(
+                values[role] <= 0.0,
+                wanted[role],
+                f"the {role.replace('_', ' ')} is not positive",
+                "a number above zero",
+            )
 
 
 def _check_loss(table: Table, column: Column, loss_factor: Floats) -> None:

@@ -10,7 +10,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from bushfit import units
-from bushfit.errors import MeasurementError, NoColumnError, UnitError
+from bushfit.errors import MeasurementError, NoColumnError, UnitError, naming
 from bushfit.reading.columns import Columns
 from bushfit.reading.files import Bytes, sha256, view_bytes
 from bushfit.reading.headers import Column, Heading, Vocabulary, split_convention
@@ -104,11 +104,8 @@ class Table(Columns):
                 hint=f'write "{column.header} [{example}]" in the header, '
                 f'or units = {{ {role} = "{example}" }} in the campaign',
             )
-        try:
+        with naming(self.file, self.place(self.layout.header_line, column)):
             return replace(column, scale=units.factor(column.unit or "1", expected))
-        except UnitError as error:
-            error.file, error.place = self.file, self.place(self.layout.header_line, column)
-            raise
 
     def agrees(self, role: str, expected: str) -> bool:
         """Whether a role has a column with a unit of the dimension of `expected`."""
@@ -185,16 +182,15 @@ class Table(Columns):
 
     def _no_column(self, role: str, named: str) -> MeasurementError:
         """The error for a role whose column was named by a header that is not there."""
-        near = get_close_matches(named, self.headers, n=1, cutoff=_ALIKE)
-        header = near[0] if near else "..."
+        near = next(iter(get_close_matches(named, self.headers, n=1, cutoff=_ALIKE)), None)
         return self.error(
             f'there is no column "{named}"',
             kind=NoColumnError,
             line=self.layout.header_line,
             found=", ".join(self.headers),
             expected=f"the header that was named for the {_label(role)}",
-            hint=(f'did you mean "{near[0]}"? ' if near else "name one of this file: ")
-            + f'columns = {{ {role} = "{header}" }} in the campaign',
+            hint=(f'did you mean "{near}"? ' if near else "name one of this file: ")
+            + f'columns = {{ {role} = "{near or "..."}" }} in the campaign',
         )
 
 

@@ -10,11 +10,11 @@ import re
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
-from difflib import get_close_matches
+from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bushfit.errors import MeasurementError
+from bushfit.errors import MeasurementError, did_you_mean
 from bushfit.reading.files import Bytes
 from bushfit.reading.source import Sheet
 
@@ -65,7 +65,14 @@ def open_sheet(data: bytes, file: Path, name: str | None, is_usable: Callable[[S
         book = calamine.load_workbook(io.BytesIO(data))
         if name is not None:
             if name not in book.sheet_names:
-                raise _no_such_sheet(book.sheet_names, name, file)
+                names = book.sheet_names
+                raise MeasurementError(
+                    "there is no such sheet",
+                    file=file,
+                    found=f'"{name}"',
+                    expected=_listed(names),
+                    hint=did_you_mean(name, names),
+                )
             return _sheet(book, name)
         visible = [sheet.name for sheet in book.sheets_metadata if sheet.visible == calamine.SheetVisibleEnum.Visible]
         sheets = [_sheet(book, name) for name in visible or book.sheet_names]
@@ -95,17 +102,6 @@ def _cell(value: object) -> str | float:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
     return " ".join(str(value).split())
-
-
-def _no_such_sheet(names: Sequence[str], name: str, file: Path) -> MeasurementError:
-    near = get_close_matches(name, names, n=1)
-    return MeasurementError(
-        "there is no such sheet",
-        file=file,
-        found=f'"{name}"',
-        expected=_listed(names),
-        hint=f'did you mean "{near[0]}"?' if near else None,
-    )
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -156,7 +152,4 @@ def _extent(archive: zipfile.ZipFile, part: zipfile.ZipInfo) -> int:
 
 def _column(letters: bytes) -> int:
     """Number of a column, from 1, by its letters."""
-    number = 0
-    for letter in letters:
-        number = 26 * number + letter - 64
-    return number
+    return reduce(lambda number, letter: 26 * number + letter - 64, letters, 0)

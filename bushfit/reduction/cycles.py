@@ -131,12 +131,12 @@ class Cycles:
         once, twice, wave = summed(turn), summed(turn * turn), summed(values[rows] * turn)
         size, total = count.astype(float), summed(values[rows])
         # unknowns: mean, cosine and negative sine; turn = cosine - i sine
-        gram = np.empty((count.size, 3, 3))
-        gram[:, 0, 0] = size
-        gram[:, 0, 1] = gram[:, 1, 0] = once.real
-        gram[:, 0, 2] = gram[:, 2, 0] = once.imag
-        gram[:, 1, 1], gram[:, 2, 2] = (size + twice.real) / 2.0, (size - twice.real) / 2.0
-        gram[:, 1, 2] = gram[:, 2, 1] = twice.imag / 2.0
+        rows_of_gram = [
+            [size, once.real, once.imag],
+            [once.real, (size + twice.real) / 2.0, twice.imag / 2.0],
+            [once.imag, twice.imag / 2.0, (size - twice.real) / 2.0],
+        ]
+        gram = np.moveaxis(np.array(rows_of_gram), -1, 0)
         right = np.stack((total, wave.real, wave.imag), axis=1)
         solved = np.full((count.size, 3), np.nan)
         sound = np.abs(np.linalg.det(gram / np.maximum(size, 1.0)[:, None, None])) > _LEAST_DETERMINANT
@@ -163,13 +163,11 @@ def least_prominence(values: Floats) -> float:
     change = np.abs(np.diff(values))
     converter_step = float(change[change > 0.0].min(initial=np.inf))
     least = _PROMINENCE_SHARE * float(np.ptp(values))
-    if values.size <= _WINDOW_ROWS:
-        windows = values[None, :]
-    else:
-        count = min(_MOST_WINDOWS, values.size // _WINDOW_ROWS)
-        starts = np.linspace(0, values.size - _WINDOW_ROWS, count).astype(np.intp)
-        windows = values[starts[:, None] + np.arange(_WINDOW_ROWS)]
-    if windows.shape[1] > _DIFFERENCE_ORDER:
+    rows = min(_WINDOW_ROWS, values.size)
+    if rows > _DIFFERENCE_ORDER:
+        count = min(_MOST_WINDOWS, values.size // rows)
+        starts = np.linspace(0, values.size - rows, count).astype(np.intp)
+        windows = np.lib.stride_tricks.sliding_window_view(values, rows)[starts]
         differences = np.abs(np.diff(windows, _DIFFERENCE_ORDER, axis=1))
         noise = np.median(differences, axis=1) * (MEDIAN_TO_SIGMA / _DIFFERENCE_GAIN)
         least = max(least, _PROMINENCE_NOISE * float(np.quantile(noise, _QUIET_QUANTILE)))
@@ -252,8 +250,7 @@ def pieces(edges: Floats, log_amplitude: Floats) -> list[slice]:
         run is cut in two where two lines fit better than one by far more than the scatter allows, and each part again.
     """
     period = float(np.median(np.diff(edges)))
-    phase = (edges - edges[0]) / period
-    phase = phase - np.arange(phase.size)
+    phase = (edges - edges[0]) / period - np.arange(edges.size)
     # of white noise, squared weights of second differences sum up to 6, of first ones to 2
     jitter = max(_deviation(np.diff(phase, 2)) / 6.0**0.5, _LEAST_JITTER)
     spread = max(_deviation(np.diff(log_amplitude)) / 2.0**0.5, _LEAST_SCATTER)
@@ -303,19 +300,18 @@ def _cut(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
     count = level.size
     if count < 2 * _FEWEST_CYCLES:
         return 0
-    number = np.arange(count, dtype=float)
     at = np.arange(_FEWEST_CYCLES, count - _FEWEST_CYCLES + 1)
     # a cut after `k` cycles gives the crossings 0..k to the first part and k..count to the second
     before, after = _line_squares(phase)[at], _line_squares(phase[::-1])[::-1][at]
-    gain = _line_squares(phase)[-1] - before - after
     first = np.cumsum(level)[at - 1] / at
     second = (level.sum() - np.cumsum(level)[at - 1]) / (count - at)
     level_gain = at * (count - at) / count * (first - second) ** 2
-    best = int(np.argmax(gain + level_gain))
+    gain = _line_squares(phase)[-1] - before - after + level_gain
+    best = int(np.argmax(gain))
     k = int(at[best])
-    if gain[best] + level_gain[best] < _SPLIT_GAIN:
+    if gain[best] < _SPLIT_GAIN:
         return 0
-    slopes = [np.polyfit(number[: part.size], part, 1)[0] * jitter for part in (phase[: k + 1], phase[k:])]
+    slopes = [np.polyfit(np.arange(part.size), part, 1)[0] * jitter for part in (phase[: k + 1], phase[k:])]
     other_frequency = abs(slopes[0] - slopes[1]) > _OTHER_FREQUENCY
     other_amplitude = abs(first[best] - second[best]) * spread > _OTHER_AMPLITUDE
     return k if other_frequency or other_amplitude else 0

@@ -115,8 +115,8 @@ class HarmonicFit:
         """Expected square of each harmonic of white noise of unit variance, (order,)."""
         return np.diag(self.covariance)[_DRIFT_TERMS:].reshape(-1, 2).sum(axis=1)
 
-    def errors(self) -> tuple[float, float]:
-        """Standard errors of |K|, relative to |K|, and of its phase [rad].
+    def errors(self) -> Floats:
+        """Standard errors of |K|, relative to |K|, and of its phase [rad], (2,).
 
         Notes:
             e = f - K x is what the noise of both channels leaves in the force. Where e is white, its scatter over the
@@ -135,16 +135,14 @@ class HarmonicFit:
             high = fdtri(2 * (cycles - 1), self.freedom, 1.0 - _WHITE_P)
             if own.mean() > high * white:
                 variance = own
-        gain, phase = np.sqrt(variance) / abs(f)
-        return float(gain), float(phase)
+        return np.sqrt(variance) / abs(f)
 
-    def distortion(self) -> tuple[float, float]:
-        """Total harmonic distortion of displacement and force, relative to the fundamental, less that of noise."""
+    def distortion(self) -> Floats:
+        """Total harmonic distortion of displacement and force, over their fundamental, less that of noise, (2,)."""
         power = np.square(np.abs(self.coefficients[:, 1:]))
         noise = np.outer(np.diag(self.squares) / self.freedom, self.chance)
         overtones = np.maximum((power - noise)[:, 1:].sum(axis=1), 0.0)
-        displacement, force = np.sqrt(overtones / power[:, 0])
-        return float(displacement), float(force)
+        return np.sqrt(overtones / power[:, 0])
 
 
 def _bases(time: Floats, frequency: float, size: int) -> Iterator[tuple[slice, Floats]]:

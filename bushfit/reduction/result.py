@@ -150,11 +150,10 @@ def _warnings(reduction: Reduction) -> Iterator[str]:
 
 def _amplitude_slope(steps: Sequence[Step]) -> float:
     """Steepest d ln|K| / d ln X between neighbouring levels at one frequency; 0 where there is only one level."""
-    slopes = [0.0]
-    for frequency in {step.nominal_frequency for step in steps}:
-        same = sorted((step for step in steps if step.nominal_frequency == frequency), key=lambda step: step.amplitude)
-        for one, other in pairwise(same):
-            if other.level != one.level:
-                change = np.log(abs(other.stiffness / one.stiffness)) / np.log(other.amplitude / one.amplitude)
-                slopes.append(float(change))
-    return max(slopes, key=abs)
+    ordered = sorted(steps, key=lambda step: (step.nominal_frequency, step.amplitude))
+    slopes = [
+        float(np.log(abs(other.stiffness / one.stiffness)) / np.log(other.amplitude / one.amplitude))
+        for one, other in pairwise(ordered)
+        if other.nominal_frequency == one.nominal_frequency and other.level != one.level
+    ]
+    return max(slopes, key=abs, default=0.0)

@@ -6,8 +6,10 @@ evaluated by one least-squares fit to all of its steady cycles.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -182,8 +184,6 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
     rows = slice(cycles.first_rows[used.start], cycles.first_rows[used.stop])
     fit = HarmonicFit.of(history.time[rows], history.displacement[rows], history.force[rows], edges)
     x, f = fit.coefficients[:, 1]
-    errors = fit.errors()
-    distortion = fit.distortion()
     return Step(
         history.name,
         float(edges[0]),
@@ -194,10 +194,8 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
         fit.frequency,
         float(abs(x)),
         complex(f / x),
-        errors[0],
-        errors[1],
-        distortion[0],
-        distortion[1],
+        *fit.errors().tolist(),
+        *fit.distortion().tolist(),
     )
 
 
@@ -209,7 +207,7 @@ def _creeps(values: Floats, least: float) -> bool:
     squares = float(number @ number)
     slope = float(number @ values) / squares
     left = values - values.mean() - slope * number
-    error = np.sqrt(float(left @ left) / max(values.size - 2, 1) / squares)
+    error = np.sqrt(float(left @ left) / (values.size - 2) / squares)
     return bool(abs(slope) * values.size > least and abs(slope) > _REAL_CHANGE * error)
 
 
@@ -235,22 +233,19 @@ def _grouped(steps: Sequence[Step], levels: Sequence[float]) -> list[Step]:
     groups = _clusters(np.log(frequency), _SAME_FREQUENCY)
     nominal = np.array([np.median(frequency[groups == group]) for group in groups])
     if levels:
-        rank = np.argmin(np.abs(np.log(amplitude[:, None] / np.asarray(levels))), axis=1)
+        stated = np.array(levels, dtype=float)
+        level = stated[np.argmin(np.abs(np.log(amplitude[:, None] / stated)), axis=1)]
     else:
         rank = _clusters(np.log(amplitude), _LEVEL_GAP)
-    seen: dict[tuple[int, int], int] = {}
-    grouped = []
-    for step, group, level, middle in zip(steps, groups.tolist(), rank.tolist(), nominal, strict=True):
-        seen[group, level] = repeat = seen.get((group, level), 0) + 1
-        asked = float(levels[level] if levels else amplitude[rank == level].mean())
-        grouped.append(replace(step, nominal_frequency=float(middle), level=asked, repeat=repeat))
-    return grouped
+        level = np.array([amplitude[rank == own].mean() for own in rank])
+    repeats: defaultdict[tuple[float, float], Iterator[int]] = defaultdict(lambda: count(1))
+    return [
+        replace(step, nominal_frequency=f, level=x, repeat=next(repeats[f, x]))
+        for step, f, x in zip(steps, nominal.tolist(), level.tolist(), strict=True)
+    ]
 
 
 def _clusters(values: Floats, gap: float) -> NDArray[np.intp]:
     """Number of the group of each value, (n,): neighbours in a group lie no further apart than `gap`, groups do."""
     order = np.argsort(values)
-    number = np.concatenate(([0], np.cumsum(np.diff(values[order]) > gap)))
-    groups = np.empty(values.size, dtype=np.intp)
-    groups[order] = number
-    return groups
+    return np.concatenate(([0], np.cumsum(np.diff(values[order]) > gap)))[np.argsort(order)]
