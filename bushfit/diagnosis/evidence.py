@@ -50,12 +50,8 @@ class Evidence:
     @property
     def reduced(self) -> float:
         """Reduced chi-square; 1 where only noise is left."""
-        return self.chi_square / max(self.counted - self.parameters, 1)
-
-    @property
-    def counted(self) -> int:
-        """Residuals that carry weight."""
-        return sum(data_set.counted for data_set in self.data_sets)
+        counted = sum(data_set.counted for data_set in self.data_sets)
+        return self.chi_square / max(counted - self.parameters, 1)
 
     @property
     def penalty(self) -> float:

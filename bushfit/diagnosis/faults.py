@@ -103,8 +103,9 @@ def _frequencies(evidence: Evidence) -> Iterator[Suspect]:
                     for chosen in touched[window]
                     for sweep, rows in zip(scope, chosen, strict=True)
                 ]
+                span = " to ".join(f"{step:.4g}" for step in dict.fromkeys(steps[[first, first + width - 1]].tolist()))
                 yield Suspect(
-                    f"{_span(steps[window], 'Hz')} in {where}, at every amplitude",
+                    f"{span} Hz in {where}, at every amplitude",
                     "frequency",
                     [column for pair in columns[window] for column in pair],
                     scope[0].direction,
@@ -115,14 +116,6 @@ def _frequencies(evidence: Evidence) -> Iterator[Suspect]:
 
 def _moved_together(evidence: Evidence, sweeps: Sequence[SweepData], chosen: Sequence[Array]) -> list[Array]:
     """A gain and a phase column of points of several sweeps that deviate as one, (n,) each."""
-    each = [
-        [evidence.embedded(column, sweep) for column in sweep.moved_together(rows)]
-        for sweep, rows in zip(sweeps, chosen, strict=True)
-    ]
-    return [np.sum(columns, axis=0) for columns in zip(*each, strict=True)]
-
-
-def _span(values: Array, unit: str) -> str:
-    if values.size == 1:
-        return f"{values[0]:.4g} {unit}"
-    return f"{values[0]:.4g} to {values[-1]:.4g} {unit}"
+    pairs = zip(sweeps, chosen, strict=True)
+    each = [[evidence.embedded(column, sweep) for column in sweep.moved_together(rows)] for sweep, rows in pairs]
+    return list(np.sum(each, axis=0))

@@ -10,14 +10,14 @@ Notes:
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import DataSet, SweepData, parted
+from bushfit.fitting.data_sets import DataSet, parted
 
 #: A part without which some parameter's variance would grow by more than this factor is not held out: what is left does
 #: not determine that parameter, so a prediction would say nothing.
@@ -32,6 +32,8 @@ _SHRUNK = 0.5
 _MOST_WORSENED = 1.1
 #: Share of all sweep points, the highest frequencies, that is one part.
 _TOP = 1.0 / 3.0
+#: Every point of a data set.
+_ALL = np.array(True)
 
 
 @dataclass(frozen=True)
@@ -60,33 +62,29 @@ class HoldOut:
 
 def hold_out(before: Evidence, after: Evidence) -> HoldOut:
     """Compare two models of the same tests on every part that both can predict from the rest."""
-    parts, sums = [], np.zeros(3)
-    for name, chosen in _parts(after):
-        if not chosen.any():
-            continue
-        gaps = [_predicted(evidence, chosen) for evidence in (before, after)]
-        if any(gap is None for gap in gaps):
-            continue
-        squares = [float(np.mean(np.square(gap))) for gap in gaps if gap is not None]
-        parts.append(HeldOut(name, float(np.sqrt(squares[0])), float(np.sqrt(squares[1]))))
-        sums += np.array([*squares, 1.0]) * np.count_nonzero(chosen)
-    if not parts:
-        rms = [float(np.sqrt(np.mean(evidence.residual**2))) for evidence in (before, after)]
-        return HoldOut((), rms[0], rms[1])
-    return HoldOut(tuple(parts), float(np.sqrt(sums[0] / sums[2])), float(np.sqrt(sums[1] / sums[2])))
+    models = (before, after)
+    gaps = {name: [_predicted(evidence, chosen) for evidence in models] for name, chosen in _parts(after)}
+    told = {name: pair for name, pair in gaps.items() if all(gap.size for gap in pair)}
+    parts = tuple(HeldOut(name, *map(_rms, pair)) for name, pair in told.items())
+    together = zip(*told.values(), strict=True) if told else [[evidence.residual] for evidence in models]
+    return HoldOut(parts, *(_rms(np.concatenate(list(each))) for each in together))
 
 
-def _predicted(evidence: Evidence, chosen: Array) -> Array | None:
-    """Residuals of the chosen rows with the model fitted to the others; None where those leave it open."""
+def _rms(gap: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(gap))))
+
+
+def _predicted(evidence: Evidence, chosen: Array) -> Array:
+    """Residuals of the chosen rows with the model fitted to the others; none where those leave it open."""
     jacobian, residual = evidence.solution.jacobian, evidence.residual
     rest, full = jacobian[:, ~chosen] @ jacobian[:, ~chosen].T, jacobian @ jacobian.T
     moving = np.diag(full) > 0.0
     rest, full = rest[np.ix_(moving, moving)], full[np.ix_(moving, moving)]
     if np.linalg.cond(rest) > _SINGULAR:
-        return None
+        return np.empty(0)
     inverse = np.linalg.inv(rest)
     if np.any(np.diag(inverse) > _MOST_GROWTH * np.diag(np.linalg.inv(full))):
-        return None
+        return np.empty(0)
     step = -inverse @ (jacobian[moving][:, ~chosen] @ residual[~chosen])
     return residual[chosen] + step @ jacobian[moving][:, chosen]
 
@@ -96,29 +94,21 @@ def _parts(evidence: Evidence) -> Iterator[tuple[str, Array]]:
     loops, sweeps = parted(evidence.data_sets)
     ranks = [np.unique(sweep.amplitude, return_inverse=True)[1] for sweep in sweeps]
     for rank in range(max((int(r.max()) + 1 for r in ranks), default=0)):
-        yield f"amplitude level {rank + 1}", _points(evidence, zip(sweeps, [r == rank for r in ranks], strict=True))
+        yield f"amplitude level {rank + 1}", _rows(evidence, zip(sweeps, [r == rank for r in ranks], strict=True))
     if sweeps:
         top = np.quantile(np.concatenate([sweep.frequency for sweep in sweeps]), 1.0 - _TOP)
-        yield "top third of the frequencies", _points(evidence, ((sweep, sweep.frequency > top) for sweep in sweeps))
+        yield "top third of the frequencies", _rows(evidence, ((sweep, sweep.frequency > top) for sweep in sweeps))
     for direction in dict.fromkeys(data_set.direction for data_set in evidence.data_sets):
         whole = [data_set for data_set in evidence.data_sets if data_set.direction is direction]
         if len(whole) < len(evidence.data_sets):
-            yield f"{direction} direction", _whole(evidence, whole)
+            yield f"{direction} direction", _rows(evidence, ((data_set, _ALL) for data_set in whole))
     for loop in loops if len(loops) > 1 else ():
-        yield f"loop {loop.name}", _whole(evidence, [loop])
+        yield f"loop {loop.name}", _rows(evidence, [(loop, _ALL)])
 
 
-def _points(evidence: Evidence, picked: Iterable[tuple[SweepData, Array]]) -> Array:
-    """Residuals of some points of the sweeps, (n,) bool."""
+def _rows(evidence: Evidence, picked: Iterable[tuple[DataSet, Array]]) -> Array:
+    """Residuals of some points of some data sets, (n,) bool."""
     chosen = np.zeros(evidence.residual.size, dtype=bool)
-    for sweep, points in picked:
-        chosen[evidence.place[sweep]] = np.tile(points, sweep.parts)
-    return chosen
-
-
-def _whole(evidence: Evidence, data_sets: Sequence[DataSet]) -> Array:
-    """All residuals of some data sets, (n,) bool."""
-    chosen = np.zeros(evidence.residual.size, dtype=bool)
-    for data_set in data_sets:
-        chosen[evidence.place[data_set]] = True
+    for data_set, points in picked:
+        chosen[evidence.place[data_set]].reshape(data_set.parts, -1)[:] = points
     return chosen

@@ -66,7 +66,8 @@ def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
             excess = float(np.sqrt(np.mean(np.square(np.concatenate(sizes)))))
             strongest = max(float(np.abs(size).max()) for size in sizes)
             touched = [i for i, size in enumerate(sizes) if np.abs(size).max() > _STRONG * strongest]
-            band = _band([mine[i] for i in touched], [sizes[i] for i in touched], strongest)
+            strong = [mine[i].frequency[np.abs(sizes[i]) > _STRONG * strongest] for i in touched]
+            band = float(min(f.min() for f in strong)), float(max(f.max() for f in strong))
             if max(float(np.abs(piece).max()) for piece in pieces) < _LEAST:
                 continue
             yield Where(
@@ -80,13 +81,6 @@ def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
             )
 
 
-def _band(levels: Sequence[Level], sizes: Sequence[Array], strongest: float) -> tuple[float, float]:
-    """Lowest and highest frequency at which some level departs strongly [Hz]."""
-    strong = [level.frequency[np.abs(size) > _STRONG * strongest] for level, size in zip(levels, sizes, strict=True)]
-    together = np.concatenate(strong)
-    return float(together.min()), float(together.max())
-
-
 def _read_sweep(
     part: str,
     direction: object,
@@ -98,36 +92,27 @@ def _read_sweep(
     """A sentence: which way, how much, how it goes with frequency and with amplitude."""
     what = "stiffness" if part == "storage" else "loss"
     worst = max(touched, key=lambda i: float(np.abs(pieces[i]).max()))
-    largest = pieces[worst]
-    at = int(np.argmax(np.abs(largest)))
-    unit, factor = levels[0].direction.display.displacement
-    size = f"{number(100 * abs(largest[at]), 2)} % of |K| {'above' if largest[at] > 0 else 'below'} the model"
-    if len(touched) == len(levels):
-        level = "at every amplitude"
-    else:
+    largest = max(pieces[worst].tolist(), key=abs)
+    size = f"{number(100 * abs(largest), 2)} % of |K| {'above' if largest > 0 else 'below'} the model"
+    level = f"at every amplitude{_over_amplitude(pieces)}"
+    if len(touched) < len(levels):
+        unit, factor = levels[0].direction.display.displacement
         level = "at " + ", ".join(f"{levels[i].amplitude * factor:.3g}" for i in touched) + f" {unit}"
-    trend = _trend(levels[worst].frequency, largest)
-    changes = "" if len(touched) < len(levels) else _over_amplitude(pieces)
+    trend = _trend(levels[worst].frequency, pieces[worst])
     span = f"{band[0]:.3g} to {band[1]:.3g} Hz"
-    return f"measured {direction} {what} is up to {size}, {trend} ({span}), {level}{changes}"
+    return f"measured {direction} {what} is up to {size}, {trend} ({span}), {level}"
 
 
 def _trend(frequency: Array, misfit: Array) -> str:
-    """How a misfit goes with frequency: the shape that leaves the least."""
+    """How a misfit goes with frequency: flat, or as the line over it that leaves the least."""
+    if np.var(misfit) < _FLAT * np.mean(np.square(misfit)):
+        return "much the same at every frequency"
     shapes = {
-        "much the same at every frequency": [np.ones_like(frequency)],
-        "changing with the logarithm of frequency": [np.ones_like(frequency), np.log(frequency)],
-        "changing in proportion to frequency": [np.ones_like(frequency), frequency],
-        "changing with the square of frequency": [np.ones_like(frequency), frequency**2],
+        "changing with the logarithm of frequency": np.log(frequency),
+        "changing in proportion to frequency": frequency,
+        "changing with the square of frequency": frequency**2,
     }
-    left = {}
-    for words, columns in shapes.items():
-        basis = np.stack(columns, axis=1)
-        rest = misfit - basis @ np.linalg.lstsq(basis, misfit, rcond=None)[0]
-        left[words] = float(rest @ rest)
-    flat = "much the same at every frequency"
-    best = min(left, key=lambda words: left[words])
-    return flat if left[flat] < _FLAT * float(misfit @ misfit) else best
+    return max(shapes, key=lambda words: abs(float(np.corrcoef(shapes[words], misfit)[0, 1])))
 
 
 def _over_amplitude(pieces: Sequence[Array]) -> str:
@@ -141,17 +126,14 @@ def _loop_regions(evidence: Evidence) -> Iterator[Where]:
     """Per loop, the harmonic in which its force departs most from the model."""
     loops, _ = parted(evidence.data_sets)
     for data_set in loops:
-        columns = data_set.contrasts()
-        unit = columns / np.linalg.norm(columns, axis=1)[:, None]
-        amounts = -(unit @ evidence.residual[evidence.place[data_set]])
-        sizes = np.concatenate(([abs(amounts[0])], np.hypot(amounts[1::2], amounts[2::2])))
+        columns, amplitude = data_set.contrasts(), data_set.drive.amplitude
+        amounts = columns @ evidence.residual[evidence.place[data_set]] / np.linalg.norm(columns, axis=1)
+        sizes = np.hypot(amounts[::2], [0.0, *amounts[1::2]])
         order = int(np.argmax(sizes))
-        share = np.sqrt(2.0) * sizes[order] / np.sqrt(data_set.size) * data_set.drive.noise / data_set.drive.half_range
-        words = _HARMONICS.get(order, f"harmonic {order}")
-        unit_name, factor = data_set.direction.display.displacement
-        amplitude = data_set.drive.amplitude
+        share = sizes[order] * np.sqrt(2.0 / data_set.size) * data_set.relative_noise
         if share < _LEAST:
             continue
+        unit, factor = data_set.direction.display.displacement
         yield Where(
             data_set.direction,
             "loop",
@@ -159,6 +141,6 @@ def _loop_regions(evidence: Evidence) -> Iterator[Where]:
             (amplitude,) * 2,
             "force",
             float(np.sqrt(np.mean(np.square(amounts)))),
-            f"the {data_set.direction} loop of {amplitude * factor:.3g} {unit_name} departs from the model most in "
-            f"{words}: {number(100 * share, 2)} % of half its force range",
+            f"the {data_set.direction} loop of {amplitude * factor:.3g} {unit} departs from the model most in "
+            f"{_HARMONICS.get(order, f'harmonic {order}')}: {number(100 * share, 2)} % of half its force range",
         )

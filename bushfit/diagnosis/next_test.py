@@ -88,17 +88,12 @@ def _distance(entry: MenuEntry, models: Sequence[Model], data_sets: Sequence[Dat
         responses = [_rig_share(model, direction, frequency, amplitude) for model in models]
     else:
         responses = [np.log(model.stiffness(direction, frequency, amplitude)) for model in models]
-    return min(_apart(one, other) for one, other in combinations(responses, 2))
+    return min(float(np.sum(np.abs(one - other) ** 2)) for one, other in combinations(responses, 2)) / _NOISE**2
 
 
 def _rig_share(model: Model, direction: Direction, frequency: Array, amplitude: Array) -> Array:
     bare = model.without(Level.INSTRUMENT)
     return np.log(model.stiffness(direction, frequency, amplitude) / bare.stiffness(direction, frequency, amplitude))
-
-
-def _apart(one: Array, other: Array) -> float:
-    difference = one - other
-    return float(np.sum(np.abs(difference) ** 2)) / _NOISE**2
 
 
 def _points(entry: MenuEntry, data_sets: Sequence[DataSet]) -> tuple[Array, Array, Direction]:
@@ -111,7 +106,5 @@ def _points(entry: MenuEntry, data_sets: Sequence[DataSet]) -> tuple[Array, Arra
         amplitudes = np.array([amplitudes.min() * -x if x < 0 else amplitudes.max() * x for x in entry.amplitudes])
     measured = np.unique(np.concatenate([data_set.frequency for data_set in data_sets]))
     frequencies = np.array(entry.frequencies) if entry.frequencies else measured
-    if entry.beyond:
-        frequencies = frequencies * measured.max()
-    f, x = np.meshgrid(frequencies, amplitudes)
+    f, x = np.meshgrid(frequencies * (measured.max() if entry.beyond else 1.0), amplitudes)
     return f.ravel(), x.ravel(), direction

@@ -143,22 +143,22 @@ class Diagnosis:
         }
 
     def _effect(self, named: Named) -> dict[str, Any]:
-        effect = effect_named(named.name)
-        values = {name: value for name, value in self._values(named.name).items() if name.startswith(f"{named.name}.")}
+        effect, model = effect_named(named.name), self.result.model
+        judged = {judged.name: judged.parameters for judged in self.candidates}
+        values = model.values if named.name in model.effects else judged.get(named.name, {})
         return {
             "name": named.name,
             "level": str(effect.level),
             "sentence": effect.sentence,
-            "parameters": {name: self._parameter(name, value) for name, value in values.items()},
+            "parameters": {
+                name: self._parameter(name, value)
+                for name, value in values.items()
+                if name.startswith(f"{named.name}.")
+            },
             "evidence": named.evidence,
             "alternatives": list(named.alternatives),
             "richer": list(named.richer),
         }
-
-    def _values(self, name: str) -> Mapping[str, float]:
-        if name in self.result.model.effects:
-            return self.result.model.values
-        return next((judged.parameters for judged in self.candidates if judged.name == name), {})
 
     def _parameter(self, name: str, value: float) -> dict[str, Any]:
         held = name in self.result.model.values

@@ -70,6 +70,12 @@ class ScoreTest:
             roots.append(vectors[:, kept] / np.sqrt(size[kept]))
         return roots
 
+    @cached_property
+    def _along(self) -> list[Array]:
+        """What the residuals have of each pattern's orthonormal columns, (r,)."""
+        amounts = self._left @ self.evidence.residual
+        return [root.T @ amounts[group] for group, root in zip(self.groups, self._roots, strict=True)]
+
     @property
     def sizes(self) -> list[int]:
         """Number of columns of each pattern that are visible."""
@@ -77,15 +83,12 @@ class ScoreTest:
 
     def gains(self) -> list[float]:
         """What each pattern would take off chi-square."""
-        amounts = self._left @ self.evidence.residual
-        pairs = zip(self.groups, self._roots, strict=True)
-        return [float(np.sum(np.square(amounts[group] @ root))) for group, root in pairs]
+        return [float(np.sum(np.square(along))) for along in self._along]
 
     def amounts(self) -> list[Array]:
         """Least-squares amounts of each pattern's columns, in their own units; 0 for what is not visible."""
-        amounts = self._left @ self.evidence.residual
-        pairs = zip(self.groups, self._roots, strict=True)
-        return [-(root @ (root.T @ amounts[group])) / self._lengths[group] for group, root in pairs]
+        triples = zip(self.groups, self._roots, self._along, strict=True)
+        return [-(root @ along) / self._lengths[group] for group, root, along in triples]
 
     def largest_by_chance(self, level: float, senses: Sequence[int] | None = None) -> float:
         """The gain that the best pattern exceeds by chance with probability 1 - level.
@@ -97,10 +100,8 @@ class ScoreTest:
         drawn = _draw(self.evidence, self._left)
         best = np.zeros(DRAWS)
         for number, (group, root) in enumerate(zip(self.groups, self._roots, strict=True)):
-            if not root.size:
-                continue
             amounts = root.T @ drawn[group]
-            if senses is not None and senses[number]:
+            if root.size and senses is not None and senses[number]:
                 amounts = np.maximum(-senses[number] * np.sign(root[0, 0]) * amounts, 0.0)
             best = np.maximum(best, np.sum(np.square(amounts), axis=0))
         return float(np.quantile(best, level)) if best.any() else np.inf
@@ -108,22 +109,14 @@ class ScoreTest:
 
 def _draw(evidence: Evidence, rows: Array) -> Array:
     """Amounts of noise along rows, (c, DRAWS)."""
-    blocks = evidence.blocks
-    shared = (
-        np.stack([rows[:, block].sum(axis=1) / np.sqrt(block.size) for block in blocks], axis=1) if blocks else None
-    )
-    rest = rows @ rows.T
-    amounts = np.zeros((rows.shape[0], DRAWS))
-    if shared is not None:
-        rest = rest - shared @ shared.T
-        scale = np.ones(DRAWS)
-        if evidence.shared_freedom:
-            scale = np.sqrt(evidence.shared_freedom / _chi_squares(evidence.shared_freedom))
-        amounts += (shared @ _normals(shared.shape[1], 0)) * scale
-    size, vectors = np.linalg.eigh(rest)
-    root = vectors * np.sqrt(np.maximum(size, 0.0))
+    columns = [rows[:, block].sum(axis=1) / np.sqrt(block.size) for block in evidence.blocks]
+    shared = np.reshape(columns, (-1, len(rows))).T
+    freedom = evidence.shared_freedom
+    scale = np.sqrt(freedom / _chi_squares(freedom)) if freedom else 1.0
+    size, vectors = np.linalg.eigh(rows @ rows.T - shared @ shared.T)
     kept = size > _ROUNDING * max(float(size.max()), 1e-300)
-    return amounts + root[:, kept] @ _normals(int(kept.sum()), 1)
+    root = vectors[:, kept] * np.sqrt(size[kept])
+    return shared @ _normals(shared.shape[1], 0) * scale + root @ _normals(root.shape[1], 1)
 
 
 @lru_cache(maxsize=32)

@@ -87,8 +87,7 @@ class Round:
     def real(self) -> Candidate | None:
         """The best candidate, where it is more than chance and more than its price."""
         best = self.best
-        worth = best is not None and self.evidence.bic - best.evidence.bic > SAME and best.gain > self.critical
-        return best if worth else None
+        return best if best and self.evidence.bic - best.evidence.bic > SAME and best.gain > self.critical else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,40 +149,33 @@ class Search:
         current, added = self.base, list[str]()
         while len(added) < self.settings.max_effects:
             best = self._round(current, added).real
-            if best is None or not self._large(current, best):
+            if best is None or footprint(current, best.evidence) <= self.settings.tolerance:
                 break
             current, added = best.evidence, [*added, best.name]
         return current, added
 
-    def _large(self, current: Evidence, best: Candidate) -> bool:
-        return footprint(current, best.evidence) > self.settings.tolerance
-
     def trace(self) -> Candidate | None:
         """The best candidate on the base model where it is real but too small to matter."""
         best = self.first.real
-        return None if best is None or self._large(self.base, best) else best
+        return best if best and footprint(self.base, best.evidence) <= self.settings.tolerance else None
 
     def reconsider(self, current: Evidence, added: Sequence[str]) -> tuple[Evidence, list[Step]]:
         """Try every added effect's rivals in its place, and dropping it; swap where that is better."""
-        names = list(added)
+        names, swaps = list(added), 0
         steps: list[Step] = []
-        for swaps_left in range(_MOST_SWAPS, -1, -1):
-            steps, swapped = [], False
-            for name in names:
-                others = [other for other in names if other != name]
-                place = self._place(current, name, others)
-                best, reduced = place.best, place.evidence
-                if swaps_left and best and best.name != name and best.evidence.bic < current.bic - _LEAST_IMPROVEMENT:
-                    names[names.index(name)] = best.name
-                    current, swapped = best.evidence, True
-                    break
-                if swaps_left and reduced.bic - current.bic < SAME and others:
-                    names.remove(name)
-                    current, swapped = reduced, True
-                    break
+        while len(steps) < len(names):
+            name = names[len(steps)]
+            others = [other for other in names if other != name]
+            place = self._place(current, name, others)
+            best, may_swap = place.best, swaps < _MOST_SWAPS
+            if may_swap and best and best.name != name and best.evidence.bic < current.bic - _LEAST_IMPROVEMENT:
+                names[len(steps)], current = best.name, best.evidence
+            elif may_swap and others and place.evidence.bic - current.bic < SAME:
+                names, current = others, place.evidence
+            else:
                 steps.append(self._step(name, current, place))
-            if not swapped:
-                break
+                continue
+            steps, swaps = [], swaps + 1
         return current, steps
 
     def _step(self, name: str, current: Evidence, place: Round) -> Step:

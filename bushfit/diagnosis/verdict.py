@@ -12,7 +12,9 @@ from bushfit.diagnosis.faults import Fault, faults
 from bushfit.diagnosis.holdout import hold_out
 from bushfit.diagnosis.locate import contrasts, largest_smooth_misfit, locate
 from bushfit.diagnosis.next_test import confirming_test, deciding_test
+from bushfit.diagnosis.propose import Proposal
 from bushfit.diagnosis.record import Diagnosis, Judged, Named, Verdict, Where
+from bushfit.diagnosis.refit import Candidate
 from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.search import SAME, Search, Step
 from bushfit.fitting.assess import Stage, covariance, measured_range, quality
@@ -59,15 +61,15 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
     names = [_named(step) for step in steps]
     held = hold_out(base, final)
     if not held.passed:
-        words = f"{_listed(names)} {_verb(names)} the gap only where fitted, so the name is taken back"
+        words = f"{_closing(names)} the gap only where fitted, so the name is taken back"
         return _finish(search, "unexplained", words, base, ())
     if any(step.rivals for step in steps):
         return _ambiguous(search, final, steps, names)
     remainder = find_remainder(search, final)
     if remainder is None:
-        return _finish(search, "named", f"{_listed(names)} {_verb(names)} the gap", final, names)
+        return _finish(search, "named", f"{_closing(names)} the gap", final, names)
     if held.after < _PARTLY * held.before:
-        words = f"{_listed(names)} {_verb(names)} part of the gap; {remainder.words}"
+        words = f"{_closing(names)} part of the gap; {remainder.words}"
         return _finish(search, "partly", words, final, names, fault=remainder.fault)
     return _finish(search, "unexplained", remainder.words, base, (), fault=remainder.fault)
 
@@ -114,29 +116,19 @@ def _fault_words(fault: Fault) -> str:
     return f"{fault.suspect.words} stands out from all other tests: measure it again before looking for physics"
 
 
-def _listed(names: Sequence[Named]) -> str:
-    return " and ".join(named.name for named in names)
-
-
-def _verb(names: Sequence[Named]) -> str:
-    return "closes" if len(names) == 1 else "close"
+def _closing(names: Sequence[Named]) -> str:
+    return f"{' and '.join(named.name for named in names)} {'closes' if len(names) == 1 else 'close'}"
 
 
 def _named(step: Step) -> Named:
-    rivals = tuple(rival.name for rival in step.rivals)
-    return Named(step.name, _evidence(step), rivals, tuple(rival.name for rival in step.richer))
-
-
-def _evidence(step: Step) -> str:
-    others = [rival for rival in step.tried[1:] if not rival.left]
-    behind = ""
+    """The effect of a step, with its gain and how far the next best is behind in words."""
+    words = f"takes {step.gain:.0f} off chi-square"
     if step.tried and step.tried[0].name == step.name:
-        behind = "; no other comes near"
-        if others:
-            behind = (
-                f"; next best {others[0].name}, {others[0].evidence.bic - step.tried[0].evidence.bic:.0f} behind by BIC"
-            )
-    return f"takes {step.gain:.0f} off chi-square{behind}"
+        others, bic = [rival for rival in step.tried[1:] if not rival.left], step.tried[0].evidence.bic
+        behind = [f"next best {rival.name}, {rival.evidence.bic - bic:.0f} behind by BIC" for rival in others]
+        words += "; " + (behind[0] if behind else "no other comes near")
+    alternatives, richer = (tuple(rival.name for rival in rivals) for rivals in (step.rivals, step.richer))
+    return Named(step.name, words, alternatives, richer)
 
 
 def _finish(
@@ -150,22 +142,17 @@ def _finish(
     next_test: str = "",
 ) -> Diagnosis:
     base = search.base
-    if fault and not next_test:
-        next_test = f"measure again: {fault.suspect.words}"
-    elif not next_test and effects:
+    if not next_test and effects:
         next_test = confirming_test(effects[0].name)
-    where = locate(base)
-    if fault:
-        where = (_fault_where(fault), *where)
-    changed = after is not base
+    where = (*([_fault_where(fault)] if fault else []), *locate(base))
     return Diagnosis(
         verdict,
         summary,
         tuple(effects),
         where,
-        locate(after) if changed else where,
+        where if after is base else locate(after),
         hold_out(base, after),
-        next_test,
+        f"measure again: {fault.suspect.words}" if fault else next_test,
         tuple(_candidates(search, {named.name for named in effects})),
         base,
         after,
@@ -176,8 +163,7 @@ def _finish(
 
 def _fault_where(fault: Fault) -> Where:
     suspect = fault.suspect
-    kind = "loop" if suspect.kind == "loop" else "sweep"
-    component = "force" if kind == "loop" else "storage"
+    kind, component = ("loop", "force") if suspect.kind == "loop" else ("sweep", "storage")
     excess = float(np.sqrt(fault.gain / max(fault.columns, 1)))
     reading = f"{suspect.words} departs by {number(100 * fault.size, 2)} % from what all other tests say"
     return Where(suspect.direction, kind, suspect.frequency, suspect.amplitude, component, excess, reading)
@@ -185,30 +171,28 @@ def _fault_where(fault: Fault) -> Where:
 
 def _candidates(search: Search, kept: set[str]) -> list[Judged]:
     """Every effect of the library on the base model: score, refit, and why it won or lost."""
-    base, judged = search.base, []
     tried = {candidate.name: candidate for candidate in search.first.tried}
-    leader = min((c.evidence.bic for c in search.first.tried), default=base.bic)
-    for proposal in search.first.proposed:
-        candidate = tried.get(proposal.name)
-        if candidate is None or candidate.left:
-            why = "not visible in these tests" if not proposal.visible else "score too small to refit"
-            why = "left on its way, far behind the best" if candidate else why
-            judged.append(Judged(proposal.name, proposal.score, None, None, None, {}, why))
-            continue
-        bic = candidate.evidence.bic
-        model = candidate.evidence.model
-        own = {name: value for name, value in model.values.items() if name not in base.model.values}
-        if proposal.name in kept:
-            why = "kept"
-        elif candidate.gain < search.first.critical:
-            why = f"gain below {number(search.first.critical, 3)}, which chance alone can make"
-        elif base.bic - bic < SAME:
-            why = "gain below its price in parameters"
-        else:
-            why = f"{number(bic - leader, 3)} behind the best by BIC"
-        held = hold_out(base, candidate.evidence).after
-        judged.append(Judged(proposal.name, proposal.score, candidate.gain, base.bic - bic, held, own, why))
-    return judged
+    return [_judged(search, proposal, tried.get(proposal.name), kept) for proposal in search.first.proposed]
+
+
+def _judged(search: Search, proposal: Proposal, candidate: Candidate | None, kept: set[str]) -> Judged:
+    first, base = search.first, search.base
+    if candidate is None or candidate.left:
+        unseen = "score too small to refit" if proposal.visible else "not visible in these tests"
+        why = "left on its way, far behind the best" if candidate else unseen
+        return Judged(proposal.name, proposal.score, None, None, None, {}, why)
+    evidence = candidate.evidence
+    if proposal.name in kept:
+        why = "kept"
+    elif candidate.gain < first.critical:
+        why = f"gain below {number(first.critical, 3)}, which chance alone can make"
+    elif base.bic - evidence.bic < SAME:
+        why = "gain below its price in parameters"
+    else:
+        why = f"{number(evidence.bic - min(c.evidence.bic for c in first.tried), 3)} behind the best by BIC"
+    own = {name: value for name, value in evidence.model.values.items() if name not in base.model.values}
+    held = hold_out(base, evidence).after
+    return Judged(proposal.name, proposal.score, candidate.gain, base.bic - evidence.bic, held, own, why)
 
 
 def _result(evidence: Evidence, bounds: Bounds) -> Result:
@@ -216,7 +200,6 @@ def _result(evidence: Evidence, bounds: Bounds) -> Result:
     model, names = evidence.model, evidence.solution.coordinates.names
     moving = tuple(name for name in names if name not in evidence.solution.at_bound)
     cov = covariance(model, [Stage(moving, evidence.data_sets)])
-    sources = tuple(data_set.source for data_set in evidence.data_sets if data_set.source is not None)
     return Result(
         model,
         moving,
@@ -224,7 +207,7 @@ def _result(evidence: Evidence, bounds: Bounds) -> Result:
         quality(model, evidence.data_sets, len(moving)),
         measured_range(model, evidence.data_sets),
         tuple(cautions(model, evidence.solution, evidence.data_sets, bounds, cov)),
-        sources,
+        tuple(data_set.source for data_set in evidence.data_sets if data_set.source is not None),
         at_bound=evidence.solution.at_bound,
     )
 
@@ -232,9 +215,7 @@ def _result(evidence: Evidence, bounds: Bounds) -> Result:
 def _notes(search: Search, after: Evidence) -> tuple[str, ...]:
     """What these tests could not show at all."""
     blind = [proposal.name for proposal in search.first.proposed if not proposal.visible]
-    notes = []
-    if blind:
-        notes.append(f"not identifiable from these tests: {', '.join(blind)}")
+    notes = [f"not identifiable from these tests: {', '.join(blind)}"] if blind else []
     _, sweeps = parted(after.data_sets)
     if sweeps and sweeps[0].noise.origin == "assumed":
         notes.append(

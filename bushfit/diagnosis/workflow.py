@@ -9,9 +9,7 @@ from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import judge
 from bushfit.effects import BASE, effect_named
-from bushfit.errors import FitError
 from bushfit.fitting.data import Data
-from bushfit.fitting.data_set import DataSet
 from bushfit.fitting.robust import estimate, outliers_at, told
 from bushfit.fitting.starts import start_values
 from bushfit.model.model import Model
@@ -33,20 +31,16 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     settings = settings or Settings()
     for name in (*settings.adopt, *settings.without):
         effect_named(name)
-    data_sets: list[DataSet] = [*data.loops, *data.sweeps]
-    if not data_sets:
-        raise FitError(
-            "there is nothing to diagnose",
-            file=data.campaign.path,
-            found="no [[loops]] and no [[sweeps]]",
-            hint="add measured tests to the campaign",
-        )
+    hint = "add measured tests to the campaign"
+    data_sets = data.some([*data.loops, *data.sweeps], "there is nothing to diagnose", hint)
     held = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
     start = {**start_values(data.campaign.bushing, data_sets, {}), **data.given}
     model = model or Model.started(data.campaign.bushing, BASE, start)
     start = {name: value for name, value in start.items() if name in model.values and name not in held}
     for name in settings.adopt:
-        model = model if name in model.effects else _adopted(model, name)
+        if name not in model.effects:  # at a tenth of its typical size: at its neutral value a fit may not see it
+            amount = next(parameter for parameter in effect_named(name).parameters if parameter.neutral is not None)
+            model = model.with_effect(name, {f"{name}.{amount.name}": 0.1 * amount.typical})
     outliers: tuple[Outlier, ...] = ()
     if data.robust:
         names = [name for name in model.parameters if name not in held]
@@ -59,9 +53,3 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
         outliers = outliers_at(found.after.model, found.after.data_sets)
     notes = (*found.notes, *told(outliers, robust=data.robust))
     return replace(found, notes=notes, result=replace(found.result, outliers=outliers))
-
-
-def _adopted(model: Model, name: str) -> Model:
-    """The model with an effect at a tenth of its typical size: at its neutral value a fit may not see it."""
-    amount = next(parameter for parameter in effect_named(name).parameters if parameter.neutral is not None)
-    return model.with_effect(name, {f"{name}.{amount.name}": 0.1 * amount.typical})

@@ -62,7 +62,7 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
         slope = jacobian(model, stage.data_sets, names)
         basis = np.linalg.qr(slope[own].T)[0]
         system[own] = basis.T @ slope.T
-        inflation = np.sqrt(_inflation(*_reduced(model, stage.data_sets, len(stage.names))))
+        inflation = np.sqrt(lack_of_fit(model, stage.data_sets, len(stage.names)) or 1.0)
         root[own, own] = inflation * np.eye(len(stage.names))
         bases.append((own, inflation * basis.T))
         begin = own.stop
@@ -128,11 +128,6 @@ def _reduced(model: Model, data_sets: Sequence[DataSet], parameters: int) -> tup
     return float(residuals @ residuals) / freedom, freedom
 
 
-def _inflation(reduced: float, freedom: int) -> float:
-    """Factor on the covariance: the reduced chi-square where noise alone does not explain it, else 1."""
-    return reduced if reduced > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else 1.0
-
-
 def quality(model: Model, data_sets: Sequence[DataSet], parameters: int) -> Quality:
     """How well a model meets data sets: NRMSE, reduced chi-square, number of residuals, relative noise."""
     relative = np.concatenate([np.abs(data_set.relative(model)) for data_set in data_sets])
@@ -158,7 +153,7 @@ def measured_range(model: Model, data_sets: Sequence[DataSet]) -> Range:
 def lack_of_fit(model: Model, data_sets: Sequence[DataSet], parameters: int) -> float | None:
     """Reduced chi-square where the model misses the data by more than their noise, else None."""
     reduced, freedom = _reduced(model, data_sets, parameters)
-    return None if _inflation(reduced, freedom) == 1.0 else reduced
+    return reduced if reduced > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else None
 
 
 def misfit(model: Model, data_sets: Sequence[DataSet], parameters: int, advice: str = "") -> list[str]:

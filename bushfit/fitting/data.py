@@ -19,7 +19,7 @@ from bushfit.model.result import Outlier
 #: Difference of two amplitudes relative to their size up to which they are the same level.
 _SAME_LEVEL = 1e-3
 
-_Kind = TypeVar("_Kind", LoopData, SweepData)
+_Kind = TypeVar("_Kind", LoopData, SweepData, DataSet)
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,18 +45,29 @@ class Data:
         Raises:
             FitError: a loop is not one whole cycle or more, rows of it are missing, or it gives energy.
         """
-        settings = campaign.fit.parameters
         return cls(
             campaign,
             tuple(loop_data(campaign.loops, without_outliers=campaign.fit.loss != "linear")),
             tuple(sweep_data(campaign.sweeps, campaign.fit.residuals)),
-            {name: (setting.min, setting.max) for name, setting in settings.items()},
+            {name: (setting.min, setting.max) for name, setting in campaign.fit.parameters.items()},
         )
 
     @property
     def robust(self) -> bool:
         """Whether outliers are left out."""
         return self.campaign.fit.loss != "linear"
+
+    def some(
+        self, tests: Sequence[_Kind], message: str, hint: str, found: str = "no [[loops]] and no [[sweeps]]"
+    ) -> Sequence[_Kind]:
+        """Those tests.
+
+        Raises:
+            FitError: there is none.
+        """
+        if not tests:
+            raise FitError(message, file=self.campaign.path, found=found, hint=hint)
+        return tests
 
     def without(self, outliers: Sequence[Outlier]) -> Data:
         """The same data with no weight on these outliers of the sweeps.
@@ -66,7 +77,7 @@ class Data:
         sweeps = []
         for data_set in self.sweeps:
             rows = [outlier.row - 1 for outlier in outliers if outlier.test == data_set.name]
-            sweeps.append(data_set.without(np.flatnonzero(np.isin(data_set.rows, rows))))
+            sweeps.append(data_set.without(np.flatnonzero(np.isin(data_set.order, rows))))
         return replace(self, sweeps=tuple(sweeps))
 
     @property
@@ -88,14 +99,8 @@ class Data:
         Raises:
             FitError: there is none.
         """
-        data_sets: list[DataSet] = [*self.loops, *self.sweeps]
-        if not data_sets:
-            raise FitError(
-                "there is nothing to fit",
-                file=self.campaign.path,
-                found="no [[loops]] and no [[sweeps]]",
-                hint="add measured tests, or make some with bushfit simulate",
-            )
+        hint = "add measured tests, or make some with bushfit simulate"
+        data_sets = self.some([*self.loops, *self.sweeps], "there is nothing to fit", hint)
         if directions is None:
             return [*_axial(self.loops), *_axial(self.sweeps)]
         chosen = [data_set for data_set in data_sets if data_set.direction in directions]
@@ -114,14 +119,8 @@ class Data:
         Raises:
             FitError: there is no loop.
         """
-        if not self.loops:
-            raise FitError(
-                "fit-static needs a loop",
-                file=self.campaign.path,
-                found="no [[loops]]",
-                hint="add a quasi-static loop, or run bushfit fit for the sweeps alone",
-            )
-        return [*_axial(self.loops)]
+        hint = "add a quasi-static loop, or run bushfit fit for the sweeps alone"
+        return [*_axial(self.some(self.loops, "fit-static needs a loop", hint, "no [[loops]]"))]
 
     @cached_property
     def smallest_sweep(self) -> SweepData:
@@ -130,24 +129,16 @@ class Data:
         Raises:
             FitError: no sweep, or none at the amplitudes named.
         """
-        sweeps = _axial(self.sweeps)
-        if not sweeps:
-            raise FitError(
-                "fit-dynamic needs a sweep",
-                file=self.campaign.path,
-                found="no [[sweeps]]",
-                hint="add a stepped-sine file, or run bushfit fit-static for the loops alone",
-            )
+        hint = "add a stepped-sine file, or run bushfit fit-static for the loops alone"
+        sweeps = _axial(self.some(self.sweeps, "fit-dynamic needs a sweep", hint, "no [[sweeps]]"))
         wanted = self.campaign.fit.dynamic_amplitudes
         if not wanted:
             sweep = min(sweeps, key=lambda data_set: float(data_set.amplitude.min()))
             return sweep.at_amplitudes((float(sweep.amplitude.min()),))
         for sweep in sweeps:
-            there = tuple(
-                float(x) for x in np.unique(sweep.amplitude) if np.any(np.isclose(x, wanted, rtol=_SAME_LEVEL))
-            )
-            if there:
-                return sweep.at_amplitudes(there)
+            there = np.isclose(sweep.amplitude[:, None], wanted, rtol=_SAME_LEVEL).any(axis=1)
+            if there.any():
+                return sweep.at_amplitudes(sweep.amplitude[there])
         levels = sorted({float(x) for sweep in sweeps for x in sweep.amplitude})
         raise FitError(
             "no sweep at these amplitudes",

@@ -207,14 +207,20 @@ class DataSet(ABC):
 
 
 def kept(answer: Callable[..., Array]) -> Callable[..., Array]:
-    """Keeps what a data set answered to the last model: residuals, derivatives and quality ask for the same again."""
-    place = f"_last{answer.__name__}"
+    """Keeps what a data set answered to the last model: residuals, derivatives and quality ask for the same again.
+
+    What is asked beside the model is a list of names, or values in place of the model's own; of these nothing is kept.
+    """
+    place = f"_last_{answer.__name__}"
 
     @wraps(answer)
-    def asked(data_set: Any, model: Model, *rest: Any) -> Array:
+    def asked(data_set: Any, model: Model, beside: Sequence[str] | Values | None = None) -> Array:
+        if isinstance(beside, Mapping):
+            return answer(data_set, model, beside)
+        question = () if beside is None else (tuple(beside),)
         last = data_set.__dict__.get(place)
-        if last is None or last[0] is not model or last[1] != rest:
-            last = data_set.__dict__[place] = (model, rest, answer(data_set, model, *rest))
+        if last is None or last[0] is not model or last[1] != question:
+            last = data_set.__dict__[place] = (model, question, answer(data_set, model, *question))
             last[2].flags.writeable = False
         return last[2]
 

@@ -136,7 +136,8 @@ class Descent:
             damping *= 2.0
             step, expected = self._step(damping)
         point = np.clip(self.point + step, self.low, self.high)
-        evaluations, converged = self.evaluations + 1, expected < _LEAST_FALL * self._variance
+        variance = max(self.chi_square / self.residual.size, 1.0)
+        evaluations, converged = self.evaluations + 1, expected < _LEAST_FALL * variance
         cautious = replace(
             self, evaluations=evaluations, converged=converged, damping=damping * self.growth, growth=2.0 * self.growth
         )
@@ -171,11 +172,6 @@ class Descent:
         while not here.converged and here.evaluations < evaluations:
             here = here.stepped()
         return here
-
-    @property
-    def _variance(self) -> float:
-        """Mean square residual, at least that of noise alone."""
-        return max(self.chi_square / self.residual.size, 1.0)
 
     @cached_property
     def _normal(self) -> tuple[Array, Array]:

@@ -104,8 +104,7 @@ def _new_loops(model: Model, data_sets: Sequence[DataSet]) -> Iterator[tuple[str
             coefficients=np.array([0.0, -1j * (times * largest)]),
             half_range=1.0,
         )
-        fresh = LoopData(silent).noise_free(model).drive
-        loop = LoopData(replace(fresh, noise=_FORCE_NOISE * fresh.half_range))
+        loop = LoopData(silent).noise_free(model).with_noise(_FORCE_NOISE)
         yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", loop
 
 
@@ -113,8 +112,7 @@ def _changed(loop: LoopData, model: Model, *, amplitude: float = 1.0, rate: floa
     """A loop of so many times the amplitude and rate, as the model would have it, with the same relative noise."""
     drive = loop.drive
     moved = replace(drive, coefficients=drive.coefficients * amplitude, frequency=drive.frequency * rate)
-    fresh = LoopData(moved).noise_free(model).drive
-    return LoopData(replace(fresh, noise=drive.noise / drive.half_range * fresh.half_range))
+    return LoopData(moved).noise_free(model).with_noise(loop.relative_noise)
 
 
 def _new_sweeps(

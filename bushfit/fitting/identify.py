@@ -151,10 +151,8 @@ def _groups(known: Information) -> list[list[str]]:
 
 def _is_zero(model: Model, name: str, covariance: Covariance) -> bool:
     """Whether noise alone explains that the size of an added effect is not its neutral value."""
-    neutral = model.parameters[name].neutral
-    if "." not in name or neutral is None:
-        return False
-    return abs(model.values[name] - neutral) < Z95 * (covariance.stderr(name) or 0.0)
+    neutral, noise = model.parameters[name].neutral, Z95 * (covariance.stderr(name) or 0.0)
+    return "." in name and neutral is not None and abs(model.values[name] - neutral) < noise
 
 
 def _meaning(known: Information, group: Sequence[str]) -> str:

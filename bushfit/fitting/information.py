@@ -63,11 +63,8 @@ class Information:
 
 def relative_sizes(model: Model, names: Sequence[str]) -> Array:
     """Change of each coordinate of a fit per relative change of its parameter, (k,)."""
-    sizes = []
-    for name in names:
-        parameter, value = model.parameters[name], abs(model.values[name])
-        sizes.append(1.0 if parameter.log else max(value / parameter.typical, _LEAST_SIZE))
-    return np.array(sizes)
+    pairs = [(model.parameters[name], abs(model.values[name])) for name in names]
+    return np.array([1.0 if each.log else max(value / each.typical, _LEAST_SIZE) for each, value in pairs])
 
 
 def percent(error: float) -> str:

@@ -10,6 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from bushfit.effects.contract import Array, Values
+from bushfit.effects.history import History
 from bushfit.fitting.data_set import DataSet, Suspect, kept
 from bushfit.fitting.drive import Drive
 from bushfit.model.model import Model
@@ -68,34 +69,30 @@ class LoopData(DataSet):
         """Standard deviation of one row, relative to half the force range."""
         return self.drive.noise / self.drive.half_range
 
+    @kept
     def force(self, model: Model, values: Values | None = None) -> Array:
         """Model force at the rows [N or N m], (..., n)."""
-        return self._force(model) if values is None else self._force_of(model, values)
-
-    @kept
-    def _force(self, model: Model) -> Array:
-        return self._force_of(model, model.values)
-
-    def _force_of(self, model: Model, values: Values) -> Array:
-        history = self.drive.history(_settles(model))
-        force = model.force(self.direction, history, kind="loop", values=values)
+        force = model.force(self.direction, self._history(model), kind="loop", values=values)
         return self.drive.at_rows(self.drive.from_datum(force)) + (self.drive.datum or 0.0)
 
     def residual(self, model: Model, values: Values | None = None) -> Array:
         return (self.force(model, values) - self.drive.force) * self._per_noise
 
-    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        return self._jacobian(model, tuple(names))
-
     @kept
-    def _jacobian(self, model: Model, names: tuple[str, ...]) -> Array:
-        history = self.drive.history(_settles(model))
-        slopes = force_jacobian(model, self.direction, history, names)
+    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
+        slopes = force_jacobian(model, self.direction, self._history(model), names)
         return self.drive.at_rows(self.drive.from_datum(slopes)) * self._per_noise
+
+    def _history(self, model: Model) -> History:
+        return self.drive.history(any(effect.settles for effect in model.records))
 
     def noise_free(self, model: Model) -> Self:
         force = self.force(model)
         return replace(self, drive=replace(self.drive, force=force, half_range=float(np.ptp(force)) / 2.0))
+
+    def with_noise(self, relative: float) -> Self:
+        """The same loop with another standard deviation of one row, relative to half the force range."""
+        return replace(self, drive=replace(self.drive, noise=relative * self.drive.half_range))
 
     def change(self, one: Model, other: Model) -> float:
         return float(np.max(np.abs(self.force(one) - self.force(other)))) / self.drive.half_range
@@ -130,10 +127,8 @@ class LoopData(DataSet):
         """A constant force, and the cosine and sine of each harmonic, as whitened residuals, (11, n)."""
         scale = self._per_noise * self.drive.half_range
         angle = 2.0 * np.pi * self.drive.phase
-        columns = [scale]
-        for order in range(1, _SMOOTH_HARMONICS + 1):
-            columns += [scale * np.cos(order * angle), scale * np.sin(order * angle)]
-        return np.array(columns)
+        waves = [wave(order * angle) for order in range(1, _SMOOTH_HARMONICS + 1) for wave in (np.cos, np.sin)]
+        return scale * np.array([np.ones_like(angle), *waves])
 
     def smooth_misfit(self, model: Model) -> float:
         columns = self.contrasts()
@@ -162,7 +157,3 @@ class LoopData(DataSet):
     @cached_property
     def _per_noise(self) -> Array:
         return np.sqrt(self.drive.weight) / self.drive.noise
-
-
-def _settles(model: Model) -> bool:
-    return any(effect.settles for effect in model.records)

@@ -17,7 +17,7 @@ from bushfit.fitting.identify import left_open
 from bushfit.fitting.plausible import implausible, unfitted
 from bushfit.fitting.profile import profile95
 from bushfit.fitting.robust import Estimate, estimate, told
-from bushfit.fitting.solve import Bounds, Coordinates, Solution, residual
+from bushfit.fitting.solve import Bounds, Coordinates, Solution
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction
 from bushfit.model.covariance import Covariance
@@ -71,10 +71,7 @@ def fit_joint(
     """
     data_sets = data.chosen(directions)
     found = _solve(data, data_sets, effects, {})
-    left: list[DataSet] = [
-        *(x for x in data.loops if x not in data_sets),
-        *(x for x in data.sweeps if x not in data_sets),
-    ]
+    left: list[DataSet] = [data_set for data_set in (*data.loops, *data.sweeps) if data_set not in data_sets]
     result = _result(data, [found], notes=unfitted(found.solution.model, left, _NEXT))
     if profile is None:
         return result
@@ -143,7 +140,10 @@ def fit_two_step(data: Data) -> TwoStep:
             answered.append(coordinates.point(model.values))
         springpot = {name: model.values[name] for name in DYNAMIC}
         if len(asked) > 1:
-            springpot = _possible(model, coordinates.values(_anderson(asked, answered)))
+            next_values = coordinates.values(_anderson(asked, answered))
+            springpot = {  # an extrapolated value may lie beyond what its parameter may have
+                name: float(np.clip(value, *model.parameters[name].bounds)) for name, value in next_values.items()
+            }
     raise FitError(
         "the static and the dynamic fit do not settle on each other",
         file=data.campaign.path,
@@ -160,11 +160,6 @@ def _anderson(asked: Sequence[Array], answered: Sequence[Array]) -> Array:
     change = gap - before
     weight = np.clip(-(change @ gap) / (change @ change), 0.0, _LONGEST_STRIDE)
     return images[-1] + weight * (images[-1] - images[-2])
-
-
-def _possible(model: Model, values: Mapping[str, float]) -> dict[str, float]:
-    """Values moved to the nearest that their parameters may have: an extrapolated one may lie beyond."""
-    return {name: float(np.clip(value, *model.parameters[name].bounds)) for name, value in values.items()}
 
 
 def _agree(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
@@ -213,54 +208,37 @@ def _solve(data: Data, data_sets: Sequence[DataSet], effects: Sequence[str], hel
             hint="check the units of displacement and force, and the dimensions of the bushing",
         ) from error
     names = [name for name in data.free(tuple(model.parameters)) if name not in held]
-    if not names:
-        return _as_given(model, data_sets, robust=data.robust)
     return estimate(model, data_sets, names, data.bounds, robust=data.robust)
-
-
-def _as_given(model: Model, data_sets: Sequence[DataSet], *, robust: bool) -> Estimate:
-    """The estimate of a model of which nothing is free: its own values, beside the data they are checked against."""
-    outlying = tuple(data_set.outlying(model) for data_set in data_sets)
-    kept = tuple(data_sets)
-    if robust:
-        kept = tuple(data_set.without(points) for data_set, points in zip(data_sets, outlying, strict=True))
-    left = residual(model, kept)
-    solution = Solution(model, Coordinates((), ()), left, np.empty((0, left.size)), 1, {}, stopped=False)
-    return Estimate(solution, kept, kept, kept, outlying)
 
 
 def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = None, notes: Sequence[str] = ()) -> Result:
     """What the steps of a procedure found, the last one's model, with the uncertainty of all of them."""
-    solution, data_sets = steps[-1].solution, [data_set for step in steps for data_set in step.data_sets]
+    model, data_sets = steps[-1].solution.model, [data_set for step in steps for data_set in step.data_sets]
     stages = [Stage(step.solution.coordinates.names, step.weighed) for step in steps if step.solution.coordinates.names]
     fitted = tuple(name for stage in stages for name in stage.names)
-    cov = covariance(solution.model, stages, held) if stages else held or Covariance()
+    cov = covariance(model, stages, held) if stages else held or Covariance()
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
     return Result(
-        solution.model,
+        model,
         fitted,
         cov,
-        quality(solution.model, data_sets, len(fitted)),
-        measured_range(solution.model, data_sets),
+        quality(model, data_sets, len(fitted)),
+        measured_range(model, data_sets),
         (
             *notes,
             *implausible(data.campaign.bushing, data_sets),
             *_assumed(data_sets),
             *told(outliers, robust=data.robust),
-            *_cautions(steps, data.bounds, cov),
+            *(
+                line
+                for step in steps
+                for line in cautions(model, step.solution, step.data_sets, data.bounds, cov, _NEXT)
+            ),
         ),
         tuple(data_set.source for data_set in data_sets if data_set.source is not None),
         outliers,
         at_bound={name: end for step in steps for name, end in step.solution.at_bound.items()},
     )
-
-
-def _cautions(steps: Sequence[Estimate], bounds: Bounds, covariance: Covariance) -> list[str]:
-    """What the data of each step cannot tell of the last one's model."""
-    model = steps[-1].solution.model
-    return [
-        line for step in steps for line in cautions(model, step.solution, step.data_sets, bounds, covariance, _NEXT)
-    ]
 
 
 def cautions(
@@ -279,7 +257,7 @@ def cautions(
         return [*notes, _checked(model, data_sets)]
     return [
         *notes,
-        *(_stopped(solution) if solution.stopped else []),
+        *([_stopped(solution)] if solution.stopped else []),
         *(_at_edge(name, end, bounds) for name, end in at_bound.items()),
         *left_open(model, data_sets, [name for name in names if name not in at_bound], covariance),
         *misfit(model, data_sets, len(names), advice),
@@ -298,9 +276,9 @@ def _checked(model: Model, data_sets: Sequence[DataSet]) -> str:
     )
 
 
-def _stopped(solution: Solution) -> list[str]:
+def _stopped(solution: Solution) -> str:
     where = _FLAT if solution.flat else _SLOPE
-    return [f"the fit was stopped after {solution.evaluations} evaluations of the model, where {where}"]
+    return f"the fit was stopped after {solution.evaluations} evaluations of the model, where {where}"
 
 
 def _at_edge(name: str, end: End, bounds: Bounds) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -96,20 +97,13 @@ class _Profile:
         """
         from scipy.optimize import brentq
 
-        here = start
-        for _ in range(_MOST_STEPS):
-            ahead = bound if abs(bound - here) <= step else here + float(np.copysign(step, bound - here))
+        steps = start + np.copysign(step, bound - start) * np.arange(_MOST_STEPS + 1)
+        for here, ahead in pairwise(np.clip(steps, min(start, bound), max(start, bound)).tolist()):
             if self.root_rise(ahead) >= allowed:
                 end = brentq(lambda at: self.root_rise(at) - allowed, here, ahead, xtol=_PRECISION * step)
-                return None if self._held_far(start, end, allowed) else self.value(end)
-            if ahead == bound:
-                break
-            here = ahead
+                held_by_others = abs(end - start) > _FAR and self._bounded(end) > _HELD_BY_OTHERS * allowed**2
+                return None if held_by_others else self.value(end)
         return None
-
-    def _held_far(self, start: float, end: float, allowed: float) -> bool:
-        """Whether it is the bounds of others that hold an end, and that far away."""
-        return abs(end - start) > _FAR and self._bounded(end) > _HELD_BY_OTHERS * allowed**2
 
     def _bounded(self, at: float) -> float:
         """How far chi-square would fall there if others could leave the bounds that they met on the way."""

@@ -8,7 +8,8 @@ Notes:
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -41,29 +42,23 @@ class Estimate:
         data_sets: the data, outliers without weight where the loss leaves them out.
         minimised: the same with the weights at which the solution is the least sum of squares.
         weighed: the same with the weights that give its covariance.
-        outlying: numbers of the outliers of each data set.
+        outliers: by file and row.
     """
 
     solution: Solution
     data_sets: tuple[DataSet, ...]
     minimised: tuple[DataSet, ...]
     weighed: tuple[DataSet, ...]
-    outlying: tuple[Array, ...]
-
-    @property
-    def outliers(self) -> tuple[Outlier, ...]:
-        """The outliers by file and row."""
-        model, data_sets = self.solution.model, self.data_sets
-        return tuple(
-            entry
-            for data_set, points in zip(data_sets, self.outlying, strict=True)
-            for entry in data_set.outliers(points, model)
-        )
+    outliers: tuple[Outlier, ...]
 
 
-def outliers_at(model: Model, data_sets: Sequence[DataSet]) -> tuple[Outlier, ...]:
-    """The outliers of some data sets as a model sees them, by file and row."""
-    return tuple(entry for data_set in data_sets for entry in data_set.outliers(data_set.outlying(model), model))
+def outliers_at(
+    model: Model, data_sets: Sequence[DataSet], outlying: Sequence[Array] | None = None
+) -> tuple[Outlier, ...]:
+    """Outliers of some data sets by file and row: those whose numbers are given, else those that the model sees."""
+    numbers = outlying or [data_set.outlying(model) for data_set in data_sets]
+    pairs = zip(data_sets, numbers, strict=True)
+    return tuple(entry for data_set, points in pairs for entry in data_set.outliers(points, model))
 
 
 def estimate(
@@ -81,9 +76,8 @@ def estimate(
     slope. Outliers of loops have no weight from the start, see `drive`.
     """
     if not robust:
-        solution = solve(model, data_sets, names, bounds)
-        outlying = tuple(data_set.outlying(solution.model) for data_set in data_sets)
-        return Estimate(solution, tuple(data_sets), tuple(data_sets), tuple(data_sets), outlying)
+        solution, same = solve(model, data_sets, names, bounds), tuple(data_sets)
+        return Estimate(solution, same, same, same, outliers_at(solution.model, same))
     for _ in range(_MOST_ROUNDS):
         outlying = tuple(data_set.outlying(model) for data_set in data_sets)
         kept = tuple(data_set.without(points) for data_set, points in zip(data_sets, outlying, strict=True))
@@ -97,7 +91,7 @@ def estimate(
                 data_set.weighted(np.full(data_set.size // data_set.parts, _efficiency(data_set.parts)))
                 for data_set in kept
             )
-            return Estimate(solution, kept, softened, weighed, outlying)
+            return Estimate(solution, kept, softened, weighed, outliers_at(model, kept, outlying))
     raise FitError(
         "the robust fit does not settle",
         found=f"{_MOST_ROUNDS} rounds of reweighting",
@@ -130,27 +124,25 @@ def told(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
     """
     left = [entry for entry in outliers if robust or entry.column == "displacement"]
     followed = [entry for entry in outliers if not robust and entry.column != "displacement"]
-    lines = []
-    if followed:
-        places = _places(followed)
-        lines.append(f"{_count(followed)} and the fit follows them: {places}; --loss soft_l1 leaves them out")
-    if left:
-        lines.append(f"{_count(left)}, left out of the fit: {_places(left)}")
-    return lines
-
-
-def _count(outliers: Sequence[Outlier]) -> str:
-    return f"{len(outliers)} point{'s lie' if len(outliers) > 1 else ' lies'} farther off than noise explains"
+    said = [
+        (followed, " and the fit follows them: {}; --loss soft_l1 leaves them out"),
+        (left, ", left out of the fit: {}"),
+    ]
+    return [
+        f"{len(entries)} point{'s lie' if len(entries) > 1 else ' lies'} farther off than noise explains"
+        f"{words.format(_places(entries))}"
+        for entries, words in said
+        if entries
+    ]
 
 
 def _places(outliers: Sequence[Outlier]) -> str:
-    rows: Mapping[str, list[int]] = {entry.place: [] for entry in outliers}
+    """Where outliers are, and the first of their rows."""
+    rows: defaultdict[str, list[str]] = defaultdict(list)
     for entry in outliers:
-        rows[entry.place].append(entry.row)
-    return "; ".join(f"{place} {_first(numbers)}" for place, numbers in rows.items())
-
-
-def _first(rows: Sequence[int]) -> str:
-    shown = ", ".join(str(row) for row in rows[:_MOST_NAMED])
-    more = f" and {len(rows) - _MOST_NAMED} more" if len(rows) > _MOST_NAMED else ""
-    return f"row{'s' if len(rows) > 1 else ''} {shown}{more}"
+        rows[entry.place].append(str(entry.row))
+    return "; ".join(
+        f"{place} row{'s' if len(numbers) > 1 else ''} {', '.join(numbers[:_MOST_NAMED])}"
+        + (f" and {len(numbers) - _MOST_NAMED} more" if len(numbers) > _MOST_NAMED else "")
+        for place, numbers in rows.items()
+    )

@@ -133,7 +133,7 @@ def solve(
     tolerance: float = _TOLERANCE,
     strict: bool = True,
 ) -> Solution:
-    """Fit the named parameters by least squares, from the model's own values, the others held.
+    """Fit the named parameters by least squares, from the model's own values, the others held; without names all are.
 
     Args:
         model: where to start.
@@ -152,6 +152,9 @@ def solve(
         Levenberg-Marquardt, the shorter way, which knows no bounds. Where a step leaves the bounds, and for every
         other model, the trust-region reflective method starts from the model's own values.
     """
+    if not names:
+        left = residual(model, data_sets)
+        return Solution(model, Coordinates((), ()), left, np.empty((0, left.size)), 1, {}, stopped=False)
     problem = _Problem.of(model, data_sets, names, bounds or {})
     limits = {"max_nfev": evaluations, "ftol": tolerance, "xtol": tolerance, "calc_covar": False}
     try:
@@ -231,26 +234,27 @@ class _Problem:
 
     def solution(self, fit: lmfit.minimizer.MinimizerResult) -> Solution:
         """Where lmfit ended."""
-        end = np.array([parameter.value for parameter in fit.params.values()])
-        model, names = self.model_at(tuple(end)), self.coordinates.names
+        end = _point(fit.params)
+        model, names = self.model_at(end), self.coordinates.names
         return Solution(
             model,
             self.coordinates,
             residual(model, self.data_sets),
             jacobian(model, self.data_sets, names),
             int(fit.nfev),
-            at_bound(names, end, self.low, self.high),
+            at_bound(names, np.array(end), self.low, self.high),
             bool(fit.aborted),
         )
 
-    def _model(self, parameters: lmfit.Parameters) -> Model:
-        return self.model_at(tuple(parameter.value for parameter in parameters.values()))
-
     def _residual(self, parameters: lmfit.Parameters) -> Array:
-        return residual(self._model(parameters), self.data_sets)
+        return residual(self.model_at(_point(parameters)), self.data_sets)
 
     def _jacobian(self, parameters: lmfit.Parameters) -> Array:
-        return jacobian(self._model(parameters), self.data_sets, self.coordinates.names)
+        return jacobian(self.model_at(_point(parameters)), self.data_sets, self.coordinates.names)
+
+
+def _point(parameters: lmfit.Parameters) -> tuple[float, ...]:
+    return tuple(parameter.value for parameter in parameters.values())
 
 
 def starting_point(
@@ -292,10 +296,9 @@ def coordinate_bounds(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, 
 def _lmfit_parameters(start: Array, low: Array | None = None, high: Array | None = None) -> lmfit.Parameters:
     """lmfit's parameters at a point, within bounds or without."""
     parameters = _blank_parameters(start.size)
-    lows = np.full(start.shape, -np.inf) if low is None else low
-    highs = np.full(start.shape, np.inf) if high is None else high
-    for parameter, value, least, most in zip(parameters.values(), start, lows, highs, strict=True):
-        parameter.set(value=float(value), min=float(least), max=float(most))
+    ends = np.broadcast_arrays(start, -np.inf if low is None else low, np.inf if high is None else high)
+    for parameter, (value, least, most) in zip(parameters.values(), np.transpose(ends).tolist(), strict=True):
+        parameter.set(value=value, min=least, max=most)
     return parameters
 
 
@@ -305,13 +308,12 @@ def _blank_parameters(count: int) -> lmfit.Parameters:
     import lmfit
 
     parameters = lmfit.Parameters()
-    for i in range(count):
-        parameters.add(f"u{i}")
+    parameters.add_many(*((f"u{i}",) for i in range(count)))
     return parameters
 
 
 def at_bound(names: Sequence[str], point: Array, low: Array, high: Array) -> dict[str, End]:
     """The parameters that rest on a bound at a point, and on which, "min" or "max"."""
     near = _AT_BOUND * np.minimum(high - low, 1.0)
-    ends: dict[str, End] = {name: "min" for name, met in zip(names, point - low < near, strict=True) if met}
-    return ends | {name: "max" for name, met in zip(names, high - point < near, strict=True) if met}
+    rooms: dict[End, Array] = {"min": point - low, "max": high - point}
+    return {name: end for end, room in rooms.items() for name, met in zip(names, room < near, strict=True) if met}

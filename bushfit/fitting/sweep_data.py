@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import Any, Literal, Self
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from bushfit.effects.contract import Array, Values
 from bushfit.fitting.data_set import DataSet, Suspect, kept, shown_amplitude
@@ -40,14 +41,14 @@ class Level:
         amplitude: zero-to-peak [m or rad].
         frequency: [Hz], (n,), each once.
         misfit: measured over model less 1, complex, (n,).
-        noise: standard deviation of the gain and the phase of one of these means.
+        noise: standard deviation of the gain and the phase of one of these means, (2,).
     """
 
     direction: Direction
     amplitude: float
     frequency: Array
     misfit: Array
-    noise: tuple[float, float]
+    noise: Array
 
     @cached_property
     def smooth(self) -> Array:
@@ -68,7 +69,7 @@ class SweepData(DataSet):
         noise: of the campaign's sweeps.
         residuals: what the residual is made of.
         weight: share of its weight that each point has, (n,) in `order`; all for None.
-        part: rows of the whole sweep, (n,), where this is a part of it.
+        part: rows of the sweep that belong to it, (n,) in `order`; all for None.
     """
 
     sweep: Sweep
@@ -85,7 +86,7 @@ class SweepData(DataSet):
 
     @property
     def size(self) -> int:
-        return 2 * int(self.sweep.frequency.size)
+        return 2 * int(self.order.size)
 
     @property
     def counted(self) -> int:
@@ -106,26 +107,16 @@ class SweepData(DataSet):
         edges = [*self.block_starts.tolist(), count]
         return [part + np.arange(first, last) for part in (0, count) for first, last in pairwise(edges)]
 
-    def at_amplitudes(self, amplitudes: Sequence[float]) -> Self:
+    def at_amplitudes(self, amplitudes: Sequence[float] | Array) -> Self:
         """The part of the sweep at some of its levels, with the same noise."""
-        return self._part(np.isin(self.sweep.amplitude, amplitudes))
+        return self._part(np.isin(self.amplitude, amplitudes))
 
     def standing(self) -> Self:
-        kept_rows = np.empty(self.frequency.size, dtype=bool)
-        kept_rows[self.order] = self.weights > 0.0
-        return self if kept_rows.all() else self._part(kept_rows)
+        standing = self.weights > 0.0
+        return self if standing.all() else self._part(standing)
 
-    def _part(self, rows: Array) -> Self:
-        sweep = replace(
-            self.sweep,
-            frequency=self.sweep.frequency[rows],
-            amplitude=self.sweep.amplitude[rows],
-            stiffness=self.sweep.stiffness[rows],
-            repeat=self.sweep.repeat[rows],
-            reached=self.sweep.amplitude_reached[rows],
-        )
-        weight = None if self.weight is None else self.weight[rows[self.order]]
-        return replace(self, sweep=sweep, weight=weight, part=self._whole[rows])
+    def _part(self, chosen: Array) -> Self:
+        return replace(self, weight=self.weights[chosen], part=self.order[chosen])
 
     def weighted(self, weight: Array) -> Self:
         return replace(self, weight=self.weights * weight)
@@ -134,23 +125,15 @@ class SweepData(DataSet):
         return self.weighted(np.isin(np.arange(self.frequency.size), points, invert=True)) if points.size else self
 
     def noise_free(self, model: Model) -> Self:
-        stiffness = np.empty_like(self.sweep.stiffness)
+        stiffness = self.sweep.stiffness.copy()
         stiffness[self.order] = self.stiffness(model)
         return replace(self, sweep=replace(self.sweep, stiffness=stiffness))
 
     @cached_property
     def order(self) -> Array:
-        """Rows of the sweep sorted by block (amplitude, repeat), then frequency."""
-        return np.lexsort((self.sweep.frequency, self.sweep.repeat, self.sweep.amplitude))
-
-    @property
-    def rows(self) -> Array:
-        """Row of the whole sweep at which each point stands, from 0, (n,) in `order`."""
-        return self._whole[self.order]
-
-    @property
-    def _whole(self) -> Array:
-        return np.arange(self.sweep.frequency.size) if self.part is None else self.part
+        """Row of the sweep at which each point stands, from 0, (n,): by block (amplitude, repeat), then frequency."""
+        by_block = np.lexsort((self.sweep.frequency, self.sweep.repeat, self.sweep.amplitude))
+        return by_block if self.part is None else self.part
 
     @cached_property
     def frequency(self) -> Array:
@@ -178,15 +161,9 @@ class SweepData(DataSet):
         label = np.stack((self.amplitude, self.repeat.astype(float)))
         return np.concatenate(([0], 1 + np.flatnonzero(np.any(np.diff(label), axis=0))))
 
+    @kept
     def stiffness(self, model: Model, values: Values | None = None) -> Array:
         """Model stiffness at the points, (..., n); what repeats is computed once."""
-        return self._stiffness(model) if values is None else self._stiffness_of(model, values)
-
-    @kept
-    def _stiffness(self, model: Model) -> Array:
-        return self._stiffness_of(model, model.values)
-
-    def _stiffness_of(self, model: Model, values: Values) -> Array:
         frequency, amplitude, place = self._distinct
         return model.stiffness(self.direction, frequency, amplitude, values=values)[..., place]
 
@@ -219,20 +196,19 @@ class SweepData(DataSet):
 
     def deviation(self, model: Model, values: Values | None = None) -> Array:
         """Residual before whitening: gain in the real, phase (or loss factor) in the imaginary part, (..., n)."""
-        return self._deviation(self.stiffness(model, values))
+        stiffness = self.stiffness(model, values)
+        if self.residuals == "complex":
+            return stiffness / self.measured - 1.0
+        gain = np.abs(stiffness / self.measured) - 1.0
+        loss = stiffness.imag / stiffness.real - self.measured.imag / self.measured.real
+        return gain + 1j * loss * self._loss_scale
 
+    @kept
     def residual(self, model: Model, values: Values | None = None) -> Array:
-        return self._residual(model) if values is None else self.whiten(self.deviation(model, values))
+        return self.whiten(self.deviation(model, values))
 
     @kept
-    def _residual(self, model: Model) -> Array:
-        return self.whiten(self.deviation(model))
-
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        return self._jacobian(model, tuple(names))
-
-    @kept
-    def _jacobian(self, model: Model, names: tuple[str, ...]) -> Array:
         frequency, amplitude, place = self._distinct
         slopes = stiffness_jacobian(model, self.direction, frequency, amplitude, names)[:, place]
         if self.residuals == "complex":
@@ -242,13 +218,6 @@ class SweepData(DataSet):
         gain = np.abs(stiffness / self.measured) * relative.real
         loss = relative.imag * (np.abs(stiffness) / stiffness.real) ** 2
         return self.whiten(gain + 1j * loss * self._loss_scale)
-
-    def _deviation(self, stiffness: Array) -> Array:
-        if self.residuals == "complex":
-            return stiffness / self.measured - 1.0
-        gain = np.abs(stiffness / self.measured) - 1.0
-        loss = stiffness.imag / stiffness.real - self.measured.imag / self.measured.real
-        return gain + 1j * loss * self._loss_scale
 
     @cached_property
     def _loss_scale(self) -> Array:
@@ -277,11 +246,9 @@ class SweepData(DataSet):
         return outlying_points(self, model)
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
-        if not points.size:
-            return
         file = str(self.source.file) if self.source else None
         distance = self.distance(model)[points].tolist()
-        for row, off in sorted(zip((self.rows[points] + 1).tolist(), distance, strict=True)):
+        for row, off in sorted(zip((self.order[points] + 1).tolist(), distance, strict=True)):
             yield Outlier(self.name, file, row, "stiffness", off)
 
     def levels(self, model: Model) -> list[Level]:
@@ -289,25 +256,18 @@ class SweepData(DataSet):
         ratio, levels = self.measured / self.stiffness(model) - 1.0, []
         for amplitude in np.unique(self.amplitude):
             chosen = self.amplitude == amplitude
-            frequency, place = np.unique(self.frequency[chosen], return_inverse=True)
-            counts, values = np.bincount(place), ratio[chosen]
-            mean = (np.bincount(place, values.real) + 1j * np.bincount(place, values.imag)) / counts
-            random = self.noise.random[self.name, float(amplitude)]
-            repeats = float(np.median(counts))
-            gain, phase = np.sqrt((np.square(random) + np.square(self.noise.shared)) / repeats).tolist()
-            levels.append(Level(self.direction, float(amplitude), frequency, mean, (gain, phase)))
+            frequency, place, counts = np.unique(self.frequency[chosen], return_inverse=True, return_counts=True)
+            mean = np.bincount(place, ratio[chosen].real) + 1j * np.bincount(place, ratio[chosen].imag)
+            of_one = np.square(self.noise.random[self.name, float(amplitude)]) + np.square(self.noise.shared)
+            noise = np.sqrt(of_one / np.median(counts))
+            levels.append(Level(self.direction, float(amplitude), frequency, mean / counts, noise))
         return levels
 
     def contrasts(self) -> Array:
         """Gain and phase of each level as polynomials in ln f, as whitened residuals, (c, 2 n)."""
-        rows = []
-        for level in np.unique(self.amplitude):
-            chosen = self.amplitude == level
-            for column in _polynomials(self.frequency[chosen]).T:
-                values = np.zeros(chosen.size, dtype=complex)
-                values[chosen] = column
-                rows += [self.whiten(unit * values) for unit in (1.0, 1.0j)]
-        return np.array(rows)
+        levels = np.split(self.frequency, np.flatnonzero(np.diff(self.amplitude)) + 1)
+        columns = block_diag(*(_polynomials(frequency).T for frequency in levels))
+        return self.whiten(np.concatenate((columns, 1.0j * columns)))
 
     def smooth_misfit(self, model: Model) -> float:
         return max(float(np.abs(level.smooth).max()) for level in self.levels(model))
@@ -315,14 +275,16 @@ class SweepData(DataSet):
     def suspects(self, residual: Array) -> Iterator[Suspect]:
         """One amplitude wrong as a whole, one repeat of one, and single points that lie far out."""
         levels = np.unique(self.amplitude)
-        for level in levels if levels.size > 1 else ():
-            words = f"the {self.direction} level {shown_amplitude(self.direction, level)}"
-            yield self._suspect(words, "level", self.amplitude == level)
         for level in levels:
-            numbers = np.unique(self.repeat[self.amplitude == level])
+            words, here = (
+                f"the {self.direction} level {shown_amplitude(self.direction, level)}",
+                self.amplitude == level,
+            )
+            if levels.size > 1:
+                yield self._suspect(words, "level", here)
+            numbers = np.unique(self.repeat[here])
             for number in numbers if numbers.size > 2 else ():
-                words = f"repeat {number} of the {self.direction} level {shown_amplitude(self.direction, level)}"
-                yield self._suspect(words, "repeat", (self.amplitude == level) & (self.repeat == number))
+                yield self._suspect(f"repeat {number} of {words}", "repeat", here & (self.repeat == number))
         count = self.frequency.size
         distance = np.maximum(np.abs(residual[:count]), np.abs(residual[count:]))
         farthest = np.argsort(-distance, kind="stable")[:_MOST_ROWS]

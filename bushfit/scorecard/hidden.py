@@ -7,6 +7,7 @@ means what is left of the effect after the plain model has absorbed what it can.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -81,6 +82,10 @@ class Sealed:
     seed: int
 
 
+class _OutOfReachError(Exception):
+    """No amount of an effect shows at a size in range."""
+
+
 def hidden_campaign(seed: int, hidden: Sequence[str], outside: str = "") -> tuple[Simulated, Sealed]:
     """One hidden campaign; the same seed makes the same.
 
@@ -93,8 +98,8 @@ def hidden_campaign(seed: int, hidden: Sequence[str], outside: str = "") -> tupl
     for _ in range(_TRIES):
         plain = _bushing(random)
         plan = _plan(plain, random, seed)
-        model, visible = _with_hidden(plain, hidden, plan, random)
-        if model is not None:
+        with suppress(_OutOfReachError):
+            model, visible = _with_hidden(plain, hidden, plan, random)
             break
     else:
         raise RuntimeError(f"no visible size of {', '.join(hidden)} was found for seed {seed}")
@@ -125,13 +130,8 @@ def _bushing(random: Generator) -> Model:
 
 def _plan(plain: Model, random: Generator, seed: int) -> SimulateSettings:
     """Two directions at three levels of like strain, two loops, three repeats."""
-    bushing = plain.bushing
-    top = random.uniform(0.03, 0.06)
-    sweeps = []
-    for direction in (Direction.AXIAL, Direction.RADIAL):
-        largest = float(f"{top / bushing.unit_strain(direction):.2g}")
-        sweeps.append(SimulatedSweep(direction, tuple(float(x) for x in _LEVELS * largest), _FREQUENCIES))
-    largest = max(sweeps[0].amplitudes)
+    top, directions = random.uniform(0.03, 0.06), (Direction.AXIAL, Direction.RADIAL)
+    axial, radial = (float(f"{top / plain.bushing.unit_strain(direction):.2g}") for direction in directions)
     shared = random.random() < 0.5
     return SimulateSettings(
         seed=seed,
@@ -141,32 +141,33 @@ def _plan(plain: Model, random: Generator, seed: int) -> SimulateSettings:
         displacement_noise=_DISPLACEMENT_NOISE,
         gain_error=_SHARED_GAIN if shared else 0.0,
         phase_error=_SHARED_PHASE if shared else 0.0,
-        loops=tuple(SimulatedLoop(Direction.AXIAL, factor * largest, 0.1, cycles=3) for factor in (1.0, 2.0)),
-        sweeps=tuple(sweeps),
+        loops=tuple(SimulatedLoop(Direction.AXIAL, factor * axial, 0.1, cycles=3) for factor in (1.0, 2.0)),
+        sweeps=tuple(
+            SimulatedSweep(direction, tuple((_LEVELS * largest).tolist()), _FREQUENCIES)
+            for direction, largest in zip(directions, (axial, radial), strict=True)
+        ),
     )
 
 
-def _with_hidden(
-    plain: Model, hidden: Sequence[str], plan: SimulateSettings, random: Generator
-) -> tuple[Model | None, float]:
-    """The plain model with effects of random visible size, and that size; None where none can be reached."""
-    if not hidden:
-        return plain, 0.0
+def _with_hidden(plain: Model, hidden: Sequence[str], plan: SimulateSettings, random: Generator) -> tuple[Model, float]:
+    """The plain model with effects of random visible size, and the least size.
+
+    Raises:
+        _OutOfReachError: an effect cannot have that size.
+    """
     model, sizes = plain, []
     for name in hidden:
         wanted = float(np.exp(random.uniform(*np.log(_VISIBLE))))
         sized, size = _sized(plain, effect_named(name), wanted, plan, random)
-        if sized is None:
-            return None, 0.0
         model = model.with_effect(name, sized)
         sizes.append(size)
-    return model, min(sizes)
+    return model, min(sizes, default=0.0)
 
 
 def _sized(
     plain: Model, effect: Effect, wanted: float, plan: SimulateSettings, random: Generator
-) -> tuple[dict[str, float] | None, float]:
-    """Values of an effect of which about the wanted size stays visible after a plain fit; None out of bounds."""
+) -> tuple[dict[str, float], float]:
+    """Values of an effect of which about the wanted size stays visible after a plain fit, and that size."""
     values = {
         qualified(effect, parameter): _shape(plain, plan, parameter.scale, parameter.typical, random)
         for parameter in effect.parameters
@@ -179,19 +180,17 @@ def _sized(
     size = 0.0
     for _ in range(_SIZING_STEPS):
         if not (amount.bounds[0] <= value <= amount.bounds[1] and abs(value) <= _LARGEST * amount.typical):
-            return None, 0.0
+            raise _OutOfReachError
         model = plain.with_effect(effect.name, {**values, name: value})
         if not _plausible(model, plan):
             value *= 0.3
             continue
         size = _visible(plain, model, plan)
-        if size <= 0.0:
-            return None, 0.0
-        if abs(np.log(size / wanted)) < _NEAR:
+        if size <= 0.0 or abs(np.log(size / wanted)) < _NEAR:
             break
         value *= float(np.clip(wanted / size, 0.1, 10.0))
     if not 0.7 * _VISIBLE[0] < size < 2.0 * _VISIBLE[1]:
-        return None, 0.0
+        raise _OutOfReachError
     return {**values, name: value}, size
 
 
@@ -211,12 +210,14 @@ def _shape(plain: Model, plan: SimulateSettings, scale: str | None, typical: flo
 def _plausible(model: Model, plan: SimulateSettings) -> bool:
     """Whether every test meets a bushing: one that resists, which beyond its clearance it does not, and that does not
     lose more than it stores."""
-    for test in plan.sweeps:
-        frequency, amplitude = np.meshgrid(test.frequencies, test.amplitudes)
-        stiffness = model.stiffness(test.direction, frequency.ravel(), amplitude.ravel())
-        if not np.all(np.abs(stiffness.imag) < _MOST_LOSS * stiffness.real):
-            return False
-    return True
+    stiffness = np.concatenate([model.stiffness(test.direction, *_points(test)) for test in plan.sweeps])
+    return bool(np.all(np.abs(stiffness.imag) < _MOST_LOSS * stiffness.real))
+
+
+def _points(test: SimulatedSweep) -> tuple[Array, Array]:
+    """Frequency and amplitude of each point, (n,) each."""
+    frequency, amplitude = np.meshgrid(test.frequencies, test.amplitudes)
+    return frequency.ravel(), amplitude.ravel()
 
 
 def _visible(plain: Model, model: Model, plan: SimulateSettings) -> float:
@@ -228,19 +229,26 @@ def _visible(plain: Model, model: Model, plan: SimulateSettings) -> float:
 
 def _noise_free_data(model: Model, plan: SimulateSettings) -> list[DataSet]:
     """The plan's tests as the model's own closed form has them: used for the choice of a size, never as data."""
-    sweeps = []
-    for number, swept in enumerate(plan.sweeps):
-        frequency, amplitude = (x.ravel() for x in np.meshgrid(swept.frequencies, swept.amplitudes))
-        stiffness = model.stiffness(swept.direction, frequency, amplitude)
-        sweeps.append(Sweep(str(number), swept.direction, frequency, amplitude, stiffness, noise=5e-3))
-    loops = []
-    for number, test in enumerate(plan.loops):
-        phase = np.arange(600) / 200.0
-        motion = test.amplitude * np.sin(2.0 * np.pi * phase)
-        data_set = loop_data([Loop(str(number), test.direction, phase / test.frequency, motion, motion)])[0]
-        data_set = data_set.noise_free(model)
-        loops.append(replace(data_set, drive=replace(data_set.drive, noise=3e-3 * data_set.drive.half_range)))
-    return [*loops, *sweep_data(sweeps)]
+    swept = [(test.direction, *_points(test)) for test in plan.sweeps]
+    sweeps = [
+        Sweep(
+            str(direction),
+            direction,
+            frequency,
+            amplitude,
+            model.stiffness(direction, frequency, amplitude),
+            noise=5e-3,
+        )
+        for direction, frequency, amplitude in swept
+    ]
+    phase = np.arange(600) / 200.0
+    motions = [(test, test.amplitude * np.sin(2.0 * np.pi * phase)) for test in plan.loops]
+    loops = [
+        Loop(str(number), test.direction, phase / test.frequency, motion, motion)
+        for number, (test, motion) in enumerate(motions)
+    ]
+    silent = [data_set.noise_free(model).with_noise(3e-3) for data_set in loop_data(loops)]
+    return [*silent, *sweep_data(sweeps)]
 
 
 def _disturbed(clean: Undisturbed, outside: str, random: Generator) -> Undisturbed:
@@ -265,15 +273,14 @@ def _mislabelled(clean: Undisturbed, random: Generator) -> tuple[tuple[Simulated
     which, level = int(random.integers(len(clean.sweeps))), int(random.integers(3))
     test, stiffness = clean.sweeps[which]
     factor = float(random.choice([0.5, 0.6, 1.6, 2.0]))
-    other = rig.dynamic_stiffness(
+    wrong = stiffness.copy()
+    wrong[level] = rig.dynamic_stiffness(
         clean.truth,
         test.direction,
         np.array(test.frequencies),
         np.full(len(test.frequencies), factor * test.amplitudes[level]),
         steps_per_cycle=_STEPS,
     )
-    wrong = stiffness.copy()
-    wrong[level] = other
     return tuple((t, wrong if i == which else k) for i, (t, k) in enumerate(clean.sweeps))
 
 
@@ -294,11 +301,11 @@ def _weakening_slip(clean: Undisturbed, size: float, random: Generator) -> Undis
         velocity = (x * omega)[..., None] * np.cos(angle)
         quadrature = 2.0 * np.mean(slip(velocity) * np.cos(angle), axis=-1)
         sweeps.append((swept, k + 1j * quadrature / x))
-    loops = []
-    for looped, rec in clean.loops:
-        velocity = np.gradient(rec.displacement, rec.time)
-        loops.append((looped, replace(rec, force=rec.force + slip(velocity))))
-    return replace(clean, sweeps=tuple(sweeps), loops=tuple(loops))
+    loops = tuple(
+        (looped, replace(rec, force=rec.force + slip(np.gradient(rec.displacement, rec.time))))
+        for looped, rec in clean.loops
+    )
+    return replace(clean, sweeps=tuple(sweeps), loops=loops)
 
 
 def hideable() -> list[str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
@@ -103,18 +103,11 @@ def tasks(count: int, seed: int) -> list[Task]:
     for kind, share in _KINDS.items():
         for number in range(max(1, round(share * count))):
             own = int(random.integers(2**31))
-            single = names[number % len(names)]
-            match kind:
-                case "single":
-                    made.append(Task(kind, own, (single,)))
-                case "clean":
-                    made.append(Task(kind, own, ()))
-                case "pair":
-                    made.append(Task(kind, own, tuple(str(x) for x in random.choice(names, 2, replace=False))))
-                case "outside":
-                    made.append(Task(kind, own, (), OUTSIDE[number % len(OUTSIDE)]))
-                case _:
-                    made.append(Task(kind, own, (single,), without=(single,)))
+            hidden: tuple[str, ...] = (names[number % len(names)],) if kind in ("single", "lacking") else ()
+            if kind == "pair":
+                hidden = tuple(random.choice(names, 2, replace=False).tolist())
+            outside = OUTSIDE[number % len(OUTSIDE)] if kind == "outside" else ""
+            made.append(Task(kind, own, hidden, outside, hidden if kind == "lacking" else ()))
     return made
 
 
@@ -186,19 +179,19 @@ class Row:
 def card(outcomes: Sequence[Outcome]) -> list[Row]:
     """Every target of the workflow, measured."""
     good = [outcome for outcome in outcomes if not outcome.error]
-    single = _kind(good, "single")
+    kinds = {kind: [outcome for outcome in good if outcome.task.kind == kind] for kind in _KINDS}
+    single, clean, pair, outside, lacking = kinds.values()
     plain = [outcome for outcome in single if outcome.gain >= PLAIN]
     named = [outcome for outcome in good if outcome.verdict == "named" and outcome.task.hidden]
     covered = [hit for outcome in good if outcome.exact for hit in outcome.covered]
-    clean, outside, lacking = (_kind(good, kind) for kind in ("clean", "outside", "lacking"))
-    strange, hidden = [*outside, *lacking], [*single, *_kind(good, "pair"), *outside]
+    strange, hidden = [*outside, *lacking], [*single, *pair, *outside]
     seconds = [outcome.seconds for outcome in good]
     shares: list[tuple[str, Sequence[Outcome], Callable[[Outcome], bool], str, float, float]] = [
         ("false alarm on clean campaigns", clean, lambda o: o.verdict != "consistent", "<= 1 %", 0.0, 0.01),
         ("truth named alone or in a set of at most three", single, lambda o: o.truth_in_sets, ">= 97 %", 0.97, 1.0),
         ("a single, confident, wrong name", hidden, lambda o: o.single_wrong, "<= 2 %", 0.0, 0.02),
         ("single name where the effect is plain", plain, lambda o: o.exact, ">= 90 %", 0.9, 1.0),
-        ("two effects at once, both named", _kind(good, "pair"), lambda o: o.truth_in_sets, ">= 90 %", 0.9, 1.0),
+        ("two effects at once, both named", pair, lambda o: o.truth_in_sets, ">= 90 %", 0.9, 1.0),
         (
             "outside the list: no confident name",
             strange,
@@ -222,10 +215,6 @@ def card(outcomes: Sequence[Outcome]) -> list[Row]:
     return rows
 
 
-def _kind(outcomes: Sequence[Outcome], kind: str) -> list[Outcome]:
-    return [outcome for outcome in outcomes if outcome.task.kind == kind]
-
-
 def _share(measure: str, hits: Sequence[bool], target: str, low: float, high: float) -> Row:
     if not hits:
         return Row(measure, "no case", 0, target, None)
@@ -235,13 +224,10 @@ def _share(measure: str, hits: Sequence[bool], target: str, low: float, high: fl
 
 def confusion(outcomes: Sequence[Outcome]) -> dict[str, Counter[str]]:
     """Per hidden effect (or kind): how often which verdict with which names was given."""
-    table: dict[str, Counter[str]] = {}
+    table: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for outcome in outcomes:
         truth = " + ".join(outcome.task.hidden) or outcome.task.outside or "none"
-        if outcome.task.without:
-            truth = f"{truth} (library lacks it)"
-        said = outcome.verdict
-        if outcome.sets:
-            said += ": " + " + ".join("|".join(members) for members in outcome.sets)
-        table.setdefault(truth, Counter())[said] += 1
+        lacks = " (library lacks it)" if outcome.task.without else ""
+        sets = " + ".join("|".join(members) for members in outcome.sets)
+        table[truth + lacks][": ".join(filter(None, (outcome.verdict, sets)))] += 1
     return dict(sorted(table.items()))

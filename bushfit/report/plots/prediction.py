@@ -206,5 +206,5 @@ def _name_levels(
 
 def points_note(data_sets: Sequence[SweepData]) -> str:
     """A sentence on what the points of sweeps are."""
-    repeated = any(np.unique(data_set.sweep.repeat).size > 1 for data_set in data_sets)
+    repeated = any(np.unique(data_set.repeat).size > 1 for data_set in data_sets)
     return f"Points: measured{', mean of the repeats, with bars from the lowest to the highest' if repeated else ''}."
