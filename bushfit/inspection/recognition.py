@@ -63,7 +63,7 @@ def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Directi
     found = direction_of_file(file, table.headers, turns=turns)
     if "direction" not in stated:
         return found
-    if turns and stated["direction"] != Direction.TORSION:
+    if turns and not Direction(stated["direction"]).is_rotation:
         raise table.error(
             "the units say torsion",
             line=table.layout.header_line,

@@ -39,6 +39,7 @@ def direction_of_file(file: Path, headers: Iterable[str], *, turns: bool) -> Dir
     Args:
         file: of which the name, without the folders, may hold a word.
         headers: of its columns; they count where the name says nothing.
-        turns: whether the displacement is in units of angle, which means torsion whatever the words.
+        turns: whether the displacement is in units of angle: then it is a rotation, torsion unless another is named.
     """
-    return Direction.TORSION if turns else named_direction([file.stem]) or named_direction(headers)
+    named = named_direction([file.stem]) or named_direction(headers)
+    return Direction.TORSION if turns and not (named and named.is_rotation) else named
