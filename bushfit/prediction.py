@@ -168,8 +168,9 @@ def caveats(result: Result) -> list[str]:
     if result.measured is None:
         lines.append("the model was not fitted here: no uncertainty, and no fitted range to compare with")
     if rig := rig_effects(result):
-        belong = "because they belong to the rig and not to the bushing"
-        lines.append(f"left out of the prediction, {belong}: {', '.join(rig)}")
+        lines.append(
+            f"left out of the prediction, because they belong to the rig and not to the bushing: {', '.join(rig)}"
+        )
     return lines
 
 
@@ -199,10 +200,9 @@ def _extrapolations(result: Result, direction: Direction, frequency: Array, ampl
     """A warning for the frequencies and one for the strains where they leave what was fitted."""
     if result.measured is None:
         return
-    strain = amplitude * result.model.bushing.unit_strain(direction)
     axes = (
         ("frequencies", "Hz", frequency, result.measured.frequency),
-        ("strains", "%", strain, result.measured.strain),
+        ("strains", "%", amplitude * result.model.bushing.unit_strain(direction), result.measured.strain),
     )
     for what, unit, asked, (low, high) in axes:
         if asked.min() < low * (1 - _MARGIN) or asked.max() > high * (1 + _MARGIN):

@@ -4,17 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Values
+from bushfit.effects.contract import (
+    Array,
+    ForceBelow,
+    Layer,
+    Level,
+    Parameter,
+    Setting,
+    StiffnessBelow,
+    Values,
+    along_a_line,
+)
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
 from bushfit.effects.history import History
 
 #: Samples of the cycle from which the first harmonic of the bent waveform is taken: chosen, more change no digit that
 #: a test resolves.
 SAMPLES = 64
-#: Factors of the samples in the first harmonic.
+#: Factors of the samples in the complex first harmonic of a cycle that starts at the top of the motion.
 _FIRST = 2.0 / SAMPLES * np.exp(-2j * np.pi * np.arange(SAMPLES) / SAMPLES)
 
 
+@along_a_line
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
     """K(omega, X - delta) N(delta/X) + what friction makes of the bent waveform [N/m]; 0 within the play.
 
@@ -25,27 +36,21 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
         difference: the first harmonic of one steady cycle, less the first term from the same samples.
     """
     delta = p["delta"]
-    if setting.direction.is_rotation or not np.any(delta):
+    if not np.any(delta):
         return below(omega, amplitude)
     reach = np.maximum(amplitude - delta, 0.0)
     share = first_harmonic(amplitude, delta)
     wave = np.cos(2.0 * np.pi * np.arange(SAMPLES) / SAMPLES)
     bent = dead_zone(amplitude[..., None] * wave, np.asarray(delta)[..., None])
     crossed = reach > 0.0
-    round_ = _harmonic(below.cycle(omega, reach[..., None] * wave)) / np.where(crossed, reach, 1.0)
-    seen = _harmonic(below.cycle(omega, bent)) / np.where(crossed, amplitude, 1.0)
+    round_ = below.cycle(omega, reach[..., None] * wave) @ _FIRST / np.where(crossed, reach, 1.0)
+    seen = below.cycle(omega, bent) @ _FIRST / np.where(crossed, amplitude, 1.0)
     return below(omega, reach) * share + (seen - share * round_) * crossed
 
 
-def _harmonic(force: Array) -> Array:
-    """Complex first harmonic of one cycle that starts at the top of the motion."""
-    return force @ _FIRST
-
-
+@along_a_line
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
     """The force of the bushing moved by what exceeds +-delta [N]."""
-    if setting.direction.is_rotation:
-        return below(history)
     return below(history.with_value(dead_zone(history.value, p["delta"])))
 
 

@@ -19,14 +19,10 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     if history.periodic:
         turn = np.expm1(-1j * history.harmonics * p["tau"])
         return undelayed + np.fft.irfft(turn * np.fft.rfft(undelayed), n=undelayed.shape[-1])
-    late = np.asarray(p["tau"]) / history.step
-    whole = np.floor(late).astype(int)
-    *lead, count = np.broadcast_shapes(undelayed.shape, late.shape)
-    padded = np.concatenate([np.zeros((*lead, 1)), np.broadcast_to(undelayed, (*lead, count))], axis=-1)
-    index = np.arange(1, count + 1) - whole
-    near, far = (np.broadcast_to(np.maximum(i, 0), (*lead, count)) for i in (index, index - 1))
-    share = late - whole
-    return (1.0 - share) * np.take_along_axis(padded, near, -1) + share * np.take_along_axis(padded, far, -1)
+    place = np.arange(undelayed.shape[-1] + 1.0)
+    from_zero = np.concatenate([np.zeros_like(undelayed[..., :1]), undelayed], axis=-1)
+    row_by_row = np.vectorize(np.interp, signature="(n),(m),(m)->(n)")
+    return row_by_row(place[1:] - np.asarray(p["tau"]) / history.step, place, from_zero)
 
 
 EFFECT = Layer(

@@ -15,6 +15,7 @@ from bushfit.effects.contract import (
     Setting,
     StiffnessBelow,
     Values,
+    along_a_line,
     linear_response,
 )
 from bushfit.effects.history import History
@@ -26,31 +27,23 @@ def fixture(p: Values, omega: Array) -> Array:
     return -p["mass"] * np.asarray(omega) ** 2 / (1.0 - ratio**2 + 2j * p["damping"] * ratio)
 
 
+@along_a_line
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
     """K - M omega^2 wr^2/(wr^2 - omega^2 + 2 i zeta omega wr) [N/m]; does not act in torsion."""
-    if setting.direction.is_rotation:
-        return below(omega, amplitude)
     return below(omega, amplitude) + fixture(p, omega)
 
 
+@along_a_line
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
     """F + the fixture's force y: y'' + 2 zeta wr y' + wr^2 y = wr^2 M x'' [N].
 
     From rest the mode rings for 1/(2 pi zeta frequency) seconds before it has fallen to 37 %.
     """
-    if setting.direction.is_rotation:
-        return below(history)
     if history.periodic:
         return below(history) + linear_response(partial(fixture, p), history)
-    shapes = [np.shape(p[name]) for name in ("frequency", "damping")]
-    *lead, _ = np.broadcast_shapes((1,), *shapes, (*history.value.shape[:-1], 1))
-    frequency, damping = (np.broadcast_to(p[name], (*lead, 1)) for name in ("frequency", "damping"))
-    push = np.broadcast_to(history.acceleration, (*lead, history.value.shape[-1]))
-    rows = [
-        _mode(2.0 * np.pi * float(frequency[i][0]), float(damping[i][0]), push[i], history.step)
-        for i in np.ndindex(*lead)
-    ]
-    return below(history) + p["mass"] * np.reshape(rows, push.shape)
+    row_by_row = np.vectorize(_mode, signature="(),(),(n),()->(n)")
+    frequency, damping = (np.atleast_1d(p[name])[..., 0] for name in ("frequency", "damping"))
+    return below(history) + p["mass"] * row_by_row(2.0 * np.pi * frequency, damping, history.acceleration, history.step)
 
 
 def _mode(omega: float, damping: float, push: Array, step: float) -> Array:

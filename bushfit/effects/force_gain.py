@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
-from bushfit.effects.history import History
+from collections.abc import Callable
+from typing import Any
+
+from bushfit.effects.contract import Array, Layer, Level, Parameter, Values
 
 
-def _factor(p: Values, setting: Setting) -> Value:
-    """1 + gain in loops, 1 in sweeps."""
-    return 1.0 + p["gain"] if setting.kind == "loop" else 1.0
-
-
-def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """(1 + gain) K in loops, K in sweeps [N/m]."""
-    return _factor(p, setting) * below(omega, amplitude)
-
-
-def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """(1 + gain) F in loops, F in sweeps [N]."""
-    return _factor(p, setting) * below(history)
+def response(p: Values, below: Callable[..., Array], *motion_and_setting: Any) -> Array:
+    """(1 + gain) times the response below in loops, that response in sweeps; K [N/m] and F [N] alike."""
+    *motion, setting = motion_and_setting
+    return (1.0 + p["gain"] if setting.kind == "loop" else 1.0) * below(*motion)
 
 
 EFFECT = Layer(
@@ -31,6 +24,6 @@ EFFECT = Layer(
     ),
     source="sensitivity error of a force transducer, ISO 376:2011",
     confirmed_by="hang a known weight on the load cell in both chains",
-    stiffness=stiffness,
-    force=force,
+    stiffness=response,
+    force=response,
 )

@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Values
+from bushfit.effects.contract import (
+    Array,
+    ForceBelow,
+    Layer,
+    Level,
+    Parameter,
+    Setting,
+    StiffnessBelow,
+    Values,
+    along_a_line,
+)
 from bushfit.effects.history import History
 
 
@@ -11,10 +21,9 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     return below(omega, amplitude)
 
 
+@along_a_line
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
     """F + offset [N]; the torque cell is another one, so not in torsion."""
-    if setting.direction.is_rotation:
-        return below(history)
     return below(history) + p["offset"]
 
 

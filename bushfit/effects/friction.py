@@ -50,7 +50,7 @@ def harmonic_shape(x: Array) -> Array:
             Im h = (2 - p^2/x ln(1 + z)) / (pi x)
                  = (2 (D - 2)/D - 8x/p T(z)) / pi,  T = 1/3 - z/4 + z^2/5 - ...   (small z)
     """
-    _, big, p, q, z = _roots(x)
+    s, big, p, q, z = _roots(x)
     shape = np.empty(x.shape, dtype=complex)
     square = p * p
     shape.real = square / ((x + p + q) * q)
@@ -58,9 +58,10 @@ def harmonic_shape(x: Array) -> Array:
     shape.imag = (2.0 - square / far * np.log1p(z)) / (np.pi * far)
     small = z < _SERIES_BELOW
     if small.any():
-        x, big, p, z = x[small], big[small], p[small], z[small]
+        x, s, big, p, z = x[small], s[small], big[small], p[small], z[small]
         series = np.polynomial.polynomial.polyval(z, _SERIES)
-        shape.imag[small] = (2.0 * _less_2(x) / big - 8.0 * x / p * series) / np.pi
+        big_less_2 = x * (x + 6.0) / (s + 1.0) + x
+        shape.imag[small] = (2.0 * big_less_2 / big - 8.0 * x / p * series) / np.pi
     return shape
 
 
@@ -94,11 +95,6 @@ def _roots(x: Array) -> tuple[Array, Array, Array, Array, Array]:
     big = s + x + 1.0
     p = 1.0 + twice / big
     return s, big, p, np.sqrt(p * (p + twice)), twice / p
-
-
-def _less_2(x: Array) -> Array:
-    """D - 2 of `harmonic_shape`."""
-    return x * (x + 6.0) / (np.sqrt(x * (x + 6.0) + 1.0) + 1.0) + x
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
@@ -159,7 +155,6 @@ def _steady_start(levels: Array, eps_half: Array) -> tuple[Array, Array]:
     travel = np.roll(levels, -1, axis=-1) - levels
     senses, distances = np.sign(travel), np.abs(travel) / eps_half
     u = np.zeros((*distances.shape[:-1], 1))
-    forced = np.zeros_like(u)
     for _ in range(_ROUNDS):
         end, contraction, forced = u, np.ones_like(u), np.zeros_like(u)
         for i in range(levels.shape[-1]):

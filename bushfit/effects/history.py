@@ -151,11 +151,8 @@ def reversals(value: Array) -> Array:
 
     Where it rests before it turns, the last sample of the rest counts.
     """
-    step = np.sign(np.diff(value, axis=-1))
-    if step.all():
-        return np.concatenate([np.zeros((*step.shape[:-1], 1), dtype=bool), step[..., 1:] != step[..., :-1]], axis=-1)
-    moving = np.maximum.accumulate(np.where(step != 0.0, np.arange(step.shape[-1]), -1), axis=-1)
-    sense = np.where(moving >= 0, np.take_along_axis(step, np.maximum(moving, 0), axis=-1), 0.0)
-    turned = np.zeros(step.shape, dtype=bool)
-    turned[..., 1:] = sense[..., 1:] * sense[..., :-1] < 0.0
-    return turned
+    sense = np.sign(np.diff(value, axis=-1))
+    if not sense.all():
+        moving = np.maximum.accumulate(np.where(sense != 0.0, np.arange(sense.shape[-1]), 0), axis=-1)
+        sense = np.take_along_axis(sense, moving, axis=-1)
+    return np.concatenate([np.zeros_like(sense[..., :1], dtype=bool), sense[..., 1:] * sense[..., :-1] < 0.0], axis=-1)

@@ -13,22 +13,21 @@ from bushfit.effects.contract import (
     Setting,
     StiffnessBelow,
     Values,
+    along_a_line,
     linear_response,
 )
 from bushfit.effects.history import History
 
 
+@along_a_line
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
     """K - M omega^2 [N/m]; a mass that is moved, not turned, does not act in torsion."""
-    if setting.direction.is_rotation:
-        return below(omega, amplitude)
     return below(omega, amplitude) - p["mass"] * np.asarray(omega) ** 2
 
 
+@along_a_line
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
     """F + M d2x/dt2 [N]; exact in every harmonic of a steady cycle, second differences from rest."""
-    if setting.direction.is_rotation:
-        return below(history)
     if history.periodic:
         return below(history) + linear_response(lambda omega: -p["mass"] * omega**2, history)
     return below(history) + p["mass"] * history.acceleration

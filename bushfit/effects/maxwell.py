@@ -28,13 +28,9 @@ def relaxed(tau: float, values: Array, step: float) -> Array:
 def stress(p: Values, history: History) -> Array:
     """s + tau ds/dt = 2 mu1 tau de/dt [Pa]."""
     if history.periodic:
-        return linear_stress(lambda omega: modulus(p, omega, history.amplitude), history)
-    taus = np.atleast_1d(np.asarray(p["tau"], dtype=float))
-    lead = np.broadcast_shapes(taus.shape[:-1], history.value.shape[:-1])
-    taus = np.broadcast_to(taus, (*lead, 1))
-    values = np.broadcast_to(history.value, (*lead, history.value.shape[-1]))
-    rows = [relaxed(float(taus[i][0]), values[i], history.step) for i in np.ndindex(lead)]
-    return 2.0 * p["mu1"] * np.reshape(rows, values.shape)
+        return linear_stress(modulus, p, history)
+    row_by_row = np.vectorize(relaxed, signature="(),(n),()->(n)")
+    return 2.0 * p["mu1"] * row_by_row(np.atleast_1d(p["tau"])[..., 0], history.value, history.step)
 
 
 EFFECT = Branch(

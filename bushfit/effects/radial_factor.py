@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
-from bushfit.effects.history import History
+from collections.abc import Callable
+from typing import Any
+
+from bushfit.effects.contract import Array, Layer, Level, Parameter, Values
 from bushfit.geometry import Direction
 
 
-def _factor(p: Values, setting: Setting) -> Value:
-    """1 + excess radially, 1 in the other directions."""
-    return 1.0 + p["excess"] if setting.direction is Direction.RADIAL else 1.0
-
-
-def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """(1 + excess) K radially, K in the other directions [N/m]."""
-    return _factor(p, setting) * below(omega, amplitude)
-
-
-def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """(1 + excess) F radially, F in the other directions [N]."""
-    return _factor(p, setting) * below(history)
+def response(p: Values, below: Callable[..., Array], *motion_and_setting: Any) -> Array:
+    """(1 + excess) times the response below radially, that response in other directions; K [N/m] and F [N] alike."""
+    *motion, setting = motion_and_setting
+    return (1.0 + p["excess"] if setting.direction is Direction.RADIAL else 1.0) * below(*motion)
 
 
 EFFECT = Layer(
@@ -41,6 +34,6 @@ EFFECT = Layer(
     source="Eqs. 11, 12 against finite elements: -0.7 to +9.7 % over 14 shapes",
     confirmed_by="a finite element solution of this shape, or the radial rig's load cell against a known weight",
     corrects=Direction.RADIAL,
-    stiffness=stiffness,
-    force=force,
+    stiffness=response,
+    force=response,
 )

@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
+from bushfit.effects.contract import (
+    Array,
+    ForceBelow,
+    Layer,
+    Level,
+    Parameter,
+    Setting,
+    StiffnessBelow,
+    Value,
+    Values,
+    along_a_line,
+)
 from bushfit.effects.history import History
 from bushfit.errors import ModelError
 
@@ -22,10 +33,9 @@ _LARGEST_MOTION = 2.0
 _PULSE_AT = 4
 
 
+@along_a_line
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
     """K/(1 + c K) [N/m] with K at the amplitude X/|1 + c K| that reaches the bushing; does not act in torsion."""
-    if setting.direction.is_rotation:
-        return below(omega, amplitude)
     compliance = p["compliance"]
     inside = below(omega, amplitude * np.exp(_log_share(compliance, below, omega, amplitude)))
     return inside / (1.0 + compliance * inside)
@@ -52,6 +62,7 @@ def _log_share(compliance: Value, below: StiffnessBelow, omega: Array, amplitude
     return new
 
 
+@along_a_line
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
     """Force [N] of the motion x_b = x - c F(x_b) that reaches the bushing.
 
@@ -62,7 +73,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         sense with the imposed motion: that it sticks for a moment is neglected.
     """
     compliance = p["compliance"]
-    if setting.direction.is_rotation or not np.any(compliance):
+    if not np.any(compliance):
         return below(history)
     imposed, history = history.value, history.driven()
     count = imposed.shape[-1]

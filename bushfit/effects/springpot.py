@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Values, linear_stress
+from bushfit.effects.contract import Array, Branch, Level, Parameter, Value, Values, linear_response, linear_stress
 from bushfit.effects.history import History
 
 #: Step of alpha in differences of the Gruenwald-Letnikov sum [1]: the cube root of rounding, which errs least.
@@ -31,16 +29,13 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
     return {"m": by_m, "alpha": p["m"] * by_m * (np.log(safe) + 0.5j * np.pi)}
 
 
-@lru_cache(maxsize=64)
-def grunwald_letnikov_weights(alpha: float, count: int) -> Array:
+def grunwald_letnikov_weights(alpha: Value, count: int) -> Array:
     """w_0 = 1, w_j = w_{j-1} (j - 1 - alpha)/j (Eq. 3): the first `count` weights."""
     j = np.arange(1, count)
-    weights = np.concatenate(([1.0], np.cumprod((j - 1.0 - alpha) / j)))
-    weights.flags.writeable = False
-    return weights
+    return np.insert(np.cumprod((j - 1.0 - alpha) / j, axis=-1), 0, 1.0, axis=-1)
 
 
-def fractional_derivative(alpha: float, values: Array, step: float) -> Array:
+def fractional_derivative(alpha: Value, values: Array, step: float) -> Array:
     """D^alpha by Gruenwald-Letnikov with full memory, from rest before the first sample (Eq. 3).
 
     First order in the step: the factor (1 - exp(-i omega step))^alpha stands for (i omega step)^alpha.
@@ -54,30 +49,20 @@ def fractional_derivative(alpha: float, values: Array, step: float) -> Array:
 def stress(p: Values, history: History) -> Array:
     """s_v = m D^alpha e (Eqs. 1, 3) [Pa]."""
     if history.periodic:
-        return linear_stress(lambda omega: modulus(p, omega, history.amplitude), history)
-    alphas = np.asarray(p["alpha"], dtype=float)
-    if alphas.ndim == 0:
-        return p["m"] * fractional_derivative(float(alphas), history.value, history.step)
-    values = np.broadcast_to(history.value, (*alphas.shape[:-1], history.value.shape[-1]))
-    rows = [
-        fractional_derivative(float(alphas[index][0]), values[index], history.step)
-        for index in np.ndindex(alphas.shape[:-1])
-    ]
-    return p["m"] * np.reshape(rows, values.shape)
+        return linear_stress(modulus, p, history)
+    return p["m"] * fractional_derivative(p["alpha"], history.value, history.step)
 
 
 def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
     """By m and by alpha: harmonic by harmonic on a steady cycle, by differences of the order from rest."""
     if not history.periodic:
-        alpha, step = float(p["alpha"]), history.step
+        alpha, step = p["alpha"], history.step
         ahead, behind = (fractional_derivative(alpha + h, history.value, step) for h in (_ORDER_STEP, -_ORDER_STEP))
         by_alpha = p["m"] * (ahead - behind) / (2.0 * _ORDER_STEP)
         return {"m": fractional_derivative(alpha, history.value, step), "alpha": by_alpha}
-
-    names = ("m", "alpha")
     slopes = modulus_sensitivities(p, history.harmonics, history.amplitude)
-    both = linear_stress(lambda _: np.stack([slopes[name] for name in names]), history)
-    return dict(zip(names, both, strict=True))
+    both = linear_response(lambda _: 2.0 * np.stack(list(slopes.values())), history)
+    return dict(zip(slopes, both, strict=True))
 
 
 EFFECT = Branch(

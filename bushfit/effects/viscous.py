@@ -15,9 +15,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 def stress(p: Values, history: History) -> Array:
     """s = 2 eta de/dt [Pa]; exact in every harmonic of a steady cycle, central differences from rest."""
-    if history.periodic:
-        return linear_stress(lambda omega: modulus(p, omega, history.amplitude), history)
-    return 2.0 * p["eta"] * history.rate
+    return linear_stress(modulus, p, history) if history.periodic else 2.0 * p["eta"] * history.rate
 
 
 EFFECT = Branch(

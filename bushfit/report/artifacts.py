@@ -55,14 +55,11 @@ def prediction_files(
     from bushfit.report.plots import fine_grid, prediction_figure, to_png
 
     for prediction in predictions:
-        over = [data_set for data_set in measured if data_set.direction is prediction.direction]
         curves = predict(result, prediction.direction, *fine_grid(prediction))
         rig = predict(result, prediction.direction, *fine_grid(prediction), rig=True) if rig_effects(result) else None
         note = ". ".join(text[0].upper() + text[1:] for text in (*caveats(result), *prediction.warnings))
-        title = result.model.bushing.name
-        files[f"{prediction.direction}.png"] = to_png(
-            prediction_figure(prediction, over, title, curves=curves, rig=rig, note=note)
-        )
+        figure = prediction_figure(prediction, measured, result.model.bushing.name, curves=curves, rig=rig, note=note)
+        files[f"{prediction.direction}.png"] = to_png(figure)
     return files
 
 

@@ -7,7 +7,7 @@ import errno
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -25,12 +25,10 @@ def exchange(one: Path, other: Path) -> None:
     Raises:
         OSError: this system, or this file system, cannot do it; both are as they were.
     """
-    names = (os.fsencode(path) for path in (one, other))
-    arguments = [part for name in names for part in (ctypes.c_int(_AT_FDCWD), ctypes.c_char_p(name))]
     rename = getattr(_libc(), "renameat2", None)
     if rename is None:
         raise OSError(errno.ENOSYS, "folders cannot be exchanged here")
-    if rename(*arguments, ctypes.c_uint(_RENAME_EXCHANGE)) != 0:
+    if rename(_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other), _RENAME_EXCHANGE) != 0:
         number = ctypes.get_errno()
         raise OSError(number, os.strerror(number), str(other))
 
@@ -57,11 +55,8 @@ def locked(folder: Path) -> Iterator[None]:
     The lock is no file, and ends with the process. Where the system or the file system has no such locks, the body runs
     without.
     """
-    held = claim(folder)
-    try:
+    with closing(claim(folder)):
         yield
-    finally:
-        held.close()
 
 
 def claim(folder: Path, *, wait: bool = True) -> Claim:
@@ -70,17 +65,32 @@ def claim(folder: Path, *, wait: bool = True) -> Claim:
     Raises:
         BlockingIOError: another holds it, and `wait` is False.
     """
-    return Claim(_lock(folder, wait=wait))
+    if sys.platform == "win32":
+        return Claim(None)
+    import fcntl
+
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError:
+        return Claim(None)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except OSError as error:
+        os.close(descriptor)
+        if isinstance(error, BlockingIOError):
+            raise
+        return Claim(None)
+    return Claim(descriptor)
 
 
 def is_abandoned(folder: Path) -> bool:
     """Whether no run claims a folder any more; False where that cannot be told."""
     try:
-        descriptor = _lock(folder, wait=False)
+        left = claim(folder, wait=False)
     except BlockingIOError:
         return False
-    Claim(descriptor).close()
-    return descriptor is not None
+    left.close()
+    return left.descriptor is not None
 
 
 @dataclass(frozen=True)
@@ -97,30 +107,6 @@ class Claim:
         """End the claim."""
         if self.descriptor is not None:
             os.close(self.descriptor)
-
-
-def _lock(folder: Path, *, wait: bool) -> int | None:
-    """Open a folder and lock it; the descriptor, or None where it cannot be locked.
-
-    Raises:
-        BlockingIOError: another holds it, and `wait` is False.
-    """
-    if sys.platform == "win32":
-        return None
-    import fcntl
-
-    try:
-        descriptor = os.open(folder, os.O_RDONLY)
-    except OSError:
-        return None
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except OSError as error:
-        os.close(descriptor)
-        if isinstance(error, BlockingIOError):
-            raise
-        return None
-    return descriptor
 
 
 @cache

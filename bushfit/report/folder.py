@@ -18,7 +18,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -49,8 +49,9 @@ def check_free(folder: Path, names: list[str], *, force: bool) -> None:
     """
     try:
         if folder.exists() and not folder.is_dir():
-            hint = "another -o/--output"
-            raise OutputError("the output is not a folder", file=folder, expected="a folder", hint=hint)
+            raise OutputError(
+                "the output is not a folder", file=folder, expected="a folder", hint="another -o/--output"
+            )
         _check_writable(folder)
         standing = [name for name in names if os.path.lexists(folder / name)]
         folders = [name for name in standing if (folder / name).is_dir()]
@@ -145,17 +146,12 @@ def _staged(home: Path, files: Mapping[str, bytes]) -> Iterator[Path]:
 
 def _write(folder: Path, files: Mapping[str, bytes]) -> None:
     """Write new files into a folder and flush them to the disk."""
-    streams = []
-    try:
-        for name, content in files.items():
-            streams.append((folder / name).open("xb", buffering=0))
-            left = memoryview(content)
-            while left:
-                left = left[streams[-1].write(left) :]
+    with ExitStack() as opened:
+        streams = [opened.enter_context((folder / name).open("xb")) for name in files]
+        for stream, content in zip(streams, files.values(), strict=True):
+            stream.write(content)
+            stream.flush()
         disk.flush([stream.fileno() for stream in streams])
-    finally:
-        for stream in streams:
-            stream.close()
 
 
 @cache  # once a run is enough: a batch writes into one folder a thousand times

@@ -24,23 +24,25 @@ def prediction_table(prediction: Prediction) -> pd.DataFrame:
     """The table of `predict`: six columns, then low and high of the last four."""
     import pandas as pd
 
-    units = prediction.direction.display
-    length, length_factor = units.displacement
-    stiffness, factor = units.stiffness
-    columns = {
-        "frequency [Hz]": prediction.frequency,
-        f"amplitude [{length}]": prediction.amplitude * length_factor,
-    }
+    (length, length_factor), _, (stiffness, factor) = prediction.direction.display
     bands = {
         f"stiffness [{stiffness}]": (prediction.stiffness, factor),
         "loss factor [-]": (prediction.loss_factor, 1.0),
         f"storage stiffness [{stiffness}]": (prediction.storage_stiffness, factor),
         f"loss stiffness [{stiffness}]": (prediction.loss_stiffness, factor),
     }
-    columns |= {name: band.value * scale for name, (band, scale) in bands.items()}
-    for name, (band, scale) in bands.items():
-        columns |= {f"{name}, low": band.low * scale, f"{name}, high": band.high * scale}
-    return pd.DataFrame(columns)
+    return pd.DataFrame(
+        {
+            "frequency [Hz]": prediction.frequency,
+            f"amplitude [{length}]": prediction.amplitude * length_factor,
+            **{name: band.value * scale for name, (band, scale) in bands.items()},
+            **{
+                f"{name}, {end}": getattr(band, end) * scale
+                for name, (band, scale) in bands.items()
+                for end in ("low", "high")
+            },
+        }
+    )
 
 
 def loops_table(model: Model, data_sets: Sequence[LoopData]) -> pd.DataFrame:
@@ -131,8 +133,7 @@ def reduced_table(reduction: Reduction) -> pd.DataFrame:
     """Raw histories reduced to a sweep: what the sweep reader takes, then what tells how good each point is."""
     import pandas as pd
 
-    units = reduction.direction.display
-    (length, length_factor), (stiffness, factor) = units.displacement, units.stiffness
+    (length, length_factor), _, (stiffness, factor) = reduction.direction.display
     steps = reduction.steps
     measured = np.array([step.stiffness for step in steps])
     loss_factors = loss_factor(measured)

@@ -77,20 +77,18 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> F
         title: of the batch.
         names: of all bushings, (n,); they stand along x too where they are few.
     """
-    count = len(panels)
-    panels = panels[:_MOST_PANELS]
+    drawn = panels[:_MOST_PANELS]
     along = [_short(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
-    lines = math.ceil(len(panels) / _COLUMNS)
+    lines = math.ceil(len(drawn) / _COLUMNS)
     height = ROW * (0.9 + 0.1 * bool(along)) * lines + 0.35 * FRAME
     height += _ALONG_LETTER * max(0, max(map(len, along), default=0) - _SHORT_NAME)
     figure = new_figure(f"{title}: {len(names)} bushings", height)
     grid = figure.subplots(lines, _COLUMNS, sharex=True, squeeze=False)
-    for axes, panel in zip(grid.flat, panels, strict=False):
-        _draw(axes, panel, names)
-    for axes in grid.flat[len(panels) :]:
+    for axes in grid.flat[len(drawn) :]:
         axes.set_visible(False)
-    for place, axes in enumerate(grid.flat[: len(panels)]):
-        lowest = place + _COLUMNS >= len(panels)
+    for place, (axes, panel) in enumerate(zip(grid.flat, drawn, strict=False)):
+        _draw(axes, panel, names)
+        lowest = place + _COLUMNS >= len(drawn)
         axes.tick_params(labelbottom=lowest)
         axes.xaxis.set_in_layout(place // _COLUMNS == lines - 1)  # else its labels hang into the empty cell below
         if along:
@@ -99,10 +97,10 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> F
         elif lowest:
             axes.set_xlabel("bushing, in the manifest's order", fontsize=SMALL, color=INK)
         axes.set_xlim(0.5, len(names) + 0.5)
-    limits = "Dashed: limits; red: out of them, the worst by name." if any(panel.allowed for panel in panels) else ""
+    limits = "Dashed: limits; red: out of them, the worst by name." if any(panel.allowed for panel in drawn) else ""
     beyond = "Triangles: further out than the panel reaches, the furthest by name and value."
-    few = len(names) <= _CLOUD and any(panel.intervals is not None for panel in panels)
-    more = f"The first {len(panels)} of {count} quantities." * (count > len(panels))
+    few = len(names) <= _CLOUD and any(panel.intervals is not None for panel in drawn)
+    more = f"The first {len(drawn)} of {len(panels)} quantities." * (len(panels) > len(drawn))
     explain(figure, "Grey line: median of the batch.", "Bars: 95 % intervals." * few, limits, beyond, more)
     return figure
 
@@ -119,21 +117,18 @@ def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     ends = None if panel.intervals is None else panel.intervals[:, there]
     low, high = _reach(values, panel.allowed, ends)
     shown = np.clip(values, low, high)
-    inside = shown == values
     bad = np.isin(place, list(panel.missed))
     cloud = values.size > _CLOUD
     good_style = {**DOT, "ms": 1.6, "alpha": max(0.15, min(1.0, _OPAQUE / values.size))} if cloud else POINT
     if ends is not None and not cloud:
-        colors = [_OUT if out else _GOOD for out in bad]
-        axes.vlines(place + 1, *ends, color=colors, lw=0.8, alpha=0.6, zorder=2)
+        axes.vlines(place + 1, *ends, color=np.where(bad, _OUT, _GOOD), lw=0.8, alpha=0.6, zorder=2)
     for chosen, color, style, order in ((~bad, _GOOD, good_style, 2), (bad, _OUT, POINT if not cloud else DOT, 4)):
-        for marker, which in (("o", inside), ("^", shown < values), ("v", shown > values)):
+        for marker, which in (("o", shown == values), ("^", shown < values), ("v", shown > values)):
             x, y = place[chosen & which] + 1, shown[chosen & which]
             axes.plot(x, y, marker, color=color, zorder=order, rasterized=cloud, **(style if marker == "o" else POINT))
     axes.axhline(float(np.median(values)), color=GREY, lw=0.9, zorder=1)
-    for limit in panel.allowed:
-        if math.isfinite(limit):
-            axes.axhline(limit, color=_OUT, lw=0.9, ls=(0, (5, 2)), zorder=3)
+    for limit in filter(math.isfinite, panel.allowed):
+        axes.axhline(limit, color=_OUT, lw=0.9, ls=(0, (5, 2)), zorder=3)
     dress(axes, "", "")
     margin = 0.08 * (high - low)
     axes.set_ylim(low - margin, high + margin)
@@ -177,9 +172,7 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
     taken: list[tuple[float, float, int, bool]] = []
     for k in sorted(beyond.union(panel.missed), key=order)[:_MOST_NAMED]:
         value = float(np.clip(panel.values[k], *reach))
-        text = _short(names[k], _MOST_LETTERS)
-        if k in beyond:
-            text = f"{text}: {number(panel.values[k], 3)}"
+        text = _short(names[k], _MOST_LETTERS) + (f": {number(panel.values[k], 3)}" if k in beyond else "")
         place, above = (k + 0.5) / panel.values.size, value < (reach[0] + reach[1]) / 2.0
         half, line = 0.5 * _LETTER * len(text), 1
         center = min(max(place, half), 1.0 - half)

@@ -77,8 +77,8 @@ def sweeps_figure(model: Model, data_sets: Sequence[SweepData], title: str) -> F
         levels = np.unique(getattr(points, held_beside(axis)))
         draw(pair, direction, _model_lines(model, direction, points, axis), points, axis, levels)
         _draw_residuals(pair, strips, model, mine, points, axis)
-    note = _OUTLIERS if any((data_set.weights == 0.0).any() for data_set in data_sets) else ""
-    explain(figure, "Lines: model.", points_note(data_sets), _RESIDUALS, note)
+    outlying = any((data_set.weights == 0.0).any() for data_set in data_sets)
+    explain(figure, "Lines: model.", points_note(data_sets), _RESIDUALS, _OUTLIERS * outlying)
     return figure
 
 
@@ -138,10 +138,9 @@ def loops_figure(model: Model, data_sets: Sequence[LoopData], title: str) -> Fig
 
 def _draw_loops(axes: Axes, model: Model, direction: Direction, data_sets: Sequence[LoopData]) -> None:
     """Force over displacement of one direction's loops."""
-    units = direction.display
-    unit, length = units.displacement
+    (unit, length), force_units, _ = direction.display
     largest = max(float(np.abs(data_set.drive.force).max()) for data_set in data_sets)
-    force_unit, factor = for_people(*units.force, largest)
+    force_unit, factor = for_people(*force_units, largest)
     motion_name, force_name = direction.motion.words
     dress(axes, f"{motion_name} [{unit}]", f"{direction} {force_name} [{force_unit}]")
     for data_set, style in zip(data_sets, styles(len(data_sets), "loop"), strict=True):

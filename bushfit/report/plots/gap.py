@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
@@ -91,14 +90,6 @@ _SUMMARY_LETTERS = 92
 _COLUMN_LETTERS = 40
 
 
-class _Scale(NamedTuple):
-    """Colours and the values at which they change, in units of noise."""
-
-    edges: Array
-    norm: BoundaryNorm
-    cmap: ListedColormap
-
-
 def gap_figure(before: Model, after: Model, data_sets: Sequence[DataSet], title: str, summary: str) -> Figure:
     """How far measurement and model are apart, before and after: sweeps over frequency and amplitude, loops over phase.
 
@@ -125,12 +116,12 @@ def gap_figure(before: Model, after: Model, data_sets: Sequence[DataSet], title:
     body.suptitle("\n".join(lines), fontsize=TEXT, color=INK, family=fonts(), parse_math=False)
     grid = body.subplots(len(heights), len(sides), squeeze=False, height_ratios=heights)
     if rows:
-        scale = _scale(sides)
+        edges, colors = _scale(sides)
         for row, (direction, part) in zip(grid, rows, strict=False):
             for axes, side in zip(row, sides, strict=True):
-                _draw_map(axes, side.maps[direction], part, scale)
+                _draw_map(axes, side.maps[direction], part, colors)
             _label_maps(row, direction, part, sides[0].maps[direction])
-        _draw_scale(body, [axes for row in grid[: len(rows)] for axes in row], scale)
+        _draw_scale(body, [axes for row in grid[: len(rows)] for axes in row], edges, colors)
     for row, (direction, mine) in zip(grid[len(rows) :], loops.items(), strict=True):
         _draw_loops(row, direction, mine, [side.loops[direction] for side in sides])
     _head(grid[0], sides)
@@ -157,10 +148,11 @@ def _legend_columns(labels: Sequence[str], sides: int) -> int:
     return math.ceil(min(_LEGEND_COLUMNS, _LEGEND_LETTERS // (longest + _HANDLE_LETTERS)) / sides)
 
 
-def _scale(sides: Sequence[Side]) -> _Scale:
-    """Steps from white (within the noise) to dark, blue where the measurement is below the model and red above.
+def _scale(sides: Sequence[Side]) -> tuple[Array, ScalarMappable]:
+    """The values at which the colour changes, in units of noise, and the colours.
 
-    It ends where 2 % of the points are left beyond.
+    Steps from white (within the noise) to dark, blue where the measurement is below the model and red above.
+    They end where 2 % of the points are left beyond.
     """
     values = np.abs(
         np.concatenate([part for side in sides for drawn in side.maps.values() for part in (drawn.storage, drawn.loss)])
@@ -171,10 +163,10 @@ def _scale(sides: Sequence[Side]) -> _Scale:
     colors = colormaps["RdBu_r"](0.5 + np.concatenate((-shades[::-1], [0.0], shades)))
     colors[edges.size] = 1.0
     both = np.concatenate((-edges[::-1], edges))
-    return _Scale(both, BoundaryNorm(both, len(colors), extend="both"), ListedColormap(colors))
+    return both, ScalarMappable(BoundaryNorm(both, len(colors), extend="both"), ListedColormap(colors))
 
 
-def _draw_map(axes: Axes, drawn: Map, part: str, scale: _Scale) -> None:
+def _draw_map(axes: Axes, drawn: Map, part: str, colors: ScalarMappable) -> None:
     """Draw a row of cells per amplitude, each as wide as the step of frequency; what was not measured stays grey."""
     values: Array = getattr(drawn, part)
     points = drawn.points
@@ -188,7 +180,7 @@ def _draw_map(axes: Axes, drawn: Map, part: str, scale: _Scale) -> None:
         [np.stack((x, row + y), axis=1) for x, y in ((low, -0.5), (high, -0.5), (high, 0.5), (low, 0.5))], axis=1
     )
     axes.add_collection(
-        PolyCollection(list(cells), array=values, norm=scale.norm, cmap=scale.cmap, ec="face", lw=0.2), autolim=False
+        PolyCollection(list(cells), array=values, norm=colors.norm, cmap=colors.cmap, ec="face", lw=0.2), autolim=False
     )
     below = values < -_BARRED
     inset = _BAR_INSET * (high - low)[below]
@@ -200,8 +192,7 @@ def _draw_map(axes: Axes, drawn: Map, part: str, scale: _Scale) -> None:
     axes.set_xlim(low.min(), high.max())
     axes.tick_params(labelsize=SMALL, colors=INK)
     axes.spines[:].set_color(GREY)
-    step = -(-levels.size // _MOST_LABELS)
-    axes.set_yticks(np.arange(0, levels.size, step))
+    axes.set_yticks(np.arange(0, levels.size, math.ceil(levels.size / _MOST_LABELS)))
 
 
 def _evenly(points: Repeats) -> bool:
@@ -217,14 +208,11 @@ def _cells(frequency: Array, *, logarithmic: bool) -> tuple[Array, Array]:
     """Lower and upper edge of the cell of each frequency [Hz], (n,) each.
 
     They lie half way to the neighbours; where one of them is much further off than the other, as far off as on the
-    other's side.
+    other's side. The cell of a lone frequency is a fifth as wide as that.
     """
     x = np.log(frequency) if logarithmic else frequency
-    if x.size == 1:
-        width = 0.1 if logarithmic else 0.1 * x[0]
-        return (np.exp(x - width), np.exp(x + width)) if logarithmic else (x - width, x + width)
-    steps = np.diff(x)
-    left, right = np.concatenate((steps[:1], steps)), np.concatenate((steps, steps[-1:]))
+    steps = np.diff(x) if x.size > 1 else np.array([0.2 if logarithmic else 0.2 * x[0]])
+    left, right = (np.concatenate(ends)[: x.size] for ends in ((steps[:1], steps), (steps, steps[-1:])))
     left, right = np.where(left > _HOLE * right, right, left), np.where(right > _HOLE * left, left, right)
     low, high = x - left / 2.0, x + right / 2.0
     return (np.exp(low), np.exp(high)) if logarithmic else (np.maximum(low, 0.0), high)
@@ -252,15 +240,13 @@ def _head(row: Sequence[Axes], sides: Sequence[Side]) -> None:
     height = legend.get_window_extent().height * 72.0 / row[0].figure.dpi if legend else 0.0
     for axes, side in zip(row, sides, strict=True):
         lines = [*textwrap.wrap(side.title, _COLUMN_LETTERS * (3 - len(sides))), f"gap {side.gap:.2f} x noise"]
-        pad = 7.0 + height
-        axes.set_title("\n".join(lines), fontsize=TEXT, color=INK, weight="bold", pad=pad, parse_math=False)
+        axes.set_title("\n".join(lines), fontsize=TEXT, color=INK, weight="bold", pad=height + 7.0, parse_math=False)
 
 
-def _draw_scale(figure: SubFigure, maps: Sequence[Axes], scale: _Scale) -> None:
+def _draw_scale(figure: SubFigure, maps: Sequence[Axes], edges: Array, colors: ScalarMappable) -> None:
     """Draw the scale of colours below the maps."""
-    colors = ScalarMappable(scale.norm, scale.cmap)
     bar = figure.colorbar(colors, ax=maps, location="bottom", shrink=0.76, aspect=42, pad=0.03, extendfrac=0.04)
-    edges, every = scale.edges, 1 if scale.edges.size <= _MOST_EDGES else 2
+    every = 1 if edges.size <= _MOST_EDGES else 2
     from_end = np.minimum(np.arange(edges.size), np.arange(edges.size)[::-1])
     numbers = ["" if place % every else f"{edge:g}" for edge, place in zip(edges, from_end, strict=True)]
     bar.ax.set_xticks(edges, numbers, fontsize=SMALL, color=INK)
@@ -319,7 +305,7 @@ def _words(side: Side) -> list[str]:
         "Maps: frequency across, amplitude upwards; white: model and measurement agree within the noise. A bar in a "
         "cell: 3 and more below." * maps,
         f"A cell is the mean of {' and of '.join(of)}, in units of the noise of that mean." * bool(of),
-        "Grey: not measured." * any(has_holes(drawn) for drawn in side.maps.values()),
+        "Grey: not measured." * any(has_holes(drawn.points) for drawn in side.maps.values()),
         f"Loops: measured less model over the cycle, means over {360 // SECTORS} deg, in units of the noise of that "
         "mean." * loops,
         f"Where the model is right, 95 % lie {within}.",

@@ -49,7 +49,7 @@ def inspection_figure(files: Sequence[Inspected]) -> Figure:
         words += ", force turned" * (seen.entry.get("force_sign") == -1)
         title = f"{name}: {words}" + (f", {len(seen.looked.odd)} odd" if seen.looked.odd else "")
         if isinstance(seen.measured, Sweep):
-            first = _draw_sweep(figure, place, seen.measured)
+            first = _draw_sweep(place, seen.measured)
         elif seen.measured is not None:
             first = _draw_history(figure, place, seen.measured, loop=seen.kind == "loop")
         first.set_title(title, fontsize=8.5, loc="left", color=GREY)
@@ -60,8 +60,7 @@ def inspection_figure(files: Sequence[Inspected]) -> Figure:
 
 def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bool) -> Axes:
     """Both channels over time, and force over displacement where it is a loop; the first panel is returned."""
-    units = history.direction.display
-    (length, to_length), unit_force = units.displacement, units.force
+    (length, to_length), unit_force, _ = history.direction.display
     force, to_force = for_people(*unit_force, float(np.abs(history.force).max()))
     names = history.direction.motion.words
     grid = place.subgridspec(2, 2 if loop else 1, width_ratios=[1.0, 1.2] if loop else None)
@@ -93,15 +92,14 @@ def _draw_over_time(axes: Axes, time: Floats, values: Floats) -> None:
         axes.fill_between(*ranges(time, values), step="post", color=_COLOR, lw=0.6)
 
 
-def _draw_sweep(figure: Figure, place: SubplotSpec, sweep: Sweep) -> Axes:
+def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
     """Stiffness and loss factor over what the sweep steps through; the first panel is returned."""
     units = sweep.direction.display
     stiffness, factor = for_people(*units.stiffness, float(np.abs(sweep.stiffness).max()))
-    grid = place.subgridspec(1, 2)
-    pair = [figure.add_subplot(grid[0, column]) for column in range(2)]
+    pair = place.subgridspec(1, 2).subplots(squeeze=False)[0]
     axis = stepped_axis(sweep.frequency, sweep.amplitude)
     held = held_beside(axis)
-    scales = {"frequency": ("Hz", 1.0), "amplitude": sweep.direction.display.displacement}
+    scales = {"frequency": ("Hz", 1.0), "amplitude": units.displacement}
     (x_unit, x_factor), (unit, length) = scales[axis], scales[held]
     x, at_level = x_factor * getattr(sweep, axis), getattr(sweep, held)
     levels = np.unique(at_level)
@@ -117,8 +115,8 @@ def _draw_sweep(figure: Figure, place: SubplotSpec, sweep: Sweep) -> Axes:
             axes.plot(x[at], values[at], style.marker, color=style.color, alpha=0.75, **POINT)
         dress(axes, f"{axis} [{x_unit}]", label)
         readable(axes, x)
-    handles = [style.handle(True) for style in drawn]
-    legend(pair[-1], handles, [f"{length * level:.3g} {unit}" for level in levels], held)
+    labels = [f"{length * level:.3g} {unit}" for level in levels]
+    legend(pair[-1], [style.handle(True) for style in drawn], labels, held)
     return pair[0]
 
 

@@ -123,7 +123,6 @@ def _curve(model: Model, data_set: LoopData) -> Curve:
     return Curve(phase, mean * np.sqrt(count))
 
 
-def has_holes(drawn: Map) -> bool:
+def has_holes(points: Repeats) -> bool:
     """Whether a level lacks a frequency that another has."""
-    points = drawn.points
     return points.frequency.size < np.unique(points.frequency).size * np.unique(points.amplitude).size

@@ -27,9 +27,9 @@ Axis = Literal["frequency", "amplitude"]
 
 def by_direction(data_sets: Sequence[_T]) -> dict[Direction, list[_T]]:
     """The tests of each direction, in the order of the tests."""
-    directions = dict.fromkeys(data_set.direction for data_set in data_sets)
     return {
-        direction: [data_set for data_set in data_sets if data_set.direction is direction] for direction in directions
+        direction: [data_set for data_set in data_sets if data_set.direction is direction]
+        for direction in dict.fromkeys(data_set.direction for data_set in data_sets)
     }
 
 

@@ -167,10 +167,8 @@ def _scaled(band: Band, factor: float) -> Band:
 
 def _draw_line(axes: Axes, look: Style, x: Array, band: Band, at: Array) -> None:
     """A line with its band; a stroke where it has but one point."""
-    alone = at.sum() == 1
-    axes.plot(
-        x[at], band.value[at], color=look.color, ls=look.dashes, lw=_LINE, marker="_" if alone else "", ms=_STROKE
-    )
+    marker = "_" if at.sum() == 1 else ""
+    axes.plot(x[at], band.value[at], color=look.color, ls=look.dashes, lw=_LINE, marker=marker, ms=_STROKE)
     axes.fill_between(x[at], band.low[at], band.high[at], color=look.color, alpha=0.22, lw=0)
 
 

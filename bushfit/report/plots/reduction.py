@@ -8,9 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from bushfit.effects.contract import Array
 from bushfit.reading.measurement import Loop
-from bushfit.reduction.result import Reduction, Step
+from bushfit.reduction.result import Reduction
 from bushfit.report.plots.points import ranges
 from bushfit.report.plots.style import (
     CM,
@@ -73,36 +72,38 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
 def _draw_history(axes: Axes, history: Loop, reduction: Reduction, looks: dict[float, Style]) -> None:
     """Displacement over time; what was used has the colour of its level."""
     unit, factor = reduction.direction.display.displacement
-    mine = [step for step in reduction.steps if step.name == history.name]
     time, low, high = ranges(history.time, factor * history.displacement)
     axes.fill_between(time, low, high, color=_UNUSED, lw=0.4, step="post")
     for level, look in looks.items():
-        inside = np.zeros(time.size, dtype=bool)
-        for step in mine:
-            if step.level == level:
-                inside |= (time >= step.start) & (time <= step.end)
-        axes.fill_between(time, low, high, where=inside, color=look.color, lw=0.4, step="post")
-    motion = reduction.direction.motion.words[0]
-    dress(axes, "time [s]", f"{motion}\n[{unit}]")
+        mine = [step for step in reduction.steps if step.name == history.name and step.level == level]
+        inside = [(time >= step.start) & (time <= step.end) for step in mine]
+        used = np.any([np.zeros(time.shape, dtype=bool), *inside], axis=0)
+        axes.fill_between(time, low, high, where=used, color=look.color, lw=0.4, step="post")
+    dress(axes, "time [s]", f"{reduction.direction.motion.words[0]}\n[{unit}]")
     axes.margins(x=0.01)
 
 
 def _draw_points(pair: Sequence[Axes], reduction: Reduction, looks: dict[float, Style]) -> None:
     """Stiffness and loss factor over frequency, with bars of twice the standard error."""
-    units = reduction.direction.display
-    unit, length = units.displacement
+    (unit, length), _, stiffness_units = reduction.direction.display
     steps = reduction.steps
-    stiffness_unit, factor = for_people(*units.stiffness, max(abs(step.stiffness) for step in steps))
-    names = f"{reduction.direction} stiffness |K| [{stiffness_unit}]", f"{reduction.direction} loss factor [-]"
-    for axes, name in zip(pair, names, strict=True):
-        for level, look in looks.items():
-            mine = [step for step in steps if step.level == level]
-            frequency = np.array([step.frequency for step in mine])
-            value, error = _stiffness(mine, factor) if axes is pair[0] else _loss(mine)
-            order = np.argsort(frequency, kind="stable")
+    stiffness_unit, factor = for_people(*stiffness_units, max(abs(step.stiffness) for step in steps))
+    for level, look in looks.items():
+        mine = [step for step in steps if step.level == level]
+        frequency = np.array([step.frequency for step in mine])
+        order = np.argsort(frequency, kind="stable")
+        magnitude = factor * np.abs([step.stiffness for step in mine])
+        loss_factor = np.array([step.loss_factor for step in mine])
+        errors = (
+            magnitude * np.array([step.gain_error for step in mine]),
+            (1.0 + loss_factor**2) * np.array([step.phase_error for step in mine]),
+        )
+        for axes, value, error in zip(pair, (magnitude, loss_factor), errors, strict=True):
             axes.plot(frequency[order], value[order], color=look.color, ls=look.dashes, lw=0.7, alpha=0.6)
             axes.vlines(frequency, value - 2 * error, value + 2 * error, color=look.color, lw=0.9)
             axes.plot(frequency, value, look.marker, color=look.color, **POINT)
+    names = f"{reduction.direction} stiffness |K| [{stiffness_unit}]", f"{reduction.direction} loss factor [-]"
+    for axes, name in zip(pair, names, strict=True):
         dress(axes, "", name)
         axes.tick_params(labelbottom=False)
         readable(axes, np.array([step.frequency for step in steps]))
@@ -120,20 +121,7 @@ def _draw_quality(pair: Sequence[Axes], reduction: Reduction, looks: dict[float,
         pair[1].plot(frequency, [100 * step.force_distortion for step in mine], look.marker, color=look.color, **POINT)
         hollow = [100 * step.displacement_distortion for step in mine]
         pair[1].plot(frequency, hollow, look.marker, color=look.color, ms=3.4, mfc="none", mew=0.7)
-    dress(pair[0], "frequency [Hz]", "noise [%]")
-    dress(pair[1], "frequency [Hz]", "distortion [%]")
-    for axes in pair:
+    for axes, name in zip(pair, ("noise [%]", "distortion [%]"), strict=True):
+        dress(axes, "frequency [Hz]", name)
         axes.set_ylim(bottom=0.0)
         readable(axes, np.array([step.frequency for step in reduction.steps]))
-
-
-def _stiffness(steps: Sequence[Step], factor: float) -> tuple[Array, Array]:
-    """|K| of the steps times a factor, and its standard error, (n,) each."""
-    magnitude = factor * np.abs([step.stiffness for step in steps])
-    return magnitude, magnitude * np.array([step.gain_error for step in steps])
-
-
-def _loss(steps: Sequence[Step]) -> tuple[Array, Array]:
-    """Loss factor of the steps, and its standard error, (n,) each."""
-    loss_factor = np.array([step.loss_factor for step in steps])
-    return loss_factor, (1.0 + loss_factor**2) * np.array([step.phase_error for step in steps])
