@@ -57,15 +57,13 @@ def fit_without_outliers(columns: Array, values: Array, solution: Array) -> tupl
         Squares let so many harmonics follow a cluster of outliers. So rows are weighted down by their distance first;
         then outliers are found and left out in turn until both agree.
     """
-    every, stuck = np.ones(values.size, dtype=bool), np.zeros(values.size, dtype=bool)
-    stuck[stuck_rows(values)] = True
-    if np.array_equal(_inliers(columns, values, solution, stuck), every):
-        return solution, every
+    inliers, stuck = np.ones(values.size, dtype=bool), np.isin(np.arange(values.size), stuck_rows(values))
+    if _inliers(columns, values, solution, stuck).all():
+        return solution, inliers
     for _ in range(_REWEIGHTINGS):
         residual = values - columns @ solution
         weight = ~stuck / np.sqrt(1.0 + np.square(residual / _noise(solution, residual[~stuck])))
         solution = least_squares(columns, values, weight)
-    inliers = every
     for _ in range(_MOST_ROUNDS):
         found = _inliers(columns, values, solution, stuck)
         if np.array_equal(found, inliers) or np.count_nonzero(found) < 2 * solution.size:
