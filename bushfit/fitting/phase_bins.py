@@ -45,10 +45,8 @@ def phase_bins(
     chunks = by_chunks(sums, edges.size - 1, 1 + CHUNK * edges.size // clock.size)
     bins, *parts = np.concatenate(chunks, axis=1)
     bins = bins.astype(np.intp)
-    place = GRID * group[bins // GRID] + bins % GRID
+    filled, place = np.unique(GRID * group[bins // GRID] + bins % GRID, return_inverse=True)
     rows, inside, total = (np.bincount(place, weights=part) for part in parts)
-    filled = np.flatnonzero(rows)
-    rows, inside, total = rows[filled], inside[filled], total[filled]
     phase = middle[filled // GRID] + (filled % GRID + inside / rows) / GRID
     return phase, total / rows, rows
 
