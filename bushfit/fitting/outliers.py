@@ -54,29 +54,26 @@ def from_neighbours(values: Array, rows: Array, window: int = NEIGHBOURS) -> Arr
     return values[rows] - np.median(sliding_window_view(values, width)[first], axis=1)
 
 
-def outlier_rows(residual: Array, recorded: Array, limit: float) -> Array:
-    """Rows farther than a limit off a curve that are as far off their neighbours, or where the channel is stuck.
+def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
+    """Whether rows are farther than a limit off a curve and as far off their neighbours, or the channel is stuck, (n,).
 
     Args:
         residual: recorded less the curve, (n,).
         recorded: what was recorded, (n,).
         limit: in the units of the residual.
-
-    Returns:
-        Numbers of the rows, in order, (k,).
     """
     far = np.abs(residual) > limit
+    if not far.any():
+        return far
     rows = np.flatnonzero(far)
-    if not rows.size:
-        return rows
-    alone = np.abs(from_neighbours(residual, rows)) > limit
     repeats = _run_lengths(recorded[1:] == recorded[:-1])
-    stuck = np.maximum(np.append(repeats, 0), np.append(0, repeats))[rows] >= _STUCK - 1
-    return rows[alone | stuck | _in_burst(residual, far, limit)[rows]]
+    found = (np.maximum(np.append(repeats, 0), np.append(0, repeats)) >= _STUCK - 1) | _in_burst(residual, far, limit)
+    found[rows] |= np.abs(from_neighbours(residual, rows)) > limit
+    return far & found
 
 
-def stuck_rows(recorded: Array) -> Array:
-    """Rows that repeat the one before them over and over, where the channel has noise that forbids it, (k,).
+def are_stuck(recorded: Array) -> Array:
+    """Whether rows repeat the one before them over and over, where the channel has noise that forbids it, (n,).
 
     Notes:
         The chance that two neighbours are equal, by the resolution of the record, is counted outside such runs. A run
@@ -90,7 +87,7 @@ def stuck_rows(recorded: Array) -> Array:
         bends = np.diff(recorded[:_NOISE_ROWS], 2)  # of white noise they have six times the variance
         noise = MEDIAN_TO_SIGMA * (float(np.median(np.abs(bends))) / np.sqrt(6.0))
         unlikely &= noise > _LEAST_NOISE * float(np.ptp(recorded))
-    return np.flatnonzero(unlikely) + 1
+    return np.append(False, unlikely)
 
 
 def gross_rows(values: Array) -> Array:
