@@ -60,10 +60,9 @@ def fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, f
     """
     (x, before, after), clock = crossings(displacement), clock - loop.time[0]
     times = clock[before] - x[before] * (clock[after] - clock[before]) / (x[after] - x[before])
-    upward = x[after] > 0.0
     rows = loop.time.size
     closed = float(loop.time[-1] - loop.time[0]) * rows / (rows - 1)
-    same_sense = max(times[upward], times[~upward], key=len)
+    same_sense = max(times[x[after] > 0.0], times[x[after] < 0.0], key=len)
     if same_sense.size > 1:
         counted = (same_sense.size - 1) / float(same_sense[-1] - same_sense[0])
         frequency = _refined(clock, x, counted, rows / (closed * counted))
@@ -92,13 +91,12 @@ def _of_one_cycle(loop: Loop, clock: Array, x: Array, across: Array) -> tuple[fl
     period = _period_by_ends(clock, x, duration, whole)
     if period is not None:
         return 1.0 / period, closed / period
-    if across.size == 2:
-        stroke = float(across[1] - across[0])
-        meets = apart < _CLOSED * np.ptp(x) / 2.0 + 1.5 * stride
-        if closed > (_MORE_THAN_ONE_THAT_MEETS if meets else _MORE_THAN_ONE) * 2.0 * stroke:
-            frequency = _refined(clock, x, 0.5 / stroke, rows)
-            if closed * frequency > 1.0 and _repeats(clock, x, 1.0 / frequency):
-                return frequency, closed * frequency
+    stroke = float(across[1] - across[0]) if across.size == 2 else np.inf
+    meets = apart < _CLOSED * np.ptp(x) / 2.0 + 1.5 * stride
+    if closed > (_MORE_THAN_ONE_THAT_MEETS if meets else _MORE_THAN_ONE) * 2.0 * stroke:
+        frequency = _refined(clock, x, 0.5 / stroke, rows)
+        if closed * frequency > 1.0 and _repeats(clock, x, 1.0 / frequency):
+            return frequency, closed * frequency
     if apart > _OPEN * np.ptp(x):
         raise FitError(
             "the loop does not hold a whole cycle",

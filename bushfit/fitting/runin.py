@@ -130,10 +130,9 @@ def _period(time: Array, motion: Array) -> float | None:
     return float(np.median(intervals[intervals.size // 2 :])) if intervals.size else None
 
 
-def _longest_stretch(alike: Array, time: Array, brief: float) -> tuple[int, int]:
+def _longest_stretch(alike: Array, time: Array, brief: float) -> Array:
     """Start and end of the longest stretch of rows that are alike; breaks no longer than `brief` [s] count as alike."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], (~alike).astype(np.int8), [0]))))
-    breaks = [(start, end) for start, end in edges.reshape(-1, 2) if time[end - 1] - time[start] > brief]
-    starts = [0, *(end for _, end in breaks)]
-    ends = [*(start for start, _ in breaks), alike.size]
-    return max(zip(starts, ends, strict=True), key=lambda part: part[1] - part[0])
+    breaks = np.flatnonzero(np.diff(alike, prepend=True, append=True)).reshape(-1, 2)
+    breaks = breaks[time[breaks[:, 1] - 1] - time[breaks[:, 0]] > brief]
+    stretches = np.concatenate(([0], breaks.ravel(), [alike.size])).reshape(-1, 2)
+    return stretches[np.argmax(np.diff(stretches))]
