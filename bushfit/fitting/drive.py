@@ -113,9 +113,7 @@ class Drive:
 
     @cached_property
     def _motion(self) -> History:
-        spectrum = np.zeros(GRID // 2 + 1, dtype=complex)
-        spectrum[1 : self.coefficients.size] = 0.5 * GRID * self.coefficients[1:]
-        cycle = np.fft.irfft(spectrum)
+        cycle = np.fft.irfft(0.5 * GRID * np.append(0.0, self.coefficients[1:]), GRID)
         if not self.from_rest:
             return History.steady(cycle, self.frequency)
         motion = np.resize(cycle - cycle[0], int(np.ceil(self.cycles * GRID)) + 2)
@@ -246,9 +244,7 @@ def _points(
     if loop.force.size > MOST_ROWS:
         clock, force = _without(clock, unweighted), _without(loop.force, unweighted)
         return phase_bins(clock, force, frequency, cycles, each_cycle=each_cycle)
-    weight = np.ones(loop.force.size)
-    weight[unweighted] = 0.0
-    return clock * frequency, loop.force, weight
+    return clock * frequency, loop.force, 1.0 - np.isin(np.arange(loop.force.size), unweighted)
 
 
 def _at_reversal(drive: Drive) -> Array:
@@ -278,14 +274,13 @@ def _from_rest(loop: Loop, frequency: float, half_motion: float, half_force: flo
         half_force: half of the range of the force [N or N m].
         noise: standard deviation of one row's force [N or N m].
     """
-    if (
-        abs(loop.displacement[0]) > _AT_REST * half_motion
-        or abs(loop.force[0]) > _AT_REST * half_force + _FIRST_ROW * noise
-    ):
-        return False
+    unmoved = abs(loop.displacement[0]) <= _AT_REST * half_motion
+    unloaded = abs(loop.force[0]) <= _AT_REST * half_force + _FIRST_ROW * noise
     end = np.searchsorted(loop.time, loop.time[0] + 2.0 / frequency)
     clock, force = loop.time[:end] - loop.time[0], loop.force[:end]
     first = clock[: np.searchsorted(clock, _START / frequency)]
     change = np.interp(first + 1.0 / frequency, clock, force) - force[: first.size]
     chance = _CERTAIN * noise * np.sqrt(2.0 / first.size)
-    return bool(abs(np.median(change)) > max(_MEDIAN_OVER_MEAN * chance, _SETTLES * half_force))
+    return bool(
+        unmoved and unloaded and abs(np.median(change)) > max(_MEDIAN_OVER_MEAN * chance, _SETTLES * half_force)
+    )

@@ -90,8 +90,7 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
 
 def _significant(coefficients: Array, noise: float, rows: int) -> Array:
     """Complex harmonics with those that noise explains set to zero, up to the last that is not."""
-    keep = np.abs(coefficients) > _SIGNIFICANT * noise * np.sqrt(2.0 / rows)
-    keep[:2] = True
+    keep = (np.abs(coefficients) > _SIGNIFICANT * noise * np.sqrt(2.0 / rows)) | (np.arange(coefficients.size) < 2)
     return np.where(keep, coefficients, 0.0)[: int(np.flatnonzero(keep)[-1]) + 1]
 
 

@@ -128,9 +128,8 @@ def sweep_noise(sweeps: Sequence[Sweep]) -> SweepNoise:
     if repeated:
         shared_freedom = sum(level.repeats - 1 for level in repeated)
         return SweepNoise(random, _shared(repeated), "repeats", shared_freedom, scatter_freedom)
-    if len(stated) == len(sweeps):
-        return SweepNoise(random, (0.0, 0.0), "stated", 0, 0)
-    return SweepNoise(random, ASSUMED_SHARED, "assumed", 0, scatter_freedom)
+    shared, origin = ((0.0, 0.0), "stated") if len(stated) == len(sweeps) else (ASSUMED_SHARED, "assumed")
+    return SweepNoise(random, shared, origin, 0, scatter_freedom)
 
 
 def _pooled(levels: Mapping[LevelKey, _Level], measured: Sequence[_Level]) -> tuple[dict[LevelKey, Array], int]:
@@ -211,16 +210,11 @@ def _about_smooth_curve(log_frequency: Array, log_stiffness: Array) -> _Level:
     inliers = np.all(residual <= np.maximum(_OUTLIER * MEDIAN_TO_SIGMA * usual, FLOOR), axis=1)
     inliers |= np.count_nonzero(inliers) < degree + 2  # too few would leave nothing free
     scatter = _complement(basis[inliers]).T @ values[inliers]
-    worst = _worst_point(basis, values)
-    calmer = _complement(np.delete(basis, worst, axis=0)).T @ np.delete(values, worst, axis=0)
-    return _Level(scatter, len(scatter), np.empty((0, 2)), 1, calmer)
-
-
-def _worst_point(basis: Array, values: Array) -> int:
-    """The point without which the sum of squares about a curve, (n, k), of gain and phase, (n, 2), falls most."""
     free = _complement(basis)
     falls = np.square(free @ (free.T @ values)).sum(axis=1) / np.maximum(np.square(free).sum(axis=1), FLOOR**2)
-    return int(np.argmax(falls))
+    worst = int(np.argmax(falls))  # the point without which the sum of squares about the curve falls most
+    calmer = _complement(np.delete(basis, worst, axis=0)).T @ np.delete(values, worst, axis=0)
+    return _Level(scatter, len(scatter), np.empty((0, 2)), 1, calmer)
 
 
 def _complement(basis: Array) -> Array:
@@ -236,12 +230,11 @@ def _least_absolute(basis: Array, values: Array) -> Array:
     Notes:
         Least squares, weighted anew by one over the distance.
     """
-    weight = np.ones(values.shape[0])
+    root_weight = np.ones((len(values), 1))
     for _ in range(_ROUNDS):
-        root = np.sqrt(weight)[:, None]
-        solution = np.linalg.lstsq(basis * root, values * root, rcond=None)[0]
-        distance = np.linalg.norm(values - basis @ solution, axis=1)
-        weight = 1.0 / np.maximum(distance, _LEAST_DISTANCE * np.median(distance) + FLOOR**2)
+        solution = np.linalg.lstsq(basis * root_weight, values * root_weight, rcond=None)[0]
+        distance = np.linalg.norm(values - basis @ solution, axis=1, keepdims=True)
+        root_weight = np.sqrt(1.0 / np.maximum(distance, _LEAST_DISTANCE * np.median(distance) + FLOOR**2))
     return np.asarray(solution)
 
 
