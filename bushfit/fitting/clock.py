@@ -8,6 +8,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.fourier import basis, derivative, least_squares, resolved_order, spread_rows
 from bushfit.fitting.loop_outliers import residual_limit
+from bushfit.fitting.runin import crossings
 from bushfit.reading.measurement import Loop
 
 #: Harmonics by which a frequency is refined at most; chosen: what a triangle has beyond them shifts no phase.
@@ -20,8 +21,9 @@ _SETTLED = 1e-12
 _LARGEST_STEP = 0.05
 #: Rows that are enough to refine a frequency.
 _ENOUGH_ROWS = 2000
-#: Share of the range on either side of the middle within which the motion is not yet across: more than any noise.
-_BAND = 0.1
+#: Distance between the ends of a record, as a share of its range, from which on it holds no whole cycle: more than
+#: any noise.
+_OPEN = 0.1
 #: Distance between the ends of a closed cycle at most, as a share of it or of its amplitude.
 _CLOSED = 0.04
 #: Share of the record at either end through which a line is drawn.
@@ -56,11 +58,11 @@ def fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, f
         Several cycles are counted by crossings of the middle in one sense, and their frequency is refined by
         Gauss-Newton on the motion. A single one is known by its ends, which meet going the same way.
     """
-    x, clock = displacement - (displacement.max() + displacement.min()) / 2.0, clock - loop.time[0]
-    times, sense = _crossings(clock, x)
+    (x, before, after), clock = crossings(displacement), clock - loop.time[0]
+    times = clock[before] - x[before] * (clock[after] - clock[before]) / (x[after] - x[before])
     rows = loop.time.size
     closed = float(loop.time[-1] - loop.time[0]) * rows / (rows - 1)
-    same_sense = max((times[sense == one] for one in (1, -1)), key=len)
+    same_sense = max(times[x[after] > 0.0], times[x[after] < 0.0], key=len)
     if same_sense.size > 1:
         counted = (same_sense.size - 1) / float(same_sense[-1] - same_sense[0])
         frequency = _refined(clock, x, counted, rows / (closed * counted))
@@ -68,25 +70,14 @@ def fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, f
     return _of_one_cycle(loop, clock, x, times)
 
 
-def _crossings(clock: Array, x: Array) -> tuple[Array, Array]:
-    """When the motion crosses its middle, (k,), and on which side it then is, 1 or -1, (k,)."""
-    band = _BAND * np.ptp(x)
-    side = np.where(x > band, 1, np.where(x < -band, -1, 0))
-    marks = np.flatnonzero(side)
-    across = np.flatnonzero(side[marks[1:]] != side[marks[:-1]])
-    before, after = marks[across], marks[across + 1]
-    times = clock[before] - x[before] * (clock[after] - clock[before]) / (x[after] - x[before])
-    return times, side[after]
-
-
-def _of_one_cycle(loop: Loop, clock: Array, x: Array, crossings: Array) -> tuple[float, float]:
+def _of_one_cycle(loop: Loop, clock: Array, x: Array, across: Array) -> tuple[float, float]:
     """Frequency [Hz] and number of cycles of a loop that crosses its middle but once in either sense.
 
     Args:
         loop: the whole loop.
         clock: time since its first row [s], (n,).
         x: displacement about its middle, (n,).
-        crossings: when it crosses the middle [s], one or two.
+        across: when it crosses the middle [s], one or two.
 
     Raises:
         FitError: the loop does not hold a whole cycle.
@@ -100,19 +91,17 @@ def _of_one_cycle(loop: Loop, clock: Array, x: Array, crossings: Array) -> tuple
     period = _period_by_ends(clock, x, duration, whole)
     if period is not None:
         return 1.0 / period, closed / period
-    if crossings.size == 2:
-        stroke = float(crossings[1] - crossings[0])
-        meets = apart < _CLOSED * np.ptp(x) / 2.0 + 1.5 * stride
-        if closed > (_MORE_THAN_ONE_THAT_MEETS if meets else _MORE_THAN_ONE) * 2.0 * stroke:
-            frequency = _refined(clock, x, 0.5 / stroke, rows)
-            if closed * frequency > 1.0 and _repeats(clock, x, 1.0 / frequency):
-                return frequency, closed * frequency
-    if apart > _BAND * np.ptp(x):
-        unit = loop.direction.motion.displacement_unit
+    stroke = float(across[1] - across[0]) if across.size == 2 else np.inf
+    meets = apart < _CLOSED * np.ptp(x) / 2.0 + 1.5 * stride
+    if closed > (_MORE_THAN_ONE_THAT_MEETS if meets else _MORE_THAN_ONE) * 2.0 * stroke:
+        frequency = _refined(clock, x, 0.5 / stroke, rows)
+        if closed * frequency > 1.0 and _repeats(clock, x, 1.0 / frequency):
+            return frequency, closed * frequency
+    if apart > _OPEN * np.ptp(x):
         raise FitError(
             "the loop does not hold a whole cycle",
             file=loop.source.file if loop.source else None,
-            found=f"displacement from {motion[0]:.4g} to {motion[-1]:.4g} {unit}",
+            found=f"displacement from {motion[0]:.4g} to {motion[-1]:.4g} {loop.direction.motion.displacement_unit}",
             expected="at least one closed cycle",
             hint="export the whole cycle, or several",
         )

@@ -25,7 +25,6 @@ from bushfit.fitting.phase_bins import phase_bins
 from bushfit.fitting.runin import steady_part, thinned
 from bushfit.fitting.waveform import wrong_clock
 from bushfit.reading.measurement import Loop
-from bushfit.reading.parallel import by_chunks
 from bushfit.reduction.cycles import HOLE
 
 #: Distance from a turning point up to which rows carry no weight [steps of the grid]: one step, and the half by which
@@ -87,6 +86,8 @@ class Drive:
     notes: tuple[str, ...] = ()
     outliers: Mapping[str, OutlierRows] = field(default_factory=dict)
     first_row: int = 0
+    # by length of a response: the samples before and after each row, and the part of the way between
+    _places: dict[int, tuple[Array, Array, Array]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def amplitude(self) -> float:
@@ -112,9 +113,7 @@ class Drive:
 
     @cached_property
     def _motion(self) -> History:
-        spectrum = np.zeros(GRID // 2 + 1, dtype=complex)
-        spectrum[1 : self.coefficients.size] = 0.5 * GRID * self.coefficients[1:]
-        cycle = np.fft.irfft(spectrum)
+        cycle = np.fft.irfft(0.5 * GRID * np.append(0.0, self.coefficients[1:]), GRID)
         if not self.from_rest:
             return History.steady(cycle, self.frequency)
         motion = np.resize(cycle - cycle[0], int(np.ceil(self.cycles * GRID)) + 2)
@@ -140,11 +139,6 @@ class Drive:
         index, ahead, part = self._places[length]
         return response.take(index, axis=-1) * (1.0 - part) + response.take(ahead, axis=-1) * part
 
-    @cached_property
-    def _places(self) -> dict[int, tuple[Array, Array, Array]]:
-        """By length of the response: the samples before and after each row, and the part of the way between."""
-        return {}
-
 
 def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
     """The cycles of a loop, its displacement cleared of noise, and its force with weights.
@@ -168,19 +162,16 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
     found = loop_harmonics(loop, frequency, cycles)
     outliers = found.outliers["force"].rows
     half_motion = float(np.ptp(series(found.motion, np.arange(GRID) / GRID))) / 2.0
-    half_force = _half_range(_without(loop.force, outliers))
+    half_force = float(np.ptp(_without(loop.force, outliers))) / 2.0
     noise = loop.noise * half_force if loop.noise is not None else found.force_noise
     from_rest = first_row == 0 and _from_rest(loop, frequency, half_motion, half_force, noise)
     unweighted = outliers if without_outliers else outliers[:0]
-    phase, force, weight = _points(loop, frequency, cycles, unweighted, each_cycle=from_rest)
     drive = Drive(
-        loop=loop,
-        frequency=frequency,
-        cycles=cycles,
-        from_rest=from_rest,
-        phase=phase,
-        force=force,
-        weight=weight,
+        loop,
+        frequency,
+        cycles,
+        from_rest,
+        *_points(loop, frequency, cycles, unweighted, each_cycle=from_rest),
         noise=max(noise, FLOOR * half_force),
         coefficients=found.motion,
         half_range=half_force,
@@ -189,7 +180,7 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
         outliers=found.outliers,
         first_row=first_row,
     )
-    drive = replace(drive, weight=np.where(_at_reversal(drive), 0.0, weight))
+    drive = replace(drive, weight=np.where(_at_reversal(drive), 0.0, drive.weight))
     _check_loses_energy(drive)
     return drive
 
@@ -237,12 +228,6 @@ def _without(values: Array, rows: Array) -> Array:
     return np.delete(values, rows) if rows.size else values
 
 
-def _half_range(values: Array) -> float:
-    """Half of the range of a long array."""
-    ends = np.array(by_chunks(lambda part: (values[part].min(), values[part].max()), values.size))
-    return float(np.ptp(ends)) / 2.0
-
-
 def _points(
     loop: Loop, frequency: float, cycles: float, unweighted: Array, *, each_cycle: bool
 ) -> tuple[Array, Array, Array]:
@@ -259,9 +244,7 @@ def _points(
     if loop.force.size > MOST_ROWS:
         clock, force = _without(clock, unweighted), _without(loop.force, unweighted)
         return phase_bins(clock, force, frequency, cycles, each_cycle=each_cycle)
-    weight = np.ones(loop.force.size)
-    weight[unweighted] = 0.0
-    return clock * frequency, loop.force, weight
+    return clock * frequency, loop.force, 1.0 - np.isin(np.arange(loop.force.size), unweighted)
 
 
 def _at_reversal(drive: Drive) -> Array:
@@ -269,19 +252,14 @@ def _at_reversal(drive: Drive) -> Array:
 
     Dry friction jumps there, and no grid can tell when.
     """
-    motion = drive.history(settles=False).value
-    cycle = motion if drive.from_rest else np.concatenate((motion[-1:], motion, motion[:1]))
-    turns = np.flatnonzero(reversals(cycle)) - (0 if drive.from_rest else 1)
-    position = drive.phase * GRID
-    if not turns.size:
-        return np.zeros(position.shape, dtype=bool)
-    if not drive.from_rest:
-        position = position % GRID
-        turns = np.concatenate((turns, turns + GRID, turns - GRID))
-    turns = np.sort(turns)
-    after = np.clip(np.searchsorted(turns, position), 1, turns.size - 1)
-    nearest = np.minimum(np.abs(position - turns[after - 1]), np.abs(turns[after] - position))
-    return nearest < _JUMP
+    motion, position = drive.history(settles=False).value, drive.phase * GRID
+    if drive.from_rest:
+        turns = np.flatnonzero(reversals(motion))
+    else:
+        turns, position = np.flatnonzero(reversals(np.tile(motion, 3))) - GRID, position % GRID
+    turns = np.concatenate(([-np.inf], turns, [np.inf]))
+    after = np.searchsorted(turns, position)
+    return np.minimum(position - turns[after - 1], turns[after] - position) < _JUMP
 
 
 def _from_rest(loop: Loop, frequency: float, half_motion: float, half_force: float, noise: float) -> bool:
@@ -296,14 +274,13 @@ def _from_rest(loop: Loop, frequency: float, half_motion: float, half_force: flo
         half_force: half of the range of the force [N or N m].
         noise: standard deviation of one row's force [N or N m].
     """
-    if (
-        abs(loop.displacement[0]) > _AT_REST * half_motion
-        or abs(loop.force[0]) > _AT_REST * half_force + _FIRST_ROW * noise
-    ):
-        return False
+    unmoved = abs(loop.displacement[0]) <= _AT_REST * half_motion
+    unloaded = abs(loop.force[0]) <= _AT_REST * half_force + _FIRST_ROW * noise
     end = np.searchsorted(loop.time, loop.time[0] + 2.0 / frequency)
     clock, force = loop.time[:end] - loop.time[0], loop.force[:end]
     first = clock[: np.searchsorted(clock, _START / frequency)]
     change = np.interp(first + 1.0 / frequency, clock, force) - force[: first.size]
     chance = _CERTAIN * noise * np.sqrt(2.0 / first.size)
-    return bool(abs(np.median(change)) > max(_MEDIAN_OVER_MEAN * chance, _SETTLES * half_force))
+    return bool(
+        unmoved and unloaded and abs(np.median(change)) > max(_MEDIAN_OVER_MEAN * chance, _SETTLES * half_force)
+    )

@@ -6,7 +6,10 @@ A series of order m has real coefficients (mean, m cosines, m negative sines), (
 
 from __future__ import annotations
 
+from itertools import accumulate, repeat
+
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import NDArray
 
 from bushfit.effects.contract import Array
@@ -38,14 +41,8 @@ def resolved_order(rows_per_cycle: float, most: int) -> int:
 def basis(phase: Array, order: int) -> Array:
     """Columns 1, cos(2 pi k phase) and -sin(2 pi k phase) for k = 1 ... order, (n, 2 order + 1)."""
     turn = np.exp(2j * np.pi * phase)
-    powers = np.empty((order, phase.size), dtype=complex)
-    powers[0] = turn
-    for k in range(1, order):
-        np.multiply(powers[k - 1], turn, out=powers[k])
-    rows = np.empty((2 * order + 1, phase.size))
-    rows[0], rows[1 : order + 1] = 1.0, powers.real
-    np.negative(powers.imag, out=rows[order + 1 :])
-    return rows.T
+    powers = np.array(list(accumulate(repeat(turn, order), np.multiply)))
+    return np.vstack((np.ones(phase.size), powers.real, -powers.imag)).T
 
 
 def least_squares(columns: Array, values: Array, weight: Array | None = None) -> Array:
@@ -80,7 +77,4 @@ def first_amplitude(real: Array) -> float:
 
 def series(coefficients: Array, phase: Array) -> Array:
     """Values of a series with complex coefficients at any phase [cycles], (n,)."""
-    turn, value = np.exp(2j * np.pi * phase), np.zeros(phase.shape, dtype=complex)
-    for coefficient in coefficients[::-1]:
-        value = value * turn + coefficient
-    return value.real
+    return polyval(np.exp(2j * np.pi * phase), coefficients).real

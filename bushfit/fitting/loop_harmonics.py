@@ -67,19 +67,18 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
     columns = basis(phase, order)
     recorded = {"displacement": loop.displacement, "force": loop.force}
     values = np.column_stack([column[chosen] for column in recorded.values()])
-    solution, inliers, outliers = least_squares(columns, values), [], {}
+    solution, inliers, outliers = least_squares(columns, values), np.empty(values.shape, dtype=bool), {}
     for which, (name, column) in enumerate(recorded.items()):
-        solution[:, which], kept = fit_without_outliers(columns, values[:, which], solution[:, which])
-        inliers.append(kept)
+        solution[:, which], inliers[:, which] = fit_without_outliers(columns, values[:, which], solution[:, which])
         residual = values[:, which] - columns @ solution[:, which]
         outliers[name] = (
             column_outliers(loop, frequency, column, solution[:, which], residual)
-            if column.size <= _MOST_ROWS_CHECKED or not kept.all()
+            if column.size <= _MOST_ROWS_CHECKED or not inliers[:, which].all()
             else NO_OUTLIERS
         )
     left = values - columns @ solution
-    of_motion, of_force = inliers
-    freedom = [max(int(np.count_nonzero(kept)) - 2 * order - 1, 1) for kept in inliers]
+    of_motion, of_force = inliers.T
+    freedom = np.maximum(np.count_nonzero(inliers, axis=0) - 2 * order - 1, 1)
     motion_noise = float(np.sqrt(np.sum(np.square(left[of_motion, 0])) / freedom[0]))
     coefficients = as_complex(solution[:, 0])
     triangle = _triangle(coefficients[0], coefficients[1])
@@ -91,8 +90,7 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
 
 def _significant(coefficients: Array, noise: float, rows: int) -> Array:
     """Complex harmonics with those that noise explains set to zero, up to the last that is not."""
-    keep = np.abs(coefficients) > _SIGNIFICANT * noise * np.sqrt(2.0 / rows)
-    keep[:2] = True
+    keep = (np.abs(coefficients) > _SIGNIFICANT * noise * np.sqrt(2.0 / rows)) | (np.arange(coefficients.size) < 2)
     return np.where(keep, coefficients, 0.0)[: int(np.flatnonzero(keep)[-1]) + 1]
 
 
@@ -106,9 +104,8 @@ def _is_triangle(triangle: Array, coefficients: Array, noise: float, phase: Arra
         phase: of the rows [cycles], (n,).
         displacement: of the rows [m or rad], (n,).
     """
-    if coefficients.size > 3 and abs(coefficients[3] - triangle[3]) >= _NO_TRIANGLE * noise:
-        return False
-    return bool(np.std(displacement - series(triangle, phase)) < _TRIANGLE_RATIO * noise)
+    other = coefficients.size > 3 and abs(coefficients[3] - triangle[3]) >= _NO_TRIANGLE * noise
+    return bool(not other and np.std(displacement - series(triangle, phase)) < _TRIANGLE_RATIO * noise)
 
 
 def _triangle(mean: complex, fundamental: complex) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.fitting.fourier import GRID, basis, first_amplitude, least_squares
 from bushfit.fitting.noise import FLOOR
-from bushfit.fitting.outliers import outlier_limit, outlier_rows, stuck_rows
+from bushfit.fitting.outliers import are_outliers, are_stuck, outlier_limit
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 
@@ -57,15 +57,13 @@ def fit_without_outliers(columns: Array, values: Array, solution: Array) -> tupl
         Squares let so many harmonics follow a cluster of outliers. So rows are weighted down by their distance first;
         then outliers are found and left out in turn until both agree.
     """
-    every, stuck = np.ones(values.size, dtype=bool), np.zeros(values.size, dtype=bool)
-    stuck[stuck_rows(values)] = True
-    if np.array_equal(_inliers(columns, values, solution, stuck), every):
-        return solution, every
+    inliers, stuck = np.ones(values.size, dtype=bool), are_stuck(values)
+    if _inliers(columns, values, solution, stuck).all():
+        return solution, inliers
     for _ in range(_REWEIGHTINGS):
         residual = values - columns @ solution
         weight = ~stuck / np.sqrt(1.0 + np.square(residual / _noise(solution, residual[~stuck])))
         solution = least_squares(columns, values, weight)
-    inliers = every
     for _ in range(_MOST_ROUNDS):
         found = _inliers(columns, values, solution, stuck)
         if np.array_equal(found, inliers) or np.count_nonzero(found) < 2 * solution.size:
@@ -87,17 +85,15 @@ def column_outliers(loop: Loop, frequency: float, column: Array, solution: Array
     grid = np.arange(GRID + 1) / GRID
     cycle = basis(grid, solution.size // 2) @ solution
     off = column - np.interp((loop.time - loop.time[0]) * frequency % 1.0, grid, cycle)
-    far = outlier_rows(off, column, residual_limit(solution, residual, column.size))
-    rows = np.union1d(far, stuck_rows(column))
+    limit = residual_limit(solution, residual, column.size)
+    rows = np.flatnonzero(are_outliers(off, column, limit) | are_stuck(column))
     return OutlierRows(rows, np.abs(off[rows]) / _noise(solution, residual))
 
 
 def _inliers(columns: Array, values: Array, solution: Array, stuck: Array) -> Array:
     """Rows that are neither stuck nor far off these harmonics, (n,)."""
     residual = values - columns @ solution
-    found = ~stuck
-    found[outlier_rows(residual, values, residual_limit(solution, residual, values.size))] = False
-    return found
+    return ~(stuck | are_outliers(residual, values, residual_limit(solution, residual, values.size)))
 
 
 def _noise(solution: Array, residual: Array) -> float:

@@ -121,16 +121,15 @@ def sweep_noise(sweeps: Sequence[Sweep]) -> SweepNoise:
     stated = {sweep.name: sweep.noise for sweep in sweeps if sweep.noise is not None}
     if stated:
         scatter_freedom = 0
-    random = {}
-    for key, variance in variances.items():
-        gain, phase = np.maximum(np.broadcast_to(stated.get(key[0], np.sqrt(variance)), 2), FLOOR)
-        random[key] = (float(gain), float(phase))
+    random = {
+        key: _pair(np.maximum(np.broadcast_to(stated.get(key[0], np.sqrt(variance)), 2), FLOOR))
+        for key, variance in variances.items()
+    }
     if repeated:
-        freedom = sum(level.repeats - 1 for level in repeated)
-        return SweepNoise(random, _shared(repeated), "repeats", freedom, scatter_freedom)
-    if len(stated) == len(sweeps):
-        return SweepNoise(random, (0.0, 0.0), "stated", 0, 0)
-    return SweepNoise(random, ASSUMED_SHARED, "assumed", 0, scatter_freedom)
+        shared_freedom = sum(level.repeats - 1 for level in repeated)
+        return SweepNoise(random, _shared(repeated), "repeats", shared_freedom, scatter_freedom)
+    shared, origin = ((0.0, 0.0), "stated") if len(stated) == len(sweeps) else (ASSUMED_SHARED, "assumed")
+    return SweepNoise(random, shared, origin, 0, scatter_freedom)
 
 
 def _pooled(levels: Mapping[LevelKey, _Level], measured: Sequence[_Level]) -> tuple[dict[LevelKey, Array], int]:
@@ -141,9 +140,9 @@ def _pooled(levels: Mapping[LevelKey, _Level], measured: Sequence[_Level]) -> tu
     alike = _of_equal_noise(measured)
     if not alike:
         return {key: level.variance for key, level in levels.items()}, min(level.freedom for level in levels.values())
-    freedoms = np.array([level.freedom for level in alike], dtype=float)
+    freedoms = [level.freedom for level in alike]
     pooled = np.average([level.variance for level in alike], axis=0, weights=freedoms)
-    return dict.fromkeys(levels, pooled), int(freedoms.sum())
+    return dict.fromkeys(levels, pooled), sum(freedoms)
 
 
 def _shared(repeated: Sequence[_Level]) -> tuple[float, float]:
@@ -151,8 +150,13 @@ def _shared(repeated: Sequence[_Level]) -> tuple[float, float]:
     pairs = np.concatenate([level.shared for level in repeated])
     usual = np.abs(pairs) <= _OUTLYING_PAIR * np.median(np.abs(pairs), axis=0)
     variance = np.where(usual.any(axis=0), np.mean(pairs, axis=0, where=usual), 0.0)
-    gain, phase = np.sqrt(np.maximum(variance, 0.0))
-    return float(gain), float(phase)
+    return _pair(np.sqrt(np.maximum(variance, 0.0)))
+
+
+def _pair(values: Array) -> tuple[float, float]:
+    """Gain and phase, (2,), as plain numbers."""
+    gain, phase = values.tolist()
+    return gain, phase
 
 
 def _level(sweep: Sweep, amplitude: float) -> _Level:
@@ -162,24 +166,25 @@ def _level(sweep: Sweep, amplitude: float) -> _Level:
     numbers, row = np.unique(sweep.repeat[chosen], return_inverse=True)
     table = np.full((numbers.size, frequencies.size), np.nan + 0j)
     table[row, column] = np.log(sweep.stiffness[chosen])
-    scatter, shared = [], []
-    for one, other in combinations(table, 2):
-        difference = one - other
-        difference = _without_outliers(difference[~np.isnan(difference.real)])
-        if difference.size < _FEWEST_FREQUENCIES:
-            continue
-        mean, spread = _parts(difference).mean(axis=0), _parts(difference - difference.mean())
-        variance = np.square(spread).sum(axis=0) / (difference.size - 1)
-        shared.append((mean**2 - variance / difference.size) / 2.0)
-        scatter.append(spread / np.sqrt(numbers.size))
-    if not scatter:
+    pairs = [_without_outliers(one - other) for one, other in combinations(table, 2)]
+    pairs = [difference for difference in pairs if difference.size >= _FEWEST_FREQUENCIES]
+    if not pairs:
         return _about_smooth_curve(np.log(frequencies), np.nanmean(table, axis=0))
-    freedom = (numbers.size - 1) * (scatter[0].shape[0] - 1)
-    return _Level(np.concatenate(scatter), freedom, np.array(shared), int(numbers.size))
+    scatter = [_parts(difference - difference.mean()) for difference in pairs]
+    shared = [
+        (_parts(difference).mean(axis=0) ** 2 - np.square(spread).sum(axis=0) / (len(spread) - 1) / len(spread)) / 2.0
+        for difference, spread in zip(pairs, scatter, strict=True)
+    ]
+    freedom = (numbers.size - 1) * (pairs[0].size - 1)
+    return _Level(np.concatenate(scatter) / np.sqrt(numbers.size), freedom, np.array(shared), int(numbers.size))
 
 
 def _without_outliers(difference: Array) -> Array:
-    """Differences of two repeats, complex (k,), less single outliers, which are faults and no measure of the noise."""
+    """Differences of two repeats where both were measured, complex (k,), less single outliers.
+
+    These are faults and no measure of the noise.
+    """
+    difference = difference[~np.isnan(difference)]
     if not difference.size:
         return difference
     parts = _parts(difference)
@@ -197,23 +202,19 @@ def _about_smooth_curve(log_frequency: Array, log_stiffness: Array) -> _Level:
     if degree < 1:
         return _Level(np.full((1, 2), ASSUMED_SHARED[0]), 1, np.empty((0, 2)), 1)
     values = _parts(log_stiffness)
-    basis = np.polynomial.legendre.legvander(_unit_interval(log_frequency), degree)
+    basis = np.polynomial.legendre.legvander(
+        2.0 * (log_frequency - log_frequency.min()) / np.ptp(log_frequency) - 1.0, degree
+    )
     residual = np.abs(values - basis @ _least_absolute(basis, values))
     usual = np.median(np.sort(residual, axis=0)[degree + 1 :], axis=0)  # the curve goes through degree + 1 points
     inliers = np.all(residual <= np.maximum(_OUTLIER * MEDIAN_TO_SIGMA * usual, FLOOR), axis=1)
-    freedom = int(np.count_nonzero(inliers)) - degree - 1
-    if freedom < 1:
-        inliers, freedom = np.ones_like(inliers), log_frequency.size - degree - 1
-    worst = _worst_point(basis, values)
-    calmer = _complement(np.delete(basis, worst, axis=0)).T @ np.delete(values, worst, axis=0)
-    return _Level(_complement(basis[inliers]).T @ values[inliers], freedom, np.empty((0, 2)), 1, calmer)
-
-
-def _worst_point(basis: Array, values: Array) -> int:
-    """The point without which the sum of squares about a curve, (n, k), of gain and phase, (n, 2), falls most."""
+    inliers |= np.count_nonzero(inliers) < degree + 2  # too few would leave nothing free
+    scatter = _complement(basis[inliers]).T @ values[inliers]
     free = _complement(basis)
     falls = np.square(free @ (free.T @ values)).sum(axis=1) / np.maximum(np.square(free).sum(axis=1), FLOOR**2)
-    return int(np.argmax(falls))
+    worst = int(np.argmax(falls))  # the point without which the sum of squares about the curve falls most
+    calmer = _complement(np.delete(basis, worst, axis=0)).T @ np.delete(values, worst, axis=0)
+    return _Level(scatter, len(scatter), np.empty((0, 2)), 1, calmer)
 
 
 def _complement(basis: Array) -> Array:
@@ -229,18 +230,12 @@ def _least_absolute(basis: Array, values: Array) -> Array:
     Notes:
         Least squares, weighted anew by one over the distance.
     """
-    weight = np.ones(values.shape[0])
+    root_weight = np.ones((len(values), 1))
     for _ in range(_ROUNDS):
-        root = np.sqrt(weight)[:, None]
-        solution = np.linalg.lstsq(basis * root, values * root, rcond=None)[0]
-        distance = np.linalg.norm(values - basis @ solution, axis=1)
-        weight = 1.0 / np.maximum(distance, _LEAST_DISTANCE * np.median(distance) + FLOOR**2)
+        solution = np.linalg.lstsq(basis * root_weight, values * root_weight, rcond=None)[0]
+        distance = np.linalg.norm(values - basis @ solution, axis=1, keepdims=True)
+        root_weight = np.sqrt(1.0 / np.maximum(distance, _LEAST_DISTANCE * np.median(distance) + FLOOR**2))
     return np.asarray(solution)
-
-
-def _unit_interval(x: Array) -> Array:
-    """Values mapped to -1 ... 1."""
-    return 2.0 * (x - x.min()) / max(float(np.ptp(x)), 1e-300) - 1.0
 
 
 def _parts(values: Array) -> Array:
@@ -251,20 +246,18 @@ def _parts(values: Array) -> Array:
 def _of_equal_noise(levels: Sequence[_Level]) -> list[_Level]:
     """Levels of equal noise, those that a single outlier sets apart without it; none where they are unequal."""
     alike = sorted(levels, key=lambda level: -float(level.variance.sum()))
-    variance = np.array([level.variance.mean() for level in alike])
-    freedom = np.array([level.freedom for level in alike], dtype=float)
     for place, level in enumerate(alike):
-        if level.calmer is not None and level.calmer.size and _unequal(variance, freedom):
-            alike[place] = calm = replace(level, scatter=level.calmer, freedom=level.calmer.shape[0])
-            variance[place], freedom[place] = calm.variance.mean(), calm.freedom
-    return [] if _unequal(variance, freedom) else alike
+        if level.calmer is not None and level.calmer.size and _unequal(alike):
+            alike[place] = replace(level, scatter=level.calmer, freedom=len(level.calmer))
+    return [] if _unequal(alike) else alike
 
 
-def _unequal(variance: Array, freedom: Array) -> bool:
-    """Bartlett's test (1937) of variances (n,), each with as many degrees of freedom in gain as in phase."""
+def _unequal(levels: Sequence[_Level]) -> bool:
+    """Bartlett's test (1937) of the variances of levels, each with as many degrees of freedom in gain as in phase."""
+    variance = np.array([level.variance.mean() for level in levels])
+    freedom = np.array([2.0 * level.freedom for level in levels])
     if variance.size < 2 or not variance.all():
         return False
-    freedom = 2.0 * freedom
     pooled = np.average(variance, weights=freedom)
     few = (np.sum(1.0 / freedom) - 1.0 / freedom.sum()) / (3.0 * (variance.size - 1))
     statistic = float(freedom @ np.log(pooled / variance)) / (1.0 + few)

@@ -7,6 +7,7 @@ puts one row far from the rows beside it. So a misfit, however large, makes no o
 from __future__ import annotations
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import median_filter
 from scipy.special import fdtri
 
@@ -50,33 +51,29 @@ def from_neighbours(values: Array, rows: Array, window: int = NEIGHBOURS) -> Arr
     """Distance of some rows from the median over their neighbours and themselves, (len(rows),)."""
     width = min(window, values.size)
     first = np.clip(rows - width // 2, 0, values.size - width)
-    around = values[first[:, None] + np.arange(width)]
-    return values[rows] - np.median(around, axis=1)
+    return values[rows] - np.median(sliding_window_view(values, width)[first], axis=1)
 
 
-def outlier_rows(residual: Array, recorded: Array, limit: float) -> Array:
-    """Rows farther than a limit off a curve that are as far off their neighbours, or where the channel is stuck.
+def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
+    """Whether rows are farther than a limit off a curve and as far off their neighbours, or the channel is stuck, (n,).
 
     Args:
         residual: recorded less the curve, (n,).
         recorded: what was recorded, (n,).
         limit: in the units of the residual.
-
-    Returns:
-        Numbers of the rows, in order, (k,).
     """
     far = np.abs(residual) > limit
+    if not far.any():
+        return far
     rows = np.flatnonzero(far)
-    if not rows.size:
-        return rows
-    alone = np.abs(from_neighbours(residual, rows)) > limit
     repeats = _run_lengths(recorded[1:] == recorded[:-1])
-    stuck = np.maximum(np.append(repeats, 0), np.append(0, repeats))[rows] >= _STUCK - 1
-    return rows[alone | stuck | _in_burst(residual, far, limit)[rows]]
+    found = (np.maximum(np.append(repeats, 0), np.append(0, repeats)) >= _STUCK - 1) | _in_burst(residual, far, limit)
+    found[rows] |= np.abs(from_neighbours(residual, rows)) > limit
+    return far & found
 
 
-def stuck_rows(recorded: Array) -> Array:
-    """Rows that repeat the one before them over and over, where the channel has noise that forbids it, (k,).
+def are_stuck(recorded: Array) -> Array:
+    """Whether rows repeat the one before them over and over, where the channel has noise that forbids it, (n,).
 
     Notes:
         The chance that two neighbours are equal, by the resolution of the record, is counted outside such runs. A run
@@ -86,12 +83,11 @@ def stuck_rows(recorded: Array) -> Array:
     runs = _run_lengths(equal)
     by_chance = max(int(np.count_nonzero(equal & (runs < _STUCK - 1))), 1) / recorded.size
     unlikely = (runs >= _STUCK - 1) & (recorded.size * by_chance ** np.minimum(runs, 99) < _CHANCE)
-    if not unlikely.any():
-        return np.empty(0, dtype=np.intp)
-    bends = np.diff(recorded[:_NOISE_ROWS], 2)  # of white noise they have six times the variance
-    noise = MEDIAN_TO_SIGMA * (float(np.median(np.abs(bends))) / np.sqrt(6.0))
-    noisy = noise > _LEAST_NOISE * float(np.ptp(recorded))
-    return np.flatnonzero(unlikely) + 1 if noisy else np.empty(0, dtype=np.intp)
+    if unlikely.any():
+        bends = np.diff(recorded[:_NOISE_ROWS], 2)  # of white noise they have six times the variance
+        noise = MEDIAN_TO_SIGMA * (float(np.median(np.abs(bends))) / np.sqrt(6.0))
+        unlikely &= noise > _LEAST_NOISE * float(np.ptp(recorded))
+    return np.append(False, unlikely)
 
 
 def gross_rows(values: Array) -> Array:
@@ -109,15 +105,12 @@ def gross_rows(values: Array) -> Array:
 
 def _in_burst(residual: Array, far: Array, limit: float) -> Array:
     """Rows of short runs of far rows that lie as far off the rows before and after the run, (n,)."""
-    runs = np.where(far, _run_lengths(far), 0)
     near = np.flatnonzero(~far)
     if not near.size:
         return np.zeros(far.size, dtype=bool)
-    index = np.arange(far.size)
-    after = np.minimum(np.searchsorted(near, index), near.size - 1)
-    before = np.maximum(np.searchsorted(near, index) - 1, 0)
-    beside = np.minimum(np.abs(residual - residual[near[before]]), np.abs(residual - residual[near[after]]))
-    return (runs > 0) & (runs <= _LONGEST_BURST) & (beside > limit)
+    after = np.searchsorted(near, np.arange(far.size))
+    beside = residual[near[np.clip((after - 1, after), 0, near.size - 1)]]
+    return far & (_run_lengths(far) <= _LONGEST_BURST) & (np.abs(residual - beside).min(axis=0) > limit)
 
 
 def _run_lengths(mask: Array) -> Array:

@@ -45,20 +45,15 @@ def phase_bins(
     chunks = by_chunks(sums, edges.size - 1, 1 + CHUNK * edges.size // clock.size)
     bins, *parts = np.concatenate(chunks, axis=1)
     bins = bins.astype(np.intp)
-    place = GRID * group[bins // GRID] + bins % GRID
+    filled, place = np.unique(GRID * group[bins // GRID] + bins % GRID, return_inverse=True)
     rows, inside, total = (np.bincount(place, weights=part) for part in parts)
-    filled = np.flatnonzero(rows)
-    rows, inside, total = rows[filled], inside[filled], total[filled]
-    phase = middle[filled // GRID] + (filled % GRID + inside / rows) / GRID
-    return phase, total / rows, rows
+    return middle[filled // GRID] + (filled % GRID + inside / rows) / GRID, total / rows, rows
 
 
 def _groups(cycles: int, *, each_cycle: bool) -> tuple[Array, Array]:
     """The group that each cycle belongs to, (cycles,), and the cycle in the middle of each group, (groups,)."""
     number = np.arange(cycles)
-    starts = number
-    if not each_cycle:
-        later = _APART * _GROWTH ** np.arange(np.log(number.size / _APART) / np.log(_GROWTH))
-        starts = np.union1d(np.arange(_APART), later.astype(np.intp))
+    later = _APART * _GROWTH ** np.arange(np.log(number.size / _APART) / np.log(_GROWTH))
+    starts = number if each_cycle else np.union1d(np.arange(_APART), later.astype(np.intp))
     group = np.searchsorted(starts, number, side="right") - 1
     return group, np.round(np.bincount(group, weights=number) / np.bincount(group))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bushfit.fitting.assess import lack_of_fit
+from bushfit.fitting.assess import lack_of_fit, quality
 from bushfit.fitting.data_sets import DataSet
 from bushfit.geometry import Bushing
 from bushfit.model.model import Model
@@ -31,19 +31,16 @@ def implausible(bushing: Bushing, data_sets: Sequence[DataSet]) -> list[str]:
     ratio = moduli[hardest] / moduli[softest]
     if ratio > _MOST_STIFFENING:
         return [f"{hardest} shows {number(ratio, 2)} times the modulus of {softest}, which no rubber does: {_CHECK}"]
-    if _SOFTEST < moduli[hardest] < _HARDEST:
-        return []
-    return [f"a shear modulus of {modulus(moduli[hardest], 3)} is that of no rubber: {_CHECK}"]
+    said = f"a shear modulus of {modulus(moduli[hardest], 3)} is that of no rubber: {_CHECK}"
+    return [] if _SOFTEST < moduli[hardest] < _HARDEST else [said]
 
 
 def unfitted(model: Model, data_sets: Sequence[DataSet], advice: str) -> list[str]:
     """Sentences on tests that a model was not fitted to and misses by more than their noise."""
-    lines = []
-    for data_set in data_sets:
-        if (misfit := lack_of_fit(model, [data_set], 0)) is not None:
-            nrmse = np.sqrt(np.mean(np.square(np.abs(data_set.relative(model)))))
-            lines.append(
-                f"{data_set.name}, {data_set.direction}, was not fitted, and the model misses it by "
-                f"{number(100 * nrmse, 2)} % (NRMSE), {number(np.sqrt(misfit), 2)} times its noise{advice}"
-            )
-    return lines
+    return [
+        f"{data_set.name}, {data_set.direction}, was not fitted, and the model misses it by "
+        f"{number(100 * quality(model, [data_set], 0).nrmse, 2)} % (NRMSE), "
+        f"{number(np.sqrt(misfit), 2)} times its noise{advice}"
+        for data_set in data_sets
+        if (misfit := lack_of_fit(model, [data_set], 0)) is not None
+    ]

@@ -30,7 +30,7 @@ _LEAST_OFF = 5e-4
 _EDGE = 0.5
 #: Cycles from which on the first one can go: three, for what noise may take off them.
 _THREE = 2.95
-#: Share of the range by which the motion passes its middle, before that counts as a crossing: more than any noise.
+#: Share of the range on either side of the middle within which the motion is not yet across: more than any noise.
 _BAND = 0.1
 
 
@@ -40,6 +40,14 @@ def thinned(loop: Loop) -> tuple[Array, Array]:
     time, motion = loop.time[every], loop.displacement[every]
     rows = gross_rows(motion)
     return np.delete(time, rows), np.delete(motion, rows)
+
+
+def crossings(motion: Array) -> tuple[Array, Array, Array]:
+    """A motion about its middle, (n,), and the last row before and the first after each crossing of it, (k,) each."""
+    centred = motion - (motion.max() + motion.min()) / 2.0
+    marks = np.flatnonzero(np.abs(centred) > _BAND * np.ptp(centred))
+    across = np.flatnonzero(np.diff(centred[marks] > 0.0))
+    return centred, marks[across], marks[across + 1]
 
 
 def steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | None]:
@@ -68,14 +76,13 @@ def steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | Non
         if duration > _BRIEF * period
     ]
     note = f"{' and '.join(left_out)} are left out; {(last - first) / period:.3g} cycles are used"
-    return _cut(loop, first, last if after else None), note
+    return _cut(loop, first, last if after else np.inf), note
 
 
 def _steady_ends(time: Array, motion: Array, period: float) -> tuple[float, float, bool] | None:
     """First and last time of the steady cycles [s], and whether anything follows; None where all or none are steady."""
-    again = np.interp(time + period, time, motion)
-    comparable = time + period <= time[-1]
-    off, clock = np.abs(again - motion)[comparable], time[comparable]
+    clock = time[time + period <= time[-1]]
+    off = np.abs(np.interp(clock + period, time, motion) - motion[: clock.size])
     start, end = _longest_stretch(off < _SAME * np.ptp(motion), clock, _BRIEF * period)
     before, after = start > 0, end < off.size
     if start == end or not (before or after):
@@ -95,18 +102,16 @@ def _steady_ends(time: Array, motion: Array, period: float) -> tuple[float, floa
 def _steady_part_between(loop: Loop, time: Array, holes: Array) -> tuple[Loop, str]:
     """As `steady_part`, of the longest part of a loop without a hole; `holes` are the steps of `time` that are one."""
     starts, ends = time[np.append(0, holes + 1)], time[np.append(holes, time.size - 1)]
-    longest = int(np.argmax(ends - starts))
-    first, last = float(starts[longest]), float(ends[longest])
+    first, last = max(zip(starts, ends, strict=True), key=lambda part: part[1] - part[0])
     whole = _cut(loop, first, last)
     part, note = steady_part(whole, *thinned(whole))
     said = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
     return part, said if note is None else f"{said}, and of these {note}"
 
 
-def _cut(loop: Loop, first: float, last: float | None) -> Loop:
-    """The rows between two times [s], both counted in; to the end where there is no last."""
-    end = None if last is None else np.searchsorted(loop.time, last, side="right")
-    kept = slice(np.searchsorted(loop.time, first), end)
+def _cut(loop: Loop, first: float, last: float) -> Loop:
+    """The rows between two times [s], both counted in."""
+    kept = slice(np.searchsorted(loop.time, first), np.searchsorted(loop.time, last, side="right"))
     return replace(loop, **{name: getattr(loop, name)[kept] for name in ("time", "displacement", "force")})
 
 
@@ -115,28 +120,19 @@ def _period(time: Array, motion: Array) -> float | None:
 
     Twice a stroke where there is one cycle. What holds a hole does not count; None where nothing is left.
     """
-    centred = motion - (motion.max() + motion.min()) / 2.0
-    band = _BAND * np.ptp(motion)
-    marks = np.flatnonzero(np.abs(centred) > band)
-    upper = centred[marks] > 0.0
-    crossings = marks[1:][upper[1:] != upper[:-1]]
-    if crossings.size < 2:
-        return None
-    strokes, steps = np.diff(time[crossings]), np.diff(time)
-    widest = np.maximum(np.maximum.reduceat(steps, crossings - 1)[:-1], steps[crossings[1:] - 1])
+    after = crossings(motion)[2]
+    strokes, steps = np.diff(time[after]), np.diff(time)
+    widest = np.maximum(np.maximum.reduceat(steps, after - 1)[:-1], steps[after[1:] - 1])
     intervals = strokes[1:] + strokes[:-1]
     intervals = intervals[np.maximum(widest[1:], widest[:-1]) < HOLE * intervals]
     if not intervals.size:
         intervals = 2.0 * strokes[widest < HOLE * strokes]
-    if not intervals.size:
-        return None
-    return float(np.median(intervals[intervals.size // 2 :]))
+    return float(np.median(intervals[intervals.size // 2 :])) if intervals.size else None
 
 
-def _longest_stretch(alike: Array, time: Array, brief: float) -> tuple[int, int]:
+def _longest_stretch(alike: Array, time: Array, brief: float) -> Array:
     """Start and end of the longest stretch of rows that are alike; breaks no longer than `brief` [s] count as alike."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], (~alike).astype(np.int8), [0]))))
-    breaks = [(start, end) for start, end in edges.reshape(-1, 2) if time[end - 1] - time[start] > brief]
-    starts = [0, *(end for _, end in breaks)]
-    ends = [*(start for start, _ in breaks), alike.size]
-    return max(zip(starts, ends, strict=True), key=lambda stretch: stretch[1] - stretch[0])
+    breaks = np.flatnonzero(np.diff(alike, prepend=True, append=True)).reshape(-1, 2)
+    breaks = breaks[time[breaks[:, 1] - 1] - time[breaks[:, 0]] > brief]
+    stretches = np.concatenate(([0], breaks.ravel(), [alike.size])).reshape(-1, 2)
+    return stretches[np.argmax(np.diff(stretches))]

@@ -82,9 +82,8 @@ def _slope(x: Array, y: Array) -> float:
 
 def _points(bushing: Bushing, data_sets: Sequence[DataSet]) -> tuple[Array, Array, Array]:
     """Strain amplitude, frequency [Hz] and complex modulus [Pa] of every operating point, loops included, (n,) each."""
-    factors = [bushing.stiffness_per_modulus(data_set.direction) for data_set in data_sets]
     return (
-        np.concatenate([data_set.amplitude * bushing.unit_strain(data_set.direction) for data_set in data_sets]),
-        np.concatenate([data_set.frequency for data_set in data_sets]),
-        np.concatenate([data_set.measured / factor for data_set, factor in zip(data_sets, factors, strict=True)]),
+        np.concatenate([each.amplitude * bushing.unit_strain(each.direction) for each in data_sets]),
+        np.concatenate([each.frequency for each in data_sets]),
+        np.concatenate([each.measured / bushing.stiffness_per_modulus(each.direction) for each in data_sets]),
     )

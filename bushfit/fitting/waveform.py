@@ -19,8 +19,7 @@ _CROWDED = 0.2
 
 def waveform(coefficients: Array) -> str:
     """The name of a motion, in words, from its complex harmonics, mean first."""
-    third = abs(coefficients[3]) if coefficients.size > 3 else 0.0
-    share = third / abs(coefficients[1])
+    share = abs(coefficients[3]) / abs(coefficients[1]) if coefficients.size > 3 else 0.0
     if abs(share - _TRIANGLE) < _LIKE:
         return "a triangle"
     return "a sine" if share < _LIKE else f"neither sine nor triangle (third harmonic {100 * share:.2g} %)"
@@ -41,9 +40,8 @@ def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
     like, other = ("a sine", "a triangle") if outer > _CROWDED else ("a triangle", "a sine")
     if waveform(coefficients) != other:
         return None
-    name = loop.direction.motion.words[0]
     return (
         f"{100 * outer:.2g} % of the rows lie beyond {_OUTER:g} of the amplitude, as those of {like} recorded evenly "
-        f"in time, but the {name} over time is {other}: where a file has no time, rate means a triangle, and frequency "
-        'with waveform = "sine" a sine'
+        f"in time, but the {loop.direction.motion.words[0]} over time is {other}: where a file has no time, rate means "
+        'a triangle, and frequency with waveform = "sine" a sine'
     )
