@@ -82,7 +82,7 @@ def command(
     for one in seen:
         _tell(options, one)
     options.write(folder, {target: text.encode()})
-    options.console.print(f"next: bushfit fit {folder / target}", markup=False)
+    options.console.print(f"next: bushfit run {folder / target}", markup=False)
     options.tell({"campaign": text, "files": [one.to_document() for one in seen]})
 
 
