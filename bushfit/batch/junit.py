@@ -17,25 +17,20 @@ class Report:
 
     def add(self, row: Row, record: Record, judged: Judgement | None) -> None:
         case = TestCase(_printable(row.name), self._suite.name, record["seconds"])
-        if record["status"] != "done":
-            text = _printable(record["error"])
-            case.result = [_with_text(Error(text.partition("\n")[0], "failed"), text)]
-        elif judged and judged.missed:
-            text = _printable("\n".join(judged.missed.values()))
-            case.result = [_with_text(Failure("; ".join(text.splitlines()), "limits"), text)]
+        failed, missed = record["status"] != "done", judged.missed if judged else {}
+        if failed or missed:
+            text = _printable(record["error"] if failed else "\n".join(missed.values()))
+            line = text.partition("\n")[0] if failed else "; ".join(text.splitlines())
+            result = Error(line, "failed") if failed else Failure(line, "limits")
+            result.text = text
+            case.result = [result]
         self._suite.add_testcase(case)
 
     def to_xml(self) -> bytes:
         report = JUnitXml("bushfit batch")
         report.add_testsuite(self._suite)
         report.update_statistics()  # type: ignore[no-untyped-call]
-        text: bytes = report.tostring()  # type: ignore[no-untyped-call]
-        return b'<?xml version="1.0" encoding="utf-8"?>\n' + text
-
-
-def _with_text(result: Error | Failure, text: str) -> Error | Failure:
-    result.text = text
-    return result
+        return b'<?xml version="1.0" encoding="utf-8"?>\n' + report.tostring()  # type: ignore[no-untyped-call]
 
 
 def _printable(text: str) -> str:

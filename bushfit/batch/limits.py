@@ -43,6 +43,9 @@ from bushfit.reduction.scatter import scatter
 from bushfit.units import number, quantity
 from bushfit.validation import converted
 
+#: Lowest and highest allowed value where there is no limit.
+_ANY = (-math.inf, math.inf)
+
 
 class Verdict(IntEnum):
     """How a value meets its limits, better before worse."""
@@ -78,26 +81,20 @@ class Bounds:
 
     def resolve(self, values: Array) -> tuple[float, float]:
         """Lowest and highest allowed value; `values` are those of the batch, (n,)."""
-        low = [-math.inf if self.min is None else self.min]
-        high = [math.inf if self.max is None else self.max]
+        ranges = [(-math.inf if self.min is None else self.min, math.inf if self.max is None else self.max)]
         if self.nominal is not None and self.tolerance is not None:
             half = abs(self.nominal) * self.tolerance
-            low.append(self.nominal - half)
-            high.append(self.nominal + half)
-        if self.sigma is not None and values.size >= self.at_least:
+            ranges.append((self.nominal - half, self.nominal + half))
+        if self.sigma is not None and not self.idle(values):
             middle, spread = scatter(values)
-            if spread > 0.0:
-                low.append(middle - self.sigma * spread)
-                high.append(middle + self.sigma * spread)
-        return max(low), min(high)
+            ranges.append((middle - self.sigma * spread, middle + self.sigma * spread))
+        return max(low for low, _ in ranges), min(high for _, high in ranges)
 
     def idle(self, values: Array) -> str | None:
         """Why `sigma` cannot be held against these values, or None."""
-        if self.sigma is None:
-            return None
-        if values.size < self.at_least:
+        if self.sigma is not None and values.size < self.at_least:
             return f"{values.size} bushings, and at_least = {self.at_least}: the batch's own scatter is not judged"
-        if scatter(values)[1] == 0.0:
+        if self.sigma is not None and scatter(values)[1] == 0.0:
             return "more than half of the bushings agree to the digit: the batch's own scatter is not judged"
         return None
 
@@ -106,20 +103,18 @@ class Bounds:
 _SIZES = ("min", "max", "nominal")
 
 
-def _sizes(table: dict[str, Any], si: Any) -> dict[str, Any]:
-    return {key: si(key, value) if key in _SIZES else value for key, value in table.items()}
+def _in_si(name: str, table: Mapping[str, Any]) -> dict[str, Any]:
+    """A parameter's table of limits with its sizes in SI."""
+    return {
+        key: parameter_value(f"{name}.{key}", name, value) if key in _SIZES else value for key, value in table.items()
+    }
 
 
 def _parameters(raw: object, _: ValidationInfo) -> object:
     """Tables of limits by parameter, sizes in SI."""
     if not isinstance(raw, dict):
         return raw
-    return {
-        name: _sizes(table, lambda key, value, name=name: parameter_value(f"{name}.{key}", name, value))
-        if isinstance(table, dict)
-        else table
-        for name, table in raw.items()
-    }
+    return {name: _in_si(name, table) if isinstance(table, dict) else table for name, table in raw.items()}
 
 
 def _stiffness(raw: object, info: ValidationInfo) -> object:
@@ -183,13 +178,17 @@ class Limits:
     guard: Annotated[bool, Field(strict=True)] = False
 
     def __post_init__(self) -> None:
-        for tables, what in ((self.stiffness, STIFFNESS), (self.loss_factor, LOSS_FACTOR)):
-            names = Counter(at_point(bounds.at, what).name for bounds in tables)
-            for name, count in names.items():
-                if count > 1:
-                    raise ValueError(
-                        CampaignError(f"{count} tables for one point", found=name, hint="put them in one table")
-                    )
+        for name, count in Counter(name for name, _ in self._at_points).items():
+            if count > 1:
+                raise ValueError(
+                    CampaignError(f"{count} tables for one point", found=name, hint="put them in one table")
+                )
+
+    @property
+    def _at_points(self) -> list[tuple[str, Bounds]]:
+        """Limits at points, by the name of the quantity."""
+        stiffness = [(at_point(bounds.at, STIFFNESS).name, bounds) for bounds in self.stiffness]
+        return [*stiffness, *((at_point(bounds.at, LOSS_FACTOR).name, bounds) for bounds in self.loss_factor)]
 
     @property
     def points(self) -> tuple[Point, ...]:
@@ -198,18 +197,9 @@ class Limits:
     @property
     def bounds(self) -> dict[str, Bounds]:
         """By the name of the quantity."""
-        found = dict(self.parameters)
-        found |= {at_point(bounds.at, STIFFNESS).name: bounds for bounds in self.stiffness}
-        found |= {at_point(bounds.at, LOSS_FACTOR).name: bounds for bounds in self.loss_factor}
-        for quantity_, most in ((NRMSE, self.nrmse), (CHI_SQUARE, self.reduced_chi_square)):
-            if most is not None:
-                found[quantity_.name] = Bounds(max=most)
-        return found
-
-    @property
-    def missed_from(self) -> Verdict:
-        """The best verdict that counts as a miss."""
-        return Verdict.CONDITIONAL_PASS if self.guard else Verdict.CONDITIONAL_FAIL
+        most = {NRMSE.name: self.nrmse, CHI_SQUARE.name: self.reduced_chi_square}
+        of_fit = {name: Bounds(max=limit) for name, limit in most.items() if limit is not None}
+        return {**self.parameters, **dict(self._at_points), **of_fit}
 
 
 def read_limits(path: Path) -> Limits:
@@ -262,6 +252,7 @@ class Judge:
 
     def __init__(self, limits: Limits, columns: Mapping[str, Array], quantities: Mapping[str, Quantity]) -> None:
         self._limits, self._quantities = limits, quantities
+        self._missed_from = Verdict.CONDITIONAL_PASS if limits.guard else Verdict.CONDITIONAL_FAIL
         self.allowed: dict[str, tuple[float, float]] = {}
         self.notes: list[str] = []
         for name, bounds in limits.bounds.items():
@@ -278,12 +269,12 @@ class Judge:
             if (found := known.get(name)) is None:
                 worst, missed[name] = Verdict.FAIL, f"{name} is not known: fail"
                 continue
-            verdict = judge(found, *self._allowed(name))
+            verdict = judge(found, *self.allowed.get(name, _ANY))
             if name in at_bound:
                 verdict = max(verdict, Verdict.CONDITIONAL_PASS)
             worst = max(worst, verdict)
             if verdict is not Verdict.PASS:
-                chosen = missed if verdict >= self._limits.missed_from else edge
+                chosen = missed if verdict >= self._missed_from else edge
                 chosen[name] = self._words(name, found, verdict, at_bound.get(name))
         said = record.get("verdict", "is not known")
         if self._limits.verdicts and said not in self._limits.verdicts:
@@ -291,11 +282,8 @@ class Judge:
             missed["verdict"] = f"verdict {said}, allowed {', '.join(self._limits.verdicts)}"
         return Judgement(worst, missed, edge)
 
-    def _allowed(self, name: str) -> tuple[float, float]:
-        return self.allowed.get(name, (-math.inf, math.inf))
-
     def _words(self, name: str, found: Figures, verdict: Verdict, bound: str | None) -> str:
-        (low, high), (value, least, most, _) = self._allowed(name), found
+        (low, high), (value, least, most, _) = self.allowed.get(name, _ANY), found
         quantity = self._quantities[name].for_people(value)
 
         def shown(x: float) -> str:

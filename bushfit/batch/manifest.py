@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
+from itertools import chain, count
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -231,10 +232,9 @@ def _rows(entries: Sequence[Entry], base: Path, given: Settings, source: str) ->
         path = Path(entry.campaign)
         shared = stems[path.stem] > 1 and path.parent.name not in ("", "..")
         name = entry.name or (path.parent.name if shared else path.stem)
-        folder, count = (first := folder_name(name)), 1
-        while folder.casefold() in taken:
-            count += 1
-            folder = f"{first} {count}"
+        first = folder_name(name)
+        numbered = (f"{first} {number}" for number in count(2))
+        folder = next(folder for folder in chain([first], numbered) if folder.casefold() not in taken)
         taken.add(folder.casefold())
         own = Settings(**{key: getattr(entry, key) for key in _keys(Settings)})
         try:

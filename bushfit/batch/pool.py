@@ -193,15 +193,12 @@ def run(
                     pool.mend(error)
                     suspects.extend(chunk)
                 else:
-                    size = _next_size(size, seconds / (_CHUNKS_PER_WORKER * len(chunk)))
+                    # towards the time a chunk should take, at most twice as many rows as before
+                    per_row = max(seconds / (_CHUNKS_PER_WORKER * len(chunk)), 1e-9)
+                    size = max(1, min(2 * size, _LARGEST_CHUNK, int(_CHUNK_SECONDS / per_row)))
                     yield from ((number, result) for (number, _), result in zip(chunk, results, strict=True))
     finally:
         pool.close()
-
-
-def _next_size(size: int, seconds_per_row: float) -> int:
-    """Rows in the next chunk: towards the time a chunk should take, at most twice as many as before."""
-    return max(1, min(2 * size, _LARGEST_CHUNK, int(_CHUNK_SECONDS / max(seconds_per_row, 1e-9))))
 
 
 def _alone(row: T, work: Callable[[Sequence[T]], Sequence[R]], give_up: Callable[[str], R], pool: Pool) -> R:

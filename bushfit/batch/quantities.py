@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,11 +48,10 @@ def at_point(point: Point, what: str) -> Quantity:
     return Quantity(f"{what} {point}", unit, factor)
 
 
-def parameter_quantities(names: Iterable[str]) -> list[Quantity]:
+def parameter_quantities(names: Collection[str]) -> list[Quantity]:
     """Parameters of the library that are among the names, in its order."""
     units = {qualified(effect, p): p.unit for effect in LIBRARY.values() for p in effect.parameters}
-    wanted = set(names)
-    return [Quantity(name, "-" if unit == "1" else unit) for name, unit in units.items() if name in wanted]
+    return [Quantity(name, "-" if unit == "1" else unit) for name, unit in units.items() if name in names]
 
 
 def figures(record: Record) -> Iterator[tuple[str, Figures]]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import shutil
 import time
-from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections import Counter, defaultdict
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -60,31 +60,57 @@ class Plan:
     picture: bool
 
 
-@dataclass(frozen=True)
+@dataclass
 class Summary:
-    """What came of it.
+    """What came of it: what is counted and named row by row, then what is said of the whole batch.
 
     Args:
+        seconds: of the work.
         status: rows by done, failed.
         kept: rows taken over from an earlier run.
+        warned: bushings with warnings.
+        bounded: bushings with a parameter at rest on a bound.
+        bounds: bushings by the parameter at rest.
         limits: bushings by verdict.
         missed: name of each bushing that misses a limit, and what it misses, in words.
-        edge: the same of those that pass on condition.
+        missing: numbers of the rows that miss a limit of a quantity, by its name.
+        edge: name of each bushing that passes on condition, and why.
         errors: name and error of rows that failed.
         scatter: median and robust standard deviation of each quantity, in its unit.
         notes: limits that could not be judged, bushings with warnings, results of earlier batches beside these.
-        seconds: of the work.
     """
 
-    status: Counter[str]
-    kept: int
-    limits: Counter[str]
-    missed: tuple[tuple[str, str], ...]
-    edge: tuple[tuple[str, str], ...]
-    errors: tuple[tuple[str, str], ...]
-    scatter: dict[Quantity, tuple[float, float]]
-    notes: tuple[str, ...]
     seconds: float
+    status: Counter[str] = field(default_factory=Counter)
+    kept: int = 0
+    warned: int = 0
+    bounded: int = 0
+    bounds: Counter[str] = field(default_factory=Counter)
+    limits: Counter[str] = field(default_factory=Counter)
+    missed: list[tuple[str, str]] = field(default_factory=list)
+    missing: defaultdict[str, set[int]] = field(default_factory=lambda: defaultdict(set))
+    edge: list[tuple[str, str]] = field(default_factory=list)
+    errors: list[tuple[str, str]] = field(default_factory=list)
+    scatter: dict[Quantity, tuple[float, float]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def add(self, number: int, row: Row, record: ledger.Record, judged: Judgement | None) -> None:
+        """Count one row."""
+        self.status[record["status"]] += 1
+        self.kept += bool(record.get("kept"))
+        self.warned += bool(record.get("warnings"))
+        self.bounded += bool(record.get("at_bound"))
+        self.bounds.update(list(record.get("at_bound", ())))
+        if record["status"] != "done":
+            self.errors.append((row.name, record["error"]))
+        if judged:
+            self.limits[str(judged.verdict)] += 1
+            for name in judged.missed:
+                self.missing[name].add(number)
+            if judged.missed:
+                self.missed.append((row.name, "; ".join(judged.missed.values())))
+            elif judged.edge:
+                self.edge.append((row.name, "; ".join(judged.edge.values())))
 
     def to_document(self) -> dict[str, Any]:
         return {
@@ -100,7 +126,7 @@ class Summary:
                 quantity.name: {"median": middle, "sigma": spread, "unit": quantity.unit}
                 for quantity, (middle, spread) in self.scatter.items()
             },
-            "warnings": list(self.notes),
+            "warnings": self.notes,
             "seconds": self.seconds,
         }
 
@@ -154,143 +180,77 @@ def run(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Summary:
     """
     begin, output = time.perf_counter(), plan.orders.output
     try:
-        with ledger.held(output), Spool(output / ledger.ASIDE / "records", len(plan.rows)) as spool:
+        with ledger.held(output), closing(Spool(output / ledger.ASIDE / "records", len(plan.rows))) as spool:
             for name in (TABLE, PICTURE):  # from here on they tell of results that are replaced
                 (output / name).unlink(missing_ok=True)
             strays = ledger.strays(output, plan.rows)
+            fate = "are still in bushings/ (--force removes them)"
             if not plan.orders.resume:
+                fate = "were removed from bushings/"
                 for folder in strays:
                     shutil.rmtree(folder)
             task = partial(work, orders=plan.orders)
             for number, (status, line) in pool.run(plan.rows, task, given_up, workers):
                 spool.put(number, line)
                 progress(status)
-            summary = _report(plan, spool, time.perf_counter() - begin)
-            return replace(summary, notes=(*summary.notes, *_on_strays(len(strays), kept=plan.orders.resume)))
+            summary = Summary(time.perf_counter() - begin)
+            _report(plan, spool, summary)
+            if strays:
+                summary.notes.append(
+                    f"results of {len(strays)} bushings of an earlier batch, no rows of this one, {fate}"
+                )
+            return summary
     except OSError as error:
         raise OutputError(
             "the results cannot be written", file=output, found=error.strerror or str(error), hint="free some space"
         ) from error
 
 
-def _on_strays(count: int, *, kept: bool) -> Iterator[str]:
-    if count:
-        fate = "are still in bushings/ (--force removes them)" if kept else "were removed from bushings/"
-        yield f"results of {count} bushings of an earlier batch, no rows of this one, {fate}"
-
-
-@dataclass
-class _Tally:
-    """What is counted and named over the rows of a batch, one after the other.
-
-    Args:
-        status: rows by done, failed.
-        kept: rows taken over from an earlier run.
-        warned: bushings with warnings.
-        bounded: bushings with a parameter at rest on a bound.
-        bounds: bushings by the parameter at rest.
-        limits: bushings by verdict.
-        missed: by row number, the limits that a bushing misses, in words by quantity.
-        edge: name of each bushing that passes on condition, and why.
-        errors: name and error of rows that failed.
-    """
-
-    status: Counter[str] = field(default_factory=Counter)
-    kept: int = 0
-    warned: int = 0
-    bounded: int = 0
-    bounds: Counter[str] = field(default_factory=Counter)
-    limits: Counter[str] = field(default_factory=Counter)
-    missed: dict[int, Mapping[str, str]] = field(default_factory=dict)
-    edge: list[tuple[str, str]] = field(default_factory=list)
-    errors: list[tuple[str, str]] = field(default_factory=list)
-
-    def add(self, number: int, row: Row, record: ledger.Record, judged: Judgement | None) -> None:
-        """Count one row."""
-        self.status[record["status"]] += 1
-        self.kept += bool(record.get("kept"))
-        self.warned += bool(record.get("warnings"))
-        self.bounded += bool(record.get("at_bound"))
-        self.bounds.update(list(record.get("at_bound", ())))
-        if record["status"] != "done":
-            self.errors.append((row.name, record["error"]))
-        if judged:
-            self.limits[str(judged.verdict)] += 1
-            if judged.missed:
-                self.missed[number] = judged.missed
-            elif judged.edge:
-                self.edge.append((row.name, "; ".join(judged.edge.values())))
-
-
-def _report(plan: Plan, spool: Spool, seconds: float) -> Summary:
-    """Hold every record against the limits and write what people read."""
+def _report(plan: Plan, spool: Spool, summary: Summary) -> None:
+    """Hold every record against the limits, write what people read, and fill the summary."""
     columns, intervals = spool.columns()
     parameters = parameter_quantities(columns)
     points = [at_point(point, what) for point in plan.orders.points for what in (STIFFNESS, LOSS_FACTOR)]
     quantities = {quantity.name: quantity for quantity in (*parameters, NRMSE, CHI_SQUARE, *points)}
     judge = Judge(plan.limits, columns, quantities) if plan.limits else None
     report = Report(plan.title) if plan.junit else None
-    tally = _tabled(plan, spool, (parameters, points), judge, report)
-    if plan.picture:
-        _draw(plan, columns, intervals, quantities, judge, tally.missed)
-    if report and plan.junit:
-        with _blamed_on(plan.junit):
-            write_files(plan.junit.parent, {plan.junit.name: report.to_xml()}, force=True)
-    return Summary(
-        tally.status,
-        tally.kept,
-        tally.limits,
-        tuple((plan.rows[number].name, "; ".join(words.values())) for number, words in tally.missed.items()),
-        tuple(tally.edge),
-        tuple(tally.errors),
-        {q: _scatter(columns[q.name], q.factor) for q in quantities.values() if q.name in columns},
-        (*(judge.notes if judge else ()), *_on_bounds(tally.bounded, tally.bounds), *_on_warnings(tally.warned)),
-        seconds,
-    )
-
-
-def _tabled(
-    plan: Plan,
-    spool: Spool,
-    quantities: tuple[Sequence[Quantity], Sequence[Quantity]],
-    judge: Judge | None,
-    report: Report | None,
-) -> _Tally:
-    """Write batch.csv, fill the JUnit report, and count, row by row; quantities are parameters, and those at points."""
-    output, tally = plan.orders.output, _Tally()
-    aside = output / ledger.ASIDE / TABLE
+    aside = plan.orders.output / ledger.ASIDE / TABLE
     with aside.open("w", encoding="utf-8", newline="") as stream:
         diagnosed = any(row.settings.diagnosed for row in plan.rows)
-        table = Table(stream, *quantities, verdicts=diagnosed, limits=judge is not None)
+        table = Table(stream, parameters, points, verdicts=diagnosed, limits=judge is not None)
         for number, (row, record) in enumerate(zip(plan.rows, spool, strict=True)):
             judged = judge(record) if judge and record["status"] == "done" else None
             table.add(row, record, judged)
-            tally.add(number, row, record, judged)
+            summary.add(number, row, record, judged)
             if report:
                 report.add(row, record, judged)
         stream.flush()
         os.fsync(stream.fileno())
-    aside.replace(output / TABLE)
-    return tally
+    aside.replace(plan.orders.output / TABLE)
+    if plan.picture:
+        _draw(plan, columns, intervals, quantities, judge, summary.missing)
+    if report and plan.junit:
+        with _blamed_on(plan.junit):
+            write_files(plan.junit.parent, {plan.junit.name: report.to_xml()}, force=True)
+    values = {quantity: columns[name] for name, quantity in quantities.items() if name in columns}
+    scattered = {quantity: scatter(sizes[np.isfinite(sizes)]) for quantity, sizes in values.items()}
+    summary.scatter = {q: (middle * q.factor, spread * q.factor) for q, (middle, spread) in scattered.items()}
+    summary.notes += [*(judge.notes if judge else ()), *_notes(summary)]
 
 
-def _on_bounds(count: int, by_name: Counter[str]) -> Iterator[str]:
-    if count:
-        names = ", ".join(f"{name} of {times}" for name, times in by_name.most_common())
+def _notes(summary: Summary) -> Iterator[str]:
+    """What a user must know of bushings whose numbers are not to be trusted blindly."""
+    if summary.bounded:
+        names = ", ".join(f"{name} of {times}" for name, times in summary.bounds.most_common())
         yield (
-            f"{count} bushing{'s' * (count > 1)} with a parameter at rest on a bound of its fit, which the tests do "
-            f"not settle: {names}; see the column on a bound of batch.csv"
+            f"{summary.bounded} bushing{'s' * (summary.bounded > 1)} with a parameter at rest on a bound of its fit, "
+            f"which the tests do not settle: {names}; see the column on a bound of batch.csv"
         )
-
-
-def _on_warnings(count: int) -> Iterator[str]:
-    if count:
-        yield f"{count} bushing{'s' * (count > 1)} with warnings of their own: see the column warnings of batch.csv"
-
-
-def _scatter(values: Array, factor: float) -> tuple[float, float]:
-    middle, spread = scatter(values[np.isfinite(values)])
-    return middle * factor, spread * factor
+    if summary.warned:
+        yield (
+            f"{summary.warned} bushing{'s' * (summary.warned > 1)} with warnings of their own: see the column warnings "
+            "of batch.csv"
+        )
 
 
 def _draw(
@@ -299,7 +259,7 @@ def _draw(
     intervals: dict[str, Array],
     quantities: dict[str, Quantity],
     judge: Judge | None,
-    missed: Mapping[int, Mapping[str, str]],
+    missing: Mapping[str, Collection[int]],
 ) -> None:
     from bushfit.report.plots import to_png
     from bushfit.report.plots.batch import Panel, batch_figure
@@ -311,7 +271,7 @@ def _draw(
         if known.sum() >= (1 if allowed else _LEAST_DRAWN):
             shown = quantity.for_people(float(np.median(columns[name][known])))
             values, limits = columns[name] * shown.factor, tuple(limit * shown.factor for limit in allowed)
-            out = {number for number, names in missed.items() if name in names and known[number]}
+            out = {number for number in missing.get(name, ()) if known[number]}
             ends = intervals[name] * shown.factor if name in intervals else None
             panels.append(Panel(shown.header, values, limits, out, ends))
     if panels:

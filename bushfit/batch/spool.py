@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from array import array
+from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,10 +22,7 @@ class Spool:
         self._stream = path.open("w+b")
         self._begins = array("q", [-1]) * count
 
-    def __enter__(self) -> Spool:
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
         self._stream.close()
 
     def put(self, number: int, line: bytes) -> None:
@@ -38,15 +36,12 @@ class Spool:
 
     def columns(self) -> tuple[dict[str, Array], dict[str, Array]]:
         """Of every quantity over the rows, NaN where a row has none: values (n,), and ends of 95 % intervals (2, n)."""
-        columns: dict[str, Array] = {}
-        intervals: dict[str, Array] = {}
+        count = len(self._begins)
+        columns: dict[str, Array] = defaultdict(lambda: np.full(count, np.nan))
+        intervals: dict[str, Array] = defaultdict(lambda: np.full((2, count), np.nan))
         for number, record in enumerate(self):
             for name, (value, low, high, _) in figures(record):
-                if name not in columns:
-                    columns[name] = np.full(len(self._begins), np.nan)
                 columns[name][number] = value
                 if low is not None and high is not None:
-                    if name not in intervals:
-                        intervals[name] = np.full((2, len(self._begins)), np.nan)
                     intervals[name][:, number] = low, high
         return columns, intervals

@@ -24,8 +24,9 @@ from bushfit.prediction import Band, predict
 
 if TYPE_CHECKING:
     from bushfit.batch.manifest import Row, Settings
+    from bushfit.diagnosis.record import Diagnosis
     from bushfit.jobs.diagnose import Diagnose, Diagnosed
-    from bushfit.jobs.fits import Fit
+    from bushfit.reading.measurement import Loop, Sweep
 
 #: Size below which an effect is as good as none, relative to its parameter's typical size (chosen).
 _NO_EFFECT = 1e-3
@@ -111,15 +112,15 @@ def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Record:
     settings, path = row.settings, Path(row.campaign)
     inputs = {path.name: ledger.digest(path.read_bytes())} if path.is_file() else {}
     campaign = load_campaign(path)
-    sources = [*(loop.source for loop in campaign.loops), *(sweep.source for sweep in campaign.sweeps)]
-    inputs |= {str(source.file): source.sha256 for source in sources if source}
+    tests: tuple[Loop | Sweep, ...] = (*campaign.loops, *campaign.sweeps)
+    inputs |= {str(test.source.file): test.source.sha256 for test in tests if test.source}
     if settings.model:
         inputs[settings.model] = ledger.digest(Path(settings.model).read_bytes())
     if "run" in (settings.commands or ()):
         result, diagnosed = _run(campaign, orders.formats, files)
     else:
         result, diagnosed = _one_by_one(campaign, settings, orders.formats, files)
-    found = {"campaign_name": campaign.name, "inputs": inputs, **_verdict(diagnosed)}
+    found = {"campaign_name": campaign.name, "inputs": inputs, **(_verdict(diagnosed.diagnosis) if diagnosed else {})}
     return {**found, **_numbers(result, orders.points, found.get("warnings", []))}
 
 
@@ -137,14 +138,17 @@ def _one_by_one(
     campaign: Campaign, settings: Settings, formats: Collection[str], files: dict[str, bytes]
 ) -> tuple[Result, Diagnosed | None]:
     """fit, diagnose and predict, as far as they are asked for, each going on from the one before."""
+    from bushfit.jobs import TABLES
+    from bushfit.jobs.fits import Fit
+    from bushfit.jobs.predict import Predict
+
     commands = settings.commands or ()
     result = load_result(Path(settings.model)) if settings.model else None
     data = Data.of(campaign) if set(commands) - {"predict"} else None
     diagnosed = None
     if "fit" in commands and data:
-        fitted = _fit(settings).run(data)
-        result = fitted.result
-        made = fitted.files(formats)
+        fitted = Fit(settings.directions or (), settings.effects or ()).run(data)
+        result, made = fitted.result, fitted.files(formats)
         if "diagnose" in commands:  # as `run` calls them: model.json is with what diagnose added
             made["joint.json"] = made.pop("model.json")
         files |= made
@@ -154,27 +158,18 @@ def _one_by_one(
         files |= diagnosed.files(formats)
     assert result is not None  # the manifest has seen to it that there is a model
     if "predict" in commands:
-        files |= _predict(result, campaign, formats)
+        files |= Predict().run(result, campaign).files({TABLES, *formats})
     return result, diagnosed
 
 
-def _verdict(diagnosed: Diagnosed | None) -> Record:
+def _verdict(diagnosis: Diagnosis) -> Record:
     """What a diagnosis adds to the record of a row."""
-    if diagnosed is None:
-        return {}
-    diagnosis = diagnosed.diagnosis
     return {
         "verdict": diagnosis.verdict,
         "effects": [named.name for named in diagnosis.effects],
         "alternatives": [name for named in diagnosis.effects for name in named.alternatives],
         "warnings": list(diagnosis.notes),
     }
-
-
-def _fit(settings: Settings) -> Fit:
-    from bushfit.jobs.fits import Fit
-
-    return Fit(settings.directions or (), settings.effects or ())
 
 
 def _diagnose(settings: Settings) -> Diagnose:
@@ -184,13 +179,6 @@ def _diagnose(settings: Settings) -> Diagnose:
     asked = {key: getattr(settings, key) for key in ("max_effects", "tolerance", "adopt", "without")}
     how = How(**{key: value for key, value in asked.items() if value is not None})
     return Diagnose(how, load_result(Path(settings.model)).model if settings.model else None)
-
-
-def _predict(result: Result, campaign: Campaign, formats: Collection[str]) -> dict[str, bytes]:
-    from bushfit.jobs import TABLES
-    from bushfit.jobs.predict import Predict
-
-    return Predict().run(result, campaign).files({TABLES, *formats})
 
 
 def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> Record:
@@ -220,9 +208,8 @@ def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> R
 
 def _vanishes(name: str, parameter: Parameter, value: float) -> bool:
     """Whether a value on a bound is that of an added effect that is not there, which is an answer like any other."""
-    if "." not in name or parameter.neutral is None:
-        return False
-    return abs(value - parameter.neutral) <= _NO_EFFECT * parameter.typical
+    neutral = parameter.neutral if "." in name else None
+    return neutral is not None and abs(value - neutral) <= _NO_EFFECT * parameter.typical
 
 
 def _band(band: Band) -> list[float | None]:

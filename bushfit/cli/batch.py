@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import os
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import DIRECTION, DIRECTIONS, Options, example, shared_options
+from bushfit.cli.common import Options, direction_option, example, naming_option, shared_options
 from bushfit.cli.show import new_table, warn
 from bushfit.units import alike, for_people
 
 if TYPE_CHECKING:
-    from bushfit.batch.manifest import Settings
+    from bushfit.batch.manifest import Command, Settings
     from bushfit.batch.points import Point
     from bushfit.batch.pool import Pool
     from bushfit.batch.run import Plan, Summary
+    from bushfit.geometry import Direction
 
 #: Bushings of a kind (failed, out of limits, on the edge) that the terminal names; batch.csv has all.
 _MOST_SHOWN = 10
@@ -37,11 +39,8 @@ _SECONDS_A_LINE = 10.0
     multiple=True,
     help="What to do with each campaign: fit, diagnose, predict, may be given again; or run, the whole chain [fit].",
 )
-@click.option(
-    "--direction",
+@direction_option(
     "directions",
-    type=DIRECTIONS,
-    metavar=DIRECTION,
     multiple=True,
     help="Tests to fit, as in bushfit fit.",
 )
@@ -81,7 +80,7 @@ def command(
     tables: bool,
     plots: bool,
     options: Options,
-    **asked: tuple[str, ...],
+    **asked: tuple[Any, ...],
 ) -> None:
     """Fit (diagnose, predict, run) every campaign of MANIFEST: a TOML or CSV list, a pattern in quotes, or campaigns.
 
@@ -126,28 +125,20 @@ def command(
         click.get_current_context().exit(1)
 
 
-def _settings(commands: tuple[str, ...], directions: tuple[str, ...], effects: tuple[str, ...]) -> Settings:
+def _settings(commands: tuple[Command, ...], directions: tuple[Direction, ...], effects: tuple[str, ...]) -> Settings:
     """What the options ask of every row that does not say otherwise."""
     from bushfit.batch.manifest import Settings
     from bushfit.effects import effect_named
-    from bushfit.geometry import Direction
 
-    return Settings(
-        commands=commands or None,  # type: ignore[arg-type]
-        directions=tuple(Direction(direction) for direction in directions) or None,
-        effects=tuple(effect_named(name).name for name in effects) or None,
-    )
+    names = tuple(effect_named(name).name for name in effects)
+    return Settings(commands=commands or None, directions=directions or None, effects=names or None)
 
 
-def _points(texts: tuple[str, ...]) -> tuple[Point, ...]:
+def _points(texts: tuple[str, ...]) -> list[Point]:
     from bushfit.batch.points import parse_point
-    from bushfit.errors import BushfitError
 
-    try:
-        return tuple(parse_point(text) for text in texts)
-    except BushfitError as error:
-        error.place = "--at"
-        raise
+    with naming_option("--at"):
+        return [parse_point(text) for text in texts]
 
 
 @contextmanager
@@ -169,31 +160,31 @@ def _progress(options: Options, total: int) -> Iterator[Callable[[str], None]]:
     )
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("bushings", total=total, rate="", failures="")
-        begin, failed = time.monotonic(), 0
+        begin, count = time.monotonic(), Counter[str]()
 
         def advance(status: str) -> None:
-            nonlocal failed
-            failed += status == "failed"
-            done = bar.tasks[0].completed + 1
-            rate = f"{done / max(time.monotonic() - begin, 1e-9):.1f}/s"
-            bar.update(task, advance=1, rate=rate, failures=f"{failed} failed" if failed else "")
+            count[status] += 1
+            rate = f"{count.total() / max(time.monotonic() - begin, 1e-9):.1f}/s"
+            failures = f"{count['failed']} failed" if count["failed"] else ""
+            bar.update(task, completed=count.total(), rate=rate, failures=failures)
 
         yield advance
 
 
 def _lines(options: Options, total: int) -> Callable[[str], None]:
     begin = said = time.monotonic()
-    done = failed = 0
-    tenth = 0
+    tenth, count = 0, Counter[str]()
 
     def advance(status: str) -> None:
-        nonlocal done, failed, said, tenth
-        done, failed, now = done + 1, failed + (status == "failed"), time.monotonic()
+        nonlocal said, tenth
+        count[status] += 1
+        done, now = count.total(), time.monotonic()
         if now - said < _SECONDS_A_LINE and (10 * done // total == tenth or now - begin < _SECONDS_A_LINE):
             return
         said, tenth, rate = now, 10 * done // total, done / (now - begin)
-        text = f"{done} of {total}, {rate:.1f}/s, {(total - done) / rate:.0f} s left"
-        options.console.print(text + (f", {failed} failed" if failed else ""), markup=False)
+        failures = f", {count['failed']} failed" if count["failed"] else ""
+        text = f"{done} of {total}, {rate:.1f}/s, {(total - done) / rate:.0f} s left{failures}"
+        options.console.print(text, markup=False)
 
     return advance
 

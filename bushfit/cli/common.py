@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 
+from bushfit.errors import BushfitError, ModelError
 from bushfit.report.folder import check_free, to_json, write_files
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from bushfit.campaign.campaign import Campaign
     from bushfit.campaign.schema import Loss
+    from bushfit.geometry import Direction
     from bushfit.jobs import Found, Job
     from bushfit.model.result import Result
 
@@ -25,10 +27,28 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 #: Width of tables where standard error is no terminal, in characters.
 _WIDTH = 100
-#: Directions as the commands take them.
-DIRECTIONS = click.Choice(["axial", "radial", "torsion"])
-#: The same in the left column of a help, short so that the right one has room.
-DIRECTION = "DIRECTION"
+
+
+class _Direction(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows none
+    """A direction of a test; geometry, which lists them, is slow to import, and is asked when they are needed."""
+
+    name = "direction"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Direction:
+        from bushfit.geometry import Direction
+
+        return Direction(click.Choice([str(direction) for direction in Direction]).convert(value, param, ctx))
+
+
+class _DirectionOption(click.Option):
+    """An option that takes directions; they stand in its help in place of "{directions}"."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str]:
+        from bushfit.geometry import Direction
+
+        name, text = super().get_help_record(ctx) or ("", "")
+        *most, last = Direction
+        return name, text.replace("{directions}", f"{', '.join(most)} or {last}")
 
 
 class _Folder(click.Path):
@@ -48,6 +68,20 @@ class _Share(click.FloatRange):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         share = super().convert(value, param, ctx)
         return share if math.isfinite(share) else self.fail(f"{value} is no share such as 0.02", param, ctx)
+
+
+#: Decorator of a command that takes a direction, or several.
+direction_option = partial(click.option, "--direction", cls=_DirectionOption, type=_Direction())
+
+
+@contextmanager
+def naming_option(option: str) -> Iterator[None]:
+    """Errors about a value name the option that it was given with."""
+    try:
+        yield
+    except BushfitError as error:
+        error.place = option
+        raise
 
 
 @dataclass(frozen=True)
@@ -98,7 +132,14 @@ def example(*commands: str) -> str:
     return "\b\n" + "\n".join([f"Example{'s' * (len(commands) > 1)}:", *(f"  {command}" for command in commands)])
 
 
-def _shared_options(where: str, function: F) -> F:
+def shared_options(function: F, where: str = "results/<campaign or file>") -> F:
+    """-o, -v, -q, --json, --no-plots, --force, gathered into one `options` argument.
+
+    Args:
+        function: the command.
+        where: results go without -o, for its help.
+    """
+
     @click.option("-o", "--output", type=_Folder(path_type=Path), help=f"Folder for the results [{where}].")
     @click.option("-v", "--verbose", is_flag=True, help="Say more: steps on the way, all correlations, files.")
     @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
@@ -107,22 +148,11 @@ def _shared_options(where: str, function: F) -> F:
     @click.option("--force", is_flag=True, help="Replace results that stand.")
     @wraps(function)
     def wrapped(*args: Any, **kwargs: Any) -> Any:
-        plots = not kwargs.pop("no_plots")
-        names = ("output", "verbose", "quiet", "as_json", "force")
-        options = Options(plots=plots, **{name: kwargs.pop(name) for name in names})
+        given = {name: kwargs.pop(name) for name in ("output", "verbose", "quiet", "as_json", "force")}
+        options = Options(plots=not kwargs.pop("no_plots"), **given)
         return function(*args, options=options, **kwargs)
 
     return wrapped  # type: ignore[return-value]
-
-
-def shared_options(function: F) -> F:
-    """-o, -v, -q, --json, --no-plots, --force, gathered into one `options` argument."""
-    return _shared_options("results/<campaign or file>", function)
-
-
-def options_without_folder(function: F) -> F:
-    """The same of a command that writes nothing where no folder is given."""
-    return _shared_options("nothing is written", function)
 
 
 @dataclass(frozen=True)
@@ -147,9 +177,12 @@ class Task:
             tell: shows what it found, given the campaign's name.
             last_line: said of it below the files written, given their folder.
         """
+        from bushfit.campaign.campaign import load_campaign
         from bushfit.fitting.data import Data
 
-        options, loaded = self.options, self._loaded()
+        options, loaded = self.options, load_campaign(self.campaign)
+        if self.loss:
+            loaded = replace(loaded, fit=replace(loaded.fit, loss=cast("Loss", self.loss)))
         folder = options.folder(loaded.slug)
         options.require_free(folder, job.names(loaded, options.formats))
         outcome = job.run(Data.of(loaded))
@@ -158,44 +191,38 @@ class Task:
         if last_line:
             options.console.print(last_line(folder, outcome), markup=False)
         options.tell(outcome.document)
-        _enforce_nrmse(outcome.result, self.max_nrmse)
-
-    def _loaded(self) -> Campaign:
-        """The campaign as it is, or with another loss."""
-        from bushfit.campaign.campaign import load_campaign
-
-        loaded = load_campaign(self.campaign)
-        return replace(loaded, fit=replace(loaded.fit, loss=cast("Loss", self.loss))) if self.loss else loaded
+        quality = outcome.result.quality
+        if self.max_nrmse is not None and quality and quality.nrmse > self.max_nrmse:
+            click.echo(f"bushfit: NRMSE {quality.nrmse:.4g} is above --max-nrmse {self.max_nrmse:g}", err=True)
+            click.get_current_context().exit(1)
 
 
-def campaign_options(soft_l1: str = "points far off pull less, outliers not at all") -> Callable[[F], F]:
+def campaign_options(function: F, soft_l1: str = "points far off pull less, outliers not at all") -> F:
     """CAMPAIGN, --loss, --max-nrmse and the shared options, gathered into one `task` argument.
 
     Args:
+        function: the command.
         soft_l1: what the robust loss does in this command, for its help.
     """
 
-    def decorate(function: F) -> F:
-        @click.argument("campaign", type=click.Path(path_type=Path))
-        @click.option(
-            "--loss",
-            type=click.Choice(["linear", "soft_l1"]),
-            help=f"linear: least squares [the campaign's, else this]. soft_l1: {soft_l1}.",
-        )
-        @click.option(
-            "--max-nrmse",
-            type=_Share(min=0.0, min_open=True),
-            help="Exit with status 1 if the NRMSE is above this share (0.02 is 2 %).",
-        )
-        @shared_options
-        @wraps(function)
-        def wrapped(*args: Any, options: Options, **kwargs: Any) -> Any:
-            task = Task(kwargs.pop("campaign"), kwargs.pop("loss"), kwargs.pop("max_nrmse"), options)
-            return function(*args, task=task, **kwargs)
+    @click.argument("campaign", type=click.Path(path_type=Path))
+    @click.option(
+        "--loss",
+        type=click.Choice(["linear", "soft_l1"]),
+        help=f"linear: least squares [the campaign's, else this]. soft_l1: {soft_l1}.",
+    )
+    @click.option(
+        "--max-nrmse",
+        type=_Share(min=0.0, min_open=True),
+        help="Exit with status 1 if the NRMSE is above this share (0.02 is 2 %).",
+    )
+    @shared_options
+    @wraps(function)
+    def wrapped(*args: Any, options: Options, **kwargs: Any) -> Any:
+        task = Task(kwargs.pop("campaign"), kwargs.pop("loss"), kwargs.pop("max_nrmse"), options)
+        return function(*args, task=task, **kwargs)
 
-        return wrapped  # type: ignore[return-value]
-
-    return decorate
+    return wrapped  # type: ignore[return-value]
 
 
 def open_model(file: Path) -> Result:
@@ -205,7 +232,6 @@ def open_model(file: Path) -> Result:
         ModelError: a campaign or a test file, or whatever else is no model.
     """
     from bushfit.campaign.campaign import TEST_FILES
-    from bushfit.errors import ModelError
     from bushfit.model.file import load_result
 
     ending = file.suffix.lower()
@@ -220,11 +246,3 @@ def open_model(file: Path) -> Result:
             hint=f"{way} makes one",
         )
     return load_result(file)
-
-
-def _enforce_nrmse(result: Result, limit: float | None) -> None:
-    """Exit with status 1 where the fit misses the user's limit."""
-    if limit is None or result.quality is None or result.quality.nrmse <= limit:
-        return
-    click.echo(f"bushfit: NRMSE {result.quality.nrmse:.4g} is above --max-nrmse {limit:g}", err=True)
-    click.get_current_context().exit(1)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, Task, campaign_options, example, open_model
+from bushfit.cli.common import Options, Task, campaign_options, example, naming_option, open_model
 from bushfit.cli.show import new_table, parameter_table, warn
-from bushfit.units import alike, for_people
+from bushfit.errors import BushfitError
+from bushfit.units import alike, for_people, quantity
 
 if TYPE_CHECKING:
     from bushfit.jobs.diagnose import Diagnosed
@@ -31,7 +33,7 @@ _COLOURS = {"consistent": "green", "named": "green", "ambiguous": "yellow", "par
 @click.option("--without", multiple=True, metavar="EFFECT", help="Do not consider this effect; may be given again.")
 @click.option("--max-effects", type=click.IntRange(0, 5), default=3, show_default=True, help="Effects to add at most.")
 @click.option("--tolerance", default="1 %", show_default=True, help="Gaps below this share of |K| do not count.")
-@campaign_options("the same with outliers left out")
+@partial(campaign_options, soft_l1="the same with outliers left out")
 def command(
     model: Path | None,
     adopt: tuple[str, ...],
@@ -56,16 +58,10 @@ def command(
 
 
 def _share(text: str) -> float:
-    from bushfit.errors import BushfitError
-    from bushfit.units import quantity
-
-    try:
+    with naming_option("--tolerance"):
         share = quantity(text, "1")
         if not 0.0 <= share <= 1.0:
             raise BushfitError("this is no share of |K|", found=f'"{text}"', expected="0 % to 100 %")
-    except BushfitError as error:
-        error.place = "--tolerance"
-        raise
     return share
 
 
@@ -84,8 +80,7 @@ def tell_verdict(options: Options, name: str, outcome: Diagnosed) -> None:
     from rich.markup import escape
 
     verdict = outcome.diagnosis.verdict
-    colour = _COLOURS[verdict]
-    options.console.print(f"[bold]{escape(name)}:[/bold] [bold {colour}]{verdict}[/bold {colour}]")
+    options.console.print(f"[bold]{escape(name)}:[/bold] [bold {_COLOURS[verdict]}]{verdict}[/]")
     options.console.print(f"  {escape(outcome.diagnosis.summary)}")
 
 

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import DIRECTION, DIRECTIONS, Options, Task, campaign_options, example
+from bushfit.cli.common import Options, Task, campaign_options, direction_option, example
 from bushfit.cli.show import tell_fit
+
+if TYPE_CHECKING:
+    from bushfit.geometry import Direction
 
 
 @click.command(
     "fit", epilog=example("bushfit fit configs/arm_bushing.toml --direction axial --direction radial --profile")
 )
-@click.option(
-    "--direction",
+@direction_option(
     "directions",
-    type=DIRECTIONS,
-    metavar=DIRECTION,
     multiple=True,
-    help="Tests to fit: axial, radial or torsion; may be given again [axial, as in the paper; of loops, or of sweeps, "
+    help="Tests to fit: {directions}; may be given again [axial, as in the paper; of loops, or of sweeps, "
     "all where none is axial].",
 )
 @click.option(
@@ -31,8 +32,8 @@ from bushfit.cli.show import tell_fit
     help="Add an effect to the paper's three, such as inertia; may be given again. A wrong NAME lists them all.",
 )
 @click.option("--profile", is_flag=True, help="Add 95 % intervals by profile likelihood (some seconds).")
-@campaign_options()
-def command(directions: tuple[str, ...], effects: tuple[str, ...], profile: bool, task: Task) -> None:
+@campaign_options
+def command(directions: tuple[Direction, ...], effects: tuple[str, ...], profile: bool, task: Task) -> None:
     """Fit all five parameters to the loops and sweeps of CAMPAIGN together.
 
     Writes model.json, and the tables and plots of both: loops.csv, loops.png, sweeps.csv, sweeps.png. Tests in
@@ -44,12 +45,10 @@ def command(directions: tuple[str, ...], effects: tuple[str, ...], profile: bool
     --profile moves each parameter until the fit of all others is worse than chance allows: slower than the interval
     from the standard error, and right where that is not, as where a parameter is hardly determined.
     """
-    from bushfit.geometry import Direction
     from bushfit.jobs.fits import Fit
 
-    chosen = tuple(Direction(direction) for direction in directions)
     with _progress(task.options) if profile else nullcontext() as advance:
-        task.perform(Fit(chosen, effects, advance), tell_fit)
+        task.perform(Fit(directions, effects, advance), tell_fit)
 
 
 @contextmanager

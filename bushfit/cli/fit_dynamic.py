@@ -16,7 +16,7 @@ from bushfit.cli.show import tell_fit
     type=click.Path(path_type=Path),
     help="Hold mu, sigma_fmax and eps_half at those of this static.json [fitted to the loops on the spot].",
 )
-@campaign_options()
+@campaign_options
 def command(static: Path | None, task: Task) -> None:
     """Fit m and alpha to the smallest-amplitude sweep of CAMPAIGN, the other three held.
 

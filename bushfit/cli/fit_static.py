@@ -16,7 +16,7 @@ from bushfit.cli.show import tell_fit
     type=click.Path(path_type=Path),
     help="Hold the springpot at m and alpha of this dynamic.json or model.json.",
 )
-@campaign_options()
+@campaign_options
 def command(dynamic: Path | None, task: Task) -> None:
     """Fit mu, sigma_fmax and eps_half to the hysteresis loops of CAMPAIGN, the springpot held.
 

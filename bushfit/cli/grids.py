@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 
-from bushfit.errors import BushfitError, UnitError
+from bushfit.cli.common import naming_option
+from bushfit.errors import UnitError
 from bushfit.units import quantity
 
 #: Values of a grid at most: more is a typing error in the step.
@@ -20,31 +21,24 @@ def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | 
     if text is None:
         return None
     expected = 'such as "5:155:10 Hz" (start:stop:step) or "0.1, 0.2, 0.5 mm", with one unit at the end'
-    if re.search(r"\d,\d", text):
-        raise UnitError(
-            "a comma between two digits may part numbers or be a decimal comma",
-            place=option,
-            found=repr(text),
-            expected=expected,
-            hint='write decimals with a point, "0.5", and numbers of a list apart, "1, 5"',
-        )
-    parts = re.fullmatch(r"\s*([-+0-9.eE,:\s]*[0-9.])\s*([^-+\d\s:,.].*)", text)
-    if not parts:
-        raise UnitError("these are no values with a unit", place=option, found=repr(text), expected=expected)
-    numbers, suffix = parts.groups()
-    try:
-        if ":" in numbers:
-            start, stop, step = (quantity(f"{number} {suffix}", unit) for number in numbers.split(":"))
-            if not (step > 0 and stop >= start > 0 and (stop - start) / step < _MOST_VALUES):
-                raise UnitError("start:stop:step does not count upward", place=option, found=text, expected=expected)
-            count = int((stop - start) / step * (1 + 1e-9)) + 1
-            return tuple(start + i * step for i in range(count))
-        values = tuple(quantity(f"{number} {suffix}", unit) for number in numbers.split(","))
-        if min(values) <= 0.0:
-            raise UnitError("frequencies and amplitudes are above zero", place=option, found=text, expected=expected)
-        return values
-    except ValueError:
-        raise UnitError("these are no values with a unit", place=option, found=repr(text), expected=expected) from None
-    except BushfitError as error:
-        error.place = option
-        raise
+    with naming_option(option):
+        if re.search(r"\d,\d", text):
+            raise UnitError(
+                "a comma between two digits may part numbers or be a decimal comma",
+                found=repr(text),
+                expected=expected,
+                hint='write decimals with a point, "0.5", and numbers of a list apart, "1, 5"',
+            )
+        parts = re.fullmatch(r"\s*([-+0-9.eE,:\s]*[0-9.])\s*([^-+\d\s:,.].*)", text)
+        if not parts or parts[1].count(":") not in (0, 2):
+            raise UnitError("these are no values with a unit", found=repr(text), expected=expected)
+        counted = ":" in parts[1]
+        values = tuple(quantity(f"{number} {parts[2]}", unit) for number in parts[1].split(":" if counted else ","))
+        if not counted and min(values) <= 0.0:
+            raise UnitError("frequencies and amplitudes are above zero", found=text, expected=expected)
+        if not counted:
+            return values
+        start, stop, step = values
+        if not (step > 0 and stop >= start > 0 and (stop - start) / step < _MOST_VALUES):
+            raise UnitError("start:stop:step does not count upward", found=text, expected=expected)
+        return tuple(start + i * step for i in range(int((stop - start) / step * (1 + 1e-9)) + 1))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, example, shared_options
+from bushfit.cli.common import Options, example, naming_option, shared_options
 from bushfit.cli.inspect import KEYS, tell_assumed
 from bushfit.cli.raw import direction_error, file_options, options_named
 from bushfit.cli.show import warn
@@ -60,11 +60,12 @@ def command(
     from bushfit.inspection.opening import inspect, stated_of_each
 
     name = name or files[0].resolve().parent.name
-    radii = {
-        "inner": _radius("inner", inner_radius, inner_diameter),
-        "outer": _radius("outer", outer_radius, outer_diameter),
+    table = {
+        "name": name,
+        "inner_radius": _radius("inner", inner_radius, inner_diameter),
+        "outer_radius": _radius("outer", outer_radius, outer_diameter),
+        "length": length,
     }
-    table = {"name": name, **{f"{side}_radius": radius for side, radius in radii.items()}, "length": length}
     folder, target = _place(options, name)
     given = {"inner_radius": inner_diameter, "outer_radius": outer_diameter}
     bushing = _bushing(table, folder / target, [key for key, diameter in given.items() if diameter])
@@ -82,7 +83,7 @@ def command(
     for one in seen:
         _tell(options, one)
     options.write(folder, {target: text.encode()})
-    options.console.print(f"next: bushfit fit {folder / target}", markup=False)
+    options.console.print(f"next: bushfit run {folder / target}", markup=False)
     options.tell({"campaign": text, "files": [one.to_document() for one in seen]})
 
 
@@ -97,11 +98,8 @@ def _radius(side: str, radius: str | None, diameter: str | None) -> str:
         return radius
     if diameter is None:
         raise click.UsageError(f"Missing option '{options[0]}' or '{options[1]}'.")
-    try:
+    with naming_option(options[1]):
         return f"{1e3 * quantity(diameter, 'm') / 2.0:.12g} mm"
-    except BushfitError as error:
-        error.place = options[1]
-        raise
 
 
 def _place(options: Options, name: str) -> tuple[Path, str]:
@@ -140,12 +138,12 @@ def _usable(seen: Inspected) -> Inspected:
         MeasurementError: it is another, with the way on.
     """
     if seen.kind == "history":
-        stated = seen.direction or "..."
         raise MeasurementError(
             "this is a raw stepped-sine history, not a sweep",
             file=seen.file,
             expected="hysteresis loops and sweeps",
-            hint=f"bushfit reduce {seen.file} --direction {stated} makes a sweep.csv of it; give that instead",
+            hint=f"bushfit reduce {seen.file} --direction {seen.direction or '...'} makes a sweep.csv of it; "
+            "give that instead",
         )
     if seen.direction is None:
         raise direction_error(seen.file)
@@ -154,9 +152,8 @@ def _usable(seen: Inspected) -> Inspected:
 
 def _check_once(files: Sequence[Path]) -> None:
     places = [file.resolve() for file in files]
-    for file, place in zip(files, places, strict=True):
-        if places.count(place) > 1:
-            raise CampaignError("a file is given twice", found=str(file), expected="each file once")
+    if twice := [file for file, place in zip(files, places, strict=True) if places.count(place) > 1]:
+        raise CampaignError("a file is given twice", found=str(twice[0]), expected="each file once")
 
 
 def _tell(options: Options, seen: Inspected) -> None:

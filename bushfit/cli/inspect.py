@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -55,9 +56,8 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     from bushfit.inspection.opening import inspect, stated_of_each
 
     folder = options.folder(folder_name(files[0].stem))
-    pages = [
-        f"inspect{f'_{page}' if page > 1 else ''}.png" for page in range(1, -(-len(files) // _FILES_A_PICTURE) + 1)
-    ]
+    last = math.ceil(len(files) / _FILES_A_PICTURE)
+    pages = ["inspect.png", *(f"inspect_{page}.png" for page in range(2, last + 1))]
     if options.plots:
         options.require_free(folder, pages)
     seen: list[Inspected] = []
@@ -78,7 +78,11 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
             click.echo(f"cannot be used: {other}", err=True)
         raise failed[-1]
     if options.plots:
-        options.write(folder, _pictures(seen, pages))
+        from bushfit.report.plots import inspection_figure, to_png
+
+        groups = (seen[start : start + _FILES_A_PICTURE] for start in range(0, len(seen), _FILES_A_PICTURE))
+        figures = (inspection_figure(group) for group in groups)
+        options.write(folder, {page: to_png(figure) for page, figure in zip(pages, figures, strict=True)})
     options.tell({"files": [one.to_document() for one in seen], "campaign": text})
 
 
@@ -96,8 +100,7 @@ def tell(options: Options, seen: Inspected) -> None:
         ends = ("" if end is None else f"{end:.6g}" for end in (column.low, column.high))
         table.add_row(escape(column.header), column.role or "(not needed)", escape(column.unit or ""), *ends)
     console.print(table)
-    facts = {"written with": written, **seen.looked.facts}
-    for label, value in facts.items():
+    for label, value in {"written with": written, **seen.looked.facts}.items():
         console.print(f"  {label}: {value}", markup=False)
     tell_assumed(options, seen)
     for sentence in seen.looked.odd:
@@ -110,12 +113,3 @@ def tell_assumed(options: Options, seen: Inspected) -> None:
     """What a file leaves open and was assumed."""
     if seen.assumed:
         options.console.print(f"  {seen.assumed}", markup=False)
-
-
-def _pictures(seen: Sequence[Inspected], pages: Sequence[str]) -> dict[str, bytes]:
-    from bushfit.report.plots import inspection_figure, to_png
-
-    return {
-        name: to_png(inspection_figure(seen[page * _FILES_A_PICTURE : (page + 1) * _FILES_A_PICTURE]))
-        for page, name in enumerate(pages)
-    }

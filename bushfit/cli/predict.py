@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import DIRECTION, DIRECTIONS, Options, example, open_model, shared_options
+from bushfit.cli.common import Options, direction_option, example, open_model, shared_options
 from bushfit.cli.show import new_table, warn
 
 if TYPE_CHECKING:
+    from bushfit.geometry import Direction
     from bushfit.jobs.predict import Predicted
 
 
@@ -26,13 +27,10 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path),
     help="Lay this campaign's sweeps over the plots, and use its [predict] grid.",
 )
-@click.option(
-    "--direction",
+@direction_option(
     "directions",
-    type=DIRECTIONS,
-    metavar=DIRECTION,
     multiple=True,
-    help="axial, radial or torsion; may be given again [axial and radial].",
+    help="{directions}; may be given again [axial and radial].",
 )
 @click.option("--frequencies", help='Such as "5:155:10 Hz" or "20, 50, 100 Hz" [the campaign\'s].')
 @click.option("--amplitudes", help='Zero-to-peak, such as "0.1, 0.2, 0.5 mm" [the campaign\'s].')
@@ -41,7 +39,7 @@ if TYPE_CHECKING:
 def command(
     model: Path,
     campaign: Path | None,
-    directions: tuple[str, ...],
+    directions: tuple[Direction, ...],
     frequencies: str | None,
     amplitudes: str | None,
     torsion_amplitudes: str | None,
@@ -57,7 +55,6 @@ def command(
     from bushfit.campaign.naming import folder_name
     from bushfit.campaign.schema import PredictSettings
     from bushfit.cli.grids import parse_grid
-    from bushfit.geometry import Direction
     from bushfit.jobs.predict import Predict
 
     result = open_model(model)
@@ -67,7 +64,7 @@ def command(
             parse_grid(frequencies, "--frequencies", "Hz"),
             parse_grid(amplitudes, "--amplitudes", "m"),
             parse_grid(torsion_amplitudes, "--torsion-amplitudes", "rad"),
-            tuple(Direction(direction) for direction in directions) or None,
+            directions or None,
         )
     )
     folder = options.folder(loaded.slug if loaded else folder_name(result.model.bushing.name))

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import click
 
-from bushfit.cli.common import DIRECTION, DIRECTIONS
+from bushfit.cli.common import direction_option
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 
@@ -66,12 +66,7 @@ def _options(keys: Sequence[str], *, sweeps: bool) -> list[Callable[[Any], Any]]
         roles = f"ROLEs of loops: {', '.join(LOOP_COLUMNS)}; of sweeps: {', '.join(SWEEP_COLUMNS)}"
         of_all = "all files given that have the role"
     return [
-        click.option(
-            "--direction",
-            type=DIRECTIONS,
-            metavar=DIRECTION,
-            help="axial, radial or torsion, of all files given [found from their names and columns].",
-        ),
+        direction_option(help="{directions}, of all files given [found from their names and columns]."),
         click.option(
             "--column",
             "columns",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,7 +65,8 @@ def command(
     asked = parse_grid(levels, "--levels", direction.motion.displacement_unit) or ()
     reduction = reduce(histories, fewest_cycles=cycles, levels=asked)
     _tell(options, reduction)
-    output = {"sweep.csv": to_csv(reduced_table(reduction))}
+    points = reduced_table(reduction)
+    output = {"sweep.csv": to_csv(points)}
     if options.plots:
         from bushfit.report.plots import reduction_figure, to_png
 
@@ -74,7 +76,8 @@ def command(
     options.write(folder, output)
     snippet = f'[[sweeps]]\nfile = "sweep.csv"\ndirection = "{direction}"\n'
     options.console.print(f"for a campaign in {folder} (elsewhere, with the way there):\n\n{snippet}", markup=False)
-    options.tell(_document(reduction, snippet))
+    document = {"direction": str(direction), "points": points.to_dict(orient="list")}
+    options.tell({**document, "warnings": list(reduction.warnings), "campaign": snippet})
 
 
 def _read(files: Sequence[Path], stated: Mapping[str, Any]) -> list[Loop]:
@@ -101,20 +104,20 @@ def _read(files: Sequence[Path], stated: Mapping[str, Any]) -> list[Loop]:
 
 def _tell(options: Options, reduction: Reduction) -> None:
     """A line a level and repeat, with -v a line a point."""
-
     units = reduction.direction.display
     (unit, length), (stiffness_unit, factor) = units.displacement, units.stiffness
-    groups: dict[tuple[float, ...], list[Step]] = {}
-    for step in reduction.steps:
-        key = (step.level, step.repeat, *((step.nominal_frequency,) if options.verbose else ()))
-        groups.setdefault(key, []).append(step)
+
+    def line(step: Step) -> tuple[float, ...]:
+        return (step.level, step.repeat, *((step.nominal_frequency,) if options.verbose else ()))
+
     count = len(reduction.steps)
     table = new_table(
         f"{count} point{'s' * (count > 1)} found; of each line the largest noise and distortion",
         f"level [{unit}]", "repeat", "points", "f [Hz]", f"|K| [{stiffness_unit}]", "loss factor", "noise [%]",
         "THD [%]",
     )  # fmt: skip
-    for (level, repeat, *_), steps in sorted(groups.items()):
+    for (level, repeat, *_), group in groupby(sorted(reduction.steps, key=line), line):
+        steps = list(group)
         table.add_row(
             number(length * level, 4),
             f"{repeat:.0f}",
@@ -134,16 +137,4 @@ def _tell(options: Options, reduction: Reduction) -> None:
 
 
 def _span(rising: Sequence[str]) -> str:
-    low, high = rising[0], rising[-1]
-    return low if low == high else f"{low}-{high}"
-
-
-def _document(reduction: Reduction, snippet: str) -> dict[str, Any]:
-    from bushfit.report.tables import reduced_table
-
-    return {
-        "direction": str(reduction.direction),
-        "points": reduced_table(reduction).to_dict(orient="list"),
-        "warnings": list(reduction.warnings),
-        "campaign": snippet,
-    }
+    return "-".join(dict.fromkeys((rising[0], rising[-1])))

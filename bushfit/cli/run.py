@@ -25,7 +25,7 @@ _AGREED = 2
 
 
 @click.command("run", epilog=example("bushfit run configs/cmp_15961.toml"))
-@campaign_options()
+@campaign_options
 def command(task: Task) -> None:
     """Fit CAMPAIGN in every way, ask what the model lacks, and predict from the result.
 
@@ -58,9 +58,8 @@ def tell_run(options: Options, name: str, outcome: Ran) -> None:
     tell_predictions(options, outcome.predicted)
     if options.verbose:
         _tell_steps(options, name, outcome)
-    line = f"{outcome.no_two_step}: the two-step procedure is passed over"
-    if outcome.two_step:
-        line = _in_a_line(outcome.two_step, outcome.joint.result)
+    two_step = outcome.two_step and _in_a_line(outcome.two_step, outcome.joint.result)
+    line = two_step or f"{outcome.no_two_step}: the two-step procedure is passed over"
     options.console.print(line, markup=False)
 
 
@@ -99,12 +98,11 @@ def _span(ends: Sequence[float], digits: int) -> str:
 
 def _in_a_line(two_step: TwoStep, joint: Result) -> str:
     """What the paper's procedure found, beside the joint fit."""
-    found, off, ratio = two_step.result, dict[str, float](), dict[str, float]()
-    for name in joint.fitted:
-        error, least = found.covariance.stderr(name), joint.covariance.stderr(name)
-        if error and least:
-            off[name] = abs(found.model.values[name] - joint.model.values[name]) / error
-            ratio[name] = error / least
+    found = two_step.result
+    errors = {name: (found.covariance.stderr(name), joint.covariance.stderr(name)) for name in joint.fitted}
+    known = {name: (error, least) for name, (error, least) in errors.items() if error and least}
+    off = {n: abs(found.model.values[n] - joint.model.values[n]) / error for n, (error, _) in known.items()}
+    ratio = {name: error / least for name, (error, least) in known.items()}
     parts = [f"{len(two_step.passes)} passes"]
     if off:
         far, unsure = (max(sizes, key=sizes.__getitem__) for sizes in (off, ratio))
@@ -153,9 +151,7 @@ def _tell_cost(options: Options, two_step: Result, joint: Result) -> None:
     """What the two-step procedure costs: its values and errors beside those of the joint fit."""
     columns = ("two-step", "std error", "joint", "std error", "unit", "difference", "error ratio")
     table = new_table("what the two-step procedure costs", "parameter", *columns)
-    for name in joint.fitted:
-        if name not in two_step.model.values:
-            continue
+    for name in (name for name in joint.fitted if name in two_step.model.values):
         one, other = two_step.model.values[name], joint.model.values[name]
         errors = two_step.covariance.stderr(name), joint.covariance.stderr(name)
         ratio = f"{errors[0] / errors[1]:.1f}" if errors[0] and errors[1] else ""

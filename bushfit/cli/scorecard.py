@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import click
 
-from bushfit.cli.common import Options, example, options_without_folder
+from bushfit.cli.common import Options, example, shared_options
 from bushfit.cli.show import new_table
 
 
@@ -17,7 +18,7 @@ from bushfit.cli.show import new_table
 @click.option("--campaigns", type=click.IntRange(min=5), default=300, show_default=True, help="Hidden campaigns.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of everything random.")
 @click.option("--jobs", type=click.IntRange(min=1), default=os.cpu_count() or 1, show_default=True, help="Cores.")
-@options_without_folder
+@partial(shared_options, where="nothing is written")
 def command(campaigns: int, seed: int, jobs: int, options: Options) -> None:
     """Judge `diagnose` on hidden campaigns of random bushings, and print how often it is right.
 

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from bushfit.cli.common import Options
-    from bushfit.effects.contract import Parameter
     from bushfit.jobs.fits import Fitted
     from bushfit.model.result import Result
 
@@ -50,8 +49,7 @@ def tell_result(options: Options, title: str, result: Result) -> None:
             f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)} "
             f"over {quality.points} points, noise {number(100 * quality.noise, 2)} % a point"
         )
-    pairs = result.covariance.correlations()
-    shown = pairs if options.verbose else [pair for pair in pairs if abs(pair[2]) > _CLOSE]
+    shown = [pair for pair in result.covariance.correlations() if options.verbose or abs(pair[2]) > _CLOSE]
     if shown:
         console.print("correlation: " + ", ".join(f"{one}/{other} {value:+.2f}" for one, other, value in shown))
 
@@ -91,7 +89,7 @@ def parameter_table(title: str, result: Result) -> Table:
     for name, parameter in result.model.parameters.items():
         value, stderr = result.model.values[name], result.covariance.stderr(name)
         interval = result.profile.get(name) or result.interval(name)
-        if _at_nothing(parameter, value):
+        if parameter.log and value <= _AT_LEAST * parameter.bounds[0]:  # a slope there tells nothing of its error
             stderr = interval = None
         elif interval == parameter.bounds:
             interval = None
@@ -102,11 +100,6 @@ def parameter_table(title: str, result: Result) -> Table:
         error = "" if stderr is None else alike([stderr * factor], 2)[0]
         table.add_row(_labelled(name, result), shown, error, " to ".join(ends), unit)
     return table
-
-
-def _at_nothing(parameter: Parameter, value: float) -> bool:
-    """Whether a strictly positive parameter is as small as it may be: there a slope tells nothing of its error."""
-    return parameter.log and value <= _AT_LEAST * parameter.bounds[0]
 
 
 def _labelled(name: str, result: Result) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, example, open_model, shared_options
+from bushfit.cli.common import Options, example, naming_option, open_model, shared_options
 
 if TYPE_CHECKING:
     from bushfit.campaign.schema import SimulateSettings
@@ -46,6 +46,7 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
 
     Writes campaign.toml, the CSV files it names, and truth.json, the model behind them.
     """
+    from bushfit.campaign.naming import folder_name
     from bushfit.model.file import model_document
     from bushfit.simulation import simulate, to_files
 
@@ -54,7 +55,7 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
     for text in effects:
         truth = _with_effect(truth, text)
     files = to_files(simulate(truth, plan))
-    folder = options.folder(f"simulated {_slug(truth)}")
+    folder = options.folder(f"simulated {folder_name(truth.bushing.name)}")
     options.console.print(truth.equation(), markup=False)
     options.write(folder, files)
     options.tell({"truth": model_document(truth), "files": sorted(files)})
@@ -68,35 +69,26 @@ def _task(source: Path) -> tuple[Model, SimulateSettings]:
     if source.suffix.lower() == ".json":
         return open_model(source).model, SimulateSettings()
     campaign = load_campaign(source)
-    truth = model_of(campaign)
-    return truth, campaign.simulate or SimulateSettings()
+    return model_of(campaign), campaign.simulate or SimulateSettings()
 
 
 def _with_options(plan: SimulateSettings, settings: dict[str, Any]) -> SimulateSettings:
-    from bushfit.errors import BushfitError, UnitError
+    from bushfit.errors import UnitError
     from bushfit.units import quantity
 
-    changes: dict[str, Any] = {}
-    for name, given in settings.items():
-        if given is None:
-            continue
-        value = given
+    changes = {name: value for name, value in settings.items() if value is not None}
+    for name, given in changes.items():
         if isinstance(given, str):
-            option = "--" + name.replace("_", "-")
-            try:
-                value = quantity(given, "rad" if name == "phase_error" else "1")
-            except BushfitError as error:
-                error.place = option
-                raise
-            if not 0.0 <= value < 1.0:
-                raise UnitError("impossible size", place=option, found=given, expected="0 up to 100 %, or below 1 rad")
-        changes[name] = value
+            with naming_option("--" + name.replace("_", "-")):
+                changes[name] = quantity(given, "rad" if name == "phase_error" else "1")
+                if not 0.0 <= changes[name] < 1.0:
+                    raise UnitError("impossible size", found=given, expected="0 up to 100 %, or below 1 rad")
     return replace(plan, **changes)
 
 
 def _with_effect(model: Model, text: str) -> Model:
     from bushfit.effects import effect_named
-    from bushfit.errors import BushfitError, ModelError
+    from bushfit.errors import ModelError
     from bushfit.units import is_number, quantity
 
     name, found, value = text.replace(" ", "").partition("=")
@@ -110,15 +102,6 @@ def _with_effect(model: Model, text: str) -> Model:
             expected='such as "inertia.mass=0.1 kg"; parameters of ' + f"{effect}: {', '.join(parameters)}",
         )
     unit = parameters[short].unit
-    try:
+    with naming_option("--effect"):
         size = float(value) if is_number(value) and unit == "1" else quantity(text.partition("=")[2].strip(), unit)
-    except BushfitError as error:
-        error.place = "--effect"
-        raise
     return model.with_values({name: size}) if effect in model.effects else model.with_effect(effect, {name: size})
-
-
-def _slug(model: Model) -> str:
-    from bushfit.campaign.naming import folder_name
-
-    return folder_name(model.bushing.name)

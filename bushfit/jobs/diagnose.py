@@ -60,8 +60,8 @@ class Diagnose:
         ]
 
     def run(self, data: Data) -> Diagnosed:
-        parameters = self.model.parameters if self.model else FIVE
-        if not (self.settings.adopt or data.free(tuple(parameters))):
+        parameters = tuple(self.model.parameters) if self.model else FIVE
+        if not (self.settings.adopt or data.free(parameters)):
             raise FitError(
                 "there is nothing to fit, and so nothing to diagnose",
                 file=data.campaign.path,

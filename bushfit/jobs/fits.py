@@ -46,13 +46,10 @@ class Fitted:
         return to_document(self.result)
 
     def files(self, formats: Collection[str]) -> dict[str, bytes]:
-        model, data = self.result.model, self.data.without(self.result.outliers)
-        files = {f"{self.stem}.json": to_json(self.document)}
-        if "loops" in self.kinds:
-            files |= fit_files("loops", model, data.loops, formats)
-        if "sweeps" in self.kinds:
-            files |= fit_files("sweeps", model, data.sweeps, formats)
-        return files
+        return {
+            f"{self.stem}.json": to_json(self.document),
+            **files_of_tests(self.data, self.result, self.kinds, formats),
+        }
 
 
 @dataclass(frozen=True)
@@ -81,21 +78,17 @@ class FitDynamic:
     def run(self, data: Data) -> Fitted:
         static, reports = self.static or given_static(data), []
         if static is None:
-            static = _static_on_the_spot(data)
+            if not data.loops:
+                raise FitError(
+                    "nothing says at which mu, sigma_fmax and eps_half to hold the fit",
+                    file=data.campaign.path,
+                    found="no --static, no [[loops]], and no values of all three in [fit]",
+                    hint="give --static static.json, add a loop, or run bushfit fit for all five parameters together",
+                )
+            static = fit_static(data)
             reports.append(("static fit of the loops, because no --static was given", static))
         reports.append(("dynamic fit of the smallest sweep", fit_dynamic(data, static)))
         return Fitted("dynamic", ("sweeps",), data, tuple(reports))
-
-
-def _static_on_the_spot(data: Data) -> Result:
-    if not data.loops:
-        raise FitError(
-            "nothing says at which mu, sigma_fmax and eps_half to hold the fit",
-            file=data.campaign.path,
-            found="no --static, no [[loops]], and no values of all three in [fit]",
-            hint="give --static static.json, add a loop, or run bushfit fit for all five parameters together",
-        )
-    return fit_static(data)
 
 
 @dataclass(frozen=True)
@@ -122,3 +115,10 @@ class Fit:
 def tests_of(campaign: Campaign) -> tuple[str, ...]:
     """The kinds of test that a campaign has: loops, sweeps."""
     return tuple(kind for kind in ("loops", "sweeps") if getattr(campaign, kind))
+
+
+def files_of_tests(data: Data, result: Result, kinds: Collection[str], formats: Collection[str]) -> dict[str, bytes]:
+    """Tables and plots of tests of some kinds beside a model, with the outliers that its fit left out marked."""
+    marked = data.without(result.outliers)
+    loops = fit_files("loops", result.model, marked.loops if "loops" in kinds else (), formats)
+    return loops | fit_files("sweeps", result.model, marked.sweeps if "sweeps" in kinds else (), formats)

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 from bushfit.errors import FitError
 from bushfit.fitting.procedures import TwoStep, fit_two_step
 from bushfit.jobs.diagnose import Diagnose, Diagnosed
-from bushfit.jobs.fits import Fit, FitStatic, Fitted, tests_of
+from bushfit.jobs.fits import Fit, FitStatic, Fitted, files_of_tests, tests_of
 from bushfit.jobs.predict import Predict, Predicted
 from bushfit.model.file import to_document
 from bushfit.model.model import FIVE
-from bushfit.report.artifacts import artifact_names, diagnosis_files, fit_files
+from bushfit.report.artifacts import artifact_names, diagnosis_files
 from bushfit.report.folder import to_json
 
 if TYPE_CHECKING:
@@ -63,13 +63,11 @@ class Ran:
         return {**documents, "diagnosis": self.diagnosed.document} if self.diagnosed else documents
 
     def files(self, formats: Collection[str]) -> dict[str, bytes]:
-        model, marked = self.result.model, self.data.without(self.result.outliers)
-        found, title = self.diagnosed, self.data.campaign.name
+        found = self.diagnosed
         return {
             **{f"{name}.json": to_json(document) for name, document in self.document.items()},
-            **fit_files("loops", model, marked.loops, formats),
-            **fit_files("sweeps", model, marked.sweeps, formats),
-            **(diagnosis_files(found.diagnosis, title, formats) if found else {}),
+            **files_of_tests(self.data, self.result, tests_of(self.data.campaign), formats),
+            **(diagnosis_files(found.diagnosis, self.data.campaign.name, formats) if found else {}),
             **self.predicted.files(formats),
         }
 
@@ -79,13 +77,12 @@ class Run:
     """The whole chain: the paper's two steps, all parameters together, what is missing, and the prediction."""
 
     def names(self, campaign: Campaign, formats: Collection[str]) -> list[str]:
-        kinds = tests_of(campaign)
         return [
             *(["static.json"] if campaign.loops else []),
             *(["dynamic.json"] if campaign.loops and campaign.sweeps else []),
             "joint.json",
             *Diagnose().names(campaign, formats),
-            *artifact_names(kinds, formats),
+            *artifact_names(tests_of(campaign), formats),
             *Predict().names(campaign, formats),
         ]
 
@@ -94,10 +91,9 @@ class Run:
         two_step, why_not = _two_step(data)
         joint = Fit().run(data)
         diagnosed = Diagnose().run(data) if data.free(FIVE) else None
-        added = diagnosed is not None and diagnosed.diagnosis.after is not diagnosed.diagnosis.before
-        result = diagnosed.result if diagnosed and added else joint.result
-        predicted = Predict().run(result, data.campaign)
-        return Ran(data, static, two_step, why_not, joint, diagnosed, predicted)
+        found = diagnosed and diagnosed.diagnosis
+        result = found.result if found and found.after is not found.before else joint.result
+        return Ran(data, static, two_step, why_not, joint, diagnosed, Predict().run(result, data.campaign))
 
 
 def _two_step(data: Data) -> tuple[TwoStep | None, str]:

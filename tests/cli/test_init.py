@@ -58,7 +58,7 @@ def test_where_it_is_written(typed: Callable, tests: list[Path], tmp_path: Path)
     assert json.loads(done.stdout)["campaign"] == text
     assert tomllib.loads(text)["bushing"]["name"] == "my tests"
     assert tomllib.loads(text)["loops"][0]["file"] == "my tests/loop_axial_1.csv"
-    assert "next: bushfit fit lab/my.toml" in done.stderr
+    assert "next: bushfit run lab/my.toml" in done.stderr
     assert "results stand there already" in typed("init", *tests, *GEOMETRY, "-o", "lab/my.toml").stderr
     assert typed("init", *tests, *GEOMETRY, "-o", "lab/my.toml", "--force").returncode == 0
     assert typed("init", *tests, *GEOMETRY).returncode == 0
