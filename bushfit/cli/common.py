@@ -214,6 +214,7 @@ def campaign_options(function: F, soft_l1: str = "points far off pull less, outl
     @click.option(
         "--max-nrmse",
         type=_Share(min=0.0, min_open=True),
+        metavar="SHARE",
         help="Exit with status 1 if the NRMSE is above this share (0.02 is 2 %).",
     )
     @shared_options

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from bushfit.geometry import Direction
     from bushfit.jobs.predict import Predicted
 
+#: Amplitudes of a direction that the terminal shows at most, spread from first to last; the CSV has all.
+_MOST_AMPLITUDES = 8
+
 
 @click.command(
     "predict",
@@ -78,14 +81,16 @@ def command(
 
 def tell_predictions(options: Options, outcome: Predicted) -> None:
     """The corners of each table, and what a user must know before using it."""
-    from bushfit.report.tables import prediction_table
+    from bushfit.report.tables import prediction_table, spread
     from bushfit.units import alike, number
 
     for prediction in outcome.predictions:
         table = prediction_table(prediction)
+        amplitudes = table.iloc[:, 1].unique()
+        chosen = amplitudes[spread(amplitudes.size, _MOST_AMPLITUDES)]
         shown = new_table(f"{outcome.result.model.bushing.name}: {prediction.direction}, corners", *table.columns[:4])
         low, high = table.iloc[:, 0].min(), table.iloc[:, 0].max()
-        for row in table[table.iloc[:, 0].isin([low, high])].itertuples(index=False):
+        for row in table[table.iloc[:, 0].isin([low, high]) & table.iloc[:, 1].isin(chosen)].itertuples(index=False):
             shown.add_row(*(number(value, 6) for value in row[:2]), *(alike([value], 4)[0] for value in row[2:4]))
         options.console.print(shown)
     warn(options, outcome.warnings)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from bushfit.diagnosis.record import Diagnosis
+    from bushfit.effects.contract import Array
     from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
     from bushfit.model.model import Model
     from bushfit.prediction import Prediction
@@ -161,3 +162,8 @@ def reduced_table(reduction: Reduction) -> pd.DataFrame:
     )
     order = [f"amplitude [{length}]", "repeat", "frequency [Hz]"]
     return frame.sort_values(order, ignore_index=True, kind="stable")
+
+
+def spread(count: int, most: int) -> Array:
+    """Places of at most so many of `count` things, evenly from the first to the last, (min(count, most),)."""
+    return np.linspace(0, count - 1, min(most, count)).round().astype(int)

@@ -37,3 +37,14 @@ def test_predict_says_each_warning_once_and_in_its_document(bushfit: Run, root: 
         warnings = json.loads(done.stdout)["warnings"]
         assert [f"warning: {line}" for line in warnings] == [line for line in told if ": of the fit: " not in line]
         assert any(line.startswith(said) for line in warnings)
+
+
+def test_predict_shows_at_most_eight_amplitudes_a_direction(bushfit: Run, tmp_path: Path) -> None:
+    amplitudes = ", ".join(f"{0.02 * n:.2f}" for n in range(1, 31)) + " mm"
+    options = ("--direction", "axial", "--amplitudes", amplitudes, "--no-plots", "-o", str(tmp_path / "x"))
+    done = bushfit("predict", "model/model.json", *options)
+    assert done.returncode == 0, done.stderr
+    shown = [line.split()[1] for line in done.stderr.splitlines() if line.split()[:1] == ["155"]]
+    assert len(shown) == 8
+    assert (shown[0], shown[-1]) == ("0.02", "0.6")
+    assert len(pd.read_csv(tmp_path / "x/axial.csv")["amplitude [mm]"].unique()) == 30

@@ -25,9 +25,9 @@ from bushfit.report.plots.style import (
     legend,
     new_figure,
     readable,
-    spread,
     styles,
 )
+from bushfit.report.tables import spread
 from bushfit.units import for_people
 
 #: Points of a model's line: chosen, no corner is seen at the size of a panel.

@@ -19,6 +19,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, ScalarFo
 
 from bushfit.effects.contract import Array
 from bushfit.model.covariance import Z95
+from bushfit.report.tables import spread
 
 #: Centimetres in an inch: lengths are written in centimetres, and matplotlib takes inches.
 CM = 2.54
@@ -146,11 +147,6 @@ def mark_outliers(axes: Axes, x: Array, y: Array) -> None:
     if x.size:
         axes.plot(x, np.clip(y, low, high), "x", color=OUTLIER, ms=4.5, mew=1.2, zorder=5, clip_on=False)
     axes.set_ylim(low, high)
-
-
-def spread(count: int, most: int) -> Array:
-    """Places of at most so many of `count` things, evenly from the first to the last, (min(count, most),)."""
-    return np.linspace(0, count - 1, min(most, count)).round().astype(int)
 
 
 def legend(
