@@ -243,7 +243,8 @@ class SweepData(DataSet):
         return np.ones(self.frequency.size) if self.weight is None else self.weight
 
     def outlying(self, model: Model) -> Array:
-        return outlying_points(self, model)
+        points, freedom = np.stack((self.frequency, self.amplitude)), self.noise.scatter_freedom or np.inf
+        return outlying_points(self.deviation(model), self.apart, self.block_starts, points, freedom)
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
         file = str(self.source.file) if self.source else None
