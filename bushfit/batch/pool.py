@@ -14,7 +14,15 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from itertools import islice
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
@@ -174,7 +182,7 @@ def run(
             while not suspects and len(out) < _CHUNKS_PER_WORKER * pool.workers():
                 if not (chunk := list(islice(left, size))):
                     break
-                future = pool.executor().submit(work, [row for _, row in chunk])
+                future = _submit(pool, work, [row for _, row in chunk])
                 out[future], started[future] = chunk, time.monotonic()
             if not out:
                 if not suspects:
@@ -201,12 +209,21 @@ def run(
         pool.close()
 
 
+def _submit(pool: Pool, work: Callable[[Sequence[T]], Sequence[R]], rows: Sequence[T]) -> Future[Sequence[R]]:
+    """Hand rows to a worker, of a new pool where the old one has just lost a worker and takes no more."""
+    try:
+        return pool.executor().submit(work, rows)
+    except BrokenExecutor as error:
+        pool.mend(error)
+        return pool.executor().submit(work, rows)
+
+
 def _alone(row: T, work: Callable[[Sequence[T]], Sequence[R]], give_up: Callable[[str], R], pool: Pool) -> R:
     """The result of a row that was with a worker when it died: nothing else is out while it tries again."""
     cause = ""
     for _ in range(_MOST_DEATHS):
         try:
-            return pool.executor().submit(work, [row]).result()[0]
+            return _submit(pool, work, [row]).result()[0]
         except BatchError:
             raise
         except (Exception, CancelledError) as error:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 from collections.abc import Sequence
+from concurrent.futures import BrokenExecutor
 from functools import partial
 from pathlib import Path
 
@@ -38,6 +40,19 @@ def test_every_row_once(tmp_path: Path) -> None:
 def test_a_worker_that_dies_costs_a_second_try(tmp_path: Path) -> None:
     assert results(40, tmp_path, once=(100, 117, 118, 139)) == {n: str(2 * (100 + n)) for n in range(40)}
     assert len(list(tmp_path.iterdir())) == 4
+
+
+def test_workers_that_die_before_they_are_given_more_are_replaced(tmp_path: Path) -> None:
+    pool = LocalPool(2)
+    found = run(list(range(100, 140)), partial(double, folder=tmp_path), lambda why: why, pool)
+    done = [next(found)]
+    for worker in multiprocessing.active_children():
+        os.kill(worker.pid or 0, signal.SIGKILL)
+        worker.join()
+    with pytest.raises(BrokenExecutor):
+        pool.executor().submit(double, [1], tmp_path).result()
+    done += found
+    assert dict(done) == {n: str(2 * (100 + n)) for n in range(40)}
 
 
 def test_rows_that_always_kill_are_given_up_and_no_others(tmp_path: Path) -> None:
