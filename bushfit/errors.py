@@ -13,6 +13,8 @@ from pathlib import Path
 _LONGEST_QUOTE = 300
 #: Characters that could steer a terminal or break a line, and halves of surrogate pairs.
 _CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
+#: Characters of a path for which a shell wants quotes.
+_TAKEN_APART = re.compile(r"[^\w./\\:~+,@%=-]")
 
 
 class BushfitError(Exception):
@@ -108,3 +110,8 @@ class OutputError(BushfitError):
 
 class BatchError(BushfitError):
     """A batch that cannot go on: no workers, another version on them, or a cluster that is gone."""
+
+
+def typed(path: Path) -> str:
+    """A path as it is typed into a terminal: in quotes where it holds what a shell would take apart."""
+    return f'"{path}"' if _TAKEN_APART.search(str(path)) else str(path)

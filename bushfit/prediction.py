@@ -192,8 +192,8 @@ def _unfitted(result: Result, direction: Direction) -> Iterator[str]:
     )
     if any(effect_named(name).corrects is formula for name in result.model.effects):
         return
-    scatter = f"its band holds the scatter of the {' and '.join(fitted)} tests"
-    yield f"{direction}: not fitted; {scatter}, not the error of the {formula} formula, {compared}"
+    band = f"its band holds the scatter of the {' and '.join(fitted)} tests, not" if result.fitted else "no band holds"
+    yield f"{direction}: not fitted; {band} the error of the {formula} formula, {compared}"
 
 
 def _extrapolations(result: Result, direction: Direction, frequency: Array, amplitude: Array) -> Iterator[str]:

@@ -170,7 +170,7 @@ def _toml(path: Path) -> ManifestFile:
         return read_toml(path, ManifestFile, what="a manifest", largest=_LARGEST_BYTES)
     except CampaignError as error:
         if error.found == '"bushing"':
-            error.hint = "this is one campaign: bushfit fit takes it, and a pattern in quotes takes many"
+            error.hint = "this is one campaign: bushfit run takes it, and a pattern in quotes takes many"
         raise
 
 

@@ -11,7 +11,7 @@ from typing import Any
 from bushfit.campaign.naming import folder_name
 from bushfit.campaign.schema import CampaignFile, FitSettings, LoopFile, PredictSettings, SimulateSettings, SweepFile
 from bushfit.campaign.toml import read_toml
-from bushfit.errors import CampaignError, naming
+from bushfit.errors import CampaignError, naming, typed
 from bushfit.geometry import Bushing
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
@@ -84,14 +84,18 @@ def load_campaign(path: str | Path) -> Campaign:
 
 
 def _refuse_tests(path: Path) -> None:
-    """Raise a CampaignError where a test file or a folder was given in place of a campaign."""
+    """Raise a CampaignError where a test file, a folder or a model was given in place of a campaign."""
+    expected = "a .toml file that names the bushing and its tests"
+    if path.suffix.lower() == ".json" and path.is_file():
+        hint = f"bushfit predict {typed(path)} predicts from a model"
+        raise CampaignError("a campaign is needed", file=path, found="a model", expected=expected, hint=hint)
     if path.is_dir() or (path.suffix.lower() in TEST_FILES and path.exists()):
-        files, found = (path / "*.csv", "a folder") if path.is_dir() else (path, "a test file")
+        files, found = (f"{typed(path)}/*.csv", "a folder") if path.is_dir() else (typed(path), "a test file")
         raise CampaignError(
             "a campaign is needed",
             file=path,
             found=found,
-            expected="a .toml file that names the bushing and its tests",
+            expected=expected,
             hint=f'bushfit init {files} --inner-radius "10 mm" --outer-radius "18 mm" --length "34 mm" makes one, with '
             "the sizes of your rubber",
         )

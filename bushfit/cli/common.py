@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 
-from bushfit.errors import BushfitError, ModelError
+from bushfit.errors import BushfitError, ModelError, typed
 from bushfit.report.folder import check_free, to_json, write_files
 
 if TYPE_CHECKING:
@@ -238,12 +238,12 @@ def open_model(file: Path) -> Result:
     ending = file.suffix.lower()
     if file.is_file() and ending in (".toml", *TEST_FILES):
         found = "a campaign" if ending == ".toml" else "a test file"
-        way = f"bushfit run {file}" if ending == ".toml" else f"bushfit init {file} ..., then bushfit run"
+        way = f"bushfit run {typed(file)}" if ending == ".toml" else f"bushfit init {typed(file)} ..., then bushfit run"
         raise ModelError(
             "a fitted model is needed",
             file=file,
             found=found,
-            expected="a model.json, as bushfit run, fit, fit-dynamic and diagnose write it",
+            expected="a .json file, as bushfit run, the fits and diagnose write it",
             hint=f"{way} makes one",
         )
     return load_result(file)

@@ -12,7 +12,7 @@ from bushfit.cli.common import Options, example, naming_option, shared_options
 from bushfit.cli.inspect import KEYS, tell_assumed
 from bushfit.cli.raw import direction_error, file_options, options_named
 from bushfit.cli.show import warn
-from bushfit.errors import BushfitError, CampaignError, MeasurementError
+from bushfit.errors import BushfitError, CampaignError, MeasurementError, typed
 
 if TYPE_CHECKING:
     from bushfit.geometry import Bushing
@@ -83,7 +83,7 @@ def command(
     for one in seen:
         _tell(options, one)
     options.write(folder, {target: text.encode()})
-    options.console.print(f"next: bushfit run {folder / target}", markup=False)
+    options.console.print(f"next: bushfit run {typed(folder / target)}", markup=False)
     options.tell({"campaign": text, "files": [one.to_document() for one in seen]})
 
 
@@ -142,7 +142,7 @@ def _usable(seen: Inspected) -> Inspected:
             "this is a raw stepped-sine history, not a sweep",
             file=seen.file,
             expected="hysteresis loops and sweeps",
-            hint=f"bushfit reduce {seen.file} --direction {seen.direction or '...'} makes a sweep.csv of it; "
+            hint=f"bushfit reduce {typed(seen.file)} --direction {seen.direction or '...'} makes a sweep.csv of it; "
             "give that instead",
         )
     if seen.direction is None:

@@ -106,14 +106,15 @@ def _in_a_line(two_step: TwoStep, joint: Result) -> str:
     parts = [f"{len(two_step.passes)} passes"]
     if off:
         far, unsure = (max(sizes, key=sizes.__getitem__) for sizes in (off, ratio))
-        count = math.ceil(off[far])
+        count = math.ceil(round(off[far], 1))
         parts.append(
             f"agrees with the joint fit within {count} standard error{'s' * (count > 1)}"
             if count <= _AGREED
             else f"{far} is {off[far]:.1f} standard errors off the joint fit"
         )
-        if ratio[unsure] > 1.0:
-            parts.append(f"{unsure} {number(ratio[unsure], 2)} times less certain than there")
+        times = number(ratio[unsure], 2)
+        if float(times) > 1.0:
+            parts.append(f"{unsure} {times} times less certain than there")
     return f"two-step procedure (the paper's): {', '.join(parts)} (static.json, dynamic.json; -v shows it)"
 
 

@@ -364,6 +364,6 @@ USAGE = [
     ("batch|loop.csv", "loop.csv, header: unknown key", "one of commands, directions, effects, adopt, without, max_effects, tolerance, model,"),
     ("batch|campaign.toml|--command|magic", "Invalid value for '--command': 'magic' is not one of 'run', 'fit', 'diagnose', 'predict'."),
     ("batch|campaign.toml|--jobs|0", "Invalid value for '--jobs': 0 is not in the range x>=1."),
-    ("batch|campaign.toml|--limits|lost.toml", "campaign.toml, bushing: unknown key", "this is one campaign: bushfit fit takes it, and a pattern in quotes takes many"),
+    ("batch|campaign.toml|--limits|lost.toml", "campaign.toml, bushing: unknown key", "this is one campaign: bushfit run takes it, and a pattern in quotes takes many"),
     ("batch", "Missing argument 'MANIFEST'."),
 ]

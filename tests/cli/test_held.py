@@ -27,6 +27,13 @@ def test_a_test_file_is_no_campaign(typed: Run, tmp_path: Path, command: str, en
     assert typed(command, f"lost.{ending}").stderr.count("there is no such file") == 1
 
 
+def test_a_model_is_no_campaign(bushfit: Run) -> None:
+    done = bushfit("run", "model/model.json")
+    assert done.returncode == 2
+    assert "model.json: a campaign is needed" in done.stderr
+    assert "bushfit predict model/model.json" in done.stderr
+
+
 def held(work: Path, name: str, mu: str = "1.09 MPa") -> str:
     """A campaign that holds all five parameters."""
     values = {"mu": mu, "m": "0.2 MPa*s^alpha", "alpha": 0.24, "sigma_fmax": "14.6 kPa", "eps_half": 0.013}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import shutil
 import tomllib
 from collections.abc import Callable
@@ -182,3 +183,11 @@ def test_a_time_that_does_not_go_with_the_rows_is_told_by_every_fit(
 @given(st.text(st.characters(exclude_categories=["Cs"])))
 def test_any_text_is_written_as_toml(text: str) -> None:
     assert tomllib.loads(f"x = {toml_value(text)}") == {"x": text}
+
+
+def test_the_next_line_can_be_pasted_whatever_the_name(typed: Callable, tests: list[Path], tmp_path: Path) -> None:
+    done = typed("init", *tests, *GEOMETRY, "--name", "My bushing")
+    (line,) = (line for line in done.stderr.splitlines() if line.startswith("next: bushfit run "))
+    _, *words = shlex.split(line.removeprefix("next: "))
+    assert words == ["run", str(Path("results/My bushing/campaign.toml"))]
+    assert typed(*words, "-o", "run", "--no-plots", "-q").returncode == 0

@@ -99,6 +99,8 @@ def prediction_figure(
     banded = np.any(lines.stiffness.high > lines.stiffness.low)
     shade = "; shaded: its 95 % band, where that is wider than the line" if banded else ""
     through = " Thin lines: the same with what belongs to the rig, as the points were measured." if laid and rig else ""
+    if amplitudes.size > _MOST_AMPLITUDES:
+        through += f" Over frequency {_MOST_AMPLITUDES} of the {amplitudes.size} amplitudes are drawn."
     explain(figure, f"Lines: model{shade}.{through}", points_note(mine) if laid else "", note)
     return figure
 
