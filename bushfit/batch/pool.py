@@ -210,12 +210,13 @@ def run(
 
 
 def _submit(pool: Pool, work: Callable[[Sequence[T]], Sequence[R]], rows: Sequence[T]) -> Future[Sequence[R]]:
-    """Hand rows to a worker, of a new pool where the old one has just lost a worker and takes no more."""
-    try:
-        return pool.executor().submit(work, rows)
-    except BrokenExecutor as error:
-        pool.mend(error)
-        return pool.executor().submit(work, rows)
+    """Hand rows to a worker, of a new pool where the old one has lost a worker, or loses it just now."""
+    for _ in range(_MOST_DEATHS):
+        try:
+            return pool.executor().submit(work, rows)
+        except (BrokenExecutor, OSError) as error:
+            pool.mend(error)
+    return pool.executor().submit(work, rows)
 
 
 def _alone(row: T, work: Callable[[Sequence[T]], Sequence[R]], give_up: Callable[[str], R], pool: Pool) -> R:
