@@ -8,41 +8,35 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigged import LEVELS, PLAN, SHARED, Diagnosed, Measured, changed, cut
+from asking import (
+    INERTIA,
+    SLIP,
+    TWO,
+    asked,
+    missing_points,
+    names,
+    no_loops,
+    no_repeats,
+    no_sweeps,
+    one_direction,
+    one_frequency,
+    one_level,
+    one_loop,
+    said,
+)
+from rigged import PLAN, SHARED, Diagnosed, Measured, changed
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import FitSettings, Loss, ParameterSetting, SimulateSettings
-from bushfit.diagnosis import verdict
-from bushfit.diagnosis.holdout import HoldOut
-from bushfit.diagnosis.next_test import MENU
-from bushfit.diagnosis.record import Diagnosis, Settings
+from bushfit.campaign.schema import FitSettings, ParameterSetting, SimulateSettings
+from bushfit.diagnosis.record import Settings
 from bushfit.diagnosis.workflow import diagnose
-from bushfit.effects import BASE, LIBRARY
+from bushfit.effects import BASE
 from bushfit.errors import BushfitError
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction
-from bushfit.model.file import to_document
 from bushfit.model.model import Model
 from bushfit.simulation import measure, undisturbed
-
-INERTIA = {"inertia": {"mass": 0.06}}
-SLIP = {"interface_slip": {"force": 6.0}}
-TWO = {"delay": {"tau": 1e-4}, "strain_stiffening": {"c3": 20.0}}
-
-
-def asked(campaign: Campaign, model: Model | None = None, **settings: object) -> Diagnosis:
-    diagnosis = diagnose(Data.of(campaign), model, Settings(**settings))  # type: ignore[arg-type]
-    print(said(diagnosis), "|", diagnosis.summary, "|", "; ".join(diagnosis.notes))
-    return diagnosis
-
-
-def said(diagnosis: Diagnosis) -> str:
-    return f"{diagnosis.verdict} " + " + ".join("|".join((e.name, *e.alternatives)) for e in diagnosis.effects)
-
-
-def names(diagnosis: Diagnosis) -> set[str]:
-    return {effect.name for effect in diagnosis.effects}
 
 
 @pytest.mark.parametrize("plan", [PLAN, SHARED], ids=["independent", "shared"])
@@ -113,136 +107,9 @@ def test_a_branch_of_the_paper_that_a_model_lacks_is_named(measured: Measured) -
         assert diagnosis.result.model.values[name] == pytest.approx(value, rel=1e-2)
 
 
-def test_what_was_left_on_its_way_has_no_gain(diagnosed: Diagnosed) -> None:
-    judged = {candidate.name: candidate for candidate in diagnosed(INERTIA, SHARED).candidates}
-    left = [candidate for candidate in judged.values() if "left on its way" in candidate.why]
-    assert left
-    for candidate in left:
-        assert candidate.gain is candidate.bic is candidate.heldout is None
-        assert candidate.score > 0.0
-
-
-def test_every_candidate_is_judged(diagnosed: Diagnosed) -> None:
-    candidates = diagnosed(INERTIA, SHARED).candidates
-    assert len({judged.name for judged in candidates}) == len(candidates) == len(LIBRARY) - len(BASE)
-    assert all(judged.why for judged in candidates)
-    (kept,) = [judged for judged in candidates if judged.why == "kept"]
-    assert kept.name == "inertia"
-    scores = [judged.score for judged in candidates]
-    assert scores == sorted(scores, reverse=True)
-    refitted = [judged for judged in candidates if judged.gain is not None]
-    assert all(judged.parameters for judged in refitted)
-    assert max(judged.gain or 0.0 for judged in refitted) > 200.0
-
-
-def test_adopt_adds_by_hand_whatever_the_evidence(measured: Measured, diagnosed: Diagnosed) -> None:
-    campaign = measured(INERTIA, SHARED)
-    adopted = asked(campaign, adopt=("inertia",))
-    assert adopted.verdict == "consistent"
-    assert "inertia" in adopted.result.model.effects
-    assert adopted.result.model.values["inertia.mass"] == pytest.approx(0.06, rel=0.05)
-    needless = asked(measured({}, SHARED), adopt=("viscous",))
-    assert needless.verdict == "consistent"
-    assert needless.result.model.effects == (*BASE, "viscous")
-
-
-def test_without_leaves_an_effect_out(measured: Measured) -> None:
-    diagnosis = asked(measured(INERTIA, SHARED), without=("inertia",))
-    assert "inertia" not in names(diagnosis)
-    assert "inertia" not in {judged.name for judged in diagnosis.candidates}
-    assert all("inertia" not in (*effect.alternatives, *effect.richer) for effect in diagnosis.effects)
-    assert diagnosis.verdict != "consistent"
-
-
-def test_no_effects_allowed_names_nothing_and_still_sees_the_gap(measured: Measured) -> None:
-    diagnosis = asked(measured(INERTIA, SHARED), max_effects=0)
-    assert diagnosis.verdict == "unexplained"
-    assert diagnosis.effects == ()
-    assert diagnosis.after is diagnosis.before
-    assert diagnosis.where
-
-
-def test_one_of_two_is_partly_or_less(measured: Measured) -> None:
-    diagnosis = asked(measured(TWO, SHARED), max_effects=1)
-    assert diagnosis.verdict in ("partly", "unexplained")
-    assert len(diagnosis.result.model.effects) <= 4
-    assert diagnosis.remainder
-
-
-def test_a_gap_within_tolerance_is_no_gap(measured: Measured) -> None:
-    diagnosis = asked(measured(INERTIA, SHARED), tolerance=0.5)
-    assert diagnosis.verdict == "consistent"
-    assert diagnosis.effects == ()
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_chance_alone_names_nothing_however_small_a_gap_counts(measured: Measured, seed: int) -> None:
-    """The thresholds hold without the tolerance: something always fits noise a little."""
-    diagnosis = asked(measured({}, SHARED, seed), tolerance=0.0)
-    assert max(judged.score for judged in diagnosis.candidates) > 1.0
-    assert diagnosis.effects == ()
-
-
-def test_look_alikes_are_a_set_and_none_is_added(measured: Measured) -> None:
-    """A little viscosity in one direction: sets, and the test that would tell."""
-    diagnosis = asked(one_direction(measured({"viscous": {"eta": 25.0}}, SHARED)))
-    assert diagnosis.verdict == "ambiguous"
-    (leader,) = diagnosis.effects
-    assert "viscous" in (leader.name, *leader.alternatives)
-    assert 1 <= len(leader.alternatives) <= 2
-    assert diagnosis.after is diagnosis.before
-    assert diagnosis.result.model.effects == BASE
-    print(diagnosis.next_test)
-    assert diagnosis.next_test in {entry.words for entry in MENU}
-    assert all(name in diagnosis.summary for name in (leader.name, *leader.alternatives))
-    (entry,) = diagnosis.to_document()["effects"]
-    assert entry["parameters"]
-
-
-def test_a_name_that_does_not_hold_out_is_taken_back(measured: Measured, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(verdict, "hold_out", lambda *_: HoldOut((), 2.0, 1.9))
-    diagnosis = asked(measured(INERTIA, SHARED))
-    assert diagnosis.verdict == "unexplained"
-    assert diagnosis.effects == ()
-    assert diagnosis.after is diagnosis.before
-    assert "inertia" in diagnosis.summary
-    assert "taken back" in diagnosis.summary
-
-
-def no_loops(c: Campaign) -> Campaign:
-    return replace(c, loops=())
-
-
-def no_sweeps(c: Campaign) -> Campaign:
-    return replace(c, sweeps=())
-
-
-def one_direction(c: Campaign) -> Campaign:
-    return replace(c, sweeps=c.sweeps[:1])
-
-
-def one_loop(c: Campaign) -> Campaign:
-    return replace(c, sweeps=(), loops=c.loops[:1])
-
-
-def no_repeats(c: Campaign) -> Campaign:
-    return replace(c, sweeps=tuple(cut(sweep, sweep.repeat == 1) for sweep in c.sweeps))
-
-
-def missing_points(c: Campaign) -> Campaign:
-    random = np.random.default_rng(3)
-    return replace(c, sweeps=tuple(cut(sweep, random.random(sweep.frequency.size) < 0.7) for sweep in c.sweeps))
-
-
-def one_level(c: Campaign) -> Campaign:
-    return replace(c, sweeps=tuple(cut(sweep, sweep.amplitude == LEVELS[0]) for sweep in c.sweeps))
-
-
-def one_frequency(c: Campaign) -> Campaign:
-    return replace(c, sweeps=tuple(cut(sweep, sweep.frequency == 25.0) for sweep in c.sweeps))
-
-
 CUTS = (no_loops, no_sweeps, one_direction, one_loop, no_repeats, missing_points, one_level, one_frequency)
+
+
 #: Sweeps of several frequencies show a mass; loops at 0.1 Hz and sweeps at 25 Hz do not.
 SHOW_MASS = {no_loops, one_direction, no_repeats, missing_points, one_level}
 
@@ -259,59 +126,6 @@ def test_with_less_no_bolder_name(measured: Measured, part: Callable[..., Campai
         assert said(diagnosis) == "named inertia"
         return
     assert said(diagnosis) == "consistent "
-
-
-def test_what_the_tests_cannot_show_is_said(measured: Measured) -> None:
-    campaign = measured({}, SHARED)
-    (note,) = asked(no_loops(campaign)).notes
-    assert note.startswith("not identifiable from these tests: ")
-    assert {"asymmetry", "force_offset", "force_gain"} <= set(note.partition(": ")[2].split(", "))
-    (note,) = asked(no_sweeps(campaign)).notes
-    assert {"viscous", "maxwell", "force_gain"} <= set(note.partition(": ")[2].split(", "))
-    assert any("nothing was repeated" in note and "assumed" in note for note in asked(no_repeats(campaign)).notes)
-    assert asked(campaign).notes == ()
-
-
-@pytest.mark.parametrize("loss", ["linear", "soft_l1"])
-def test_a_wild_point_is_listed_whatever_the_loss(measured: Measured, loss: Loss) -> None:
-    campaign = measured({}, SHARED)
-    stiffness = campaign.sweeps[0].stiffness.copy()
-    stiffness[11] *= 1.1
-    sweeps = (replace(campaign.sweeps[0], stiffness=stiffness), *campaign.sweeps[1:])
-    diagnosis = asked(replace(campaign, sweeps=sweeps, fit=replace(campaign.fit, loss=loss)))
-    assert [(entry.test, entry.row) for entry in diagnosis.result.outliers] == [(campaign.sweeps[0].name, 12)]
-    (note,) = [note for note in diagnosis.notes if "row 12" in note]
-    assert ("the fit follows them" if loss == "linear" else "left out of the fit") in note
-
-
-def test_what_stays_open_of_the_final_model_goes_with_it(measured: Measured) -> None:
-    campaign = measured({}, SHARED)
-    result = asked(no_sweeps(campaign)).result
-    print(*result.warnings, sep="\n")
-    assert any("cannot be told from one another" in line for line in to_document(result)["warnings"])
-    assert asked(campaign).result.warnings == ()
-
-
-#: 3 % of give in the axial direction, 17 % in the radial, measured at a few frequencies.
-SOFT_RIG = {"rig_compliance": {"compliance": 4e-8}}
-FEW = replace(
-    SHARED, sweeps=tuple(replace(sweep, frequencies=(5.0, 25.0, 55.0, 85.0, 115.0, 155.0)) for sweep in SHARED.sweeps)
-)
-
-
-def test_compliance_in_one_direction_alone_is_never_a_bold_name(measured: Measured) -> None:
-    """A softer rig and a softer rubber look alike in one direction; two tell."""
-    campaign = measured(SOFT_RIG, FEW)
-    whole = asked(campaign)
-    assert said(whole) == "named rig_compliance"
-    low, high = whole.result.interval("rig_compliance.compliance") or (0.0, 0.0)
-    print(f"compliance {low:.3g} to {high:.3g}, truth 4e-8")
-    assert low <= 4e-8 <= high
-    for alone in (
-        replace(campaign, sweeps=campaign.sweeps[:1]),
-        replace(campaign, sweeps=campaign.sweeps[1:], loops=()),
-    ):
-        assert asked(alone).verdict in ("consistent", "ambiguous")
 
 
 def held(campaign: Campaign, **settings: ParameterSetting) -> Campaign:

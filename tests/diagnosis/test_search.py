@@ -1,0 +1,79 @@
+"""The search: candidates judged, effects added in turn, left out, or too small to count."""
+
+from __future__ import annotations
+
+import pytest
+from asking import INERTIA, TWO, asked, names
+from rigged import SHARED, Diagnosed, Measured
+
+from bushfit.effects import BASE, LIBRARY
+
+
+def test_what_was_left_on_its_way_has_no_gain(diagnosed: Diagnosed) -> None:
+    judged = {candidate.name: candidate for candidate in diagnosed(INERTIA, SHARED).candidates}
+    left = [candidate for candidate in judged.values() if "left on its way" in candidate.why]
+    assert left
+    for candidate in left:
+        assert candidate.gain is candidate.bic is candidate.heldout is None
+        assert candidate.score > 0.0
+
+
+def test_every_candidate_is_judged(diagnosed: Diagnosed) -> None:
+    candidates = diagnosed(INERTIA, SHARED).candidates
+    assert len({judged.name for judged in candidates}) == len(candidates) == len(LIBRARY) - len(BASE)
+    assert all(judged.why for judged in candidates)
+    (kept,) = [judged for judged in candidates if judged.why == "kept"]
+    assert kept.name == "inertia"
+    scores = [judged.score for judged in candidates]
+    assert scores == sorted(scores, reverse=True)
+    refitted = [judged for judged in candidates if judged.gain is not None]
+    assert all(judged.parameters for judged in refitted)
+    assert max(judged.gain or 0.0 for judged in refitted) > 200.0
+
+
+def test_adopt_adds_by_hand_whatever_the_evidence(measured: Measured, diagnosed: Diagnosed) -> None:
+    campaign = measured(INERTIA, SHARED)
+    adopted = asked(campaign, adopt=("inertia",))
+    assert adopted.verdict == "consistent"
+    assert "inertia" in adopted.result.model.effects
+    assert adopted.result.model.values["inertia.mass"] == pytest.approx(0.06, rel=0.05)
+    needless = asked(measured({}, SHARED), adopt=("viscous",))
+    assert needless.verdict == "consistent"
+    assert needless.result.model.effects == (*BASE, "viscous")
+
+
+def test_without_leaves_an_effect_out(measured: Measured) -> None:
+    diagnosis = asked(measured(INERTIA, SHARED), without=("inertia",))
+    assert "inertia" not in names(diagnosis)
+    assert "inertia" not in {judged.name for judged in diagnosis.candidates}
+    assert all("inertia" not in (*effect.alternatives, *effect.richer) for effect in diagnosis.effects)
+    assert diagnosis.verdict != "consistent"
+
+
+def test_no_effects_allowed_names_nothing_and_still_sees_the_gap(measured: Measured) -> None:
+    diagnosis = asked(measured(INERTIA, SHARED), max_effects=0)
+    assert diagnosis.verdict == "unexplained"
+    assert diagnosis.effects == ()
+    assert diagnosis.after is diagnosis.before
+    assert diagnosis.where
+
+
+def test_one_of_two_is_partly_or_less(measured: Measured) -> None:
+    diagnosis = asked(measured(TWO, SHARED), max_effects=1)
+    assert diagnosis.verdict in ("partly", "unexplained")
+    assert len(diagnosis.result.model.effects) <= 4
+    assert diagnosis.remainder
+
+
+def test_a_gap_within_tolerance_is_no_gap(measured: Measured) -> None:
+    diagnosis = asked(measured(INERTIA, SHARED), tolerance=0.5)
+    assert diagnosis.verdict == "consistent"
+    assert diagnosis.effects == ()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_chance_alone_names_nothing_however_small_a_gap_counts(measured: Measured, seed: int) -> None:
+    """The thresholds hold without the tolerance: something always fits noise a little."""
+    diagnosis = asked(measured({}, SHARED, seed), tolerance=0.0)
+    assert max(judged.score for judged in diagnosis.candidates) > 1.0
+    assert diagnosis.effects == ()
