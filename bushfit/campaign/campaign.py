@@ -85,20 +85,19 @@ def load_campaign(path: str | Path) -> Campaign:
 
 def _refuse_tests(path: Path) -> None:
     """Raise a CampaignError where a test file, a folder or a model was given in place of a campaign."""
+    ending, is_folder = path.suffix.lower(), path.is_dir()
+    if not (is_folder or (ending in (*TEST_FILES, ".json") and path.exists())):
+        return
+    files = f"{typed(path)}/*.csv" if is_folder else typed(path)
+    found = "a folder" if is_folder else "a test file"
+    hint = (
+        f'bushfit init {files} --inner-radius "10 mm" --outer-radius "18 mm" --length "34 mm" makes one, with '
+        "the sizes of your rubber"
+    )
+    if ending == ".json" and not is_folder:
+        found, hint = "a model", f"bushfit predict {files} predicts from a model"
     expected = "a .toml file that names the bushing and its tests"
-    if path.suffix.lower() == ".json" and path.is_file():
-        hint = f"bushfit predict {typed(path)} predicts from a model"
-        raise CampaignError("a campaign is needed", file=path, found="a model", expected=expected, hint=hint)
-    if path.is_dir() or (path.suffix.lower() in TEST_FILES and path.exists()):
-        files, found = (f"{typed(path)}/*.csv", "a folder") if path.is_dir() else (typed(path), "a test file")
-        raise CampaignError(
-            "a campaign is needed",
-            file=path,
-            found=found,
-            expected=expected,
-            hint=f'bushfit init {files} --inner-radius "10 mm" --outer-radius "18 mm" --length "34 mm" makes one, with '
-            "the sizes of your rubber",
-        )
+    raise CampaignError("a campaign is needed", file=path, found=found, expected=expected, hint=hint)
 
 
 def reader_keywords(campaign: Path, tests: Sequence[LoopFile | SweepFile]) -> Iterator[dict[str, Any]]:

@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
+from bushfit.reading.measurement import loss_factor
+
 if TYPE_CHECKING:
     import pandas as pd
-    from numpy.typing import NDArray
 
-    from bushfit.reading.measurement import Floats, Loop, Sweep
+    from bushfit.reading.measurement import Loop, Sweep
 
 #: The start of a text that a spreadsheet takes for a formula, in ASCII or full width, even after blanks.
 _FORMULA = re.compile("[\\s\"']*[=+\\-@\uff1d\uff0b\uff0d\uff20|%]|\\t")
@@ -95,8 +96,3 @@ def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
             "loss factor [-]": loss_factor(sweep.stiffness),
         }
     )
-
-
-def loss_factor(stiffness: NDArray[np.complex128]) -> Floats:
-    """Loss over storage stiffness [-], (n,)."""
-    return np.imag(stiffness) / np.real(stiffness)

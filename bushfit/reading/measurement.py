@@ -171,3 +171,8 @@ def _strictly_increasing(values: Floats) -> Floats:
     keep[0] = True
     index = np.arange(values.size)
     return np.interp(index, index[keep], highest[keep])
+
+
+def loss_factor(stiffness: Complex) -> Floats:
+    """Loss over storage stiffness [-], (n,)."""
+    return np.imag(stiffness) / np.real(stiffness)

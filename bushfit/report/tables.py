@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bushfit.effects import effect_named
-from bushfit.reading.csvfile import loss_factor
+from bushfit.reading.measurement import loss_factor
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bushfit.geometry import Direction
-from bushfit.reading.csvfile import Rows, defused, loss_factor, raw_loop_table, raw_sweep_table, to_csv
+from bushfit.reading.csvfile import Rows, defused, raw_loop_table, raw_sweep_table, to_csv
 from bushfit.reading.loops import read_loop
-from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.measurement import Loop, Sweep, loss_factor
 from bushfit.reading.sweeps import read_sweep
 
 PHASE = np.linspace(0.0, 12.0, 50)
