@@ -8,8 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from bushfit.errors import ModelError
-from bushfit.geometry import Direction, Place, Specimen
+from bushfit.geometry import Place, Specimen, place_named
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Source
@@ -120,10 +119,7 @@ class Result:
         Raises:
             ModelError: it is neither.
         """
-        known: dict[str, Place] = {str(place): place for place in (*Direction, *self.specimens)}
-        if name not in known:
-            raise ModelError("no such direction or specimen", found=name, expected="one of " + ", ".join(known))
-        return known[name]
+        return place_named(name, self.specimens)
 
     def interval(self, name: str) -> tuple[float, float] | None:
         """95 % interval of a parameter [its SI unit], cut at its bounds; None where it was held at an exact value.
