@@ -10,6 +10,7 @@ import numpy as np
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
+from bushfit.fitting.agreement import misfits, usable
 from bushfit.fitting.assess import Stage, covariance, lack_of_fit, measured_range, misfit, quality
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, parted
@@ -71,6 +72,8 @@ def fit_joint(
     found = _solve(data, data_sets, data.effects if effects is None else effects, {})
     left: list[DataSet] = [data_set for data_set in (*data.loops, *data.sweeps) if data_set not in data_sets]
     result = _result(data, [found], notes=unfitted(found.solution.model, left, _NEXT))
+    tests = misfits(found.solution.model, found.data_sets, left)
+    result = replace(result, tests=tests, usable=usable(found.solution, found.minimised, left))
     if profile is None:
         return result
     intervals = profile95(found.solution, found.minimised, result.covariance, data.bounds, profile)
@@ -223,6 +226,8 @@ def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = Non
         tuple(data_set.source for data_set in data_sets if data_set.source is not None),
         outliers,
         at_bound={name: end for step in steps for name, end in step.solution.at_bound.items()},
+        specimens=data.campaign.specimens,
+        tests=misfits(model, data_sets),
     )
 
 
