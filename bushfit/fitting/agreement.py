@@ -29,12 +29,16 @@ _SHARE = 0.95
 #: Share of the points of a place that have to be held out for these to speak for it.
 _ENOUGH = 0.5
 
+#: How far points are off in |K| and loss factor, (2, n), and whether they were predicted without their run.
+_Off = tuple[Array, bool]
+
 
 class _Run(NamedTuple):
-    """What of a test was recorded with one value held: which of its points, (n,) bool."""
+    """What of a test was recorded with one value held, in which unit, and which of its points it is, (n,) bool."""
 
     held: Literal["amplitude", "frequency"] | None
     value: float | None
+    unit: str | None
     points: Array
 
 
@@ -96,18 +100,20 @@ def misfits(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet] = (
 
 
 def _misfits(model: Model, data_set: DataSet, *, was_fitted: bool) -> Iterator[Misfit]:
-    """The figures of a test, and of its runs where there are several."""
-    squares = np.square(data_set.residual(model)).reshape(data_set.parts, -1).sum(axis=0)
+    """The figures of a test without points of no weight, and of its runs where there are several."""
     relative, gain = data_set.relative(model), np.abs(_modelled(model, data_set) / data_set.measured) - 1.0
-    place, runs = str(data_set.direction), list(_runs(data_set))
-    nrmse, reduced = float(np.sqrt(np.mean(np.square(relative)))), float(squares.sum()) / max(data_set.counted, 1)
-    points, offset = data_set.counted // data_set.parts, float(gain.mean())
-    yield Misfit(data_set.name, place, was_fitted, None, None, points, nrmse, reduced, offset)
-    for held, value, at in runs if len(runs) > 1 else ():
-        nrmse, reduced = float(np.sqrt(np.mean(np.square(relative[at])))), float(squares[at].mean()) / data_set.parts
-        yield Misfit(
-            data_set.name, place, was_fitted, held, value, int(at.sum()), nrmse, reduced, float(gain[at].mean())
-        )
+    squares = np.square(data_set.residual(model)).reshape(data_set.parts, -1).sum(axis=0)
+    place, every = str(data_set.direction), np.ones(data_set.frequency.size, dtype=bool)
+
+    def figures(run: _Run, relative: Array, squares: Array, gain: Array) -> Misfit:
+        named = data_set.name, place, was_fitted, run.held, run.value, run.unit
+        reduced = float(squares.sum()) / (data_set.parts * relative.size)
+        return Misfit(*named, relative.size, float(np.sqrt(np.mean(relative**2))), reduced, float(gain.mean()))
+
+    yield figures(_Run(None, None, None, every), relative, squares, gain)
+    runs = list(_runs(data_set))
+    for run in runs if len(runs) > 1 else ():
+        yield figures(run, *(values[run.points] for values in (relative, squares, gain)))
 
 
 def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[DataSet] = ()) -> tuple[Usable, ...]:
@@ -123,7 +129,7 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
     """
     free = [i for i, name in enumerate(solution.coordinates.names) if name not in solution.at_bound]
     whole, begin = LeaveOut.of(solution.jacobian[free], solution.residual), 0
-    found: dict[str, list[tuple[Array, bool]]] = {}
+    found: dict[str, list[_Off]] = {}
     for data_set in data_sets:
         modelled, slopes = _modelled(solution.model, data_set), _slopes(solution, data_set)[free]
         for run in _runs(data_set):
@@ -134,13 +140,26 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
             off = _off(moved[counted], data_set.measured[counted])
             found.setdefault(str(data_set.direction), []).append((off, step is not None))
         begin += data_set.size
-    for data_set in left:
-        off = _off(_modelled(solution.model, data_set), data_set.measured)
-        found.setdefault(str(data_set.direction), []).append((off, True))
+    _add(found, solution.model, left, held_out=True)
     return tuple(_usable(place, parts) for place, parts in found.items())
 
 
-def _usable(place: str, parts: Sequence[tuple[Array, bool]]) -> Usable:
+def met_within(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet]) -> tuple[Usable, ...]:
+    """As `usable` of a model whose fit is not at hand: the tests that it was fitted to count as the fit has them."""
+    found: dict[str, list[_Off]] = {}
+    _add(found, model, fitted, held_out=False)
+    _add(found, model, left, held_out=True)
+    return tuple(_usable(place, parts) for place, parts in found.items())
+
+
+def _add(found: dict[str, list[_Off]], model: Model, data_sets: Sequence[DataSet], *, held_out: bool) -> None:
+    """Add to `found`, by place, how far the points of tests are off."""
+    for data_set in data_sets:
+        off = _off(_modelled(model, data_set), data_set.measured)
+        found.setdefault(str(data_set.direction), []).append((off, held_out))
+
+
+def _usable(place: str, parts: Sequence[_Off]) -> Usable:
     """The figures of a place from how far its points are off, (2, n) a part, and whether each was predicted."""
     every = np.concatenate([off for off, _ in parts], axis=1)
     predicted = np.concatenate([np.empty((2, 0)), *(off for off, held_out in parts if held_out)], axis=1)
@@ -172,12 +191,15 @@ def _slopes(solution: Solution, data_set: DataSet) -> Array:
 
 def _runs(data_set: DataSet) -> Iterator[_Run]:
     """What was recorded with each value held; a loop, and a sweep that holds nothing, is one run."""
-    if not isinstance(data_set, SweepData) or data_set.sweep.stepped is None:
-        yield _Run(None, None, np.ones(data_set.frequency.size, dtype=bool))
+    stepped = data_set.sweep.stepped if isinstance(data_set, SweepData) else None
+    if not isinstance(data_set, SweepData) or stepped is None:
+        yield _Run(None, None, None, np.ones(data_set.frequency.size, dtype=bool))
         return
+    what: Literal["amplitude", "frequency"] = "amplitude" if stepped == "frequency" else "frequency"
+    unit = data_set.direction.motion.displacement_unit if what == "amplitude" else "Hz"
     held = data_set.sweep.held[data_set.order]
     for value in np.unique(held):
-        yield _Run("amplitude" if data_set.sweep.stepped == "frequency" else "frequency", float(value), held == value)
+        yield _Run(what, float(value), unit, held == value)
 
 
 def _counted(data_set: DataSet) -> Array:

@@ -118,5 +118,5 @@ def tests_of(campaign: Campaign) -> tuple[str, ...]:
 def files_of_tests(data: Data, result: Result, kinds: Collection[str], formats: Collection[str]) -> dict[str, bytes]:
     """Tables and plots of tests of some kinds beside a model, with the outliers that its fit left out marked."""
     marked = data.without(result.outliers)
-    loops = fit_files("loops", result.model, marked.loops if "loops" in kinds else (), formats)
-    return loops | fit_files("sweeps", result.model, marked.sweeps if "sweeps" in kinds else (), formats)
+    loops = fit_files("loops", result, marked.loops if "loops" in kinds else (), formats)
+    return loops | fit_files("sweeps", result, marked.sweeps if "sweeps" in kinds else (), formats)

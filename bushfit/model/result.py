@@ -63,7 +63,8 @@ class Misfit:
         place: direction, or specimen by its name.
         fitted: whether the model was fitted to it.
         held: what the run holds; None of the whole test.
-        value: at which it is held [m, rad or 1; Hz].
+        value: at which it is held.
+        unit: of the value, SI: "m", "rad" or "1" of an amplitude, "Hz".
         points: that carry weight: operating points of a sweep, rows of a loop.
         nrmse: root mean square difference, relative to |K| or to half the loop's force range.
         reduced_chi_square: mean square residual in units of noise.
@@ -75,6 +76,7 @@ class Misfit:
     fitted: Flag
     held: Literal["amplitude", "frequency"] | None
     value: Number | None
+    unit: str | None
     points: WholeNumber
     nrmse: Number
     reduced_chi_square: Number
