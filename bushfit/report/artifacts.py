@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from bushfit.campaign.naming import folder_name
+from bushfit.effects import Level
 from bushfit.reading.csvfile import to_csv
 from bushfit.report import tables
 
@@ -64,11 +65,12 @@ def prediction_files(
     from bushfit.prediction import caveats, predict, rig_effects
     from bushfit.report.plots import fine_grid, prediction_figure, to_png
 
+    bare = result.model.without(Level.INSTRUMENT)
     for name, prediction in pairs:
         curves = predict(result, prediction.direction, *fine_grid(prediction))
         rig = predict(result, prediction.direction, *fine_grid(prediction), rig=True) if rig_effects(result) else None
         note = ". ".join(text[0].upper() + text[1:] for text in (*notes, *caveats(result), *prediction.warnings))
-        figure = prediction_figure(prediction, measured, result.name, curves=curves, rig=rig, note=note)
+        figure = prediction_figure(prediction, measured, result.name, curves=curves, rig=rig, model=bare, note=note)
         files[f"{name}.png"] = to_png(figure)
     return files
 
