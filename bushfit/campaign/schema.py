@@ -297,8 +297,8 @@ class PredictSettings:
     frequencies: Frequencies | None = None
     amplitudes: Annotated[tuple[Length, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
     torsion_amplitudes: Annotated[tuple[Angle, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
-    strain_amplitudes: Annotated[tuple[Strain, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
     directions: Annotated[tuple[Name, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
+    strain_amplitudes: Annotated[tuple[Strain, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
 
 
 @dataclass(frozen=True)

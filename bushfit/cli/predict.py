@@ -84,8 +84,8 @@ def command(
             parse_grid(frequencies, "--frequencies", "Hz"),
             parse_grid(amplitudes, "--amplitudes", "m"),
             parse_grid(torsion_amplitudes, "--torsion-amplitudes", "rad"),
-            parse_grid(strain_amplitudes, "--strain-amplitudes", "1"),
             directions or None,
+            parse_grid(strain_amplitudes, "--strain-amplitudes", "1"),
         )
     )
     folder = options.folder(loaded.slug if loaded else folder_name(result.name))

@@ -117,6 +117,6 @@ def tests_of(campaign: Campaign) -> tuple[str, ...]:
 
 def files_of_tests(data: Data, result: Result, kinds: Collection[str], formats: Collection[str]) -> dict[str, bytes]:
     """Tables and plots of tests of some kinds beside a model, with the outliers that its fit left out marked."""
-    marked = data.without(result.outliers)
-    loops = fit_files("loops", result, marked.loops if "loops" in kinds else (), formats)
-    return loops | fit_files("sweeps", result, marked.sweeps if "sweeps" in kinds else (), formats)
+    marked, title = data.without(result.outliers), result.model.name if result.model.bushing else data.campaign.name
+    loops = fit_files("loops", result, title, marked.loops if "loops" in kinds else (), formats)
+    return loops | fit_files("sweeps", result, title, marked.sweeps if "sweeps" in kinds else (), formats)

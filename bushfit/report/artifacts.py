@@ -9,6 +9,7 @@ import numpy as np
 
 from bushfit.campaign.naming import folder_name
 from bushfit.effects import Level
+from bushfit.geometry import Direction
 from bushfit.reading.csvfile import to_csv
 from bushfit.report import tables
 
@@ -34,6 +35,7 @@ _TABLES: Mapping[str, Callable[[Model, Any], pd.DataFrame]] = {
 def fit_files(
     kind: Literal["loops", "sweeps"],
     result: Result,
+    title: str,
     data_sets: Sequence[LoopData] | Sequence[SweepData],
     formats: Collection[str],
 ) -> dict[str, bytes]:
@@ -45,7 +47,7 @@ def fit_files(
         from bushfit.report.plots import loops_figure, sweeps_figure, to_png
 
         draw: Mapping[str, Callable[[Model, Any, str], Figure]] = {"loops": loops_figure, "sweeps": sweeps_figure}
-        files[f"{kind}.png"] = to_png(draw[kind](result.model, data_sets, result.name))
+        files[f"{kind}.png"] = to_png(draw[kind](result.model, data_sets, title))
     return files
 
 
@@ -70,7 +72,8 @@ def prediction_files(
         curves = predict(result, prediction.direction, *fine_grid(prediction))
         rig = predict(result, prediction.direction, *fine_grid(prediction), rig=True) if rig_effects(result) else None
         note = ". ".join(text[0].upper() + text[1:] for text in (*notes, *caveats(result), *prediction.warnings))
-        figure = prediction_figure(prediction, measured, result.name, curves=curves, rig=rig, model=bare, note=note)
+        title = result.name if isinstance(prediction.direction, Direction) else str(prediction.direction)
+        figure = prediction_figure(prediction, measured, title, curves=curves, rig=rig, model=bare, note=note)
         files[f"{name}.png"] = to_png(figure)
     return files
 

@@ -153,9 +153,8 @@ def _legend_columns(labels: Sequence[str], sides: int) -> int:
 def _scale(sides: Sequence[Side]) -> tuple[Array, ScalarMappable]:
     """The values at which the colour changes, in units of noise, and the colours.
 
-    Steps from a pale grey (within the noise) to dark, blue where the measurement is below the model and red above; white
-    is what was not measured.
-    They end where 2 % of the points are left beyond.
+    Steps from a pale grey (within the noise) to dark, blue where the measurement is below the model and red above. They
+    end where 2 % of the points are left beyond.
     """
     values = np.abs(
         np.concatenate([part for side in sides for drawn in side.maps.values() for part in (drawn.storage, drawn.loss)])
@@ -306,12 +305,15 @@ def _words(side: Side) -> list[str]:
     within = " and ".join(["within 2 (maps)"] * maps + ["in the grey (loops)"] * loops)
     merged = max((drawn.merged for drawn in side.maps.values()), default=1)
     of = [*["its repeats"] * repeated, *[f"up to {merged} neighbouring rows"] * (merged > 1)]
-    stepped = {kind.stepped for kind in side.maps}
+    usual = all(kind.stepped == "frequency" for kind in side.maps)
+    across = (
+        "frequency across, amplitude"
+        if usual
+        else "across what is stepped (or the frequency), what is held (or the test)"
+    )
     return [
-        "Maps: frequency across, amplitude upwards." * ("frequency" in stepped),
-        "Maps of stepped amplitudes: amplitude across, frequency upwards." * ("amplitude" in stepped),
-        "Maps of tests that hold nothing: frequency across, a row a test." * (None in stepped),
-        "Pale grey: model and measurement agree within the noise. A bar in a cell: 3 and more below." * maps,
+        f"Maps: {across} upwards; pale grey: model and measurement agree within the noise. A bar in a cell: 3 and more "
+        "below." * maps,
         f"A cell is the mean of {' and of '.join(of)}, in units of the noise of that mean." * bool(of),
         "White: not measured." * any(has_holes(drawn.points) for drawn in side.maps.values()),
         f"Loops: measured less model over the cycle, means over {360 // SECTORS} deg, in units of the noise of that "

@@ -83,10 +83,8 @@ def _map(model: Model, kind: Kind, data_sets: Sequence[SweepData]) -> Map:
     Repeats differ by what scatters from point to point and by what each block shares: both average out.
     """
     repeated = bool(Repeats.of(data_sets).count.max() > 1)
-    along, held = (
-        np.concatenate([getattr(data_set, name) for data_set in data_sets])
-        for name in (kind.axis, held_beside(kind.axis))
-    )
+    axes = kind.axis, held_beside(kind.axis)
+    along, held = (np.concatenate([getattr(data_set, name) for data_set in data_sets]) for name in axes)
     if kind.stepped is None:
         held = np.repeat(np.arange(1.0, len(data_sets) + 1.0), [data_set.frequency.size for data_set in data_sets])
     row = map_rows(held)

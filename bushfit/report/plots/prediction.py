@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -95,14 +95,18 @@ def prediction_figure(
     mine = [data_set for data_set in every if data_set.sweep.stepped]
     free = [data_set for data_set in every if model and not data_set.sweep.stepped]
     points = means(mine)
+
+    def held_by(axis: Axis) -> Array:
+        return np.concatenate([np.empty(0), *(each.sweep.held for each in mine if each.sweep.stepped == axis)])
+
     frequencies, amplitudes = np.unique(prediction.frequency), np.unique(prediction.amplitude)
     rows: list[tuple[Axis, Array]] = []
     if frequencies.size > 1 or amplitudes.size == 1:
-        rows.append(("frequency", amplitudes[spread(amplitudes.size, _MOST_AMPLITUDES)]))
+        rows.append(("frequency", _lines(amplitudes, held_by("frequency"), _MOST_AMPLITUDES)))
     if amplitudes.size > 1:
         known = frequencies[[np.isclose(points.frequency, f, _SAME, 0.0).any() for f in frequencies]]
         levels = known if known.size > 1 else frequencies
-        rows.append(("amplitude", levels[spread(levels.size, _MOST_FREQUENCIES)]))
+        rows.append(("amplitude", _lines(levels, held_by("amplitude"), _MOST_FREQUENCIES)))
     height = len(rows) + bool(free)
     figure = new_figure(title, height * ROW)
     grid = figure.subplots(height, 2, squeeze=False)
@@ -115,9 +119,16 @@ def prediction_figure(
     shade = "; shaded: its 95 % band, where that is wider than the line" if banded else ""
     through = " Thin lines: the same with what belongs to the rig, as the points were measured." if laid and rig else ""
     if amplitudes.size > _MOST_AMPLITUDES:
-        through += f" Over frequency {_MOST_AMPLITUDES} of the {amplitudes.size} amplitudes are drawn."
+        through += f" Over frequency some of the {amplitudes.size} amplitudes are drawn."
     explain(figure, f"Lines: model{shade}.{through}", points_note(every) if laid or free else "", note)
     return figure
+
+
+def _lines(levels: Array, held: Array, most: int) -> Array:
+    """The levels that are drawn as lines: those that some test held, or else all; of more than fit some, evenly."""
+    met = levels[[np.isclose(held, level, _SAME, 0.0).any() for level in levels]]
+    chosen = met if met.size else levels
+    return chosen[spread(chosen.size, most)]
 
 
 def draw(
@@ -224,7 +235,10 @@ def draw_as_it_came(pair: Sequence[Axes], place: Place, model: Model, data_sets:
     largest = max(float(np.abs(data_set.measured).max()) for data_set in data_sets)
     unit, factor = for_people(*place.display.stiffness, largest)
     looks = styles(len(data_sets), "loop")
-    kinds = ((np.abs, factor, stiffness_label(place, unit)), (loss_factor, 1.0, f"{place} loss factor [-]"))
+    kinds: tuple[tuple[Callable[[Array], Array], float, str], ...] = (
+        (np.abs, factor, stiffness_label(place, unit)),
+        (loss_factor, 1.0, f"{place} loss factor [-]"),
+    )
     for axes, (quantity, scale, name) in zip(pair, kinds, strict=True):
         for data_set, look in zip(data_sets, looks, strict=True):
             rising = np.argsort(data_set.frequency, kind="stable")

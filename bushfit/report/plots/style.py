@@ -205,7 +205,7 @@ def name_levels(
     colors = ScalarMappable(BoundaryNorm(edges, len(levels)), ListedColormap([look.color for look in looks]))
     bar = axes.figure.colorbar(colors, ax=axes, aspect=16, pad=0.04, drawedges=False)
     ticks = spread(len(levels), MOST_NAMED)
-    bar.set_ticks(ticks, labels=[levels[tick] for tick in ticks], fontsize=SMALL, color=INK)
+    bar.set_ticks(ticks.tolist(), labels=[levels[tick] for tick in ticks], fontsize=SMALL, color=INK)
     bar.ax.tick_params(length=2, colors=INK, which="both")
     bar.minorticks_off()
     bar.ax.set_title(what, fontsize=SMALL, color=INK)
