@@ -10,13 +10,14 @@ from typing import TypeVar
 import numpy as np
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.effects import BASE, effect_named
+from bushfit.effects import BASE
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, naming
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data, sweep_data
 from bushfit.fitting.solve import Bounds
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction, Specimen, place_named
+from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 
 #: Difference of two amplitudes relative to their size up to which they are the same level.
@@ -47,7 +48,10 @@ class Data:
 
         Raises:
             FitError: a loop is not one whole cycle or more, rows of it are missing, or it gives energy.
+            ModelError: [fit] effects has an unknown effect, or one twice.
         """
+        with naming(campaign.path, place="[fit] effects"):
+            Model.started(None, (*BASE, *campaign.fit.effects), {})
         return cls(
             campaign,
             tuple(loop_data(campaign.loops, without_outliers=campaign.fit.loss != "linear")),
@@ -96,7 +100,7 @@ class Data:
             FitError: see `start_values`.
         """
         with naming(self.campaign.path):
-            return {**start_values(self.campaign.bushing, data_sets, held), **self.given, **held}
+            return start_values(self.campaign.bushing, data_sets, {**self.given, **held})
 
     def free(self, names: Sequence[str]) -> tuple[str, ...]:
         """Those names that the campaign does not hold."""
@@ -105,13 +109,8 @@ class Data:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """The model that [fit] asks for: the paper's three branches and the effects that it adds.
-
-        Raises:
-            ModelError: an unknown effect.
-        """
-        with naming(self.campaign.path, place="[fit] effects"):
-            return (*BASE, *(effect_named(name).name for name in self.campaign.fit.effects))
+        """The model that [fit] asks for: the paper's three branches and the effects that it adds."""
+        return (*BASE, *self.campaign.fit.effects)
 
     def chosen(self, places: Sequence[str] | None) -> list[DataSet]:
         """Data sets of the places of these names; by default the axial ones, as in the paper, and the specimens'.

@@ -73,6 +73,7 @@ def start_values(bushing: Bushing | None, data_sets: Sequence[DataSet], known: M
         viscous_loss = np.maximum(modulus.imag - friction.imag, least)
         m, alpha = _springpot(log_omega, modulus.real[smallest], viscous_loss[smallest], _LEAST_GROWTH * mu)
     found = {"mu": mu, "m": m, "alpha": alpha, "sigma_fmax": sigma_fmax, "eps_half": eps_half}
+    found = {name: value for name, value in found.items() if name not in known}
     inside = {name: float(np.clip(value, *parameter_named(name).bounds)) for name, value in found.items()}
     if inside != found and (reasons := implausible(bushing, data_sets)):
         raise FitError(

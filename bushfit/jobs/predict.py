@@ -99,7 +99,7 @@ class Predict:
         specimens = {specimen.name: specimen for _, some in bodies for specimen in some}
         if names := self._settings(campaign).directions:
             return [place_named(name, specimens.values()) for name in names]
-        return [*(_DIRECTIONS if bodies[0][0] else ()), *specimens.values()]
+        return [*(_DIRECTIONS if bodies[0][0] or not specimens else ()), *specimens.values()]
 
     def names(self, result: Result | None, campaign: Campaign | None, formats: Collection[str]) -> list[str]:
         """The files of each place."""

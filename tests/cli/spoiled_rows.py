@@ -95,6 +95,10 @@ IN_MORE = [
     ('\namplitudes = ["0.1 mm"]', "\namplitudes = []", "more.toml, predict.amplitudes: this value is not understood", "at least one value"),
     ('\namplitudes = ["0.1 mm"]', '\namplitudes = ["0 mm"]', "more.toml, predict.amplitudes #1: this value is not understood", "greater than 0"),
     ('["0.5 deg"]', '["0.5 mm"]', "more.toml, predict.torsion_amplitudes #1: the unit does not fit", "an angle, such as deg"),
+    ('torsion_amplitudes = ["0.5 deg"]', 'strain_amplitudes = ["0.5 mm"]', "more.toml, predict.strain_amplitudes #1: the unit does not fit"),
+    ('residuals = "complex"', 'effects = ["inertai"]', "more.toml, [fit] effects: unknown effect", "did you mean inertia?"),
+    ('residuals = "complex"', 'effects = ["inertia", "inertia"]', "more.toml, [fit] effects: an effect is listed twice", "inertia"),
+    ('residuals = "complex"', 'effects = "inertia"', "more.toml, fit.effects: this value is not understood", "a list"),
     ('directions = ["axial"]', 'directions = ["sideways"]', "more.toml, predict.directions: no such direction or specimen", "one of axial, radial, torsion"),
     ("seed = 1", "seed = -1", "more.toml, simulate.seed: this value is not understood", "greater than or equal to 0"),
     ("seed = 1", 'seed = "one"', "more.toml, simulate.seed: this value is not understood", "a whole number"),
@@ -156,6 +160,9 @@ IN_MODEL = [
     ("name of half a character", entry("bushing", "name", value="a\ud800"), "model.json, bushing.name: this value is not understood", "found: a\\ud800", "text in Unicode"),
     ("name without end", entry("bushing", "name", value="x" * 5000), "model.json, bushing.name: this value is not understood", "at most 200 characters"),
     ("empty name", entry("bushing", "name", value=""), "model.json, bushing.name: this value is not understood", "a text that is not empty"),
+    ("no bushing and no specimen", entry("bushing", value=None), "there is no bushing", "bushfit predict MODEL.json --bushing other.toml"),
+    ("tests is a text", entry("fit", "tests", value="all"), "model.json, fit.tests: this value is not understood", "a list"),
+    ("place of a test is missing", entry("fit", "usable", value=[{"stiffness": 0.1, "loss_factor": 0.1, "points": 9, "held_out": True}]), "model.json, fit.usable #1.place: a key is missing"),
     ("no effects", without("effects"), "model.json, effects: a key is missing", "effects = ..."),
     ("effects is a text", entry("effects", value="elastic"), "model.json, effects: this value is not understood", "a list"),
     ("unknown effect", entry("effects", value=["elastic", "springpot", "friction", "inertai"]), "model.json: unknown effect", "did you mean inertia?"),
@@ -247,7 +254,7 @@ IN_LOOP = [
     ("displacement and force swapped", every("displacement [mm],force [N]", "force [N],displacement [mm]"), "loop.csv: the loop gives energy, which no bushing does", "are the columns of displacement and force swapped, or do the rows run backwards in time?"),
     ("gives energy", lambda lines: text([lines[0], *(",".join([a, b, str(900 * float(b) - float(c))]) for a, b, c in (line.split(",") for line in lines[1:]))]), "loop.csv: the loop gives energy, which no bushing does", "are the columns of displacement and force swapped, or do the rows run backwards in time?"),
     ("no time", lambda lines: text([line.partition(",")[2] for line in lines]), "loop.csv, line 1: there is no column for the time", 'name the column in the campaign: columns = { time = "..." }, or state rate = "10 mm/min",'),
-    ("metres for millimetres", every("displacement [mm]", "displacement [m]"), "eps_half: impossible value", "1e-06 to 10 (strain at half of sigma_fmax)"),
+    ("metres for millimetres", every("displacement [mm]", "displacement [m]"), "campaign.toml: the tests are of a size that no rubber shows", "times the modulus of loop, which no rubber does: check the units"),
 ]
 #: (name, change of the lines of the sweep, what the error says ...)
 IN_SWEEP = [
@@ -323,7 +330,6 @@ USAGE = [
     ("predict|model.json|--amplitudes|0 mm", "--amplitudes: frequencies and amplitudes are above zero", 'such as "5:155:10 Hz" (start:stop:step) or "0.1, 0.2, 0.5 mm", with one unit at the end'),
     ("predict|model.json|--amplitudes|a few mm", "--amplitudes: these are no values with a unit", 'such as "5:155:10 Hz" (start:stop:step) or "0.1, 0.2, 0.5 mm", with one unit at the end'),
     ("predict|model.json|--torsion-amplitudes|1 mm|--direction|torsion", "--torsion-amplitudes: the unit does not fit", "an angle, such as deg"),
-    ("predict|model.json|--direction|up", "Invalid value for '--direction': 'up' is not one of 'axial', 'radial', 'torsion'."),
     ("predict|model.json|--campaign|lost.toml", "lost.toml: there is no such file", 'did you mean "more.toml"?'),
     ("predict|model.json|--campaign|model.json", "model.json: a campaign is needed", "found: a model", "bushfit predict model.json predicts from a model"),
     ("simulate|campaign.toml", "campaign.toml: nothing says what to simulate", "or fit the campaign first and simulate its model.json"),
