@@ -227,9 +227,8 @@ def _unfitted(result: Result, direction: Place) -> Iterator[str]:
     fitted = result.measured.directions if result.measured else ()
     if not fitted or str(direction) in fitted:
         return
-    if isinstance(direction, Specimen) or not {Direction.AXIAL, Direction.RADIAL, Direction.TORSION}.intersection(
-        fitted
-    ):
+    of_bushing = direction is Direction.AXIAL and not set(Direction).isdisjoint(fitted)
+    if not (of_bushing or direction in (Direction.RADIAL, Direction.TORSION)):
         if not any(effect_named(name).corrects == str(direction) for name in result.model.effects):
             tests = " and ".join(fitted)
             yield (

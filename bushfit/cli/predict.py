@@ -78,6 +78,7 @@ def command(
     if bushing:
         result, note = carried(result, load_bushing(bushing))
         notes.append(note)
+        directions = directions or ("axial", "radial")
     loaded = load_campaign(campaign) if campaign else None
     job = Predict(
         PredictSettings(
@@ -108,7 +109,9 @@ def tell_predictions(options: Options, outcome: Predicted) -> None:
         table = prediction_table(prediction)
         amplitudes = table.iloc[:, 1].unique()
         chosen = amplitudes[spread(amplitudes.size, _MOST_AMPLITUDES)]
-        shown = new_table(f"{outcome.result.name}: {prediction.direction}, corners", *table.columns[:4])
+        place = str(prediction.direction)
+        whose = "" if prediction.direction in outcome.result.specimens else f"{outcome.result.name}: "
+        shown = new_table(f"{whose}{place}, corners", *table.columns[:4])
         low, high = table.iloc[:, 0].min(), table.iloc[:, 0].max()
         for row in table[table.iloc[:, 0].isin([low, high]) & table.iloc[:, 1].isin(chosen)].itertuples(index=False):
             shown.add_row(*(number(value, 6) for value in row[:2]), *(alike([value], 4)[0] for value in row[2:4]))
