@@ -42,13 +42,13 @@ _LINES_AN_OCTAVE = 3
 @file_options(*(key for key in KEYS if key not in ("rate", "frequency", "waveform", "amplitude")), sweeps=False)
 @click.option(
     "--levels",
-    help='Amplitudes that were asked for, such as "0.1, 0.2, 0.5 mm", where the rig missed them by more than 10 %; a '
-    "step more than 30 % off all of them is refused [found from the data].",
+    help='Amplitudes that were asked for, such as "0.1, 0.2, 0.5 mm", where the rig missed them by more than 10 % '
+    "[found from the data].",
 )
 @click.option("--cycles", type=click.IntRange(3, 1000), default=3, show_default=True, help="Fewest steady cycles.")
-@click.option("--mass", help='Of a resonance test: the mass on the mount, such as "0.5 kg".')
-@click.option("--mass-added", help='What moves with it, such as "15 g" of screws, or half the rubber.')
-@click.option("--base-acceleration", help='Zero-to-peak, such as "0.1 g", where the file has no column for it.')
+@click.option("--mass", help='Of a resonance test, such as "0.5 kg".')
+@click.option("--mass-added", help='What moves with it, such as "15 g".')
+@click.option("--base-acceleration", help='Such as "0.1 g", where no column says it.')
 @shared_options
 def command(
     files: tuple[Path, ...],
@@ -58,18 +58,16 @@ def command(
     options: Options,
     **moving: str | None,
 ) -> None:
-    """Reduce raw stepped-sine histories (columns time, displacement, force) or a resonance test to a sweep.
+    """Reduce raw stepped-sine histories or a resonance test to a sweep.
 
-    One FILE may hold one step or many, joined by ramps and pauses; several files of one direction make one sweep, and
-    what occurs again is a repeat. The steady whole cycles of each step are found, its transient left out, and stiffness
-    and loss factor of the fundamental computed by least squares. A step needs five or six cycles: three steady ones
-    and what its start and end take. A swept sine is refused; single outliers are left out and counted. Each point has
-    its noise (the standard error, from the scatter of its cycles and rows), THD (the overtones of the force over its
-    fundamental: friction makes some, a loose fixture many), and the amplitude that the rig really reached.
+    Time, displacement, force: one FILE may hold many steps, joined by ramps and pauses; several files of one direction
+    make one sweep, and what occurs again is a repeat. The steady whole cycles of each step are found, its transient
+    left out, and stiffness and loss factor of the fundamental computed by least squares; a step needs five or six
+    cycles. A swept sine is refused, single outliers are left out. Told of each point: its noise (standard error), THD
+    (overtones of the force over its fundamental) and the amplitude reached.
 
-    A resonance test (--mass, one FILE): a mass on the mount on a shaker. Columns frequency, acceleration and phase of
-    base and mass, or their transmissibility. Each point has the amplitude that the mount reached, and its standard
-    error.
+    A mass on the mount on a shaker (--mass, one FILE): frequency, acceleration and phase of base and mass, or their
+    transmissibility. Told of each point: the amplitude reached and its standard error.
 
     Writes sweep.csv, which a campaign names under [[sweeps]] and `bushfit init` takes, and reduce.png.
     """

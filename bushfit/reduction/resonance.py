@@ -26,6 +26,8 @@ LARGEST_ERROR = 0.2
 _CLEAR_SHARE = 0.8
 #: [-] Mean loss factor below which the phases show no loss; chosen: a tenth of what little-damping rubber has.
 _LEAST_LOSS_FACTOR = 0.005
+#: Points about which a smooth curve is laid, at least; chosen: twice the four terms that it has.
+_FEWEST_POINTS = 8
 #: Neighbours whose scatter gives the error of a point; chosen: enough for a median, few enough to be local.
 _NEIGHBOURS = 15
 #: Median of the magnitude of complex scatter over the standard deviation of its parts, sqrt(2 ln 2).
@@ -96,7 +98,7 @@ def _warnings(found: Resonance) -> Iterator[str]:
         yield f"no resonance: |T| is largest, {largest:.3g}, at the end of the sweep ({frequency:.4g} Hz)"
 
 
-def _refused(test: ResonanceTest, problem: str, expected: str, hint: str, found: str | None = None) -> MeasurementError:
+def _refused(test: ResonanceTest, problem: str, expected: str, hint: str, found: str) -> MeasurementError:
     """The error for a test that cannot be used."""
     return MeasurementError(problem, file=test.source.file, found=found, expected=expected, hint=hint)
 
@@ -175,10 +177,14 @@ def reduce_resonance(test: ResonanceTest, mass: float) -> Resonance:
     omega = 2.0 * np.pi * test.frequency
     frequency = mean(test.frequency)
     flexibility: Complex = mean((1.0 - 1.0 / ratio) / (mass * omega**2))
-    stiffness = 1.0 / flexibility
     amplitude = mean(np.abs(ratio - 1.0) * test.base_acceleration / omega**2)
+    moving = flexibility != 0.0
+    stiffness = np.where(moving, flexibility, 1.0 + 0j) ** -1
     thinned = transmissibility(stiffness, mass, frequency)
-    error = _scatter(frequency, amplitude, thinned) / np.abs(thinned - 1.0)
+    error = np.full(count, np.inf)
+    if np.count_nonzero(moving) >= _FEWEST_POINTS:
+        around = _scatter(frequency[moving], amplitude[moving], thinned[moving])
+        error[moving] = around / np.abs(thinned[moving] - 1.0)
     kept = (error <= LARGEST_ERROR) & (stiffness.real > 0.0)
     if not kept.any():
         raise _refused(
@@ -196,21 +202,15 @@ def reduce_resonance(test: ResonanceTest, mass: float) -> Resonance:
 def _is_turned(test: ResonanceTest) -> bool:
     """Whether the phases count the other way: with them, the loss is below zero.
 
-    Rows count by their information on K, |T - 1|^2, most of which lies at the resonance.
+    Rows count by (ln |T|)^2: most at the resonance and far above it, where they tell K well, and the same should base
+    and mass be swapped, which then shows as a stiffness below zero.
     """
     ratio = test.transmissibility
     flexibility = (1.0 - 1.0 / ratio) / test.frequency**2
-    weight = np.abs(ratio - 1.0) ** 2 / np.sum(np.abs(ratio - 1.0) ** 2)
-    storage = float(np.sum(weight * np.sign(flexibility.real)))
-    if storage <= 0.0:
-        raise _refused(
-            test,
-            "the stiffness comes out below zero",
-            "a mass that moves with the base at low frequency, and more around the resonance",
-            "check that base and mass are not swapped, and that no phase is off by 180 deg",
-        )
+    weight = np.log(np.abs(ratio)) ** 2
+    weight /= max(float(weight.sum()), np.finfo(float).tiny)
     share = float(np.sum(weight[flexibility.imag < 0.0]))
-    loss = float(np.sum(weight * -flexibility.imag / np.abs(flexibility)))
+    loss = -float(np.sum(weight * np.sin(np.angle(flexibility))))
     if max(share, 1.0 - share) < _CLEAR_SHARE or abs(loss) < _LEAST_LOSS_FACTOR:
         raise _refused(
             test,
@@ -218,6 +218,15 @@ def _is_turned(test: ResonanceTest) -> bool:
             "a mass that lags behind the base through the whole resonance",
             "check the unit of the phases, deg or rad, and that they are those of base and mass",
             found=f"a mean loss factor of {loss:.2g}, above zero in {100 * share:.0f} % of what the test tells",
+        )
+    positive = float(np.sum(weight[flexibility.real > 0.0]))
+    if positive < _CLEAR_SHARE:
+        raise _refused(
+            test,
+            "the stiffness comes out below zero",
+            "a mass that moves with the base at low frequency, and more around the resonance",
+            "check that base and mass are not swapped, and that no phase is off by 180 deg",
+            found=f"a stiffness above zero in {100 * positive:.0f} % of what the test tells",
         )
     return loss < 0.0
 
