@@ -18,13 +18,15 @@ import numpy as np
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.naming import folder_name
 from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulatedTest, SimulateSettings
+from bushfit.campaign.written import body_lines, table_lines
 from bushfit.effects import BASE, Level, effect_of
 from bushfit.effects.contract import Array
-from bushfit.errors import CampaignError, naming
+from bushfit.errors import CampaignError, naming, typed
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.model import rig
 from bushfit.model.model import FIVE, Model
-from bushfit.reading.measurement import Loop, Sweep
+from bushfit.model.result import Result
+from bushfit.reading.measurement import Loop, Source, Sweep
 from bushfit.reading.resonance import ResonanceTest
 from bushfit.reduction.resonance import reduce_resonance, response
 
@@ -323,30 +325,31 @@ def _with_noise(clean: Array, plan: SimulateSettings, random: Generator) -> Arra
 
 
 def to_files(simulated: Simulated) -> dict[str, bytes]:
-    """The campaign as files: CSVs, `campaign.toml` that names them, and `truth.json`, the model behind them."""
+    """The campaign as files: CSVs, `campaign.toml` that names them, and `truth.json`, the model behind them.
+
+    A resonance test is what `bushfit reduce` takes; `campaign.toml` says how.
+    """
     from bushfit.model.file import to_document
-    from bushfit.model.result import Result
-    from bushfit.reading.csvfile import raw_loop_table, raw_sweep_table, to_csv
+    from bushfit.reading.csvfile import raw_loop_table, raw_resonance_table, raw_sweep_table, to_csv
 
     files = {f"{loop.name}.csv": to_csv(raw_loop_table(loop)) for loop in simulated.loops}
     files |= {f"{sweep.name}.csv": to_csv(raw_sweep_table(sweep)) for sweep in simulated.sweeps}
+    files |= {f"{test.name}.csv": to_csv(raw_resonance_table(test)) for _, test in simulated.resonances}
     files["campaign.toml"] = _campaign_toml(simulated).encode()
-    truth = Result(simulated.truth, warnings=("simulated: the values a rig simulation was given, not a fit",))
-    files["truth.json"] = (json.dumps(to_document(truth), indent=1) + "\n").encode()
+    files["truth.json"] = (json.dumps(to_document(simulated.result), indent=1) + "\n").encode()
     return files
 
 
 def _campaign_toml(simulated: Simulated) -> str:
-    bushing, plan = simulated.truth.bushing, simulated.plan
-    lines = [
-        f"# Simulated by bushfit simulate with seed {plan.seed}: no rubber was tested. The model is in truth.json.",
-    ]
-    if bushing:
-        lines += ["[bushing]", f"name = {json.dumps(bushing.name, ensure_ascii=False)}"]
-        lines += [
-            f'{key} = "{getattr(bushing, key) * 1e3:.6g} mm"' for key in ("inner_radius", "outer_radius", "length")
-        ]
+    seed = simulated.plan.seed
+    lines = [f"# Simulated by bushfit simulate with seed {seed}: no rubber was tested. The model is in truth.json."]
+    lines += body_lines(simulated.truth.bushing, simulated.specimens)
     for kind, tests in (("loops", simulated.loops), ("sweeps", simulated.sweeps)):
-        for test in tests:
-            lines += ["", f"[[{kind}]]", f'file = "{test.name}.csv"', f'direction = "{test.direction}"']
+        lines += [line for test in tests for line in table_lines(kind, f"{test.name}.csv", test.direction)]
+    for mass, test in simulated.resonances:
+        file, folder = (typed(Path(name)) for name in (f"{test.name}.csv", test.name))
+        along = test.direction if isinstance(test.direction, Direction) else Direction.AXIAL
+        lines += ["", "# A sweep comes of this resonance test with:"]
+        lines += [f'# bushfit reduce {file} --mass "{mass:.6g} kg" --direction {along} -o {folder}']
+        lines += [f"# {line}" for line in table_lines("sweeps", f"{test.name}/sweep.csv", test.direction) if line]
     return "\n".join(lines) + "\n"

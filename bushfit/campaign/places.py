@@ -24,7 +24,7 @@ def place_tested(specimen: object, direction: object, specimens: Iterable[Specim
     """
     known = {specimen.name: specimen for specimen in specimens}
     if specimen is None:
-        if direction in [*Direction]:
+        if isinstance(direction, str) and direction in [*Direction]:
             return Direction(direction)
         expected = "direction = " + " or ".join(f'"{choice}"' for choice in Direction)
         hint = f'or specimen = "{next(iter(known))}"' if known else None

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from bushfit.geometry import Direction
+    from bushfit.geometry import Direction, Place
     from bushfit.reading.measurement import Loop
     from bushfit.reading.table import Table
     from bushfit.reduction.resonance import Resonance
@@ -97,7 +97,7 @@ def command(
 class _Found:
     """What files were reduced to: the points as a table, how to show and draw them, and what --json has besides."""
 
-    direction: Direction
+    direction: Place
     points: pd.DataFrame
     warnings: Sequence[str]
     tell: Callable[[Options], None]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bushfit.cli.common import Options, example, naming_option, open_model, shared_options
+from bushfit.errors import naming
 
 if TYPE_CHECKING:
     from bushfit.campaign.schema import SimulateSettings
@@ -26,8 +27,11 @@ if TYPE_CHECKING:
 @click.option(
     "--displacement-noise", help='Scatter of a loop\'s displacement relative to its amplitude, such as "0.02 %".'
 )
-@click.option("--gain-error", help='Gain error shared by a block (one repeat of one level), such as "0.4 %".')
-@click.option("--phase-error", help='Phase error shared by a block, such as "0.2 deg".')
+@click.option(
+    "--gain-error",
+    help='Gain error shared by a run (one repeat of one amplitude, or of what is held), such as "0.4 %".',
+)
+@click.option("--phase-error", help='Phase error shared by a run, such as "0.2 deg".')
 @click.option(
     "--effect",
     "effects",
@@ -54,8 +58,10 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
     plan = _with_options(plan, settings)
     for text in effects:
         truth = _with_effect(truth, text)
-    files = to_files(simulate(truth, plan))
-    folder = options.folder(f"simulated {folder_name(truth.name)}")
+    with naming(source):
+        simulated = simulate(truth, plan)
+    files = to_files(simulated)
+    folder = options.folder(f"simulated {folder_name(simulated.result.name)}")
     options.console.print(truth.equation(), markup=False)
     options.write(folder, files)
     options.tell({"truth": model_document(truth), "files": sorted(files)})

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bushfit.errors import MeasurementError
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 from bushfit.reading.headers import RESONANCE_COLUMNS, Column
 from bushfit.reading.measurement import Complex, Floats, Source
 from bushfit.reading.table import Table
@@ -36,7 +36,7 @@ class ResonanceTest:
 
     Args:
         name: of the test.
-        direction: of the motion.
+        direction: of the motion, or the specimen in place of a bushing.
         frequency: [Hz], (n,), rising.
         transmissibility: acceleration of the mass over that of the base, complex [-], (n,).
         base_acceleration: amplitude, zero-to-peak [m/s^2], (n,).
@@ -44,7 +44,7 @@ class ResonanceTest:
     """
 
     name: str
-    direction: Direction
+    direction: Place
     frequency: Floats
     transmissibility: Complex
     base_acceleration: Floats
@@ -56,7 +56,7 @@ def is_resonance(table: Table) -> bool:
     return not _TELLING.isdisjoint(table.roles)
 
 
-def read_resonance(table: Table, direction: Direction, base_acceleration: float | None = None) -> ResonanceTest:
+def read_resonance(table: Table, direction: Place, base_acceleration: float | None = None) -> ResonanceTest:
     """The resonance test in a table that was opened with RESONANCE_COLUMNS.
 
     Args:
