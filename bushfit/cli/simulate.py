@@ -93,21 +93,26 @@ def _with_options(plan: SimulateSettings, settings: dict[str, Any]) -> SimulateS
 
 
 def _with_effect(model: Model, text: str) -> Model:
-    from bushfit.effects import effect_named
+    from bushfit.effects import effect_named, effect_of, is_parameter, qualified
     from bushfit.errors import ModelError
     from bushfit.units import is_number, quantity
 
     name, found, value = text.replace(" ", "").partition("=")
-    effect, dot, short = name.partition(".")
-    parameters = {parameter.name: parameter for parameter in effect_named(effect).parameters}
-    if not (found and dot and short in parameters):
+    known = "." in name and is_parameter(name)
+    effect = effect_named(effect_of(name) if known else name.partition(".")[0])
+    if not (found and known):
         raise ModelError(
             "not an effect with a value",
             place="--effect",
             found=repr(text),
-            expected='such as "inertia.mass=0.1 kg"; parameters of ' + f"{effect}: {', '.join(parameters)}",
+            expected='such as "inertia.mass=0.1 kg"; parameters of '
+            + f"{effect.name}: {', '.join(parameter.name for parameter in effect.parameters)}",
         )
-    unit = parameters[short].unit
+    unit = next(parameter.unit for parameter in effect.parameters if qualified(effect, parameter) == name)
     with naming_option("--effect"):
         size = float(value) if is_number(value) and unit == "1" else quantity(text.partition("=")[2].strip(), unit)
-    return model.with_values({name: size}) if effect in model.effects else model.with_effect(effect, {name: size})
+    return (
+        model.with_values({name: size})
+        if effect.name in model.effects
+        else model.with_effect(effect.name, {name: size})
+    )
