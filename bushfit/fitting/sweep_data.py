@@ -75,8 +75,8 @@ class Line:
 class SweepData(DataSet):
     """Dynamic stiffness of a sweep, as relative complex residual or as magnitude and loss factor; see `DataSet`.
 
-    Points stand sorted by run (what it holds, repeat), then step; a run is a block. The residual (K - K_meas)/K_meas has the gain
-    error in its real and the phase error in its imaginary part.
+    Points stand sorted by run (what it holds, repeat), then step; a run is a block. The residual
+    (K - K_meas)/K_meas has the gain error in its real and the phase error in its imaginary part.
 
     Args:
         sweep: as measured.
@@ -163,6 +163,11 @@ class SweepData(DataSet):
     def held(self) -> Array:
         """What each point's run holds, (n,): amplitude [m or rad] or frequency [Hz], or else the number of the run."""
         return self.sweep.held[self.order]
+
+    @cached_property
+    def step(self) -> Array:
+        """What changes within each point's run, (n,): frequency [Hz] or amplitude [m or rad]."""
+        return self.sweep.step[self.order]
 
     @cached_property
     def repeat(self) -> Array:
@@ -277,11 +282,10 @@ class SweepData(DataSet):
     def lines(self, model: Model) -> list[Line]:
         """Mean misfit of each line over its repeats."""
         ratio, lines = self.measured / self.stiffness(model) - 1.0, []
-        step = self.sweep.step[self.order]
         for held in np.unique(self.held):
             chosen = self.held == held
             _, first, place, counts = np.unique(
-                step[chosen], return_index=True, return_inverse=True, return_counts=True
+                self.step[chosen], return_index=True, return_inverse=True, return_counts=True
             )
             mean = np.bincount(place, ratio[chosen].real) + 1j * np.bincount(place, ratio[chosen].imag)
             of_one = np.square(self.noise.random[self.name, float(held)]) + np.square(self.noise.shared)
@@ -292,7 +296,7 @@ class SweepData(DataSet):
 
     def contrasts(self) -> Array:
         """Gain and phase of each line as polynomials in the logarithm of its step, as whitened residuals, (c, 2 n)."""
-        lines = np.split(self.sweep.step[self.order], np.flatnonzero(np.diff(self.held)) + 1)
+        lines = np.split(self.step, np.flatnonzero(np.diff(self.held)) + 1)
         columns = block_diag(*(_polynomials(step).T for step in lines))
         return self.whiten(np.concatenate((columns, 1.0j * columns)))
 
