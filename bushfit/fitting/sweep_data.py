@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from bushfit.effects.contract import Array, Values
-from bushfit.fitting.data_set import DataSet, Suspect, kept, shown_amplitude
+from bushfit.fitting.data_set import DataSet, Freedoms, Suspect, kept, shown_amplitude
 from bushfit.fitting.noise import FLOOR, SweepNoise
 from bushfit.fitting.sweep_outliers import outlying_points
 from bushfit.fitting.whitening import Whitening
@@ -112,8 +112,8 @@ class SweepData(DataSet):
         return float(np.sqrt(np.mean(np.square(list(self.noise.random.values())))))
 
     @property
-    def shared_freedom(self) -> int:
-        return self.noise.freedom
+    def freedoms(self) -> Freedoms:
+        return Freedoms(id(self.noise), self.noise.freedom, self.noise.scatter_freedom)
 
     @property
     def blocks(self) -> list[Array]:
