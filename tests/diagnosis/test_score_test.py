@@ -15,6 +15,7 @@ from bushfit.diagnosis.propose import proposals
 from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.search import critical_gain
 from bushfit.effects.contract import Array
+from bushfit.fitting.data_sets import parted
 
 LEVEL = 0.95
 SEEDS = 300
