@@ -12,7 +12,7 @@ from bushfit.units import quantity
 from bushfit.validation import unknown_key
 
 #: Size of a plain number at most: no parameter comes near it, and its square is still finite.
-LARGEST_NUMBER = 1e100
+_LARGEST_NUMBER = 1e100
 #: The second to the power of alpha, at the end of the unit of m.
 _S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
 
@@ -43,7 +43,7 @@ def parameter_value(place: str, name: str, raw: Any) -> float:
             raise unknown_key(name, known_parameters())
         unit = _S_TO_ALPHA.sub("", parameter_named(name).unit)
         is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
-        if is_number and (unit == "1" or "." in name) and abs(raw) <= LARGEST_NUMBER:
+        if is_number and (unit == "1" or "." in name) and abs(raw) <= _LARGEST_NUMBER:
             return float(raw)
         return quantity(_S_TO_ALPHA.sub("", raw) if name == "m" and isinstance(raw, str) else raw, unit)
 
