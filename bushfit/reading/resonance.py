@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from bushfit.errors import MeasurementError
-from bushfit.geometry import Direction
 from bushfit.reading.headers import RESONANCE_COLUMNS, Column
 from bushfit.reading.measurement import Complex, Floats, Source
 from bushfit.reading.table import Table
@@ -36,7 +35,6 @@ class ResonanceTest:
 
     Args:
         name: of the test.
-        direction: of the motion.
         frequency: [Hz], (n,), rising.
         transmissibility: acceleration of the mass over that of the base, complex [-], (n,).
         base_acceleration: amplitude, zero-to-peak [m/s^2], (n,).
@@ -44,7 +42,6 @@ class ResonanceTest:
     """
 
     name: str
-    direction: Direction
     frequency: Floats
     transmissibility: Complex
     base_acceleration: Floats
@@ -56,12 +53,11 @@ def is_resonance(table: Table) -> bool:
     return not _TELLING.isdisjoint(table.roles)
 
 
-def read_resonance(table: Table, direction: Direction, base_acceleration: float | None = None) -> ResonanceTest:
+def read_resonance(table: Table, base_acceleration: float | None = None) -> ResonanceTest:
     """The resonance test in a table that was opened with RESONANCE_COLUMNS.
 
     Args:
         table: with a frequency and the columns of one of TRANSMISSIBILITY_WAYS.
-        direction: of the motion.
         base_acceleration: amplitude of the base [m/s^2], for a table without one.
 
     Raises:
@@ -78,7 +74,7 @@ def read_resonance(table: Table, direction: Direction, base_acceleration: float 
     table.refuse(bad, wanted["frequency"], "base or mass stands still here", "two accelerations that are not zero")
     order = np.argsort(values["frequency"], kind="stable")
     source = Source(Path(table.file.name), table.sha256)
-    return ResonanceTest(table.file.stem, direction, values["frequency"][order], ratio[order], base[order], source)
+    return ResonanceTest(table.file.stem, values["frequency"][order], ratio[order], base[order], source)
 
 
 def _wanted(table: Table, *, stated: bool) -> dict[str, Column]:
