@@ -43,7 +43,7 @@ _LINES_AN_OCTAVE = 3
 @file_options(*(key for key in KEYS if key not in ("rate", "frequency", "waveform", "amplitude")), sweeps=False)
 @click.option(
     "--levels",
-    help='Amplitudes that were asked for, such as "0.1, 0.2 mm", where the rig missed them [found from the data].',
+    help='Amplitudes that were asked for, such as "0.1, 0.2 mm" [found].',
 )
 @click.option("--cycles", type=click.IntRange(3, 1000), default=3, show_default=True, help="Fewest steady cycles.")
 @click.option("--mass", help='Of a resonance test, such as "0.5 kg".')
@@ -156,6 +156,7 @@ def _resonance(
     files: Sequence[Path], table: Table, stated: Mapping[str, Any], moving: Mapping[str, str | None], levels: str | None
 ) -> _Found:
     """A resonance test, reduced."""
+    from bushfit.geometry import Direction
     from bushfit.inspection.recognition import direction_of
     from bushfit.reading.resonance import read_resonance
     from bushfit.reduction.resonance import reduce_resonance
@@ -175,8 +176,9 @@ def _resonance(
         error.hint = f'{error.hint}; or name the specimen that was tested: --specimen "mount"'
         raise error
     mass, base_acceleration = _mass(table, direction, moving), _positive("base_acceleration", "m/s^2", moving)
+    read_as = direction or Direction.AXIAL  # which translation it is makes no difference to reading
     with options_named():
-        reduction = reduce_resonance(read_resonance(table, base_acceleration), mass)
+        reduction = reduce_resonance(read_resonance(table, read_as, base_acceleration), mass)
 
     def figure() -> Figure:
         from bushfit.report.plots import resonance_figure

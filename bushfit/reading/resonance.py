@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bushfit.errors import MeasurementError
+from bushfit.geometry import Place
 from bushfit.reading.headers import RESONANCE_COLUMNS, Column
 from bushfit.reading.measurement import Complex, Floats, Source
 from bushfit.reading.table import Table
@@ -35,6 +36,7 @@ class ResonanceTest:
 
     Args:
         name: of the test.
+        direction: of the motion, or the specimen in place of a bushing.
         frequency: [Hz], (n,), rising.
         transmissibility: acceleration of the mass over that of the base, complex [-], (n,).
         base_acceleration: amplitude, zero-to-peak [m/s^2], (n,).
@@ -42,6 +44,7 @@ class ResonanceTest:
     """
 
     name: str
+    direction: Place
     frequency: Floats
     transmissibility: Complex
     base_acceleration: Floats
@@ -53,11 +56,12 @@ def is_resonance(table: Table) -> bool:
     return not _TELLING.isdisjoint(table.roles)
 
 
-def read_resonance(table: Table, base_acceleration: float | None = None) -> ResonanceTest:
+def read_resonance(table: Table, direction: Place, base_acceleration: float | None = None) -> ResonanceTest:
     """The resonance test in a table that was opened with RESONANCE_COLUMNS.
 
     Args:
         table: with a frequency and the columns of one of TRANSMISSIBILITY_WAYS.
+        direction: of the motion.
         base_acceleration: amplitude of the base [m/s^2], for a table without one.
 
     Raises:
@@ -74,7 +78,7 @@ def read_resonance(table: Table, base_acceleration: float | None = None) -> Reso
     table.refuse(bad, wanted["frequency"], "base or mass stands still here", "two accelerations that are not zero")
     order = np.argsort(values["frequency"], kind="stable")
     source = Source(Path(table.file.name), table.sha256)
-    return ResonanceTest(table.file.stem, values["frequency"][order], ratio[order], base[order], source)
+    return ResonanceTest(table.file.stem, direction, values["frequency"][order], ratio[order], base[order], source)
 
 
 def _wanted(table: Table, *, stated: bool) -> dict[str, Column]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bushfit.errors import BushfitError
+from bushfit.geometry import Direction
 from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.resonance import ResonanceTest, is_resonance, read_resonance
 from bushfit.reading.table import Table
@@ -34,7 +35,7 @@ def written(folder: Path, header: str, *columns: np.ndarray, mark: str = ",", de
 def read(file: Path, base_acceleration: float | None = None) -> ResonanceTest:
     table = Table.open(file, RESONANCE_COLUMNS)
     assert is_resonance(table)
-    return read_resonance(table, base_acceleration)
+    return read_resonance(table, Direction.AXIAL, base_acceleration)
 
 
 MASS = BASE * np.abs(RATIO)

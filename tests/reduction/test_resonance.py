@@ -41,7 +41,7 @@ def shaken(model: Model, rows: int, noise: Callable[[int], Array] | None = None)
     _, ratio = response(lambda x: model.stiffness(Direction.AXIAL, frequency, x), MASS, frequency, base)
     if noise:
         ratio = ratio * (1.0 + noise(rows) + 1j * noise(rows))
-    return ResonanceTest("t", frequency, ratio, np.full(rows, BASE), Source(Path("t.csv"), ""))
+    return ResonanceTest("t", Direction.AXIAL, frequency, ratio, np.full(rows, BASE), Source(Path("t.csv"), ""))
 
 
 def misses(found: Resonance, model: Model) -> Array:
@@ -176,7 +176,7 @@ def epdm(root: Path) -> dict[tuple[str, int], Resonance]:
     for level in ("01g", "1g"):
         for mass in MEASURED:
             table = Table.open(root / f"data/measured/epdm_70/shaker_{level}_{mass}g.csv", RESONANCE_COLUMNS)
-            found[level, mass] = reduce_resonance(read_resonance(table), 1e-3 * (mass + DISCS))
+            found[level, mass] = reduce_resonance(read_resonance(table, Direction.AXIAL), 1e-3 * (mass + DISCS))
     return found
 
 
