@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from bushfit.geometry import Direction, Place
+    from bushfit.geometry import Direction
     from bushfit.reading.measurement import Loop
     from bushfit.reading.table import Table
     from bushfit.reduction.resonance import Resonance
@@ -35,19 +36,19 @@ _LINES_AN_OCTAVE = 3
     "reduce",
     epilog=example(
         "bushfit reduce data/cmp_15961_raw/stepped_sine_axial.csv",
-        'bushfit reduce data/measured/epdm_70/shaker_1g_573g.csv --mass "0.5878 kg" --direction axial',
+        'bushfit reduce data/measured/epdm_70/shaker_1g_573g.csv --mass "0.5878 kg" --specimen mount',
     ),
 )
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @file_options(*(key for key in KEYS if key not in ("rate", "frequency", "waveform", "amplitude")), sweeps=False)
 @click.option(
     "--levels",
-    help='Amplitudes that were asked for, such as "0.1, 0.2, 0.5 mm", where the rig missed them by more than 10 % '
-    "[found from the data].",
+    help='Amplitudes that were asked for, such as "0.1, 0.2 mm" [found].',
 )
 @click.option("--cycles", type=click.IntRange(3, 1000), default=3, show_default=True, help="Fewest steady cycles.")
 @click.option("--mass", help='Of a resonance test, such as "0.5 kg".')
 @click.option("--mass-added", help='What moves with it, such as "15 g".')
+@click.option("--specimen", help="What was tested, where it is no bushing.")
 @click.option("--base-acceleration", help='Such as "0.1 g", where no column says it.')
 @shared_options
 def command(
@@ -69,7 +70,7 @@ def command(
     A mass on the mount on a shaker (--mass, one FILE): frequency, acceleration and phase of base and mass, or their
     transmissibility. Told of each point: the amplitude reached and its standard error.
 
-    Writes sweep.csv, which a campaign names under [[sweeps]] and `bushfit init` takes, and reduce.png.
+    Writes sweep.csv, for [[sweeps]] of a campaign or `bushfit init`, and reduce.png.
     """
     from bushfit.campaign.naming import folder_name
     from bushfit.reading.csvfile import to_csv
@@ -87,17 +88,21 @@ def command(
 
         output["reduce.png"] = to_png(found.figure())
     options.write(folder, output)
-    snippet = f'[[sweeps]]\nfile = "sweep.csv"\ndirection = "{found.direction}"\n'
+    snippet = f'[[sweeps]]\nfile = "sweep.csv"\n{found.body} = {json.dumps(found.name, ensure_ascii=False)}\n'
     options.console.print(f"for a campaign in {folder} (elsewhere, with the way there):\n\n{snippet}", markup=False)
-    document = {"direction": str(found.direction), "points": found.points.to_dict(orient="list"), **found.document}
+    document = {found.body: found.name, "points": found.points.to_dict(orient="list"), **found.document}
     options.tell({**document, "warnings": list(found.warnings), "campaign": snippet})
 
 
 @dataclass(frozen=True)
 class _Found:
-    """What files were reduced to: the points as a table, how to show and draw them, and what --json has besides."""
+    """What files were reduced to: the points as a table, how to show and draw them, and what --json has besides.
 
-    direction: Place
+    What was tested is told by `body` and `name`, as in a campaign: direction = "axial", or specimen = "mount".
+    """
+
+    body: Literal["direction", "specimen"]
+    name: str
     points: pd.DataFrame
     warnings: Sequence[str]
     tell: Callable[[Options], None]
@@ -122,9 +127,8 @@ def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | N
         names = histories[0].name if len(histories) == 1 else f"{len(histories)} histories"
         return reduction_figure(reduction, histories, f"{names}: {len(reduction.steps)} points, {direction}")
 
-    return _Found(
-        direction, reduced_table(reduction), reduction.warnings, lambda options: _tell(options, reduction), figure
-    )
+    points, warnings = reduced_table(reduction), reduction.warnings
+    return _Found("direction", str(direction), points, warnings, lambda options: _tell(options, reduction), figure)
 
 
 def _resonance_table(file: Path, stated: Mapping[str, Any], moving: Mapping[str, str | None]) -> Table | None:
@@ -152,6 +156,7 @@ def _resonance(
     files: Sequence[Path], table: Table, stated: Mapping[str, Any], moving: Mapping[str, str | None], levels: str | None
 ) -> _Found:
     """A resonance test, reduced."""
+    from bushfit.geometry import Direction
     from bushfit.inspection.recognition import direction_of
     from bushfit.reading.resonance import read_resonance
     from bushfit.reduction.resonance import reduce_resonance
@@ -165,21 +170,27 @@ def _resonance(
             expected="one file, and no levels: the amplitude follows the resonance",
             hint="call bushfit reduce for each of them, with its own mass",
         )
-    direction = direction_of(table.file, table, stated)
-    if direction is None:
-        raise direction_error(table.file)
+    direction, specimen = direction_of(table.file, table, stated), moving["specimen"] or None
+    if direction is None and specimen is None:
+        error = direction_error(table.file)
+        error.hint = f'{error.hint}; or name the specimen that was tested: --specimen "mount"'
+        raise error
     mass, base_acceleration = _mass(table, direction, moving), _positive("base_acceleration", "m/s^2", moving)
+    read_as = direction or Direction.AXIAL  # which translation it is makes no difference to reading
     with options_named():
-        reduction = reduce_resonance(read_resonance(table, direction, base_acceleration), mass)
+        reduction = reduce_resonance(read_resonance(table, read_as, base_acceleration), mass)
 
     def figure() -> Figure:
         from bushfit.report.plots import resonance_figure
 
-        return resonance_figure(reduction, f"{table.file.stem}: {number(mass, 4)} kg on the mount, {direction}")
+        return resonance_figure(
+            reduction, f"{table.file.stem}: {number(mass, 4)} kg on the mount, {specimen or direction}"
+        )
 
     frequency, largest = reduction.peak
     return _Found(
-        direction,
+        "specimen" if specimen else "direction",
+        specimen or str(direction),
         resonance_table(reduction),
         reduction.warnings,
         lambda options: _tell_resonance(options, reduction),
@@ -188,10 +199,10 @@ def _resonance(
     )
 
 
-def _mass(table: Table, direction: Direction, moving: Mapping[str, str | None]) -> float:
+def _mass(table: Table, direction: Direction | None, moving: Mapping[str, str | None]) -> float:
     """The mass that moves [kg]."""
     mass = _positive("mass", "kg", moving)
-    if direction.is_rotation:
+    if direction is not None and direction.is_rotation:
         raise MeasurementError(
             "a mass resists no rotation", file=table.file, found=str(direction), expected="a translation"
         )
@@ -279,10 +290,10 @@ def _tell_resonance(options: Options, found: Resonance) -> None:
     """A line a third of an octave, with -v a line a point."""
     import numpy as np
 
+    from bushfit.geometry import TRANSLATION
     from bushfit.reading.measurement import loss_factor
 
-    units = found.test.direction.display
-    (unit, length), (stiffness_unit, factor) = units.displacement, units.stiffness
+    (unit, length), _, (stiffness_unit, factor) = TRANSLATION.display
     frequency, largest = found.peak
     count = found.frequency.size
     table = new_table(

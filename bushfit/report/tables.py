@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bushfit.effects import effect_named
+from bushfit.geometry import TRANSLATION
 from bushfit.reading.measurement import loss_factor
 
 if TYPE_CHECKING:
@@ -169,7 +170,7 @@ def resonance_table(found: Resonance) -> pd.DataFrame:
     """A resonance test reduced to a sweep: what the sweep reader takes, then what tells how each point came about."""
     import pandas as pd
 
-    (length, length_factor), _, (stiffness, factor) = found.test.direction.display
+    (length, length_factor), _, (stiffness, factor) = TRANSLATION.display
     return pd.DataFrame(
         {
             "frequency [Hz]": found.frequency,

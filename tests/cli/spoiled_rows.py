@@ -373,7 +373,7 @@ USAGE = [
     ("reduce|lost.csv", "lost.csv: there is no such file", 'did you mean "loop.csv"?'),
     ("reduce|sweep.csv", "sweep.csv, line 1: this is a sweep already", "name it in the campaign under [[sweeps]]"),
     ("reduce|shaker.csv|--direction|axial", "shaker.csv, line 1: this is a resonance test, and nothing says how large the mass is", 'state it: --mass "0.5 kg"'),
-    ("reduce|shaker.csv|--mass|0.5 kg", "shaker.csv: nothing says in which direction this was tested", "state it: --direction axial"),
+    ("reduce|shaker.csv|--mass|0.5 kg", "shaker.csv: nothing says in which direction this was tested", "state it: --direction axial", '--specimen "mount"'),
     ("reduce|shaker.csv|--mass|0.5|--direction|axial", "--mass: a number without a unit", 'write "0.5 kg"'),
     ("reduce|shaker.csv|--mass|5 N|--direction|axial", "--mass: the unit does not fit", "a mass, such as kg"),
     ("reduce|shaker.csv|--mass|0 kg|--direction|axial", "--mass: this is not positive", "a value above zero"),

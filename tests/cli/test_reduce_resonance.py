@@ -30,6 +30,17 @@ def test_a_measured_test_becomes_a_sweep(typed: Callable, root: Path, tmp_path: 
     assert table["frequency [Hz]"].is_monotonic_increasing
 
 
+def test_the_test_of_a_specimen(typed: Callable, root: Path, tmp_path: Path) -> None:
+    """A mount that is no bushing goes by its name, and needs no direction."""
+    stated = (*STATED[:-2], "--specimen", "the mount")
+    done = typed("reduce", root / MEASURED, *stated, "-o", "x", "--no-plots", "--json")
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    assert document["specimen"] == "the mount"
+    assert "direction" not in document
+    assert 'specimen = "the mount"' in done.stderr
+
+
 def test_json_and_a_line_a_point(typed: Callable, root: Path, tmp_path: Path) -> None:
     done = typed("reduce", root / MEASURED, *STATED, "-o", "x", "--no-plots", "--json", "-v")
     assert done.returncode == 0

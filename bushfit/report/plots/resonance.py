@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from bushfit.geometry import TRANSLATION
 from bushfit.reading.measurement import loss_factor
 from bushfit.reduction.resonance import LARGEST_ERROR, Resonance
 from bushfit.report.plots.style import (
@@ -27,7 +28,7 @@ def resonance_figure(found: Resonance, title: str) -> Figure:
     """Transmissibility and amplitude reached, stiffness and loss factor with errors, each over the frequency."""
     figure = new_figure(title, 2 * ROW)
     (ratio, amplitude), (stiffness, loss) = figure.subplots(2, 2, sharex=True)
-    (unit, length), _, stiffness_units = found.test.direction.display
+    (unit, length), _, stiffness_units = TRANSLATION.display
     stiffness_unit, factor = for_people(*stiffness_units, float(np.abs(found.stiffness).max()))
     color = styles(1, "amplitude")[0].color
     upper = (
@@ -45,8 +46,8 @@ def resonance_figure(found: Resonance, title: str) -> Figure:
     )
     magnitude, factors = factor * np.abs(found.stiffness), loss_factor(found.stiffness)
     lower = (
-        (stiffness, magnitude, magnitude, f"{found.test.direction} stiffness |K| [{stiffness_unit}]"),
-        (loss, factors, 1.0 + factors**2, f"{found.test.direction} loss factor [-]"),
+        (stiffness, magnitude, magnitude, f"stiffness |K| [{stiffness_unit}]"),
+        (loss, factors, 1.0 + factors**2, "loss factor [-]"),
     )
     for axes, values, scale, label in lower:
         error = 2.0 * found.relative_error * scale
