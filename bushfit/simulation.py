@@ -28,6 +28,7 @@ from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
 from bushfit.reading.measurement import Loop, Source, Sweep
 from bushfit.reading.resonance import ResonanceTest
+from bushfit.reading.runs import nominal
 from bushfit.reduction.resonance import reduce_resonance, response
 
 if TYPE_CHECKING:
@@ -276,7 +277,7 @@ def _loop(test: SimulatedLoop, clean: rig.Record, number: int, plan: SimulateSet
 def _sweep(
     truth: Model, test: SimulatedSweep, clean: Array, name: str, plan: SimulateSettings, random: Generator
 ) -> Sweep:
-    """All repeats of a sweep; without its levels where the amplitude is stepped, as laboratories write it."""
+    """All repeats of a sweep; where the amplitude is stepped, with the levels that a reader finds in those reached."""
     shape = (len(test.held), plan.repeats, len(test.steps))
     frequency, level = (np.broadcast_to(values[:, None], shape).ravel() for values in _points(test))
     repeat = np.broadcast_to(np.arange(1, plan.repeats + 1)[:, None], shape).ravel()
@@ -286,7 +287,7 @@ def _sweep(
         stiffness = _near(truth, test.direction, frequency, level, stiffness.ravel())(reached).reshape(shape)
     measured = np.stack([_with_noise(stiffness[:, number], plan, random) for number in range(plan.repeats)], axis=1)
     if test.stepped == "amplitude" and reached is not None:
-        level, reached = reached, None
+        level = nominal(reached)
     return Sweep(
         name, test.direction, frequency, level, measured.ravel(), repeat, reached=reached, stepped=test.stepped
     )
@@ -348,8 +349,9 @@ def _campaign_toml(simulated: Simulated) -> str:
         lines += [line for test in tests for line in table_lines(kind, f"{test.name}.csv", test.direction)]
     for mass, test in simulated.resonances:
         file, folder = (typed(Path(name)) for name in (f"{test.name}.csv", test.name))
-        along = test.direction if isinstance(test.direction, Direction) else Direction.AXIAL
+        tested = "specimen" if isinstance(test.direction, Specimen) else "direction"
+        place = typed(Path(str(test.direction)))
         lines += ["", "# A sweep comes of this resonance test with:"]
-        lines += [f'# bushfit reduce {file} --mass "{mass:.6g} kg" --direction {along} -o {folder}']
+        lines += [f'# bushfit reduce {file} --mass "{mass:.6g} kg" --{tested} {place} -o {folder}']
         lines += [f"# {line}" for line in table_lines("sweeps", f"{test.name}/sweep.csv", test.direction) if line]
     return "\n".join(lines) + "\n"

@@ -98,21 +98,22 @@ def runs(sweep: Sweep) -> tuple[int, int, int]:
 def test_an_amplitude_sweep_has_the_stiffness_at_the_amplitudes_reached(coupon: Undisturbed) -> None:
     """It is carried there from the nominal amplitudes, to 1e-5 of what the rig measures there itself."""
     (sweep,) = measure(coupon, SimulateSettings(repeats=2, seed=1)).sweeps
-    assert (sweep.stepped, sweep.reached) == ("amplitude", None)
+    assert sweep.stepped == "amplitude"
     some = np.s_[3::11]
-    points = sweep.frequency[some], sweep.amplitude[some]
+    points = sweep.frequency[some], sweep.amplitude_reached[some]
     itself = rig.dynamic_stiffness(coupon.truth, COUPON, *points)
     off = np.abs(sweep.stiffness[some] / itself - 1.0).max()
     print(f"stiffness carried to the amplitude reached: off the rig by {off:.1e}")
     assert off < 2e-5
-    np.testing.assert_allclose(sweep.stiffness, coupon.truth.stiffness(COUPON, sweep.frequency, sweep.amplitude), 2e-3)
+    closed = coupon.truth.stiffness(COUPON, sweep.frequency, sweep.amplitude_reached)
+    np.testing.assert_allclose(sweep.stiffness, closed, rtol=2e-3)
 
 
 def test_amplitudes_are_missed_at_a_frequency_and_at_a_point(coupon: Undisturbed) -> None:
     off = []
     for seed in range(200):
         (sweep,) = measure(coupon, SimulateSettings(repeats=2, seed=seed)).sweeps
-        off.append(np.log(sweep.amplitude.reshape(runs(sweep)) / STRAINS))
+        off.append(np.log(sweep.amplitude_reached.reshape(runs(sweep)) / STRAINS))
     missed = np.array(off)
     assert np.std(missed) == pytest.approx(0.02, rel=0.05)
     assert np.std(missed.mean(axis=(2, 3))) == pytest.approx(0.02 * np.sqrt(0.5), rel=0.1)
@@ -135,7 +136,7 @@ def test_gain_and_phase_errors_are_shared_by_a_run_of_amplitudes(coupon: Undistu
     gains, phases = [], []
     for seed in range(150):
         (sweep,) = measure(coupon, SimulateSettings(repeats=3, gain_error=0.01, phase_error=0.02, seed=seed)).sweeps
-        ideal = coupon.truth.stiffness(COUPON, sweep.frequency, sweep.amplitude)
+        ideal = coupon.truth.stiffness(COUPON, sweep.frequency, sweep.amplitude_reached)
         off = np.log(sweep.stiffness / ideal).reshape(runs(sweep))
         assert np.ptp(off.real, axis=-1).max() < 1e-3  # the rig is that near to the closed form
         gains.append(off.real.mean(axis=-1))
@@ -204,8 +205,9 @@ def test_what_is_fitted_to_simulated_tests_is_the_truth(
     assert (campaign.name, campaign.bushing) == (in_memory.name, bushing)
     assert campaign.specimens == in_memory.specimens
     for read, measured in zip(campaign.sweeps, simulated.sweeps, strict=True):
-        assert read.direction == measured.direction
+        assert (read.direction, read.stepped) == (measured.direction, measured.stepped)
         np.testing.assert_allclose(read.amplitude, measured.amplitude, rtol=1e-6)
+        np.testing.assert_allclose(read.amplitude_reached, measured.amplitude_reached, rtol=1e-6)
         np.testing.assert_allclose(read.stiffness, measured.stiffness, rtol=1e-6)
     for looped, loop in zip(campaign.loops, simulated.loops, strict=True):
         np.testing.assert_allclose(looped.force, loop.force, atol=1e-5 * np.ptp(loop.force))
@@ -224,7 +226,7 @@ def test_strains_are_written_as_files_of_the_specimen_state_them(coupon: Undistu
     """Tensor strain is half the engineering strain; the modulus is the same."""
     (sweep,) = measure(coupon, SimulateSettings()).sweeps
     tensor = raw_sweep_table(replace(sweep, direction=replace(COUPON, strain="tensor")))
-    np.testing.assert_allclose(tensor["amplitude [%]"], 50.0 * sweep.amplitude)
+    np.testing.assert_allclose(tensor["amplitude [%]"], 50.0 * sweep.amplitude_reached)
     np.testing.assert_allclose(tensor["stiffness [MPa]"], 1e-6 * np.abs(sweep.stiffness))
 
 

@@ -85,15 +85,20 @@ def raw_loop_table(loop: Loop) -> pd.DataFrame:
 
 
 def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
-    """A sweep as a rig writes it: frequency, amplitude, repeat, stiffness and loss factor in the units of engineers."""
+    """A sweep as a rig writes it: frequency, amplitude, repeat, stiffness and loss factor in the units of engineers.
+
+    Where the amplitude is stepped, it is written as reached, without its level.
+    """
     import pandas as pd
 
     (length, length_factor), _, (stiffness, factor) = _as_stated(sweep.direction)
-    reached = sweep.reached
+    level, reached = sweep.amplitude, sweep.reached
+    if sweep.stepped == "amplitude" and reached is not None:
+        level, reached = reached, None
     return pd.DataFrame(
         {
             "frequency [Hz]": sweep.frequency,
-            f"amplitude [{length}]": sweep.amplitude * length_factor,
+            f"amplitude [{length}]": level * length_factor,
             **({} if reached is None else {f"amplitude reached [{length}]": reached * length_factor}),
             "repeat": sweep.repeat,
             f"stiffness [{stiffness}]": np.abs(sweep.stiffness) * factor,
