@@ -17,8 +17,10 @@ from bushfit.reading.measurement import Floats, Stepped
 _WIDEST_LEVEL = 0.08
 #: Distance in ln X from a level to the next over the span of a level, at least; chosen: below, they may be one.
 _LEAST_GAP = 3.0
-#: Points of a run at least, on average, for something to count as held.
-_FEWEST_POINTS = 2.0
+#: Share of the rows, at least, with the frequency or the level of the row before, where one of them is held.
+_LEAST_HELD = 0.1
+#: Points of a run at least for its levels to be told by their place in it.
+_FEWEST_POINTS = 3
 
 
 class Runs(NamedTuple):
@@ -47,12 +49,11 @@ def runs_of(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | No
     levels = nominal(amplitude)
     if (levels == amplitude).all():
         levels = _by_rank(frequency, amplitude, repeat)
-    of_frequency, of_level = (np.unique(values).size for values in (frequency, levels))
-    counted = repeat if repeat is not None else _occurrence(frequency, levels)
-    runs = np.unique(counted).size
-    if max(frequency.size / of_frequency, frequency.size / of_level) < _FEWEST_POINTS * runs and frequency.size > runs:
+    if np.mean((np.diff(frequency) == 0.0) | (np.diff(levels) == 0.0)) < _LEAST_HELD:
         restarts = np.cumsum(np.append(False, np.diff(frequency) < 0.0)) + 1
         return Runs(None, amplitude, restarts if repeat is None else repeat)
+    of_frequency, of_level = (np.unique(values).size for values in (frequency, levels))
+    counted = repeat if repeat is not None else _occurrence(frequency, levels)
     return Runs("amplitude" if of_level > of_frequency else "frequency", levels, counted)
 
 
