@@ -184,7 +184,7 @@ def _resonance(
         from bushfit.report.plots import resonance_figure
 
         return resonance_figure(
-            reduction, f"{table.file.stem}: {number(mass, 4)} kg on the mount, {specimen or direction}"
+            reduction, f"{table.file.stem}, {specimen or direction}: {number(mass, 4)} kg on a shaker"
         )
 
     frequency, largest = reduction.peak
