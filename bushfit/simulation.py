@@ -210,6 +210,7 @@ def _campaign_toml(simulated: Simulated) -> str:
         "[bushing]",
         f"name = {json.dumps(bushing.name, ensure_ascii=False)}",
         *(f'{key} = "{getattr(bushing, key) * 1e3:.6g} mm"' for key in ("inner_radius", "outer_radius", "length")),
+        *([f'shape = "{bushing.shape}"'] if bushing.shape != "paper" else []),
     ]
     for kind, tests in (("loops", simulated.loops), ("sweeps", simulated.sweeps)):
         for test in tests:
