@@ -41,6 +41,14 @@ _WRITTEN = {
     "1": ("-", 1.0),
     "Pa*s^alpha": ("MPa*s^alpha", 1e-6),
 }
+#: Zero of the Celsius scale [K].
+CELSIUS = 273.15
+#: By the unit of a temperature: kelvin per unit, and kelvin at zero of the unit.
+_TEMPERATURES = {
+    **dict.fromkeys(("degc", "c", "celsius"), (1.0, CELSIUS)),
+    **dict.fromkeys(("k", "kelvin"), (1.0, 0.0)),
+    **dict.fromkeys(("degf", "f", "fahrenheit"), (5.0 / 9.0, CELSIUS - 32.0 * 5.0 / 9.0)),
+}
 #: Times below this many seconds are written in milliseconds.
 _LEAST_IN_SECONDS = 0.1
 #: Stresses take a prefix from this many of the larger unit on: 0.2 MPa, not 200 kPa.
@@ -325,3 +333,17 @@ def _registry() -> pint.UnitRegistry[Any]:
     import pint
 
     return pint.UnitRegistry(str(Path(__file__).with_name("units.txt")), cache_folder=None)
+
+
+def temperature(raw: object) -> float:
+    """The temperature [K] that a text such as "22 degC", "295 K" or "72 degF" states.
+
+    Raises:
+        UnitError: no text of a number and one of these units, or one below absolute zero.
+    """
+    found = re.fullmatch(r"\s*([+-]?\d+(?:[.,]\d+)?)\s*(.*?)\s*", raw) if isinstance(raw, str) else None
+    scale = _TEMPERATURES.get(found[2].replace("°", "deg").replace(" ", "").lower()) if found else None
+    kelvin = scale[0] * float(found[1].replace(",", ".")) + scale[1] if found and scale else -1.0
+    if kelvin < 0.0:
+        raise UnitError("this is no temperature", found=repr(raw), expected='such as "22 degC" or "295 K"')
+    return kelvin

@@ -99,7 +99,7 @@ def _parts(evidence: Evidence) -> Iterator[tuple[str, Array]]:
         top = np.quantile(np.concatenate([sweep.frequency for sweep in sweeps]), 1.0 - _TOP)
         yield "top third of the frequencies", _rows(evidence, ((sweep, sweep.frequency > top) for sweep in sweeps))
     for direction in dict.fromkeys(data_set.direction for data_set in evidence.data_sets):
-        whole = [data_set for data_set in evidence.data_sets if data_set.direction is direction]
+        whole = [data_set for data_set in evidence.data_sets if data_set.direction == direction]
         if len(whole) < len(evidence.data_sets):
             yield f"{direction} direction", _rows(evidence, ((data_set, _ALL) for data_set in whole))
     for loop in loops if len(loops) > 1 else ():

@@ -59,7 +59,7 @@ def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
     _, sweeps = parted(evidence.data_sets)
     levels = [level for sweep in sweeps for level in sweep.levels(evidence.model)]
     for direction in dict.fromkeys(level.direction for level in levels):
-        mine = [level for level in levels if level.direction is direction]
+        mine = [level for level in levels if level.direction == direction]
         for part, name in enumerate(_PARTS):
             pieces = [(np.real if part == 0 else np.imag)(level.smooth) for level in mine]
             sizes = [piece / level.noise[part] for piece, level in zip(pieces, mine, strict=True)]

@@ -17,6 +17,7 @@ from bushfit.diagnosis.record import Diagnosis, Judged, Named, Verdict, Where
 from bushfit.diagnosis.refit import Candidate
 from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.search import SAME, Search, Step
+from bushfit.effects import effect_of
 from bushfit.fitting.assess import Stage, covariance, measured_range, quality
 from bushfit.fitting.data_sets import parted
 from bushfit.fitting.procedures import cautions
@@ -79,7 +80,7 @@ def _ambiguous(search: Search, final: Evidence, steps: Sequence[Step], names: Se
     model = search.base.model
     for step in steps:
         if not step.rivals:
-            own = {key: value for key, value in final.model.values.items() if key.startswith(f"{step.name}.")}
+            own = {key: value for key, value in final.model.values.items() if effect_of(key) == step.name}
             model = model.with_effect(step.name, own)
     kept = search.base if model is search.base.model else fit(model, final.data_sets, search.held, search.bounds)
     sets = "; ".join(f"{name.name} from {' or '.join(name.alternatives)}" for name in names if name.alternatives)

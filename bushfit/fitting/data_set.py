@@ -13,7 +13,7 @@ from functools import wraps
 from typing import Any, ClassVar, Self
 
 from bushfit.effects.contract import Array, Values
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model
 from bushfit.model.result import Outlier
 from bushfit.reading.measurement import Loop, Source, Sweep
@@ -36,7 +36,7 @@ class Suspect:
     words: str
     kind: str
     columns: Sequence[Array]
-    direction: Direction
+    direction: Place
     frequency: tuple[float, float]
     amplitude: tuple[float, float]
     looked: int = 0
@@ -71,7 +71,7 @@ class DataSet(ABC):
         return self.test.name
 
     @property
-    def direction(self) -> Direction:
+    def direction(self) -> Place:
         """Of the test."""
         return self.test.direction
 
@@ -227,7 +227,7 @@ def kept(answer: Callable[..., Array]) -> Callable[..., Array]:
     return asked
 
 
-def shown_amplitude(direction: Direction, amplitude: float) -> str:
+def shown_amplitude(direction: Place, amplitude: float) -> str:
     """An amplitude [m or rad] as engineers read it: "0.1 mm"."""
     unit, factor = direction.display.displacement
     return f"{amplitude * factor:.4g} {unit}"

@@ -16,7 +16,7 @@ from bushfit.fitting.data_set import DataSet, Suspect, kept, shown_amplitude
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.sweep_outliers import outlying_points
 from bushfit.fitting.whitening import Whitening
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.model.sensitivity import stiffness_jacobian
@@ -44,7 +44,7 @@ class Level:
         noise: standard deviation of the gain and the phase of one of these means, (2,).
     """
 
-    direction: Direction
+    direction: Place
     amplitude: float
     frequency: Array
     misfit: Array

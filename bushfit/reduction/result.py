@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 from bushfit.units import number
 
 #: Relative distance of an amplitude from its level that is told; chosen: |K| may then be 1 % off.
@@ -94,7 +94,7 @@ class Reduction:
         outliers: number of rows that were left out as outliers.
     """
 
-    direction: Direction
+    direction: Place
     steps: tuple[Step, ...]
     skipped: tuple[Skipped, ...]
     outliers: int = 0
