@@ -64,12 +64,12 @@ def test_how_far_the_formulas_lie_off_over_all_shapes() -> None:
 
 @given(radius_ratios, slendernesses, moduli)
 def test_positive_and_smooth(radius_ratio: float, slenderness: float, mu: float) -> None:
-    """A shape that differs by 1 % has a correction that differs by a few per cent at most, of its softening more."""
+    """A thickness or length that differs by 1 % changes the correction by a few per cent at most."""
     here = np.log(correction(radius_ratio, slenderness))
     assert np.all(np.isfinite(here))
-    for there in ((radius_ratio * 0.99, slenderness), (radius_ratio, slenderness * 0.99)):
+    for there in ((1.01 * radius_ratio - 0.01, slenderness), (radius_ratio, slenderness * 0.99)):
         if (near := radial_correction(*there)) is not None:
-            assert np.all(np.abs(np.log(near) - here) < (0.01, 0.05, 0.15))
+            assert np.all(np.abs(np.log(near) - here) < (0.01, 0.03, 0.05))
     assert 0.0 <= correction(radius_ratio, slenderness).lowering(mu) < 1.0
 
 
@@ -124,12 +124,13 @@ def test_the_ends_of_the_ranges_belong_to_them(ends: tuple[float, float]) -> Non
     assert Bushing("tube", ends[0], 0.01, ends[1], "calibrated").correction is not None
 
 
-def test_a_model_file_keeps_the_shape_and_an_older_one_is_the_papers(paper_model: Model) -> None:
+def test_a_model_file_keeps_a_calibrated_shape_and_is_the_papers_without(paper_model: Model) -> None:
     calibrated = replace(paper_model.bushing, shape="calibrated")
     document = to_document(Result(replace(paper_model, bushing=calibrated)))
     assert from_document(document).model.bushing == calibrated
-    del document["bushing"]["shape"]
+    assert document["bushing"].pop("shape") == "calibrated"
     assert from_document(document).model.bushing == paper_model.bushing
+    assert "shape" not in to_document(Result(paper_model))["bushing"]
 
 
 def test_a_campaign_says_the_shape() -> None:

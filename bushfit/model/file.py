@@ -266,7 +266,7 @@ def model_document(model: Model) -> dict[str, Any]:
             "inner_radius_m": bushing.inner_radius,
             "outer_radius_m": bushing.outer_radius,
             "length_m": bushing.length,
-            "shape": bushing.shape,
+            **({"shape": bushing.shape} if bushing.shape != "paper" else {}),
         },
         "effects": [effect.name for effect in model.records],
         "parameters": {
