@@ -29,6 +29,23 @@ class Source:
     sha256: str
 
 
+@dataclass(frozen=True)
+class Part:
+    """Where a loop stands in a record that holds several, one after the other.
+
+    Args:
+        number: of the loop in its record, from 1.
+        of: how many loops the record holds.
+        first_row: row of the record that it begins with, from 0.
+        left_out: a sentence on what of the record around it belongs to no loop; None where all does.
+    """
+
+    number: int
+    of: int
+    first_row: int
+    left_out: str | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Loop:
     """A hysteresis loop, or any other record of time, displacement and force.
@@ -42,6 +59,9 @@ class Loop:
         noise: standard deviation of the force relative to its half range, where the campaign states it.
         source: the file it came from; None where it came from none.
         timed: whether time was recorded; else it was rebuilt from the displacement.
+        part: where it stands in a record of several loops; None where the record is one loop.
+        softening: by how much its first cycle is stiffer than its last, relative to the last; None where no more than
+            noise and the memory of rubber make.
 
     Raises:
         MeasurementError: arrays of different length.
@@ -55,6 +75,8 @@ class Loop:
     noise: float | None = None
     source: Source | None = None
     timed: bool = True
+    part: Part | None = None
+    softening: float | None = None
 
     def __post_init__(self) -> None:
         _check_lengths(self.name, self.time, self.displacement, self.force)
