@@ -14,9 +14,9 @@ from bushfit.campaign.toml import read_toml
 from bushfit.errors import CampaignError, naming, typed
 from bushfit.geometry import Bushing
 from bushfit.reading.layout import FileFormat
-from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.sweeps import read_sweep
+from bushfit.reduction.programme import read_programme
 
 #: Endings of test files, which `bushfit init` makes a campaign of.
 TEST_FILES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods")
@@ -51,7 +51,7 @@ class Campaign:
 
 
 def load_campaign(path: str | Path) -> Campaign:
-    """Read a campaign file and the measurements that it names, each once.
+    """Read a campaign file and the measurements that it names, each once; a record of several loops gives each.
 
     Raises:
         CampaignError: the file is missing, no TOML, or has keys or values that are not understood.
@@ -75,7 +75,7 @@ def load_campaign(path: str | Path) -> Campaign:
         content.name or bushing.name,
         path,
         bushing,
-        tuple(read_loop(**keywords) for keywords in reader_keywords(path, content.loops)),
+        tuple(loop for keywords in reader_keywords(path, content.loops) for loop in read_programme(**keywords)),
         tuple(read_sweep(**keywords) for keywords in reader_keywords(path, content.sweeps)),
         content.fit,
         content.predict,

@@ -32,6 +32,8 @@ _LARGEST_NUMBER = 1e100
 _ROUNDING = 1e-9
 #: Repeats or cycles at most: more than any rig runs.
 _LARGEST_COUNT = 1_000_000
+#: [s] Pause in a simulated programme at most: a day is more than any rig rests between two loops.
+_LONGEST_PAUSE = 86_400.0
 #: Ends the check of a list at its first error: those of a hundred thousand would fill the memory.
 _FIRST_ERROR = Field(fail_fast=True)
 #: The second to the power of alpha, at the end of the unit of m.
@@ -131,6 +133,17 @@ def _fit_table(raw: dict[str, Any]) -> dict[str, Any]:
         raise unknown_key("parameters", known_keys(FitSettings))
     settings = {key: value for key, value in raw.items() if key not in _parameter_units()}
     return {**settings, "parameters": {key: value for key, value in raw.items() if key not in settings}}
+
+
+def _programme(raw: dict[str, Any]) -> dict[str, Any]:
+    """A table of [[simulate.loops]] whose lists of amplitudes or frequencies also give the first as its one."""
+    for one, several in (("amplitude", "amplitudes"), ("frequency", "frequencies")):
+        if several in raw and one in raw:
+            expected = f"{one} of a single loop, or {several} of a programme"
+            raise CampaignError("one of these keys is too many", found=f"{one} and {several}", expected=expected)
+        if isinstance(raw.get(several), list) and raw[several]:
+            raw = {**raw, one: raw[several][0]}
+    return raw
 
 
 def _roles(known: Collection[str]) -> BeforeValidator:
@@ -242,13 +255,26 @@ class PredictSettings:
 
 @dataclass(frozen=True)
 class SimulatedLoop:
-    """[[simulate.loops]]: zero-to-peak amplitude [m or rad], frequency [Hz], cycles and waveform."""
+    """[[simulate.loops]]: zero-to-peak amplitude [m or rad], frequency [Hz], cycles and waveform.
+
+    In place of one amplitude or one frequency a programme has amplitudes or frequencies: all amplitudes in turn at each
+    frequency, `cycles` of each, recorded in one go from rest, with `pause` [s] at zero between them.
+    """
 
     direction: Direction
     amplitude: Displacement
     frequency: Frequency
     cycles: Count = 3
     waveform: Waveform = "sine"
+    amplitudes: Annotated[tuple[Displacement, ...], _FIRST_ERROR] = ()
+    frequencies: Annotated[tuple[Frequency, ...], _FIRST_ERROR] = ()
+    pause: Annotated[float, _si("s"), Field(ge=0, le=_LONGEST_PAUSE)] = 0.0
+
+    @property
+    def parts(self) -> list[tuple[float, float]]:
+        """Frequency [Hz] and amplitude [m or rad] of each part of a programme; one of a single loop."""
+        amplitudes = self.amplitudes or (self.amplitude,)
+        return [(frequency, size) for frequency in self.frequencies or (self.frequency,) for size in amplitudes]
 
 
 @dataclass(frozen=True)
@@ -285,7 +311,7 @@ class SimulateSettings:
     displacement_noise: Share = 0.0
     gain_error: Share = 0.0
     phase_error: Annotated[float, _si("rad"), Field(ge=0)] = 0.0
-    loops: tuple[SimulatedLoop, ...] = ()
+    loops: tuple[Annotated[SimulatedLoop, _table(_programme)], ...] = ()
     sweeps: tuple[SimulatedSweep, ...] = ()
 
 
