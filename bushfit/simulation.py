@@ -171,7 +171,7 @@ def _clean_programme(truth: Model, test: SimulatedLoop) -> rig.Record:
             "a programme of loops is too long to simulate",
             place="simulate.loops",
             found=f"{duration:.3g} s at up to {fastest:.3g} Hz, {duration / step:.2g} steps",
-            expected=f"no more than {_MOST_STEPS} steps, {_ROWS_PER_CYCLE * _STEPS_PER_ROW} a cycle at {fastest:.3g} Hz",
+            expected=f"no more than {_MOST_STEPS} steps, {_ROWS_PER_CYCLE * _STEPS_PER_ROW} a cycle of the fastest",
             hint="pause for less, or simulate slow and fast loops as programmes of their own",
         )
     rest = np.zeros(round(test.pause / step))

@@ -22,7 +22,7 @@ from bushfit.fitting.loop_harmonics import MOST_ROWS, loop_harmonics
 from bushfit.fitting.loop_outliers import OutlierRows
 from bushfit.fitting.noise import FLOOR
 from bushfit.fitting.phase_bins import phase_bins
-from bushfit.fitting.preload import is_preload, preload
+from bushfit.fitting.preload import mean_of_preload, preload
 from bushfit.fitting.runin import steady_part, thinned
 from bushfit.fitting.waveform import wrong_clock
 from bushfit.reading.measurement import Loop
@@ -183,10 +183,10 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
     )
     drive = replace(drive, weight=np.where(_at_reversal(drive), 0.0, drive.weight))
     _check_loses_energy(drive)
-    if not from_rest and (abs(found.motion[0]) > _CENTRED * half_motion or is_preload(drive, found.force_mean)):
-        notes = (*drive.notes, *preload(drive, found.force_mean))
-        drive = replace(drive, datum=found.force_mean, notes=notes)
-    return drive
+    if not from_rest:
+        off_zero = abs(found.motion[0]) > _CENTRED * half_motion
+        drive = replace(drive, datum=found.force_mean if off_zero else mean_of_preload(drive))
+    return replace(drive, notes=(*drive.notes, *preload(drive)))
 
 
 def _of_the_record(loop: Loop) -> Iterator[str]:

@@ -18,31 +18,31 @@ if TYPE_CHECKING:
 _PRELOADED = 0.25
 #: Share of the amplitude, or of half the force's range, from which on a mean is told as a preload; chosen: sensors are
 #: off zero by less.
-_TOLD_MEAN = 0.05
+TOLD_MEAN = 0.05
 
 
-def is_preload(drive: Drive, mean: float) -> bool:
-    """Whether the mean of the force [N or N m] is that of a preload about which the displacement counts from zero.
+def mean_of_preload(drive: Drive) -> float | None:
+    """The mean force of a preload about which the displacement counts from zero [N or N m]; None where there is none.
 
     A stiffness that is not the same to either side makes a mean force too, and a second harmonic of its size.
     """
-    if abs(mean) <= _PRELOADED * drive.half_range:
-        return False
-    second = least_squares(basis(drive.phase, 2), drive.force, drive.weight)[[2, 4]]
-    return bool(abs(mean) - np.hypot(*second) > _PRELOADED * drive.half_range)
+    mean, _, cosine, _, sine = least_squares(basis(drive.phase, 2), drive.force, drive.weight)
+    return float(mean) if abs(mean) - np.hypot(cosine, sine) > _PRELOADED * drive.half_range else None
 
 
-def preload(drive: Drive, mean_force: float) -> Iterator[str]:
-    """A sentence on the means that a loop was recorded about [m or rad, N or N m], where they are no sensor's zero."""
+def preload(drive: Drive) -> Iterator[str]:
+    """A sentence on the means that a loop counts from, where they are no sensor's zero."""
+    if drive.datum is None:
+        return
     (motion, force), units = drive.loop.direction.motion.words, drive.loop.direction.display
     mean_motion = float(drive.coefficients[0].real)
     means = [
         f"a mean {word} of {number(factor * mean, 3)} {unit}"
         for word, mean, (unit, factor), half in (
             (motion, mean_motion, units.displacement, drive.amplitude),
-            (force, mean_force, for_people(*units.force, mean_force), drive.half_range),
+            (force, drive.datum, for_people(*units.force, drive.datum), drive.half_range),
         )
-        if abs(mean) > _TOLD_MEAN * half
+        if abs(mean) > TOLD_MEAN * half
     ]
     if means:
         yield f"recorded about {' and '.join(means)}; the model knows no preload: the fit takes the loop about its mean"

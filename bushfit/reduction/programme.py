@@ -1,12 +1,12 @@
 """Loop programmes: a record of several amplitudes or rates, one after the other, parted into loops.
 
 The strokes of the motion, from one turning point to the next, are told apart by their range and by the time between
-the crossings of their middles. A run of alike ones is a part; ramps, pauses and single cycles between them are left out.
+the crossings of their middles. A run of alike ones is a part; ramps, pauses and single cycles between are left out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -100,8 +100,12 @@ class _Span:
 
 def read_programme(**keywords: Any) -> tuple[Loop, ...]:
     """The loops of a file, most often one: `read_loop` with these keywords, then `programme`."""
-    stated = {key: keywords[key] for key in _CLOCK if key in keywords}
-    return programme(read_loop(**keywords), **stated)
+    return programme(read_loop(**keywords), **clock_stated(keywords))
+
+
+def clock_stated(keywords: Mapping[str, Any]) -> dict[str, Any]:
+    """The keywords of `read_loop` that settle the time of a record without it."""
+    return {key: keywords[key] for key in _CLOCK if key in keywords}
 
 
 def programme(loop: Loop, **clock: Any) -> tuple[Loop, ...]:
