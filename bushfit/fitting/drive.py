@@ -67,8 +67,9 @@ class Drive:
         noise: standard deviation of one row's force [N or N m].
         coefficients: complex harmonics of the displacement, mean first.
         half_range: half of the range of the measured force, outliers aside [N or N m].
-        datum: mean of the measured force where the motion lies off zero or the force is a preload's, else None.
-            Whether a sensor's zero or a preload put it there is not known, so such a loop counts from its own middle.
+        datum: mean of the measured force where the motion lies off zero, the force is a preload's, or other cycles
+            went before in the record; else None. Whether a sensor's zero, a preload or the memory of rubber put it
+            there is not known, so such a loop counts from its own middle.
         notes: sentences on what of the record was left out, and on a time that does not go with its rows.
         outliers: by column, rows of the loop that are faults of the record, and how far they lie off [noise].
         first_row: row of the whole record that the loop begins with.
@@ -184,8 +185,9 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
     drive = replace(drive, weight=np.where(_at_reversal(drive), 0.0, drive.weight))
     _check_loses_energy(drive)
     if not from_rest:
-        off_zero = abs(found.motion[0]) > _CENTRED * half_motion
-        drive = replace(drive, datum=found.force_mean if off_zero else mean_of_preload(drive))
+        follows = loop.part is not None and loop.part.first_row > 0  # rubber remembers what came before
+        unknown = follows or abs(found.motion[0]) > _CENTRED * half_motion
+        drive = replace(drive, datum=found.force_mean if unknown else mean_of_preload(drive))
     return replace(drive, notes=(*drive.notes, *preload(drive)))
 
 

@@ -36,13 +36,12 @@ def preload(drive: Drive) -> Iterator[str]:
         return
     (motion, force), units = drive.loop.direction.motion.words, drive.loop.direction.display
     mean_motion = float(drive.coefficients[0].real)
+    off_zero = abs(mean_motion) > TOLD_MEAN * drive.amplitude
     means = [
-        f"a mean {word} of {number(factor * mean, 3)} {unit}"
-        for word, mean, (unit, factor), half in (
-            (motion, mean_motion, units.displacement, drive.amplitude),
-            (force, drive.datum, for_people(*units.force, drive.datum), drive.half_range),
-        )
-        if abs(mean) > TOLD_MEAN * half
-    ]
+        f"a mean {motion} of {number(units.displacement.factor * mean_motion, 3)} {units.displacement.name}"
+    ] * off_zero
+    if abs(drive.datum) > (TOLD_MEAN if off_zero else _PRELOADED) * drive.half_range:
+        unit, factor = for_people(*units.force, drive.datum)
+        means.append(f"a mean {force} of {number(factor * drive.datum, 3)} {unit}")
     if means:
         yield f"recorded about {' and '.join(means)}; the model knows no preload: the fit takes the loop about its mean"
