@@ -110,9 +110,15 @@ class Drive:
     def history(self, settles: bool) -> History:
         """The motion as the model wants it, GRID samples a cycle.
 
-        One settled cycle, or the whole record where it begins at rest or the model `settles` over the cycles.
+        One settled cycle, or the whole record where it begins at rest or the model `settles` over the cycles; in a part
+        after other cycles it has.
         """
-        return self._settling if settles and not self.from_rest else self._motion
+        return self._settling if settles and not (self.from_rest or self.follows) else self._motion
+
+    @property
+    def follows(self) -> bool:
+        """Whether other rows of its record went before, which the rubber remembers."""
+        return self.loop.part is not None and self.loop.part.first_row > 0
 
     @cached_property
     def _motion(self) -> History:
@@ -185,8 +191,7 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
     drive = replace(drive, weight=np.where(_at_reversal(drive), 0.0, drive.weight))
     _check_loses_energy(drive)
     if not from_rest:
-        follows = loop.part is not None and loop.part.first_row > 0  # rubber remembers what came before
-        unknown = follows or abs(found.motion[0]) > _CENTRED * half_motion
+        unknown = drive.follows or abs(found.motion[0]) > _CENTRED * half_motion
         drive = replace(drive, datum=found.force_mean if unknown else mean_of_preload(drive))
     return replace(drive, notes=(*drive.notes, *preload(drive)))
 
