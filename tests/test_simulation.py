@@ -88,6 +88,27 @@ def test_files_are_a_campaign_that_says_nothing_of_the_truth(
     assert [name for name in FIVE if f"{name} =" in text] == []
 
 
+def test_a_programme_is_one_file_of_several_loops(paper_model: Model, tmp_path: Path) -> None:
+    sizes, rates = (2e-4, 1e-3), (0.1, 0.3)
+    loop = SimulatedLoop(Direction.AXIAL, cycles=4, amplitudes=sizes, frequencies=rates, pause=5.0)
+    simulated = simulate(paper_model, SimulateSettings(loops=(loop,)))
+    (record,) = simulated.loops
+    assert record.time[-1] == pytest.approx(2 * 4 / 0.1 + 2 * 4 / 0.3 + 3 * 5.0, abs=0.02)
+    for name, content in to_files(simulated).items():
+        (tmp_path / name).write_bytes(content)
+    read, in_memory = load_campaign(tmp_path / "campaign.toml").loops, simulated.campaign().loops
+    for loops in (read, in_memory):
+        assert [part.name for part in loops] == [f"loop_axial_1_part_{number}" for number in (1, 2, 3, 4)]
+        assert [np.ptp(part.displacement) / 2.0 for part in loops] == pytest.approx([*sizes, *sizes], rel=1e-3)
+    assert {part.source for part in read} == {read[0].source}
+
+
+def test_a_programme_too_long_to_simulate_is_refused(paper_model: Model) -> None:
+    loop = SimulatedLoop(Direction.AXIAL, 1e-3, frequencies=(1e-3, 10.0))
+    with pytest.raises(CampaignError, match="too long to simulate"):
+        simulate(paper_model, SimulateSettings(loops=(loop,)))
+
+
 def test_sweeps_of_one_direction_have_names_of_their_own(paper_model: Model) -> None:
     plan = SimulateSettings(sweeps=(SWEEP, replace(SWEEP, amplitudes=(2e-4,))))
     assert [sweep.name for sweep in simulate(paper_model, plan).sweeps] == ["sweep_axial_1", "sweep_axial_2"]

@@ -135,17 +135,6 @@ def _fit_table(raw: dict[str, Any]) -> dict[str, Any]:
     return {**settings, "parameters": {key: value for key, value in raw.items() if key not in settings}}
 
 
-def _programme(raw: dict[str, Any]) -> dict[str, Any]:
-    """A table of [[simulate.loops]] whose lists of amplitudes or frequencies also give the first as its one."""
-    for one, several in (("amplitude", "amplitudes"), ("frequency", "frequencies")):
-        if several in raw and one in raw:
-            expected = f"{one} of a single loop, or {several} of a programme"
-            raise CampaignError("one of these keys is too many", found=f"{one} and {several}", expected=expected)
-        if isinstance(raw.get(several), list) and raw[several]:
-            raw = {**raw, one: raw[several][0]}
-    return raw
-
-
 def _roles(known: Collection[str]) -> BeforeValidator:
     """A validator that refuses other keys than these roles of columns."""
 
@@ -262,13 +251,21 @@ class SimulatedLoop:
     """
 
     direction: Direction
-    amplitude: Displacement
-    frequency: Frequency
+    amplitude: Displacement = 0.0
+    frequency: Frequency = 0.0
     cycles: Count = 3
     waveform: Waveform = "sine"
-    amplitudes: Annotated[tuple[Displacement, ...], _FIRST_ERROR] = ()
-    frequencies: Annotated[tuple[Frequency, ...], _FIRST_ERROR] = ()
+    amplitudes: Annotated[tuple[Displacement, ...], _FIRST_ERROR, Field(min_length=1)] = ()
+    frequencies: Annotated[tuple[Frequency, ...], _FIRST_ERROR, Field(min_length=1)] = ()
     pause: Annotated[float, _si("s"), Field(ge=0, le=_LONGEST_PAUSE)] = 0.0
+
+    def __post_init__(self) -> None:
+        for one, several in (("amplitude", "amplitudes"), ("frequency", "frequencies")):
+            given = [key for key in (one, several) if getattr(self, key)]
+            if len(given) != 1:
+                message = "one of these keys is too many" if given else "a key is missing"
+                expected = f"{one} = ..., or {several} = [...] of a programme"
+                raise ValueError(CampaignError(message, found=" and ".join(given) or None, expected=expected))
 
     @property
     def parts(self) -> list[tuple[float, float]]:
@@ -311,7 +308,7 @@ class SimulateSettings:
     displacement_noise: Share = 0.0
     gain_error: Share = 0.0
     phase_error: Annotated[float, _si("rad"), Field(ge=0)] = 0.0
-    loops: tuple[Annotated[SimulatedLoop, _table(_programme)], ...] = ()
+    loops: tuple[SimulatedLoop, ...] = ()
     sweeps: tuple[SimulatedSweep, ...] = ()
 
 

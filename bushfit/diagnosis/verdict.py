@@ -207,7 +207,7 @@ def _result(evidence: Evidence, bounds: Bounds) -> Result:
         quality(model, evidence.data_sets, len(moving)),
         measured_range(model, evidence.data_sets),
         tuple(cautions(model, evidence.solution, evidence.data_sets, bounds, cov)),
-        tuple(data_set.source for data_set in evidence.data_sets if data_set.source is not None),
+        tuple(dict.fromkeys(data_set.source for data_set in evidence.data_sets if data_set.source is not None)),
         at_bound=evidence.solution.at_bound,
     )
 

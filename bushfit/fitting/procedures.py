@@ -235,7 +235,7 @@ def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = Non
                 for line in cautions(model, step.solution, step.data_sets, data.bounds, cov, _NEXT)
             ),
         ),
-        tuple(data_set.source for data_set in data_sets if data_set.source is not None),
+        tuple(dict.fromkeys(data_set.source for data_set in data_sets if data_set.source is not None)),
         outliers,
         at_bound={name: end for step in steps for name, end in step.solution.at_bound.items()},
     )

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bushfit.campaign.schema import SimulatedLoop, SimulateSettings
+from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects.contract import Array
 from bushfit.errors import MeasurementError
 from bushfit.fitting.data import Data
@@ -208,6 +209,18 @@ def test_a_softening_is_told_of_each_part(paper_model: Model) -> None:
     assert one.softening == pytest.approx(0.12, abs=0.03)
 
 
+def test_a_softening_in_the_virgin_cycles_of_a_programme_is_diagnosed(paper_model: Model) -> None:
+    """Later parts of the record are past it, though each is a loop of its own."""
+    softening = paper_model.with_effect("mullins_softening", {"share": 0.2, "cycles": 1.0})
+    loop = SimulatedLoop(Direction.AXIAL, cycles=5, amplitudes=(2e-4, 5e-4, 1e-3), frequency=0.1, pause=12.0)
+    data = Data.of(simulate(softening, replace(NOISE, loops=(loop,))).campaign())
+    found = diagnose(data)
+    share = found.result.model.values["mullins_softening.share"]
+    print(f"{found.verdict}: {[effect.name for effect in found.effects]}, share {share:.3f} of 0.2")
+    assert [effect.name for effect in found.effects] == ["mullins_softening"]
+    assert share == pytest.approx(0.2, abs=0.02)
+
+
 @pytest.mark.parametrize("case", ["three amplitudes", "pauses", "up and down"])
 def test_what_rubber_remembers_is_no_softening(paper_model: Model, other_models: dict[str, Model], case: str) -> None:
     for model in (paper_model, *other_models.values()):
@@ -245,7 +258,7 @@ def test_a_stiffness_other_to_either_side_is_no_preload(paper_model: Model) -> N
 
 def test_a_programme_fits_as_its_loops_in_files_of_their_own(paper_model: Model) -> None:
     sizes, rates = (2e-4, 5e-4, 1e-3), (0.02, 0.5)
-    whole = SimulatedLoop(Direction.AXIAL, sizes[0], rates[0], cycles=4, amplitudes=sizes, frequencies=rates)
+    whole = SimulatedLoop(Direction.AXIAL, cycles=4, amplitudes=sizes, frequencies=rates)
     single = tuple(SimulatedLoop(Direction.AXIAL, x, f, cycles=3) for f in rates for x in sizes)
     results = []
     for loops in ((whole,), single):
@@ -253,6 +266,7 @@ def test_a_programme_fits_as_its_loops_in_files_of_their_own(paper_model: Model)
         data = Data.of(simulated.campaign())
         assert len(data.loops) == 6
         results.append(fit_joint(data))
+        assert [outlier for outlier in results[-1].outliers if outlier.distance > 6.0] == []
     for name in ("mu", "sigma_fmax", "eps_half"):
         one, other = (result.model.values[name] for result in results)
         print(f"{name}: {one:.4g} of the programme, {other:.4g} of single loops, {paper_model.values[name]:.4g} true")
