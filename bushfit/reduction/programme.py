@@ -37,8 +37,11 @@ _MOST_CREEP = 1.5
 _MOST_DRIFT = 3.0
 #: Half cycles between crossings, fewer than which make no part: a whole cycle.
 _FEWEST_HALVES = 2
-#: Strokes of other ranges from which on a record without a part is refused; chosen: two cycles show what changes.
-_FEWEST_CHANGING = 4
+#: Strokes from which on a record without a part is refused, where their ranges differ by more than the natural log
+#: after it; chosen: two cycles show what changes, and no rig misses its amplitude by a third.
+_FEWEST_CHANGING, _CHANGING = 4, 0.3
+#: Relative difference of the ranges of two parts up to which they have one amplitude; chosen: rigs step by more.
+_SAME_AMPLITUDE = 0.08
 #: Cycles between two parts alike up to which they are one that was disturbed; chosen: an outlier disturbs no more.
 _DISTURBED = 3.1
 #: Distance from its phase [cycles] up to which a motion goes on.
@@ -93,9 +96,8 @@ class _Span:
 
     def like(self, other: _Span) -> bool:
         """Whether two parts have one amplitude and one rate."""
-        return (
-            abs(np.log(self.range / other.range)) < _SAME_RANGE and abs(np.log(self.period / other.period)) < _SAME_RATE
-        )
+        ranges, periods = np.log(self.range / other.range), np.log(self.period / other.period)
+        return bool(abs(ranges) < _SAME_AMPLITUDE and abs(periods) < _SAME_RATE)
 
 
 def read_programme(**keywords: Any) -> tuple[Loop, ...]:
@@ -171,7 +173,7 @@ def _spans(loop: Loop, time: Floats, motion: Floats) -> list[_Span]:
                 part = float(np.median(size[first : last + 1]))
                 found.append(_Span(first, last, float(across[first]), float(across[last]), period, part))
     inner = size[1:-1]
-    if not found and inner.size >= _FEWEST_CHANGING and np.ptp(np.log(inner)) > _SAME_RANGE * _FEWEST_CHANGING:
+    if not found and inner.size >= _FEWEST_CHANGING and np.ptp(np.log(inner)) > _CHANGING:
         unit, factor = loop.direction.display.displacement
         raise MeasurementError(
             "no part of the record is a loop",
