@@ -1,6 +1,6 @@
-"""The bushing and the directions in which it is tested: equivalent strain and stiffness (Eqs. 7, 8, 10, 11, 12).
+"""What is tested, and how: a bushing in a direction, or a specimen of its compound; equivalent strain and stiffness.
 
-Source: Garcia Tarrago, Kari, Vinolas, Gil-Negrete, Polymer Testing 26 (2007) 629-638.
+Eqs. 7, 8, 10, 11, 12. Source: Garcia Tarrago, Kari, Vinolas, Gil-Negrete, Polymer Testing 26 (2007) 629-638.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from scipy.special import ive, kve
 
@@ -50,12 +50,12 @@ class Motion:
     """A kind of motion: what moves, what resists it, and the units of both.
 
     Args:
-        words: what moves and what resists, as files and reports call them.
+        words: what moves, what resists it, and what relates the two, as files and reports call them.
         displacement_unit, force_unit, stiffness_unit: SI units, as `units` writes them.
         display: the units in which engineers read them.
     """
 
-    words: tuple[str, str]
+    words: tuple[str, str, str]
     displacement_unit: str
     force_unit: str
     stiffness_unit: str
@@ -63,23 +63,31 @@ class Motion:
 
 
 TRANSLATION = Motion(
-    words=("displacement", "force"),
+    words=("displacement", "force", "stiffness"),
     displacement_unit="m",
     force_unit="N",
     stiffness_unit="N/m",
     display=Display(Unit("mm", 1e3), Unit("N", 1.0), Unit("N/mm", 1e-3)),
 )
 ROTATION = Motion(
-    words=("rotation", "moment"),
+    words=("rotation", "moment", "stiffness"),
     displacement_unit="rad",
     force_unit="N*m",
     stiffness_unit="N*m/rad",
     display=Display(Unit("deg", math.degrees(1.0)), Unit("N m", 1.0), Unit("N m/rad", 1.0)),
 )
+#: Of a test of the material alone, whatever the shape of the specimen.
+STRAINING = Motion(
+    words=("strain", "stress", "modulus"),
+    displacement_unit="1",
+    force_unit="Pa",
+    stiffness_unit="Pa",
+    display=Display(Unit("%", 100.0), Unit("kPa", 1e-3), Unit("MPa", 1e-6)),
+)
 
 
 class Direction(StrEnum):
-    """Direction of a test: its name in files, and its kind of motion."""
+    """Direction in which a bushing is tested: its name in files, and its kind of motion."""
 
     AXIAL = "axial"
     RADIAL = "radial"
@@ -146,6 +154,120 @@ class Bushing:
     def stiffness_per_modulus(self, direction: Direction) -> float:
         """Stiffness per unit equivalent shear modulus: [m], or [m^3/rad] of a rotation."""
         return _DEFINITIONS[direction].stiffness_per_modulus(self)
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """A body of the compound that is tested in one way only: a coupon, or a mount in plain shear.
+
+    Args:
+        name: of the specimen; its tests and tables go by it.
+        kind: "modulus" where tests give strain and modulus, "shear" where they give displacement and force of rubber
+            blocks in shear.
+        strain: of a modulus test, what its files state: engineering shear strain gamma = 2 e, the tensor's shear e (it
+            is read as gamma), or the strain of a bar in tension, with Young's modulus.
+        area: of one block in shear [m^2].
+        thickness: of one block [m].
+        elements: blocks in parallel.
+
+    Raises:
+        ModelError: a shear specimen without a positive area and thickness.
+
+    Notes:
+        The model's equivalent strain e is the tensor's shear, with stress 2 mu e. A block in shear has e/d = 1/(2
+        thickness) and K/G = elements area/thickness. A bar of an incompressible rubber in tension has E = 3 G and, by
+        equal energy, e = sqrt(3)/2 of its strain.
+    """
+
+    name: str
+    kind: Literal["modulus", "shear"]
+    strain: Literal["engineering", "tensor", "tension"] = "engineering"
+    area: float | None = None
+    thickness: float | None = None
+    elements: int = 1
+
+    def __post_init__(self) -> None:
+        for key in ("area", "thickness"):
+            size = getattr(self, key)
+            if (self.kind == "shear") != (size is not None) or not (size is None or (math.isfinite(size) and size > 0)):
+                raise ModelError(
+                    "impossible specimen",
+                    place=f"{self.name}, {key}",
+                    found="none" if size is None else f"{size:g}",
+                    expected="a positive size" if self.kind == "shear" else f'none, because kind = "{self.kind}"',
+                )
+
+    def __str__(self) -> str:
+        return self.name
+
+    @property
+    def motion(self) -> Motion:
+        """Displacement and force of a block, or strain and stress of the material."""
+        return TRANSLATION if self.kind == "shear" else STRAINING
+
+    @property
+    def is_rotation(self) -> bool:
+        """Whether it counts rotation; no specimen does."""
+        return False
+
+    @property
+    def display(self) -> Display:
+        """The units in which engineers read its displacement, force and stiffness, or strain, stress and modulus."""
+        return self.motion.display
+
+    @property
+    def unit_strain(self) -> float:
+        """Equivalent strain per unit displacement [1/m], or per unit of its strain [1]."""
+        if self.thickness is not None:
+            return 0.5 / self.thickness
+        return math.sqrt(3.0) / 2.0 if self.strain == "tension" else 0.5
+
+    @property
+    def stiffness_per_modulus(self) -> float:
+        """Stiffness per unit equivalent shear modulus [m], or modulus that a test gives over it [1]."""
+        if self.area is not None and self.thickness is not None:
+            return self.elements * self.area / self.thickness
+        return 3.0 if self.strain == "tension" else 1.0
+
+    @property
+    def stated_strain(self) -> float:
+        """What one unit of strain as its files state it is as it is counted: 2 of the tensor's shear, else 1."""
+        return 2.0 if self.strain == "tensor" else 1.0
+
+
+#: Where a response is measured or predicted: a direction of the bushing, or a specimen of its compound.
+Place = Direction | Specimen
+
+
+def unit_strain(bushing: Bushing | None, place: Place) -> float:
+    """Equivalent strain per unit displacement [1/m], rotation [1/rad] or strain [1] at a place.
+
+    Raises:
+        ModelError: a direction where there is no bushing.
+    """
+    return place.unit_strain if isinstance(place, Specimen) else _present(bushing, place).unit_strain(place)
+
+
+def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
+    """Stiffness per unit equivalent shear modulus at a place: [m], [m^3/rad] of a rotation, [1] of a modulus.
+
+    Raises:
+        ModelError: a direction where there is no bushing.
+    """
+    if isinstance(place, Specimen):
+        return place.stiffness_per_modulus
+    return _present(bushing, place).stiffness_per_modulus(place)
+
+
+def _present(bushing: Bushing | None, place: Direction) -> Bushing:
+    if bushing is None:
+        raise ModelError(
+            "there is no bushing",
+            place=str(place),
+            expected="a [bushing] with its radii and length, which a direction belongs to",
+            hint="bushfit predict MODEL.json --bushing other.toml carries the compound of a model to a bushing",
+        )
+    return bushing
 
 
 def _axial_strain(tube: Bushing) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from bushfit.effects import Level, effect_named
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
-from bushfit.geometry import Direction
+from bushfit.geometry import Direction, Place
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_jacobian
 from bushfit.reading.measurement import Sweep
@@ -58,7 +58,7 @@ class Prediction:
         warnings: sentences on directions, frequencies and strains that were not fitted.
     """
 
-    direction: Direction
+    direction: Place
     frequency: Array
     amplitude: Array
     stiffness: Band
@@ -68,14 +68,14 @@ class Prediction:
     warnings: tuple[str, ...]
 
 
-def default_grid(result: Result, direction: Direction, sweeps: Sequence[Sweep] = ()) -> tuple[Array, Array]:
+def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ()) -> tuple[Array, Array]:
     """Frequencies [Hz] and amplitudes [m or rad] to predict at where none are asked for, rising.
 
     They are those of the sweeps in this direction, so that prediction and measurement stand side by side. Without any
     sweep they are the paper's as far as they lie in the measured range, or an even grid over that range where fewer
     than two do.
     """
-    mine = [sweep for sweep in sweeps if sweep.direction is direction]
+    mine = [sweep for sweep in sweeps if sweep.direction == direction]
     if mine:
         frequency, amplitude = (
             _distinct(np.concatenate([getattr(sweep, name) for sweep in mine])) for name in ("frequency", "amplitude")
@@ -91,7 +91,7 @@ def default_grid(result: Result, direction: Direction, sweeps: Sequence[Sweep] =
         inside = _distinct(np.geomspace(low, high, _FREQUENCIES))
     if direction.is_rotation:
         return inside, amplitudes
-    per_displacement = result.model.bushing.unit_strain(Direction.AXIAL)
+    per_displacement = result.model.unit_strain(Direction.AXIAL)
     least, most = (strain / per_displacement for strain in result.measured.strain)
     reached = amplitudes[(amplitudes >= least * (1 - _MARGIN)) & (amplitudes <= most * (1 + _MARGIN))]
     if reached.size < 2:
@@ -110,7 +110,7 @@ def _distinct(values: Array) -> Array:
 
 def predict(
     result: Result,
-    direction: Direction,
+    direction: Place,
     frequencies: Sequence[float] | Array,
     amplitudes: Sequence[float] | Array,
     *,
@@ -179,7 +179,7 @@ def rig_effects(result: Result) -> list[str]:
     return [name for name in result.model.effects if effect_named(name).level is Level.INSTRUMENT]
 
 
-def _unfitted(result: Result, direction: Direction) -> Iterator[str]:
+def _unfitted(result: Result, direction: Place) -> Iterator[str]:
     """A warning where a direction was not fitted: its band lacks the error of the formula that leads there."""
     fitted = result.measured.directions if result.measured else ()
     if not fitted or direction in fitted:
@@ -190,19 +190,19 @@ def _unfitted(result: Result, direction: Direction) -> Iterator[str]:
         if radially
         else (Direction.TORSION, "which was not compared with finite elements")
     )
-    if any(effect_named(name).corrects is formula for name in result.model.effects):
+    if any(effect_named(name).corrects == formula for name in result.model.effects):
         return
     band = f"its band holds the scatter of the {' and '.join(fitted)} tests, not" if result.fitted else "no band holds"
     yield f"{direction}: not fitted; {band} the error of the {formula} formula, {compared}"
 
 
-def _extrapolations(result: Result, direction: Direction, frequency: Array, amplitude: Array) -> Iterator[str]:
+def _extrapolations(result: Result, direction: Place, frequency: Array, amplitude: Array) -> Iterator[str]:
     """A warning for the frequencies and one for the strains where they leave what was fitted."""
     if result.measured is None:
         return
     axes = (
         ("frequencies", "Hz", frequency, result.measured.frequency),
-        ("strains", "%", amplitude * result.model.bushing.unit_strain(direction), result.measured.strain),
+        ("strains", "%", amplitude * result.model.unit_strain(direction), result.measured.strain),
     )
     for what, unit, asked, (low, high) in axes:
         if asked.min() < low * (1 - _MARGIN) or asked.max() > high * (1 + _MARGIN):

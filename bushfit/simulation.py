@@ -15,7 +15,7 @@ import numpy as np
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
-from bushfit.effects import BASE
+from bushfit.effects import BASE, effect_of
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError, naming
 from bushfit.geometry import Direction
@@ -71,8 +71,9 @@ class Simulated:
     def campaign(self) -> Campaign:
         """The measurements as a campaign in memory, without the truth."""
         bushing = self.truth.bushing
+        name = self.truth.name
         loops = tuple(part for loop in self.loops for part in programme(loop))
-        return Campaign(bushing.name, Path(bushing.name), bushing, loops, self.sweeps)
+        return Campaign(name, Path(name), bushing, loops, self.sweeps)
 
 
 def model_of(campaign: Campaign) -> Model:
@@ -100,9 +101,9 @@ def model_of(campaign: Campaign) -> Model:
             expected="all of " + ", ".join(FIVE),
         )
     effects = campaign.simulate.effects
-    values |= {f"{effect}.{name}": value for effect, table in effects.items() for name, value in table.items()}
+    own = {f"{effect}.{name}": value for effect, table in effects.items() for name, value in table.items()}
     with naming(campaign.path):
-        return Model(campaign.bushing, (*BASE, *effects), values)
+        return Model(campaign.bushing, (*BASE, *dict.fromkeys(map(effect_of, own))), {**values, **own})
 
 
 def simulate(truth: Model, plan: SimulateSettings) -> Simulated:
@@ -240,10 +241,12 @@ def _campaign_toml(simulated: Simulated) -> str:
     bushing, plan = simulated.truth.bushing, simulated.plan
     lines = [
         f"# Simulated by bushfit simulate with seed {plan.seed}: no rubber was tested. The model is in truth.json.",
-        "[bushing]",
-        f"name = {json.dumps(bushing.name, ensure_ascii=False)}",
-        *(f'{key} = "{getattr(bushing, key) * 1e3:.6g} mm"' for key in ("inner_radius", "outer_radius", "length")),
     ]
+    if bushing:
+        lines += ["[bushing]", f"name = {json.dumps(bushing.name, ensure_ascii=False)}"]
+        lines += [
+            f'{key} = "{getattr(bushing, key) * 1e3:.6g} mm"' for key in ("inner_radius", "outer_radius", "length")
+        ]
     for kind, tests in (("loops", simulated.loops), ("sweeps", simulated.sweeps)):
         for test in tests:
             lines += ["", f"[[{kind}]]", f'file = "{test.name}.csv"', f'direction = "{test.direction}"']

@@ -31,6 +31,8 @@ _KINDS = {
     "m/s": ("a speed", "mm/min"),
     "rad/s": ("an angular speed", "deg/min"),
     "Pa": ("a stress", "MPa"),
+    "kg": ("a mass", "kg"),
+    "m/s^2": ("an acceleration", "m/s^2"),
     "1": ("a ratio", "%"),
 }
 #: By SI unit: the unit in which people write it, and the factor from SI to it; MPa*s^alpha is the paper's.
@@ -40,6 +42,14 @@ _WRITTEN = {
     "N/m": ("N/mm", 1e-3),
     "1": ("-", 1.0),
     "Pa*s^alpha": ("MPa*s^alpha", 1e-6),
+}
+#: Zero of the Celsius scale [K].
+CELSIUS = 273.15
+#: By the unit of a temperature: kelvin per unit, and kelvin at zero of the unit.
+_TEMPERATURES = {
+    **dict.fromkeys(("degc", "c", "celsius"), (1.0, CELSIUS)),
+    **dict.fromkeys(("k", "kelvin"), (1.0, 0.0)),
+    **dict.fromkeys(("degf", "f", "fahrenheit"), (5.0 / 9.0, CELSIUS - 32.0 * 5.0 / 9.0)),
 }
 #: Times below this many seconds are written in milliseconds.
 _LEAST_IN_SECONDS = 0.1
@@ -90,10 +100,14 @@ _EVERYDAY = {
         "kilogram * meter ** 2 / second ** 2": {"N*m": 1.0, "N m": 1.0, "Nm": 1.0},
         "kilogram / second ** 2": {"N/m": 1.0, "N/mm": 1e3, "kN/mm": 1e6},
         "kilogram * meter ** 2 / radian / second ** 2": {"N*m/rad": 1.0, "N m/deg": 180.0 / math.pi},
+        "kilogram": {"kg": 1.0, "g": 1e-3},
+        "meter / second ** 2": {"m/s^2": 1.0},
         "kilogram / meter / second ** 2": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6},
     }.items()
     for unit, scale in scales.items()
 }
+#: What an acceleration is written in that is another quantity elsewhere (a gram, square milliseconds), as pint has it.
+_OF_ACCELERATION = {"g": "gravity", "G": "gravity", "gn": "gravity", "ms2": "m/s^2", "ms-2": "m/s^2", "ms^-2": "m/s^2"}
 #: Units whose capitals matter, by the spelling of users: pint takes Grad for a billion radians.
 _EXACT = {
     spelling: unit
@@ -142,6 +156,8 @@ def factor(text: str, expected: str) -> float:
     Raises:
         UnitError: an unknown unit, or a unit of another dimension.
     """
+    if expected == "m/s^2":
+        text = _OF_ACCELERATION.get(text.strip(), text)
     scale, base = _resolve(text)
     if base != _resolve(expected)[1]:
         hint = 'a pound of force is "lbf"' if {"lb", "lbs"} & set(_WORD.findall(text)) else None
@@ -325,3 +341,17 @@ def _registry() -> pint.UnitRegistry[Any]:
     import pint
 
     return pint.UnitRegistry(str(Path(__file__).with_name("units.txt")), cache_folder=None)
+
+
+def temperature(raw: object) -> float:
+    """The temperature [K] that a text such as "22 degC", "295 K" or "72 degF" states.
+
+    Raises:
+        UnitError: no text of a number and one of these units, or one below absolute zero.
+    """
+    found = re.fullmatch(r"\s*([+-]?\d+(?:[.,]\d+)?)\s*(.*?)\s*", raw) if isinstance(raw, str) else None
+    scale = _TEMPERATURES.get(found[2].replace("°", "deg").replace(" ", "").lower()) if found else None
+    kelvin = scale[0] * float(found[1].replace(",", ".")) + scale[1] if found and scale else -1.0
+    if kelvin < 0.0:
+        raise UnitError("this is no temperature", found=repr(raw), expected='such as "22 degC" or "295 K"')
+    return kelvin

@@ -195,7 +195,7 @@ def test_a_fit_knows_its_directions(campaign: Campaign) -> None:
 
 
 def test_a_radial_factor_stands_for_the_error_of_the_radial_formula(result: Result) -> None:
-    model = result.model.with_effect("radial_factor", {"radial_factor.excess": 0.05})
+    model = result.model.with_effect("stiffness_factor.radial", {"stiffness_factor.radial": 1.05})
     for direction, said in ((Direction.RADIAL, False), (Direction.TORSION, True)):
         warnings = predict(replace(result, model=model), direction, [5.0], [2e-5]).warnings
         assert any("not fitted" in line for line in warnings) is said

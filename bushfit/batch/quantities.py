@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bushfit.batch.points import Point
-from bushfit.effects import LIBRARY, qualified
+from bushfit.effects import is_parameter, parameter_named, parameter_names
 from bushfit.units import for_people
 
 Record = Mapping[str, Any]
@@ -50,8 +50,9 @@ def at_point(point: Point, what: str) -> Quantity:
 
 def parameter_quantities(names: Collection[str]) -> list[Quantity]:
     """Parameters of the library that are among the names, in its order."""
-    units = {qualified(effect, p): p.unit for effect in LIBRARY.values() for p in effect.parameters}
-    return [Quantity(name, "-" if unit == "1" else unit) for name, unit in units.items() if name in names]
+    in_order = dict.fromkeys([*parameter_names(), *sorted(filter(is_parameter, names))])
+    units = {name: parameter_named(name).unit for name in in_order if name in names}
+    return [Quantity(name, "-" if unit == "1" else unit) for name, unit in units.items()]
 
 
 def figures(record: Record) -> Iterator[tuple[str, Figures]]:

@@ -1,4 +1,4 @@
-"""A campaign: one bushing, its tests and settings, read from a TOML file and the measurements that it names."""
+"""A campaign: a bushing, specimens of its compound, their tests and settings, read from a TOML file."""
 
 from __future__ import annotations
 
@@ -12,37 +12,43 @@ from bushfit.campaign.naming import folder_name
 from bushfit.campaign.schema import CampaignFile, FitSettings, LoopFile, PredictSettings, SimulateSettings, SweepFile
 from bushfit.campaign.toml import read_toml
 from bushfit.errors import CampaignError, naming, typed
-from bushfit.geometry import Bushing
+from bushfit.geometry import Bushing, Direction, Place, Specimen
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reduction.programme import read_programme
+from bushfit.units import CELSIUS, quantity
 
 #: Endings of test files, which `bushfit init` makes a campaign of.
 TEST_FILES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods")
 
+#: Keys of a test that no fit uses, and that results carry on.
+_CONDITIONS = ("preload", "date", "operator", "specimen_number")
+
 
 @dataclass(frozen=True, eq=False)
 class Campaign:
-    """One bushing, its tests in SI, and the settings of what to do with them.
+    """A bushing, specimens of its compound, their tests in SI, and the settings of what to do with them.
 
     Args:
-        name: of the campaign; default the name of the bushing.
+        name: of the campaign; default the name of the bushing, or of the first specimen.
         path: the campaign file.
-        bushing: geometry [m].
+        bushing: geometry [m]; None where specimens alone were tested.
         loops, sweeps: the measurements, SI.
         fit, predict: settings, SI; their defaults where the file has none.
         simulate: settings, SI; None where the file has none.
+        specimens: other bodies of the compound.
     """
 
     name: str
     path: Path
-    bushing: Bushing
+    bushing: Bushing | None
     loops: tuple[Loop, ...] = ()
     sweeps: tuple[Sweep, ...] = ()
     fit: FitSettings = field(default_factory=FitSettings)
     predict: PredictSettings = field(default_factory=PredictSettings)
     simulate: SimulateSettings | None = None
+    specimens: tuple[Specimen, ...] = ()
 
     @property
     def slug(self) -> str:
@@ -70,17 +76,32 @@ def load_campaign(path: str | Path) -> Campaign:
             hint='add [[loops]] with file = "..." and direction = "axial"',
         )
     with naming(path):
-        bushing = Bushing(**vars(content.bushing))
+        bushing = Bushing(**vars(content.bushing)) if content.bushing else None
+        specimens = tuple(Specimen(**vars(table)) for table in content.specimens)
+        _check_bodies(bushing, specimens)
     return Campaign(
-        content.name or bushing.name,
+        content.name or (bushing or specimens[0]).name,
         path,
         bushing,
-        tuple(loop for keywords in reader_keywords(path, content.loops) for loop in read_programme(**keywords)),
-        tuple(read_sweep(**keywords) for keywords in reader_keywords(path, content.sweeps)),
+        tuple(
+            loop for keywords in reader_keywords(path, content.loops, specimens) for loop in read_programme(**keywords)
+        ),
+        tuple(read_sweep(**keywords) for keywords in reader_keywords(path, content.sweeps, specimens)),
         content.fit,
         content.predict,
         content.simulate,
+        specimens,
     )
+
+
+def _check_bodies(bushing: Bushing | None, specimens: Sequence[Specimen]) -> None:
+    """Raise a CampaignError where there is no body, or two have one name."""
+    names = [specimen.name for specimen in specimens]
+    if bushing is None and not names:
+        expected = "[bushing] with its name, radii and length, or [[specimens]]"
+        raise CampaignError("nothing is said of what was tested", expected=expected)
+    if doubles := {name for name in names if names.count(name) > 1}:
+        raise CampaignError("two specimens have one name", place="[[specimens]]", found=", ".join(sorted(doubles)))
 
 
 def _refuse_tests(path: Path) -> None:
@@ -100,22 +121,76 @@ def _refuse_tests(path: Path) -> None:
     raise CampaignError("a campaign is needed", file=path, found=found, expected=expected, hint=hint)
 
 
-def reader_keywords(campaign: Path, tests: Sequence[LoopFile | SweepFile]) -> Iterator[dict[str, Any]]:
-    """The keywords of `read_loop` or `read_sweep` for each file of a campaign.
+def reader_keywords(
+    campaign: Path, tests: Sequence[LoopFile | SweepFile], specimens: Sequence[Specimen] = ()
+) -> Iterator[dict[str, Any]]:
+    """The keywords of `read_loop` or `read_sweep` for each test of a campaign.
 
-    A test is named by the stem of its file; where two files have one stem, by the file as the campaign lists it.
+    A test is named by the stem of its file; where two files have one stem, by the file as the campaign lists it. Tests
+    of one file are told apart by its sheet, or by temperature.
 
     Raises:
-        CampaignError: a file that is listed twice.
+        CampaignError: a test that is listed twice, or one of no body.
     """
-    stems = [Path(test.file).stem for test in tests]
+    names = _test_names(tests)
     seen = set()
-    for test, stem in zip(tests, stems, strict=True):
+    for test, name in zip(tests, names, strict=True):
         file = campaign.parent / test.file
-        if (place := os.path.normpath(file)) in seen:
-            raise CampaignError("a file is listed twice", file=campaign, found=test.file, expected="each file once")
+        if (place := (os.path.normpath(file), test.sheet, test.temperature)) in seen:
+            raise CampaignError(
+                "a file is listed twice", file=campaign, found=test.file, expected="each file, or sheet of it, once"
+            )
         seen.add(place)
         stated = {key: value for key, value in vars(test).items() if value is not None}
         written = FileFormat(**{entry.name: stated.pop(entry.name, None) for entry in fields(FileFormat)})
-        name = stem if stems.count(stem) == 1 else test.file
-        yield {**stated, "file": file, "name": name, "listed_as": Path(test.file), "written": written}
+        conditions = {key: stated.pop(key) for key in _CONDITIONS if key in stated}
+        stated.pop("specimen", None)
+        with naming(campaign, place=test.file):
+            stated["direction"] = _tested(test, specimens)
+            if amplitude := stated.pop("at_amplitude", None):
+                stated["at_amplitude"] = quantity(amplitude, stated["direction"].motion.displacement_unit)
+        yield {
+            **stated,
+            "file": file,
+            "name": name,
+            "listed_as": Path(test.file),
+            "written": written,
+            "conditions": conditions,
+        }
+
+
+def _test_names(tests: Sequence[LoopFile | SweepFile]) -> list[str]:
+    """A name of its own for each test."""
+    stems = [Path(test.file).stem for test in tests]
+    names = [stem if stems.count(stem) == 1 else test.file for test, stem in zip(tests, stems, strict=True)]
+    files = [test.file for test in tests]
+    for place, test in enumerate(tests):
+        if files.count(test.file) > 1:
+            at = None if test.temperature is None else f"{test.temperature - CELSIUS:.4g} degC"
+            names[place] = " ".join(filter(None, (stems[place], test.sheet, at)))
+    return names
+
+
+def _tested(test: LoopFile | SweepFile, specimens: Sequence[Specimen]) -> Place:
+    """What a test was made on: a direction of the bushing, or a specimen.
+
+    Raises:
+        CampaignError: an unknown specimen, a bushing without a direction, or a specimen with one of the bushing's.
+    """
+    known = {specimen.name: specimen for specimen in specimens}
+    if test.specimen is None:
+        if isinstance(test.direction, Direction):
+            return test.direction
+        expected = "direction = " + " or ".join(f'"{direction}"' for direction in Direction)
+        hint = f'or specimen = "{next(iter(known))}"' if known else None
+        raise CampaignError("a test without a direction", found=test.direction or "none", expected=expected, hint=hint)
+    if test.specimen not in known:
+        raise CampaignError(
+            "this specimen is not in the campaign",
+            found=test.specimen,
+            expected="one of " + ", ".join(known) if known else "a [[specimens]] table with this name",
+        )
+    if test.direction not in (None, "shear"):
+        expected = 'direction = "shear", or none: a specimen is tested in one way only'
+        raise CampaignError("a specimen has no such direction", found=str(test.direction), expected=expected)
+    return known[test.specimen]

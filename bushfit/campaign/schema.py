@@ -5,18 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from functools import cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field
 
 from bushfit.errors import CampaignError, naming
-from bushfit.geometry import Direction
+from bushfit.geometry import TRANSLATION, Direction
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Waveform
-from bushfit.units import quantity
+from bushfit.units import quantity, temperature
 from bushfit.validation import Flag, Name, Text, converted, known_keys, standing_in_table, unknown_key
 
 #: What a sweep's residuals compare: real and imaginary part, or |K| and loss factor.
@@ -47,9 +46,11 @@ def _si(*units: str) -> BeforeValidator:
 
 def _motion(per: str = "") -> BeforeValidator:
     """A validator as `_si("m")`, but for [rad] in a table whose direction is a rotation; with "/s" for a speed."""
-    return converted(
-        lambda raw, info: quantity(raw, info.data.get("direction", Direction.AXIAL).motion.displacement_unit + per)
-    )
+
+    def unit(direction: object) -> str:
+        return (direction.motion if isinstance(direction, Direction) else TRANSLATION).displacement_unit + per
+
+    return converted(lambda raw, info: quantity(raw, unit(info.data.get("direction"))))
 
 
 def _table(convert: Callable[[dict[str, Any]], Any]) -> BeforeValidator:
@@ -69,16 +70,17 @@ def _frequencies(raw: dict[str, Any]) -> list[str]:
     return [f"{value!r} Hz" for value in (start + step * np.arange(count)).tolist()]
 
 
-@cache
-def _parameter_units() -> dict[str, str]:
-    """SI unit of each parameter of the library by name; the s^alpha of m is left out."""
-    from bushfit.effects import LIBRARY, qualified
+def _parameter_names() -> tuple[str, ...]:
+    """Names of all parameters of the library; a stiffness factor may have other places than are listed."""
+    from bushfit.effects import parameter_names
 
-    return {
-        qualified(effect, parameter): _S_TO_ALPHA.sub("", parameter.unit)
-        for effect in LIBRARY.values()
-        for parameter in effect.parameters
-    }
+    return parameter_names()
+
+
+def _is_parameter(name: str) -> bool:
+    from bushfit.effects import is_parameter
+
+    return is_parameter(name)
 
 
 def parameter_value(place: str, name: str, raw: Any) -> float:
@@ -86,14 +88,16 @@ def parameter_value(place: str, name: str, raw: Any) -> float:
 
     Ratios, and parameters of added effects, may be plain numbers.
     """
-    units = _parameter_units()
+    from bushfit.effects import parameter_named
+
     with naming(place=place):
-        if name not in units:
-            raise unknown_key(name, units)
+        if not _is_parameter(name):
+            raise unknown_key(name, _parameter_names())
+        unit = _S_TO_ALPHA.sub("", parameter_named(name).unit)
         is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
-        if is_number and (units[name] == "1" or "." in name) and abs(raw) <= _LARGEST_NUMBER:
+        if is_number and (unit == "1" or "." in name) and abs(raw) <= _LARGEST_NUMBER:
             return float(raw)
-        return quantity(_S_TO_ALPHA.sub("", raw) if name == "m" and isinstance(raw, str) else raw, units[name])
+        return quantity(_S_TO_ALPHA.sub("", raw) if name == "m" and isinstance(raw, str) else raw, unit)
 
 
 def _parameters(raw: dict[str, Any]) -> dict[str, float]:
@@ -131,7 +135,7 @@ def _fit_table(raw: dict[str, Any]) -> dict[str, Any]:
     """[fit] with its tables by parameter, such as [fit.mu] or [fit."inertia.mass"], under the key "parameters"."""
     if "parameters" in raw:
         raise unknown_key("parameters", known_keys(FitSettings))
-    settings = {key: value for key, value in raw.items() if key not in _parameter_units()}
+    settings = {key: value for key, value in raw.items() if not _is_parameter(key)}
     return {**settings, "parameters": {key: value for key, value in raw.items() if key not in settings}}
 
 
@@ -147,6 +151,7 @@ def _roles(known: Collection[str]) -> BeforeValidator:
     return _table(check_keys)
 
 
+Temperature = Annotated[float, converted(lambda raw, _: temperature(raw))]
 Length = Annotated[float, _si("m"), Field(gt=0)]
 Angle = Annotated[float, _si("rad"), Field(gt=0)]
 Frequency = Annotated[float, _si("Hz"), Field(gt=0)]
@@ -167,18 +172,60 @@ class BushingTable:
 
 
 @dataclass(frozen=True)
-class LoopFile(FileFormat):
-    """[[loops]]: a file and what it does not say itself. See reading.read_loop."""
+class SpecimenTable:
+    """[[specimens]]: another body of the same compound, and what its tests give. See geometry.Specimen."""
+
+    name: Name
+    kind: Literal["modulus", "shear"]
+    strain: Literal["engineering", "tensor", "tension"] = "engineering"
+    area: Annotated[float, _si("m^2"), Field(gt=0)] | None = None
+    thickness: Length | None = None
+    elements: Count = 1
+
+    def __post_init__(self) -> None:
+        if self.name in (*Direction, "loops", "sweeps", "gap", "candidates", "shear"):
+            expected = "a name of its own: its tables are named after it"
+            raise ValueError(CampaignError("this name is taken", place="name", found=self.name, expected=expected))
+
+
+@dataclass(frozen=True)
+class TestFile(FileFormat):
+    """What [[loops]] and [[sweeps]] say alike: a file, what was tested in it, and under which conditions.
+
+    Args:
+        file: from the campaign's folder.
+        direction: of the bushing, or "shear" of a specimen.
+        specimen: by its name in [[specimens]]; the bushing unless stated.
+        noise: relative standard deviation of a point, where it is known.
+        weight: of the test in the fit, a share of the weight that its noise gives it.
+        temperature: [K]; it selects the rows of a file that has several.
+        preload, date, operator, specimen_number: carried on to results as they are written.
+    """
+
+    __test__ = False
 
     file: Text
-    direction: Direction
+    direction: Direction | Literal["shear"] | None = None
+    specimen: Name | None = None
+    noise: Share | None = None
+    weight: Annotated[float, Field(gt=0, le=1)] = 1.0
+    temperature: Temperature | None = None
+    preload: Text | None = None
+    date: Text | None = None
+    operator: Text | None = None
+    specimen_number: Text | None = None
+
+
+@dataclass(frozen=True)
+class LoopFile(TestFile):
+    """[[loops]]: a file and what it does not say itself. See reading.read_loop."""
+
     columns: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS)] = field(default_factory=dict)
     units: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS)] = field(default_factory=dict)
     force_sign: Literal[1, -1] = 1
     rate: Annotated[float, _motion("/s"), Field(gt=0)] | None = None
     frequency: Frequency | None = None
     waveform: Waveform | None = None
-    noise: Share | None = None
 
     def __post_init__(self) -> None:
         if (self.frequency is None) != (self.waveform is None) or (self.rate and self.frequency):
@@ -192,15 +239,19 @@ class LoopFile(FileFormat):
 
 
 @dataclass(frozen=True)
-class SweepFile(FileFormat):
-    """[[sweeps]]: a file and what it does not say itself. See reading.read_sweep."""
+class SweepFile(TestFile):
+    """[[sweeps]]: a file and what it does not say itself. See reading.read_sweep.
 
-    file: Text
-    direction: Direction
+    Args:
+        at_amplitude: of a file without a column for it, with its unit: "0.1 mm", "0.15 %".
+        at_frequency: likewise [Hz].
+    """
+
     columns: Annotated[Mapping[str, Text], _roles(SWEEP_COLUMNS)] = field(default_factory=dict)
     units: Annotated[Mapping[str, Text], _roles(SWEEP_COLUMNS)] = field(default_factory=dict)
     amplitude: AmplitudeConvention | None = None
-    noise: Share | None = None
+    at_amplitude: Text | None = None
+    at_frequency: Frequency | None = None
 
 
 @dataclass(frozen=True)
@@ -221,14 +272,16 @@ class FitSettings:
         dynamic_amplitudes: [m or rad] that fit-dynamic uses; none for the smallest.
         residuals: what a sweep's residuals compare.
         loss: what is summed over the residuals.
+        effects: added to the paper's model, such as "stiffness_factor.mount".
         parameters: start value and bounds by parameter.
     """
 
     dynamic_amplitudes: Annotated[tuple[Annotated[float, _si("m", "rad"), Field(gt=0)], ...], _FIRST_ERROR] = ()
     residuals: Residuals = "complex"
     loss: Loss = "linear"
+    effects: tuple[Text, ...] = ()
     parameters: Annotated[Mapping[str, ParameterSetting], _table(_parameter_settings)] = field(
-        default_factory=dict, metadata=standing_in_table(_parameter_units)
+        default_factory=dict, metadata=standing_in_table(_parameter_names)
     )
 
 
@@ -318,8 +371,9 @@ class CampaignFile:
 
     __pydantic_config__ = ConfigDict(extra="forbid")
 
-    bushing: BushingTable
+    bushing: BushingTable | None = None
     name: Name | None = None
+    specimens: tuple[SpecimenTable, ...] = ()
     loops: tuple[LoopFile, ...] = ()
     sweeps: tuple[SweepFile, ...] = ()
     fit: Annotated[FitSettings, _table(_fit_table)] = field(default_factory=FitSettings)

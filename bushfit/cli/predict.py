@@ -70,7 +70,7 @@ def command(
             directions or None,
         )
     )
-    folder = options.folder(loaded.slug if loaded else folder_name(result.model.bushing.name))
+    folder = options.folder(loaded.slug if loaded else folder_name(result.name))
     options.require_free(folder, job.names(loaded, options.formats))
     outcome = job.run(result, loaded)
     tell_predictions(options, outcome)
@@ -88,7 +88,7 @@ def tell_predictions(options: Options, outcome: Predicted) -> None:
         table = prediction_table(prediction)
         amplitudes = table.iloc[:, 1].unique()
         chosen = amplitudes[spread(amplitudes.size, _MOST_AMPLITUDES)]
-        shown = new_table(f"{outcome.result.model.bushing.name}: {prediction.direction}, corners", *table.columns[:4])
+        shown = new_table(f"{outcome.result.name}: {prediction.direction}, corners", *table.columns[:4])
         low, high = table.iloc[:, 0].min(), table.iloc[:, 0].max()
         for row in table[table.iloc[:, 0].isin([low, high]) & table.iloc[:, 1].isin(chosen)].itertuples(index=False):
             shown.add_row(*(number(value, 6) for value in row[:2]), *(alike([value], 4)[0] for value in row[2:4]))

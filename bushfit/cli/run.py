@@ -74,11 +74,11 @@ def _which(folder: Path, outcome: Ran) -> str:
 
 def _tell_range(options: Options, outcome: Ran, measured: Range) -> None:
     """Where the model was fitted to tests: least and largest frequency and amplitude, and the directions."""
-    bushing, predicted = outcome.result.model.bushing, [p.direction for p in outcome.predicted.predictions]
+    result, predicted = outcome.result, [p.direction for p in outcome.predicted.predictions]
     amplitudes = []
-    for direction in dict.fromkeys((*measured.directions, *predicted)):
+    for direction in dict.fromkeys([*map(result.place, measured.directions), *predicted]):
         unit, factor = direction.display.displacement
-        per_strain = factor / bushing.unit_strain(direction)
+        per_strain = factor / result.model.unit_strain(direction)
         amplitudes.append(f"{direction} {_span([per_strain * end for end in measured.strain], 3)} {unit}")
     options.console.print(
         "tested range, least and largest of all tests; beyond it the model extrapolates", style="bold"

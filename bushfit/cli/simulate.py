@@ -55,7 +55,7 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
     for text in effects:
         truth = _with_effect(truth, text)
     files = to_files(simulate(truth, plan))
-    folder = options.folder(f"simulated {folder_name(truth.bushing.name)}")
+    folder = options.folder(f"simulated {folder_name(truth.name)}")
     options.console.print(truth.equation(), markup=False)
     options.write(folder, files)
     options.tell({"truth": model_document(truth), "files": sorted(files)})

@@ -11,7 +11,7 @@ import numpy as np
 from bushfit.effects import effect_named
 from bushfit.effects.contract import Array, Level
 from bushfit.fitting.data_sets import DataSet, parted
-from bushfit.geometry import Direction
+from bushfit.geometry import Direction, Place
 from bushfit.model.model import Model
 
 #: Relative noise of one point of a test that does not exist yet: that of a good servo-hydraulic rig.
@@ -34,7 +34,7 @@ class MenuEntry:
 
     words: str
     effort: float
-    direction: Direction | None = None
+    direction: Place | None = None
     frequencies: tuple[float, ...] | None = None
     beyond: bool = False
     amplitudes: tuple[float, ...] | None = None
@@ -91,14 +91,14 @@ def _distance(entry: MenuEntry, models: Sequence[Model], data_sets: Sequence[Dat
     return min(float(np.sum(np.abs(one - other) ** 2)) for one, other in combinations(responses, 2)) / _NOISE**2
 
 
-def _rig_share(model: Model, direction: Direction, frequency: Array, amplitude: Array) -> Array:
+def _rig_share(model: Model, direction: Place, frequency: Array, amplitude: Array) -> Array:
     bare = model.without(Level.INSTRUMENT)
     return np.log(model.stiffness(direction, frequency, amplitude) / bare.stiffness(direction, frequency, amplitude))
 
 
-def _points(entry: MenuEntry, data_sets: Sequence[DataSet]) -> tuple[Array, Array, Direction]:
+def _points(entry: MenuEntry, data_sets: Sequence[DataSet]) -> tuple[Array, Array, Place]:
     direction = entry.direction or data_sets[-1].direction
-    same = [data_set for data_set in data_sets if data_set.direction is direction] or list(data_sets)
+    same = [data_set for data_set in data_sets if data_set.direction == direction] or list(data_sets)
     amplitudes = np.unique(np.concatenate([data_set.amplitude for data_set in same]))
     if direction.is_rotation and not same[0].direction.is_rotation:
         amplitudes = np.array([0.02])

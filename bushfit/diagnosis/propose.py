@@ -15,7 +15,7 @@ import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.score_test import SENSITIVITY_LEFT, ScoreTest
-from bushfit.effects import LIBRARY, Effect, Parameter, qualified
+from bushfit.effects import Effect, Parameter, at_places, qualified
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import DataSet
 from bushfit.model.model import Model
@@ -51,7 +51,8 @@ class Proposal:
 
 def proposals(evidence: Evidence, excluded: Collection[str]) -> list[Proposal]:
     """Every effect of the library that is not yet in the model, in its best shape, best score first."""
-    asked = [effect for name, effect in LIBRARY.items() if name not in (*evidence.model.effects, *excluded)]
+    library = at_places(str(data_set.direction) for data_set in evidence.data_sets)
+    asked = [effect for name, effect in library.items() if name not in (*evidence.model.effects, *excluded)]
     probed = [_probed(evidence, effect) for effect in asked]
     ends = np.cumsum([0, *(len(columns) for _, columns in probed)])
     every = np.concatenate([np.empty((0, evidence.residual.size)), *(columns for _, columns in probed)])
@@ -59,7 +60,7 @@ def proposals(evidence: Evidence, excluded: Collection[str]) -> list[Proposal]:
     amounts, gains, sizes = np.ravel(test.amounts()), np.array(test.gains()), test.sizes
     found = []
     for effect, (shapes, columns), first, last in zip(asked, probed, ends[:-1], ends[1:], strict=True):
-        amount = _amount(effect)
+        amount = effect.amount
         sense = 1 if amount.neutral == amount.bounds[0] else 0
         scores = np.where((amounts[first:last] > 0.0) | (sense == 0), gains[first:last], 0.0)
         best = int(np.argmax(scores))
@@ -71,11 +72,6 @@ def proposals(evidence: Evidence, excluded: Collection[str]) -> list[Proposal]:
     return sorted(found, key=lambda proposal: -proposal.score)
 
 
-def _amount(effect: Effect) -> Parameter:
-    """The parameter whose neutral value makes the effect vanish."""
-    return next(parameter for parameter in effect.parameters if parameter.neutral is not None)
-
-
 def _probed(evidence: Evidence, effect: Effect) -> tuple[list[dict[str, float]], Array]:
     """Shapes of an effect on a grid that the tests suggest, and its whitened sensitivity at next to no amount."""
     model = evidence.model.with_effect(effect.name)
@@ -85,7 +81,7 @@ def _probed(evidence: Evidence, effect: Effect) -> tuple[list[dict[str, float]],
         if parameter.neutral is None
     }
     shapes = [dict(zip(axes, point, strict=True)) for point in product(*axes.values())]
-    amount = _amount(effect)
+    amount = effect.amount
     little = np.full((len(shapes), 1), model.values[qualified(effect, amount)] + _STEP * amount.typical)
     grids = {name: np.array([[shape[name]] for shape in shapes]) for name in axes}
     values = {**model.values, **grids, qualified(effect, amount): little}
@@ -107,7 +103,7 @@ def _probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) ->
         case "displacement":
             low, high = stroke(data_sets)
         case "strain":
-            strains = [data_set.amplitude * model.bushing.unit_strain(data_set.direction) for data_set in data_sets]
+            strains = [data_set.amplitude * model.unit_strain(data_set.direction) for data_set in data_sets]
             low = 0.03 * np.concatenate(strains).min()
             high = max(0.5 * model.values.get("eps_half", np.concatenate(strains).max()), low)
         case None:

@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.holdout import HoldOut
-from bushfit.effects import effect_named
-from bushfit.geometry import Direction
+from bushfit.effects import effect_named, effect_of, parameter_named
+from bushfit.geometry import Place
 from bushfit.model.result import Result
 
 SCHEMA = "bushfit/diagnosis/1"
@@ -47,7 +47,7 @@ class Where:
         reading: a sentence.
     """
 
-    direction: Direction
+    direction: Place
     kind: str
     frequency: tuple[float, float]
     amplitude: tuple[float, float]
@@ -151,9 +151,7 @@ class Diagnosis:
             "level": str(effect.level),
             "sentence": effect.sentence,
             "parameters": {
-                name: self._parameter(name, value)
-                for name, value in values.items()
-                if name.startswith(f"{named.name}.")
+                name: self._parameter(name, value) for name, value in values.items() if effect_of(name) == named.name
             },
             "evidence": named.evidence,
             "alternatives": list(named.alternatives),
@@ -163,13 +161,11 @@ class Diagnosis:
     def _parameter(self, name: str, value: float) -> dict[str, Any]:
         held = name in self.result.model.values
         interval = self.result.interval(name) if held else None
-        effect, _, short = name.partition(".")
-        unit = next(parameter.unit for parameter in effect_named(effect).parameters if parameter.name == short)
         return {
             "value": value,
             "stderr": self.result.covariance.stderr(name) if held else None,
             "ci95": None if interval is None else list(interval),
-            "unit": unit,
+            "unit": parameter_named(name).unit,
         }
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from bushfit.diagnosis.evidence import EVALUATIONS, Evidence, fit_from
 from bushfit.diagnosis.propose import Proposal, stroke
-from bushfit.effects import LIBRARY, qualified
+from bushfit.effects import effect_named, qualified
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.descent import Descent
@@ -109,6 +109,6 @@ def _ended(fit: Descent) -> bool:
 
 def _within_stroke(data_sets: Sequence[DataSet], name: str) -> Bounds:
     """Limits of an effect's displacements [m] to what the tests can show: a stop that is always met is no stop."""
-    effect = LIBRARY[name]
+    effect = effect_named(name)
     scaled = [parameter for parameter in effect.parameters if parameter.scale == "displacement"]
     return {qualified(effect, parameter): stroke(data_sets) for parameter in scaled}

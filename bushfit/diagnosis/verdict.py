@@ -17,8 +17,9 @@ from bushfit.diagnosis.record import Diagnosis, Judged, Named, Verdict, Where
 from bushfit.diagnosis.refit import Candidate
 from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.search import SAME, Search, Step
+from bushfit.effects import effect_of
 from bushfit.fitting.assess import Stage, covariance, measured_range, quality
-from bushfit.fitting.data_sets import parted
+from bushfit.fitting.data_sets import parted, sources
 from bushfit.fitting.procedures import cautions
 from bushfit.fitting.solve import Bounds
 from bushfit.model.result import Result
@@ -79,7 +80,7 @@ def _ambiguous(search: Search, final: Evidence, steps: Sequence[Step], names: Se
     model = search.base.model
     for step in steps:
         if not step.rivals:
-            own = {key: value for key, value in final.model.values.items() if key.startswith(f"{step.name}.")}
+            own = {key: value for key, value in final.model.values.items() if effect_of(key) == step.name}
             model = model.with_effect(step.name, own)
     kept = search.base if model is search.base.model else fit(model, final.data_sets, search.held, search.bounds)
     sets = "; ".join(f"{name.name} from {' or '.join(name.alternatives)}" for name in names if name.alternatives)
@@ -207,7 +208,7 @@ def _result(evidence: Evidence, bounds: Bounds) -> Result:
         quality(model, evidence.data_sets, len(moving)),
         measured_range(model, evidence.data_sets),
         tuple(cautions(model, evidence.solution, evidence.data_sets, bounds, cov)),
-        tuple(dict.fromkeys(data_set.source for data_set in evidence.data_sets if data_set.source is not None)),
+        sources(evidence.data_sets),
         at_bound=evidence.solution.at_bound,
     )
 
@@ -219,7 +220,7 @@ def _notes(search: Search, after: Evidence) -> tuple[str, ...]:
     _, sweeps = parted(after.data_sets)
     if sweeps and sweeps[0].noise.origin == "assumed":
         notes.append(
-            "nothing was repeated at three frequencies or more: "
-            "errors shared by a block are assumed, 0.5 % gain and 0.25 deg phase"
+            "nothing was repeated at three points or more: "
+            "errors shared by a run are assumed, 0.5 % gain and 0.25 deg phase"
         )
     return tuple(notes)

@@ -8,7 +8,7 @@ from bushfit.diagnosis.evidence import fit
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import judge
-from bushfit.effects import BASE, effect_named
+from bushfit.effects import BASE, effect_named, qualified
 from bushfit.fitting.data import Data
 from bushfit.fitting.robust import estimate, outliers_at, told
 from bushfit.fitting.starts import start_values
@@ -39,8 +39,8 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     start = {name: value for name, value in start.items() if name in model.values and name not in held}
     for name in settings.adopt:
         if name not in model.effects:  # at a tenth of its typical size: at its neutral value a fit may not see it
-            amount = next(parameter for parameter in effect_named(name).parameters if parameter.neutral is not None)
-            model = model.with_effect(name, {f"{name}.{amount.name}": 0.1 * amount.typical})
+            amount = (effect := effect_named(name)).amount
+            model = model.with_effect(name, {qualified(effect, amount): amount.sized(0.1)})
     outliers: tuple[Outlier, ...] = ()
     if data.robust:
         names = [name for name in model.parameters if name not in held]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Iterable
+from functools import cache
 
 from bushfit.effects import (
     amplitude_rolloff,
@@ -20,18 +22,19 @@ from bushfit.effects import (
     interface_slip,
     maxwell,
     mullins_softening,
-    radial_factor,
     rate_dependent_friction,
     rig_compliance,
     second_friction,
     self_heating,
     springpot,
+    stiffness_factor,
     strain_stiffening,
     viscous,
 )
 from bushfit.effects.contract import Branch, Effect, Layer, Level, Modifier, Parameter, Setting
 from bushfit.effects.history import History
 from bushfit.errors import ModelError
+from bushfit.geometry import Direction
 
 __all__ = [
     "BASE",
@@ -44,7 +47,12 @@ __all__ = [
     "Modifier",
     "Parameter",
     "Setting",
+    "at_places",
     "effect_named",
+    "effect_of",
+    "is_parameter",
+    "parameter_named",
+    "parameter_names",
     "qualified",
 ]
 
@@ -67,7 +75,7 @@ LIBRARY: dict[str, Effect] = {
         clearance,
         interface_slip,
         bump_stop,
-        radial_factor,
+        stiffness_factor,
         rig_compliance,
         inertia,
         fixture_resonance,
@@ -90,6 +98,9 @@ def effect_named(name: str) -> Effect:
     """
     if name in LIBRARY:
         return LIBRARY[name]
+    family, _, place = name.partition(".")
+    if family == stiffness_factor.FAMILY and place:
+        return stiffness_factor.stiffness_factor(place)
     near = difflib.get_close_matches(name, LIBRARY, n=1)
     raise ModelError(
         "unknown effect",
@@ -100,5 +111,53 @@ def effect_named(name: str) -> Effect:
 
 
 def qualified(effect: Effect, parameter: Parameter) -> str:
-    """Name of a parameter in files and reports: plain for the paper's three, `<effect>.<name>` for the rest."""
-    return parameter.name if effect.name in BASE else f"{effect.name}.{parameter.name}"
+    """Name of a parameter in files and reports: plain for the paper's three, `<effect>.<name>` for the rest.
+
+    An effect that belongs to a place, such as `stiffness_factor.radial`, is named like its one parameter.
+    """
+    if effect.name in BASE:
+        return parameter.name
+    return effect.name if "." in effect.name else f"{effect.name}.{parameter.name}"
+
+
+def effect_of(name: str) -> str:
+    """The name of the effect that a parameter belongs to, by the name of the parameter in files and reports."""
+    if name.startswith(f"{stiffness_factor.FAMILY}."):
+        return name
+    effect, dot, _ = name.partition(".")
+    return effect if dot else next(base for base in BASE for own in LIBRARY[base].parameters if own.name == name)
+
+
+@cache
+def _parameters() -> dict[str, Parameter]:
+    """Every parameter of the library by its name in files and reports."""
+    return {qualified(effect, parameter): parameter for effect in LIBRARY.values() for parameter in effect.parameters}
+
+
+def parameter_names() -> tuple[str, ...]:
+    """Names of all parameters of the library, in its order."""
+    return tuple(_parameters())
+
+
+def is_parameter(name: str) -> bool:
+    """Whether a name in files and reports is that of a parameter."""
+    family, _, place = name.partition(".")
+    return name in _parameters() or (family == stiffness_factor.FAMILY and bool(place))
+
+
+def parameter_named(name: str) -> Parameter:
+    """A parameter by its name in files and reports; `is_parameter` tells whether there is one."""
+    return _parameters()[name] if name in _parameters() else effect_named(name).parameters[0]
+
+
+def at_places(places: Iterable[str]) -> dict[str, Effect]:
+    """The library for tests at these places: a stiffness factor for each but the first, which the moduli go by.
+
+    Args:
+        places: directions, or specimens by name; one that is axial counts as the first.
+    """
+    known = dict.fromkeys(sorted(places, key=lambda place: place != Direction.AXIAL))
+    factors = {f"{stiffness_factor.FAMILY}.{place}" for place in list(known)[1:]}
+    others = {name: effect_named(name) for name in sorted(factors)}
+    kept = {name: effect for name, effect in LIBRARY.items() if name != stiffness_factor.EFFECT.name or name in factors}
+    return kept | others

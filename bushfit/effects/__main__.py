@@ -38,7 +38,7 @@ def sources_table() -> str:
 
 
 def _link(effect: Effect) -> str:
-    return f"[`{effect.name}`]({effect.name}.py)"
+    return f"[`{effect.name}`]({effect.name.partition('.')[0]}.py)"
 
 
 def _parameters(effect: Effect) -> str:

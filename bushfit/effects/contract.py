@@ -26,7 +26,7 @@ import numpy as np
 
 from bushfit.effects.history import Array as Array
 from bushfit.effects.history import History
-from bushfit.geometry import Bushing, Direction
+from bushfit.geometry import Bushing, Place
 
 #: A number, or an array that broadcasts against operating points or samples.
 Value = Any
@@ -75,7 +75,7 @@ class Parameter:
         unit: SI unit, for files and reports.
         bounds: what a rubber, a bushing or a rig can have.
         neutral: the value at which the effect vanishes; None where another parameter does that.
-        typical: a usual size; the scale on which a fit moves a linear parameter.
+        typical: a usual distance from the neutral value; the scale on which a fit moves a linear parameter.
         log: whether a fit moves its logarithm (strictly positive parameters).
         meaning: what it is, in a few words.
         scale: what of the tests its size goes with, so that a search knows where to start: "period",
@@ -91,19 +91,23 @@ class Parameter:
     meaning: str
     scale: Literal["period", "frequency", "displacement", "strain"] | None = None
 
+    def sized(self, share: float) -> float:
+        """The value at a share of the typical distance from the neutral one, or from 0 where none is neutral."""
+        return (self.neutral or 0.0) + share * self.typical
+
 
 @dataclass(frozen=True)
 class Setting:
     """The test that a response belongs to.
 
     Args:
-        bushing: the body under test.
-        direction: of the motion.
+        bushing: on whose rig the test is made; None where specimens alone are tested.
+        direction: of the motion, or the specimen under test.
         kind: of the test: some effects belong to the rig that makes one of the two.
     """
 
-    bushing: Bushing
-    direction: Direction
+    bushing: Bushing | None
+    direction: Place
     kind: Literal["sweep", "loop"]
 
 
@@ -141,8 +145,8 @@ class Effect:
         harmonic_error: relative error of the first-harmonic face against the time face; 0 where exact.
         settles: True where the response changes from cycle to cycle, so that a loop must be followed
             through all its cycles.
-        corrects: the direction whose stiffness formula it scales by a fitted factor; where the effect is in a model,
-            that formula's own error needs no warning. None where it scales no formula.
+        corrects: the direction, or specimen, whose stiffness formula it scales by a fitted factor; where the effect is
+            in a model, that formula's own error needs no warning. None where it scales no formula.
     """
 
     name: str
@@ -154,7 +158,12 @@ class Effect:
     confirmed_by: str = ""
     harmonic_error: float = 0.0
     settles: bool = False
-    corrects: Direction | None = None
+    corrects: str | None = None
+
+    @property
+    def amount(self) -> Parameter:
+        """The parameter whose neutral value makes the effect vanish."""
+        return next(parameter for parameter in self.parameters if parameter.neutral is not None)
 
 
 @dataclass(frozen=True, kw_only=True)

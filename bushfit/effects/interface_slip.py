@@ -13,7 +13,7 @@ SMALLEST_AMPLITUDE = 1e-12
 
 def _force(p: Values, setting: Setting) -> Value:
     """The slip force [N], or its moment about the axis in torsion, at the outer sleeve's face [N m]."""
-    arm = setting.bushing.outer_radius if setting.direction.is_rotation else 1.0
+    arm = setting.bushing.outer_radius if setting.bushing and setting.direction.is_rotation else 1.0
     return p["force"] * arm
 
 

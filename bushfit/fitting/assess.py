@@ -143,10 +143,9 @@ def quality(model: Model, data_sets: Sequence[DataSet], parameters: int) -> Qual
 def measured_range(model: Model, data_sets: Sequence[DataSet]) -> Range:
     """Frequencies [Hz], equivalent strains and directions that the data sets reach."""
     f = np.concatenate([data_set.frequency for data_set in data_sets])
-    e = np.concatenate([data_set.amplitude * model.bushing.unit_strain(data_set.direction) for data_set in data_sets])
-    directions = tuple(
-        direction for direction in Direction if any(data_set.direction is direction for data_set in data_sets)
-    )
+    e = np.concatenate([data_set.amplitude * model.unit_strain(data_set.direction) for data_set in data_sets])
+    found = [str(data_set.direction) for data_set in data_sets]
+    directions = tuple(dict.fromkeys([*(str(direction) for direction in Direction if direction in found), *found]))
     return Range((float(f.min()), float(f.max())), (float(e.min()), float(e.max())), directions)
 
 

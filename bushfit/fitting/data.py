@@ -13,7 +13,7 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.errors import FitError
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data, sweep_data
 from bushfit.fitting.solve import Bounds
-from bushfit.geometry import Direction
+from bushfit.geometry import Direction, Place
 from bushfit.model.result import Outlier
 
 #: Difference of two amplitudes relative to their size up to which they are the same level.
@@ -91,7 +91,7 @@ class Data:
         settings = self.campaign.fit.parameters
         return tuple(name for name in names if name not in settings or settings[name].vary)
 
-    def chosen(self, directions: Sequence[Direction] | None) -> list[DataSet]:
+    def chosen(self, directions: Sequence[Place] | None) -> list[DataSet]:
         """Data sets of the given directions; by default the axial loops and sweeps, as in the paper.
 
         Where no loop is axial, all loops are taken by default, and so with sweeps.

@@ -10,10 +10,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 from bushfit.effects.contract import Array, Values
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model
 from bushfit.model.result import Outlier
 from bushfit.reading.measurement import Loop, Source, Sweep
@@ -36,10 +36,24 @@ class Suspect:
     words: str
     kind: str
     columns: Sequence[Array]
-    direction: Direction
+    direction: Place
     frequency: tuple[float, float]
     amplitude: tuple[float, float]
     looked: int = 0
+
+
+class Freedoms(NamedTuple):
+    """Degrees of freedom behind the noise of a rig.
+
+    Args:
+        rig: what tests of one rig have in common; None where nothing is estimated.
+        shared: behind the errors that blocks share; 0 where these are not measured.
+        scatter: behind what scatters from point to point; 0 where it counts as known.
+    """
+
+    rig: Hashable
+    shared: int
+    scatter: int
 
 
 #: Kinds of suspects, in the order in which they are listed.
@@ -71,7 +85,7 @@ class DataSet(ABC):
         return self.test.name
 
     @property
-    def direction(self) -> Direction:
+    def direction(self) -> Place:
         """Of the test."""
         return self.test.direction
 
@@ -121,9 +135,9 @@ class DataSet(ABC):
         return ()
 
     @property
-    def shared_freedom(self) -> int:
-        """Degrees of freedom behind the errors that blocks share; 0 where these are not measured."""
-        return 0
+    def freedoms(self) -> Freedoms:
+        """How well the noise of the rig is known that the test was made on."""
+        return Freedoms(None, 0, 0)
 
     @abstractmethod
     def residual(self, model: Model, values: Values | None = None) -> Array:
@@ -227,7 +241,7 @@ def kept(answer: Callable[..., Array]) -> Callable[..., Array]:
     return asked
 
 
-def shown_amplitude(direction: Direction, amplitude: float) -> str:
+def shown_amplitude(direction: Place, amplitude: float) -> str:
     """An amplitude [m or rad] as engineers read it: "0.1 mm"."""
     unit, factor = direction.display.displacement
     return f"{amplitude * factor:.4g} {unit}"

@@ -78,7 +78,7 @@ def _tests(model: Model, data_sets: Sequence[DataSet]) -> Iterator[tuple[str, li
 
 def _repeated_loops(model: Model, loops: Sequence[LoopData]) -> Iterator[tuple[str, LoopData]]:
     """The loop of the largest strain at other amplitudes and rates."""
-    largest = max(loops, key=lambda loop: loop.drive.amplitude * model.bushing.unit_strain(loop.direction))
+    largest = max(loops, key=lambda loop: loop.drive.amplitude * model.unit_strain(loop.direction))
     for factor in (3.0, 10.0):
         yield f"a loop of {factor:g} times the largest amplitude", _changed(largest, model, amplitude=factor)
     for words, factor in (("a tenth of", 0.1), ("ten times", 10.0)):
@@ -88,7 +88,7 @@ def _repeated_loops(model: Model, loops: Sequence[LoopData]) -> Iterator[tuple[s
 def _new_loops(model: Model, data_sets: Sequence[DataSet]) -> Iterator[tuple[str, LoopData]]:
     """Slow loops of the largest amplitude and more, where the campaign has none."""
     direction = data_sets[0].direction
-    largest = max(float(data_set.amplitude.max()) for data_set in data_sets if data_set.direction is direction)
+    largest = max(float(data_set.amplitude.max()) for data_set in data_sets if data_set.direction == direction)
     for times, words in ((1.0, ""), (3.0, "three times "), (10.0, "ten times ")):
         phase = _NEW_CYCLES * np.arange(_NEW_ROWS) / _NEW_ROWS
         motion, nil = times * largest * np.sin(2.0 * np.pi * phase), np.zeros(_NEW_ROWS)
@@ -120,7 +120,7 @@ def _new_sweeps(
 ) -> Iterator[tuple[str, SweepData]]:
     """Sweeps beyond the frequencies and amplitudes of the campaign, and within them."""
     reach = measured_range(model, data_sets)
-    unit_strain = model.bushing.unit_strain(data_sets[0].direction)
+    unit_strain = model.unit_strain(data_sets[0].direction)
     small, large = (strain / unit_strain for strain in reach.strain)
     slow, fast = reach.frequency
     low, high = band = _NEW_BAND if fast < _SLOW else (slow, fast)

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from bushfit.effects import effect_of
 from bushfit.fitting.assess import measured_range
 from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.further_test import further_test
@@ -108,10 +109,10 @@ def left_open(model: Model, data_sets: Sequence[DataSet], names: Sequence[str], 
     each = dict(zip(names, stderr / np.abs(slopes), strict=True))
     groups = _groups(known)
     zero = [name for group in groups for name in group if _is_zero(model, name, covariance)]
-    lines = [f"{name} is no different from zero: these tests do not show {_effect(name)}" for name in zero]
+    lines = [f"{name} is no different from zero: these tests do not show {effect_of(name)}" for name in zero]
     if zero:
-        idle = {_effect(name) for name in zero}
-        rest = [name for name in names if _effect(name) not in idle]
+        idle = {effect_of(name) for name in zero}
+        rest = [name for name in names if effect_of(name) not in idle]
         if not rest:
             return lines
         known = Information.of(model, data_sets, rest)
@@ -127,11 +128,6 @@ def left_open(model: Model, data_sets: Sequence[DataSet], names: Sequence[str], 
     if combinations:
         lines.append("what is known all the same: " + "; ".join(combinations))
     return [*lines, *further_test(model, data_sets, known)]
-
-
-def _effect(name: str) -> str:
-    """The effect that a parameter belongs to."""
-    return name.partition(".")[0]
 
 
 def _groups(known: Information) -> list[list[str]]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from bushfit.fitting.assess import lack_of_fit, quality
 from bushfit.fitting.data_sets import DataSet
-from bushfit.geometry import Bushing
+from bushfit.geometry import Bushing, stiffness_per_modulus
 from bushfit.model.model import Model
 from bushfit.units import modulus, number
 
@@ -21,10 +21,10 @@ _MOST_STIFFENING = 20.0
 _CHECK = "check the units of displacement and force, and the dimensions of the bushing"
 
 
-def implausible(bushing: Bushing, data_sets: Sequence[DataSet]) -> list[str]:
+def implausible(bushing: Bushing | None, data_sets: Sequence[DataSet]) -> list[str]:
     """Sentences on moduli that no rubber has, and on tests too far apart to be of one bushing: most often a unit."""
     moduli = {
-        data_set.name: float(np.median(np.abs(data_set.measured))) / bushing.stiffness_per_modulus(data_set.direction)
+        data_set.name: float(np.median(np.abs(data_set.measured))) / stiffness_per_modulus(bushing, data_set.direction)
         for data_set in data_sets
     }
     softest, hardest = (pick(moduli, key=moduli.__getitem__) for pick in (min, max))

@@ -34,7 +34,7 @@ def preload(drive: Drive) -> Iterator[str]:
     """A sentence on the means that a loop counts from, where they are no sensor's zero."""
     if drive.datum is None:
         return
-    (motion, force), units = drive.loop.direction.motion.words, drive.loop.direction.display
+    (motion, force, _), units = drive.loop.direction.motion.words, drive.loop.direction.display
     mean_motion = float(drive.coefficients[0].real)
     off_zero = abs(mean_motion) > TOLD_MEAN * drive.amplitude
     means = [

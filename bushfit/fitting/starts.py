@@ -12,7 +12,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.effects.friction import harmonic_shape
 from bushfit.fitting.data_sets import DataSet
-from bushfit.geometry import Bushing
+from bushfit.geometry import Bushing, stiffness_per_modulus, unit_strain
 
 #: Strain amplitude of the largest test over eps_half, before anything is known; chosen: the fit finds the rest.
 _SCALED_STRAIN = 3.0
@@ -38,7 +38,7 @@ _USUAL_M = 0.2
 _ALPHA_RANGE = (0.1, 0.6)
 
 
-def start_values(bushing: Bushing, data_sets: Sequence[DataSet], known: Mapping[str, float]) -> dict[str, float]:
+def start_values(bushing: Bushing | None, data_sets: Sequence[DataSet], known: Mapping[str, float]) -> dict[str, float]:
     """Values of mu, m, alpha, sigma_fmax, eps_half to start from; `known` ones are kept and allowed for.
 
     Notes:
@@ -80,10 +80,10 @@ def _slope(x: Array, y: Array) -> float:
     return float(apart @ y / (apart @ apart))
 
 
-def _points(bushing: Bushing, data_sets: Sequence[DataSet]) -> tuple[Array, Array, Array]:
+def _points(bushing: Bushing | None, data_sets: Sequence[DataSet]) -> tuple[Array, Array, Array]:
     """Strain amplitude, frequency [Hz] and complex modulus [Pa] of every operating point, loops included, (n,) each."""
     return (
-        np.concatenate([each.amplitude * bushing.unit_strain(each.direction) for each in data_sets]),
+        np.concatenate([each.amplitude * unit_strain(bushing, each.direction) for each in data_sets]),
         np.concatenate([each.frequency for each in data_sets]),
-        np.concatenate([each.measured / bushing.stiffness_per_modulus(each.direction) for each in data_sets]),
+        np.concatenate([each.measured / stiffness_per_modulus(bushing, each.direction) for each in data_sets]),
     )

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from bushfit import units
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 
 #: A quantity in a name: "0.5mm", "0,5 mm", "0p5mm", "10Hz", "2deg"; not "10mm_min" nor the "18mm" of "abc18mm".
 _LABEL = re.compile(
@@ -37,7 +37,7 @@ def labelled(file: Path, expected: str) -> list[tuple[str, float]]:
 
 
 def wrong_labels(
-    file: Path, direction: Direction, amplitudes: Sequence[float], frequencies: Sequence[float]
+    file: Path, direction: Place, amplitudes: Sequence[float], frequencies: Sequence[float]
 ) -> Iterator[str]:
     """A sentence where a file's name states an amplitude or a frequency that the file does not contain."""
     unit, factor = direction.display.displacement

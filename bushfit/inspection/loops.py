@@ -182,7 +182,7 @@ def _changing(drive: Drive) -> Iterator[str]:
     if cycles is None:
         return
     loop = drive.loop
-    (motion, force), units = loop.direction.motion.words, loop.direction.display
+    (motion, force, _), units = loop.direction.motion.words, loop.direction.display
     least = _WORTH_TELLING * np.ptp(loop.force) / 2.0
     yield from _settling(cycles, least, force, units.force)
     yield from _drifting(cycles.mean_force, max(_REAL_CHANGE * 1.5 * cycles.error, least), force, units.force)

@@ -14,7 +14,7 @@ import numpy as np
 from bushfit.campaign.campaign import reader_keywords
 from bushfit.campaign.schema import LoopFile, SweepFile
 from bushfit.errors import BushfitError, MeasurementError, NoColumnError
-from bushfit.geometry import Direction
+from bushfit.geometry import Direction, Place
 from bushfit.inspection.histories import look_at_history
 from bushfit.inspection.loops import look_at_loop, look_at_programme
 from bushfit.inspection.recognition import direction_of, open_table, recognised
@@ -142,7 +142,7 @@ def _entry(schema: type[LoopFile | SweepFile], stated: Mapping[str, Any], table:
 
 
 def _keywords(
-    file: Path, direction: Direction, entry: Mapping[str, Any], schema: type[LoopFile] | type[SweepFile]
+    file: Path, direction: Place, entry: Mapping[str, Any], schema: type[LoopFile] | type[SweepFile]
 ) -> dict[str, Any]:
     """What a reader is called with for a file that a campaign lists with these keys."""
     test = check_tables({**entry, "file": str(file), "direction": str(direction)}, file, schema)
@@ -150,7 +150,7 @@ def _keywords(
 
 
 def _read_loop(
-    file: Path, direction: Direction, entry: dict[str, Any], table: Table
+    file: Path, direction: Place, entry: dict[str, Any], table: Table
 ) -> tuple[Loop, dict[str, Any], list[str]]:
     """A loop, its keys in a campaign, and what is odd: a force that counts the other way is turned."""
     try:

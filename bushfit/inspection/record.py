@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 from bushfit.reading.measurement import Loop, Sweep
 
 #: A hysteresis loop, a sweep, or the raw history of a stepped sine.
@@ -63,7 +63,7 @@ class Inspected:
 
     file: Path
     kind: Kind
-    direction: Direction | None
+    direction: Place | None
     written: Mapping[str, str]
     columns: tuple[ColumnSeen, ...]
     looked: Looked

@@ -1,4 +1,4 @@
-"""Model files: a result as JSON in the schema bushfit/model/1, and back.
+"""Model files: a result as JSON in the schema bushfit/model/1, or /2 with specimens, and back.
 
 The dataclasses below are the keys that are read, and pydantic checks them all at once; other keys are left alone.
 """
@@ -11,13 +11,14 @@ from collections.abc import Mapping, Set
 from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 
 from bushfit import __version__
+from bushfit.effects.stiffness_factor import EFFECT as FACTOR
 from bushfit.errors import ModelError, naming
-from bushfit.geometry import Bushing, Direction
+from bushfit.geometry import Bushing, Specimen
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import End, Outlier, Quality, Range, Result
@@ -25,8 +26,10 @@ from bushfit.reading.files import read_utf8
 from bushfit.reading.measurement import Source
 from bushfit.validation import Flag, Name, Number, WholeNumber, check_tables
 
-#: What the key "schema" of a model file has to say.
-SCHEMA = "bushfit/model/1"
+#: What the key "schema" of a model file has to say: of one with a bushing alone, and of one with specimens too.
+SCHEMAS = ("bushfit/model/1", "bushfit/model/2")
+#: The effect that older files have in place of a factor of its own for the radial direction, and its parameter.
+_RADIAL_FACTOR = ("radial_factor", "radial_factor.excess")
 #: Size of a model file at most [bytes]: a hundred times what a model with every effect of the library takes.
 _LARGEST_BYTES = 10_000_000
 #: Packages that the numbers rest on; a model file records their versions.
@@ -46,6 +49,22 @@ class BushingTable:
     inner_radius_m: Number
     outer_radius_m: Number
     length_m: Number
+
+
+@dataclass(frozen=True)
+class SpecimenTable:
+    """specimens: other bodies of the compound; see geometry.Specimen."""
+
+    name: Name
+    kind: Literal["modulus", "shear"]
+    strain: Literal["engineering", "tensor", "tension"] = "engineering"
+    area_m2: Number | None = None
+    thickness_m: Number | None = None
+    elements: WholeNumber = 1
+
+    @property
+    def specimen(self) -> Specimen:
+        return Specimen(self.name, self.kind, self.strain, self.area_m2, self.thickness_m, self.elements)
 
 
 @dataclass(frozen=True)
@@ -90,7 +109,7 @@ class FitTable:
     noise: Number
     frequency_Hz: tuple[Number, Number] | None = None  # noqa: N815
     strain: tuple[Number, Number] | None = None
-    directions: tuple[Direction, ...] = ()
+    directions: tuple[Name, ...] = ()
 
     def __post_init__(self) -> None:
         if self.strain and not self.frequency_Hz:
@@ -119,7 +138,7 @@ class ProvenanceTable:
 class ModelFile:
     """A whole model file."""
 
-    bushing: BushingTable
+    bushing: BushingTable | None
     effects: tuple[str, ...]
     parameters: Mapping[str, ParameterTable]
     covariance: CovarianceTable | None = None
@@ -127,6 +146,7 @@ class ModelFile:
     warnings: tuple[str, ...] = ()
     outliers: tuple[Outlier, ...] = ()
     provenance: ProvenanceTable = field(default_factory=ProvenanceTable)
+    specimens: tuple[SpecimenTable, ...] = ()
 
 
 def load_result(file: Path) -> Result:
@@ -154,16 +174,16 @@ def from_document(document: object, file: Path | None = None) -> Result:
         raise ModelError(
             "not a model", file=file, found=_KINDS.get(type(document), "null"), expected="a JSON object { ... }"
         )
-    if document.get("schema") != SCHEMA:
+    if document.get("schema") not in SCHEMAS:
         raise ModelError(
             "not a model this version reads",
             file=file,
             place="schema",
             found=repr(document.get("schema")),
-            expected=SCHEMA,
+            expected=" or ".join(SCHEMAS),
             hint="use a file written by bushfit fit-static, fit-dynamic, fit or diagnose",
         )
-    tables = check_tables(document, file, ModelFile, kind=ModelError)
+    tables = check_tables(_renamed(document), file, ModelFile, kind=ModelError)
     with naming(file):
         return _result(tables)
 
@@ -176,11 +196,11 @@ def _result(tables: ModelFile) -> Result:
     """
     shape, entries, fit = tables.bushing, tables.parameters, tables.fit
     model = Model(
-        Bushing(shape.name, shape.inner_radius_m, shape.outer_radius_m, shape.length_m),
+        Bushing(shape.name, shape.inner_radius_m, shape.outer_radius_m, shape.length_m) if shape else None,
         tables.effects,
         {name: entry.value for name, entry in entries.items()},
     )
-    return Result(
+    result = Result(
         model,
         fitted=tuple(name for name, entry in entries.items() if entry.vary),
         covariance=_covariance(tables.covariance, model.parameters.keys()) if tables.covariance else Covariance(),
@@ -191,7 +211,12 @@ def _result(tables: ModelFile) -> Result:
         outliers=tables.outliers,
         profile={name: entry.profile95 for name, entry in entries.items() if entry.profile95},
         at_bound={name: entry.at_bound for name, entry in entries.items() if entry.at_bound},
+        specimens=tuple(table.specimen for table in tables.specimens),
     )
+    with naming(place="fit, directions"):
+        for name in result.measured.directions if result.measured else ():
+            result.place(name)
+    return result
 
 
 def _covariance(table: CovarianceTable, parameters: Set[str]) -> Covariance:
@@ -203,11 +228,12 @@ def _covariance(table: CovarianceTable, parameters: Set[str]) -> Covariance:
 
 
 def to_document(result: Result) -> dict[str, Any]:
-    """The result as JSON-ready data in the schema bushfit/model/1."""
+    """The result as JSON-ready data in one of SCHEMAS."""
     model, covariance = model_document(result.model), result.covariance
     return {
-        "schema": SCHEMA,
+        "schema": SCHEMAS[bool(result.specimens)],
         **model,
+        **({"specimens": [_specimen(specimen) for specimen in result.specimens]} if result.specimens else {}),
         "parameters": {name: entry | _uncertainty(result, name) for name, entry in model["parameters"].items()},
         "covariance": {
             "names": list(covariance.names),
@@ -219,7 +245,11 @@ def to_document(result: Result) -> dict[str, Any]:
         "outliers": [asdict(outlier) for outlier in result.outliers],
         "provenance": {
             "bushfit": __version__,
-            "inputs": [{"file": str(source.file), "sha256": source.sha256} for source in result.inputs],
+            "inputs": [
+                {"file": str(source.file), "sha256": source.sha256}
+                | ({"conditions": dict(source.conditions)} if source.conditions else {})
+                for source in result.inputs
+            ],
             "packages": dict(_versions()),
         },
     }
@@ -229,7 +259,8 @@ def model_document(model: Model) -> dict[str, Any]:
     """The model as JSON-ready data: bushing, effects, parameters with value and unit."""
     bushing = model.bushing
     return {
-        "bushing": {
+        "bushing": bushing
+        and {
             "name": bushing.name,
             "inner_radius_m": bushing.inner_radius,
             "outer_radius_m": bushing.outer_radius,
@@ -241,6 +272,26 @@ def model_document(model: Model) -> dict[str, Any]:
             for name, parameter in model.parameters.items()
         },
     }
+
+
+def _specimen(specimen: Specimen) -> dict[str, Any]:
+    sizes = {"area_m2": specimen.area, "thickness_m": specimen.thickness, "elements": specimen.elements}
+    of_kind = {"strain": specimen.strain} if specimen.kind == "modulus" else sizes
+    return {"name": specimen.name, "kind": specimen.kind, **of_kind}
+
+
+def _renamed(document: dict[str, Any]) -> dict[str, Any]:
+    """A document with the factor of the radial direction as it is called today: 1 + excess, of the same uncertainty."""
+    old, excess = _RADIAL_FACTOR
+    if not (isinstance(effects := document.get("effects"), list) and old in effects):
+        return document
+    text = json.dumps(document).replace(f'"{excess}"', f'"{FACTOR.name}"').replace(f'"{old}"', f'"{FACTOR.name}"')
+    renamed = json.loads(text)
+    entry = renamed["parameters"][FACTOR.name]
+    entry["value"] += 1.0
+    if entry.get("profile95"):
+        entry["profile95"] = [None if end is None else 1.0 + end for end in entry["profile95"]]
+    return renamed
 
 
 def _uncertainty(result: Result, name: str) -> dict[str, Any]:
@@ -262,7 +313,7 @@ def _fit(quality: Quality, measured: Range) -> dict[str, Any]:
         **asdict(quality),
         "frequency_Hz": list(measured.frequency),
         "strain": list(measured.strain),
-        "directions": [str(direction) for direction in measured.directions],
+        "directions": list(measured.directions),
     }
 
 

@@ -10,6 +10,7 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
+from bushfit import geometry
 from bushfit.effects import (
     BASE,
     LIBRARY,
@@ -26,7 +27,7 @@ from bushfit.effects import (
 from bushfit.effects.contract import Array, Condition, ForceBelow, StiffnessBelow, Values
 from bushfit.effects.history import History
 from bushfit.errors import ModelError
-from bushfit.geometry import Bushing, Direction
+from bushfit.geometry import STRAINING, Bushing, Direction, Place
 from bushfit.units import for_people
 
 #: What records a response: a sweep or a loop, which may have force chains of their own.
@@ -64,7 +65,9 @@ class _Structure:
         if doubles:
             raise ModelError("an effect is listed twice", found=", ".join(sorted(doubles)))
         place = {name: place for place, name in enumerate(LIBRARY)}
-        records = tuple(sorted(map(effect_named, names), key=lambda effect: (effect.level, place[effect.name])))
+        known = map(effect_named, names)
+        order = sorted(known, key=lambda effect: (effect.level, place.get(effect.name, len(place)), effect.name))
+        records = tuple(order)
         return cls(
             records,
             MappingProxyType(
@@ -81,7 +84,7 @@ class Model:
     """A bushing, the effects that its response is made of, and one value per parameter; it does not change.
 
     Args:
-        bushing: geometry.
+        bushing: geometry; None where specimens of the compound alone are known.
         effects: names from the library, in any order.
         values: SI value of every parameter, by the names of files and reports.
 
@@ -90,7 +93,7 @@ class Model:
             outside the parameter's bounds.
     """
 
-    bushing: Bushing
+    bushing: Bushing | None
     effects: tuple[str, ...]
     values: Mapping[str, float]
 
@@ -127,12 +130,25 @@ class Model:
         """Whether the response is the plain sum of the branches, without modifiers and layers."""
         return len(self._structure.branches) == len(self.records)
 
+    @property
+    def name(self) -> str:
+        """Of the bushing; "compound" where there is none."""
+        return self.bushing.name if self.bushing else "compound"
+
+    def unit_strain(self, place: Place) -> float:
+        """Equivalent strain per unit displacement [1/m], rotation [1/rad] or strain [1]."""
+        return geometry.unit_strain(self.bushing, place)
+
+    def stiffness_per_modulus(self, place: Place) -> float:
+        """Stiffness per unit equivalent shear modulus: [m], [m^3/rad] of a rotation, [1] of a modulus."""
+        return geometry.stiffness_per_modulus(self.bushing, place)
+
     def with_values(self, values: Mapping[str, float]) -> Model:
         """The same model with some values replaced."""
         return Model(self.bushing, self.effects, {**self.values, **values})
 
     @classmethod
-    def started(cls, bushing: Bushing, effects: Sequence[str], values: Mapping[str, float]) -> Model:
+    def started(cls, bushing: Bushing | None, effects: Sequence[str], values: Mapping[str, float]) -> Model:
         """A model with the values given; other parameters have their neutral value, or a typical one."""
         defaults = {
             qualified(effect, parameter): parameter.typical if parameter.neutral is None else parameter.neutral
@@ -162,7 +178,7 @@ class Model:
 
     def stiffness(
         self,
-        direction: Direction | str,
+        direction: Place | str,
         frequency: Array | float,
         amplitude: Array | float,
         *,
@@ -172,7 +188,7 @@ class Model:
         """Complex dynamic stiffness of the steady first harmonic.
 
         Args:
-            direction: of the test, or its name: axial, radial or torsion.
+            direction: of the test, or its name: axial, radial or torsion; or the specimen under test.
             frequency: [Hz], broadcast with amplitude.
             amplitude: zero-to-peak displacement [m] or rotation [rad].
             kind: whether a loop or a sweep records it; only effects of the instrument tell them apart.
@@ -192,7 +208,7 @@ class Model:
             omega, amplitude = np.broadcast_arrays(omega, amplitude)
         points = np.atleast_1d(omega)
         respond = self._stack_stiffness(
-            Setting(self.bushing, Direction(direction), kind), self.values if values is None else values
+            _setting(self.bushing, direction, kind), self.values if values is None else values
         )
         stiffness = respond(points, np.atleast_1d(amplitude))
         if stiffness.shape[-points.ndim :] != points.shape:
@@ -201,7 +217,7 @@ class Model:
 
     def force(
         self,
-        direction: Direction | str,
+        direction: Place | str,
         displacement: History,
         *,
         kind: Kind = "sweep",
@@ -210,26 +226,32 @@ class Model:
         """Force over a displacement history [N or N m], from rest or on the steady cycle.
 
         Args:
-            direction: of the test, or its name.
+            direction: of the test, or its name; or the specimen under test.
             displacement: [m or rad], (..., n).
             kind, values: as of `stiffness`.
 
         Returns:
             (..., n).
         """
-        setting = Setting(self.bushing, Direction(direction), kind)
-        respond = self._stack_force(setting, self.values if values is None else values, self._structure.layers)
+        setting = _setting(self.bushing, direction, kind)
+        respond = self._stack_force(setting, self.values if values is None else values, self._layers(setting))
         return respond(displacement)
+
+    def _layers(self, setting: Setting) -> tuple[Layer, ...]:
+        """The layers that act on a test: a coupon whose modulus is measured has no rig and no sleeves around it."""
+        if setting.direction.motion is not STRAINING:
+            return self._structure.layers
+        return tuple(layer for layer in self._structure.layers if layer.corrects)
 
     def _stack_stiffness(self, setting: Setting, values: Values) -> Callable[[Array, Array], Array]:
         """The stiffness outside all layers, as a function of omega [rad/s] and amplitude [m or rad]."""
 
         def rubber(omega: Array, amplitude: Array) -> Array:
-            strain = amplitude * self.bushing.unit_strain(setting.direction)
+            strain = amplitude * self.unit_strain(setting.direction)
             base = self._adjusted(setting, values, omega, amplitude, strain)
             return self._branch_stiffness(setting, values, omega, strain, base)
 
-        layers = self._structure.layers
+        layers = self._layers(setting)
         if not layers:
             return rubber
         per_sample = {
@@ -253,8 +275,8 @@ class Model:
 
     def _stack_force(self, setting: Setting, values: Values, layers: Sequence[Layer]) -> ForceBelow:
         """The force outside these layers, as a function of the displacement history."""
-        per_displacement = self.bushing.unit_strain(setting.direction)
-        factor = self.bushing.stiffness_per_modulus(setting.direction) / (2.0 * per_displacement)
+        per_displacement = self.unit_strain(setting.direction)
+        factor = self.stiffness_per_modulus(setting.direction) / (2.0 * per_displacement)
 
         def rubber(displacement: History) -> Array:
             strain = displacement.scaled(per_displacement)
@@ -272,7 +294,7 @@ class Model:
     def _branch_stiffness(self, setting: Setting, values: Values, omega: Array, strain: Array, base: Values) -> Array:
         """Complex stiffness of the rubber, with the paper's parameters as in `base`."""
         moduli = (branch.modulus(seen_by(branch, values, base), omega, strain) for branch in self._structure.branches)
-        return np.atleast_1d(self.bushing.stiffness_per_modulus(setting.direction) * sum(moduli))
+        return np.atleast_1d(self.stiffness_per_modulus(setting.direction) * sum(moduli))
 
     def _adjusted(self, setting: Setting, values: Values, omega: Array, amplitude: Array, strain: Array) -> Values:
         """All values, with the paper's parameters as the modifiers leave them at an operating condition."""
@@ -283,6 +305,10 @@ class Model:
         for modifier in self._structure.modifiers:
             base = {**base, **modifier.adjust(seen_by(modifier, values, base), condition)}
         return base
+
+
+def _setting(bushing: Bushing | None, place: Place | str, kind: Kind) -> Setting:
+    return Setting(bushing, Direction(place) if isinstance(place, str) else place, kind)
 
 
 def _check(name: str, value: float, parameter: Parameter) -> None:

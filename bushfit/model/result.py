@@ -8,7 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from bushfit.geometry import Direction
+from bushfit.errors import ModelError
+from bushfit.geometry import Direction, Place, Specimen
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Source
@@ -46,12 +47,12 @@ class Range:
     Args:
         frequency: least and largest [Hz].
         strain: least and largest equivalent strain amplitude.
-        directions: of the tests; none where an older file does not say which.
+        directions: of the tests, and specimens, by name; none where an older file does not say which.
     """
 
     frequency: tuple[float, float]
     strain: tuple[float, float]
-    directions: tuple[Direction, ...] = ()
+    directions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,7 @@ class Result:
         outliers: points that lie farther off than noise explains.
         profile: 95 % intervals by profile likelihood, where they were asked for; None is an open end.
         at_bound: parameters that came to rest on the least or largest value they may have, and on which.
+        specimens: that were tested beside the bushing, or instead of it.
     """
 
     model: Model
@@ -105,6 +107,23 @@ class Result:
     outliers: tuple[Outlier, ...] = ()
     profile: Mapping[str, tuple[float | None, float | None]] = field(default_factory=dict)
     at_bound: Mapping[str, End] = field(default_factory=dict)
+    specimens: tuple[Specimen, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Of the bushing, or of the first specimen where there is none."""
+        return self.specimens[0].name if self.specimens and not self.model.bushing else self.model.name
+
+    def place(self, name: str) -> Place:
+        """The specimen of this name, or else the direction.
+
+        Raises:
+            ModelError: it is neither.
+        """
+        known: dict[str, Place] = {str(place): place for place in (*Direction, *self.specimens)}
+        if name not in known:
+            raise ModelError("no such direction or specimen", found=name, expected="one of " + ", ".join(known))
+        return known[name]
 
     def interval(self, name: str) -> tuple[float, float] | None:
         """95 % interval of a parameter [its SI unit], cut at its bounds; None where it was held at an exact value.

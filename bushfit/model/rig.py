@@ -13,7 +13,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model
 
 #: Time steps in a cycle, where none are asked for: within 0.03 % of the closed form at 20 Hz.
@@ -38,7 +38,7 @@ def wave(waveform: str, phase: Array) -> Array:
 
 def record(
     model: Model,
-    direction: Direction,
+    direction: Place,
     frequency: float,
     amplitude: float,
     *,
@@ -72,7 +72,7 @@ def record(
 
 
 def imposed(
-    model: Model, direction: Direction, motion: Array, step: float, frequency: float, *, kind: Kind = "loop"
+    model: Model, direction: Place, motion: Array, step: float, frequency: float, *, kind: Kind = "loop"
 ) -> Record:
     """Impose any motion from rest.
 
@@ -114,7 +114,7 @@ def lock_in(measured: Record, frequency: float) -> complex:
 
 def dynamic_stiffness(
     model: Model,
-    direction: Direction,
+    direction: Place,
     frequency: Array,
     amplitude: Array,
     *,

@@ -17,7 +17,7 @@ import numpy as np
 from bushfit.effects import Branch, Parameter, qualified
 from bushfit.effects.contract import Array, Value, Values
 from bushfit.effects.history import History
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model, seen_by
 
 #: Step of the differences, relative to the value (log parameters) or to the typical size (linear ones);
@@ -30,7 +30,7 @@ Face = Callable[[Branch], tuple[Callable[..., Array], Callable[..., dict[str, Ar
 
 
 def stiffness_jacobian(
-    model: Model, direction: Direction, frequency: Array, amplitude: Array, names: Sequence[str], kind: Kind = "sweep"
+    model: Model, direction: Place, frequency: Array, amplitude: Array, names: Sequence[str], kind: Kind = "sweep"
 ) -> Array:
     """Derivatives of the complex dynamic stiffness by parameters: (k, n) [N/m or N m/rad per unit of the parameter].
 
@@ -47,14 +47,14 @@ def stiffness_jacobian(
             model, names, lambda values: model.stiffness(direction, frequency, amplitude, kind=kind, values=values)
         )
     omega = 2.0 * np.pi * frequency
-    strain = amplitude * model.bushing.unit_strain(direction)
+    strain = amplitude * model.unit_strain(direction)
     total = np.zeros((len(names), frequency.size), dtype=complex)
     _add(total, model, names, lambda branch: (branch.modulus, branch.modulus_sensitivities), (omega, strain))
-    return model.bushing.stiffness_per_modulus(direction) * total
+    return model.stiffness_per_modulus(direction) * total
 
 
 def force_jacobian(
-    model: Model, direction: Direction, displacement: History, names: Sequence[str], kind: Kind = "loop"
+    model: Model, direction: Place, displacement: History, names: Sequence[str], kind: Kind = "loop"
 ) -> Array:
     """Derivatives of the force by parameters along a displacement history: (k, n) [N or N m per unit].
 
@@ -67,11 +67,11 @@ def force_jacobian(
     """
     if not model.only_branches:
         return differences(model, names, lambda values: model.force(direction, displacement, kind=kind, values=values))
-    per_displacement = model.bushing.unit_strain(direction)
+    per_displacement = model.unit_strain(direction)
     test = (displacement.scaled(per_displacement),)
     total = np.zeros((len(names), displacement.value.shape[-1]))
     _add(total, model, names, lambda branch: (branch.stress, branch.stress_sensitivities), test)
-    return model.bushing.stiffness_per_modulus(direction) / (2.0 * per_displacement) * total
+    return model.stiffness_per_modulus(direction) / (2.0 * per_displacement) * total
 
 
 def _add(total: Array, model: Model, names: Sequence[str], face: Face, test: tuple[object, ...]) -> None:

@@ -9,10 +9,10 @@ from typing import Literal
 
 import numpy as np
 
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 from bushfit.reading.headers import LOOP_COLUMNS, Column
 from bushfit.reading.layout import FileFormat
-from bushfit.reading.measurement import Floats, Loop, Source, Waveform, rebuild_time
+from bushfit.reading.measurement import Floats, Loop, Waveform, rebuild_time, source_of
 from bushfit.reading.parallel import by_chunks
 from bushfit.reading.table import Table
 
@@ -22,7 +22,7 @@ _FEWEST_LOOP_ROWS = 10
 
 def read_loop(
     file: Path,
-    direction: Direction,
+    direction: Place,
     *,
     name: str | None = None,
     listed_as: Path | None = None,
@@ -34,6 +34,9 @@ def read_loop(
     frequency: float | None = None,
     waveform: Waveform = "triangle",
     noise: float | None = None,
+    weight: float = 1.0,
+    temperature: float | None = None,
+    conditions: Mapping[str, str | float] | None = None,
 ) -> Loop:
     """Read a hysteresis loop.
 
@@ -49,7 +52,9 @@ def read_loop(
         rate: speed of the displacement [m/s or rad/s], for a file without time.
         frequency: cycles per time [Hz], for a file without time; goes with `waveform`.
         waveform: course of the displacement in time.
-        noise: of the loop, see `Loop`.
+        noise, weight: of the loop, see `Loop`.
+        temperature: at which it was tested [K], where it is stated.
+        conditions: what else is stated of the test, for provenance.
 
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
@@ -66,11 +71,11 @@ def read_loop(
         time = rebuild_time(displacement, rate=rate, frequency=frequency, waveform=waveform)
     else:
         _check_increases(table, wanted["time"], time)
-    source = Source(listed_as or Path(file.name), table.sha256)
-    return Loop(name or file.stem, direction, time, displacement, force, noise, source, "time" in values)
+    source = source_of(file, listed_as, table.sha256, temperature, conditions)
+    return Loop(name or file.stem, direction, time, displacement, force, noise, source, "time" in values, weight)
 
 
-def _check_not_swapped(table: Table, direction: Direction) -> None:
+def _check_not_swapped(table: Table, direction: Place) -> None:
     """Refuse a displacement in units of force beside a force in units of displacement."""
     if table.agrees("displacement", direction.motion.force_unit) and table.agrees(
         "force", direction.motion.displacement_unit
@@ -86,7 +91,7 @@ def _check_not_swapped(table: Table, direction: Direction) -> None:
         )
 
 
-def _loop_columns(table: Table, direction: Direction, force_sign: int, *, has_clock: bool) -> dict[str, Column]:
+def _loop_columns(table: Table, direction: Place, force_sign: int, *, has_clock: bool) -> dict[str, Column]:
     """The columns of a loop with their units; only one `has_clock`, a rate or frequency that is stated, lacks time."""
     displacement = table.column("displacement", direction.motion.displacement_unit)
     force = table.column("force", direction.motion.force_unit)

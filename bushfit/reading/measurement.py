@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -11,11 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
+from bushfit.units import CELSIUS
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Waveform = Literal["sine", "triangle"]
+#: What changes from point to point of a run.
+Stepped = Literal["frequency", "amplitude"]
 
 #: Share of the range by which a turning point of a loop stands out from its neighbours; chosen: noise stays below it.
 _TURN_PROMINENCE = 0.1
@@ -23,10 +27,29 @@ _TURN_PROMINENCE = 0.1
 
 @dataclass(frozen=True)
 class Source:
-    """The file that a measurement came from, as the campaign names it, and its SHA-256: the provenance of results."""
+    """Where a measurement came from: the provenance of results.
+
+    Args:
+        file: as the campaign names it.
+        sha256: of the file.
+        conditions: what campaign or file state of the test and no fit uses, such as temperature, date and operator.
+    """
 
     file: Path
     sha256: str
+    conditions: Mapping[str, str | float] = field(default_factory=dict)
+
+
+def source_of(
+    file: Path,
+    listed_as: Path | None,
+    sha256: str,
+    temperature: float | None,
+    conditions: Mapping[str, str | float] | None,
+) -> Source:
+    """The provenance of a test: its file as the campaign names it, and its conditions, a temperature [K] in degC."""
+    degrees = {} if temperature is None else {"temperature_degC": round(temperature - CELSIUS, 6)}
+    return Source(listed_as or Path(file.name), sha256, {**(conditions or {}), **degrees})
 
 
 @dataclass(frozen=True)
@@ -52,13 +75,14 @@ class Loop:
 
     Args:
         name: of the loop.
-        direction: of the test.
+        direction: of the bushing, or the specimen tested in place of one.
         time: [s], (n,).
-        displacement: [m or rad], (n,).
-        force: [N or N m], (n,).
+        displacement: [m or rad], or strain of a modulus test, (n,).
+        force: [N or N m], or stress [Pa], (n,).
         noise: standard deviation of the force relative to its half range, where the campaign states it.
         source: the file it came from; None where it came from none.
         timed: whether time was recorded; else it was rebuilt from the displacement.
+        weight: of the test in a fit, relative to that of others.
         part: where it stands in a record of several loops; None where the record is one loop.
         softening: by how much its first cycle is stiffer than its last, relative to the last; None where no more than
             noise and the memory of rubber make.
@@ -68,13 +92,14 @@ class Loop:
     """
 
     name: str
-    direction: Direction
+    direction: Place
     time: Floats
     displacement: Floats
     force: Floats
     noise: float | None = None
     source: Source | None = None
     timed: bool = True
+    weight: float = 1.0
     part: Part | None = None
     softening: float | None = None
 
@@ -84,25 +109,32 @@ class Loop:
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """A stepped-sine sweep: a complex dynamic stiffness for each of its operating points.
+    """A sweep: a complex dynamic stiffness for each of its operating points.
+
+    Either the frequency is stepped and the amplitude held, or the amplitude is stepped and the frequency held, or
+    neither is held, as where a mass swings on a mount. What was recorded in one go is a run.
 
     Args:
         name: of the sweep.
-        direction: of the test.
+        direction: of the bushing, or the specimen tested in place of one.
         frequency: [Hz], (n,).
-        amplitude: of the level, the same for all its points, zero-to-peak [m or rad], (n,).
-        stiffness: complex [N/m or N m/rad], (n,).
+        amplitude: of the level, the same for all its points, zero-to-peak [m or rad, or strain], (n,).
+        stiffness: complex [N/m or N m/rad, or Pa], (n,).
         repeat: number of the repeat, (n,); all 1 unless given.
         noise: standard deviation of the real and of the imaginary part relative to |K|, where the campaign states it.
         source: the file it came from; None where it came from none.
         reached: amplitude that each point really reached [m or rad], (n,); None where it is not known.
+        stepped: what changes from point to point of a run; the other is held. None where neither is.
+        relative_error: standard deviation of the real and of the imaginary part of each point relative to |K|, (n,),
+            where the file states it.
+        weight: of the test in a fit, relative to that of others.
 
     Raises:
         MeasurementError: arrays of different length.
     """
 
     name: str
-    direction: Direction
+    direction: Place
     frequency: Floats
     amplitude: Floats
     stiffness: Complex
@@ -110,6 +142,9 @@ class Sweep:
     noise: float | None = None
     source: Source | None = None
     reached: Floats | None = None
+    stepped: Stepped | None = "frequency"
+    relative_error: Floats | None = None
+    weight: float = 1.0
 
     def __post_init__(self) -> None:
         if self.repeat.size == 0:
@@ -120,6 +155,18 @@ class Sweep:
     def amplitude_reached(self) -> Floats:
         """Amplitude that each point reached, or else that of its level [m or rad], (n,): a model is evaluated there."""
         return self.amplitude if self.reached is None else self.reached
+
+    @property
+    def held(self) -> Floats:
+        """What every point of a run has in common, (n,): amplitude [m or rad] or frequency [Hz], or else its number."""
+        if self.stepped is None:
+            return self.repeat.astype(float)
+        return self.amplitude if self.stepped == "frequency" else self.frequency
+
+    @property
+    def step(self) -> Floats:
+        """What changes from point to point of a run, (n,): frequency [Hz] or amplitude [m or rad]."""
+        return self.amplitude if self.stepped == "amplitude" else self.frequency
 
 
 def _check_lengths(name: str, *columns: NDArray[np.generic]) -> None:

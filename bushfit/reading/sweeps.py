@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 from bushfit.reading.headers import SWEEP_COLUMNS, AmplitudeConvention, Column
 from bushfit.reading.layout import FileFormat
-from bushfit.reading.measurement import Complex, Floats, Source, Sweep
+from bushfit.reading.measurement import Complex, Floats, Sweep, source_of
+from bushfit.reading.runs import runs_of
 from bushfit.reading.table import Table
 
 #: The pairs of columns that each make a complex stiffness, in order of preference.
@@ -36,7 +37,7 @@ _ZERO_TO_PEAK: dict[AmplitudeConvention, float] = {"zero-to-peak": 1.0, "peak-to
 
 def read_sweep(
     file: Path,
-    direction: Direction,
+    direction: Place,
     *,
     name: str | None = None,
     listed_as: Path | None = None,
@@ -45,6 +46,9 @@ def read_sweep(
     written: FileFormat | None = None,
     amplitude: AmplitudeConvention | None = None,
     noise: float | None = None,
+    weight: float = 1.0,
+    temperature: float | None = None,
+    conditions: Mapping[str, str | float] | None = None,
 ) -> Sweep:
     """Read a stepped-sine sweep.
 
@@ -60,7 +64,9 @@ def read_sweep(
         written: how the file is written, where it does not tell.
         amplitude: how the file counts amplitudes, where its header does not say so: zero-to-peak unless stated.
             The sweep has them zero-to-peak.
-        noise: of the sweep, see `Sweep`.
+        noise, weight: of the sweep, see `Sweep`.
+        temperature: at which it was tested [K], where it is stated.
+        conditions: what else is stated of the test, for provenance.
 
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
@@ -77,9 +83,23 @@ def read_sweep(
     _check_agreement(table, pair, values, stiffness)
     frequency, level = values["frequency"], to_peak * values["amplitude"]
     reached = to_peak * values["amplitude_reached"] if "amplitude_reached" in values else None
-    repeat = _repeats(table, wanted, values)
-    source = Source(listed_as or Path(file.name), table.sha256)
-    return Sweep(name or file.stem, direction, frequency, level, stiffness, repeat, noise, source, reached)
+    runs = runs_of(frequency, level, _repeats(table, wanted, values))
+    if reached is None and not np.array_equal(runs.amplitude, level):
+        reached = level
+    source = source_of(file, listed_as, table.sha256, temperature, conditions)
+    return Sweep(
+        name or file.stem,
+        direction,
+        frequency,
+        runs.amplitude,
+        stiffness,
+        runs.repeat,
+        noise,
+        source,
+        reached,
+        runs.stepped,
+        weight=weight,
+    )
 
 
 def _stiffness_pair(table: Table) -> tuple[str, str]:
@@ -96,7 +116,7 @@ def _stiffness_pair(table: Table) -> tuple[str, str]:
     )
 
 
-def _sweep_columns(table: Table, direction: Direction, pair: tuple[str, str]) -> dict[str, Column]:
+def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str]) -> dict[str, Column]:
     """The columns of a sweep with their units, in the order in which they are checked.
 
     Beside those that are needed, the pairs that say the same are read, if their units fit.
@@ -199,14 +219,11 @@ def _complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> t
             return first + 1j * second, second / first
 
 
-def _repeats(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> NDArray[np.int64]:
-    """Number of each row's repeat, (n,): as its column has it, or else its count at this frequency and amplitude."""
-    if "repeat" in values:
-        repeat = values["repeat"]
-        is_count = (repeat == np.round(repeat)) & (repeat >= 0) & (repeat < _MOST_REPEATS)
-        table.refuse(~is_count, wanted["repeat"], "this is no repeat number", "a whole number")
-        return repeat.astype(np.int64)
-    import pandas as pd
-
-    points = pd.DataFrame({role: values[role] for role in ("frequency", "amplitude")})
-    return np.asarray(points.groupby(["frequency", "amplitude"]).cumcount(), dtype=np.int64) + 1
+def _repeats(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> NDArray[np.int64] | None:
+    """Number of each row's repeat as its column has it, (n,); None where there is none."""
+    if "repeat" not in values:
+        return None
+    repeat = values["repeat"]
+    is_count = (repeat == np.round(repeat)) & (repeat >= 0) & (repeat < _MOST_REPEATS)
+    table.refuse(~is_count, wanted["repeat"], "this is no repeat number", "a whole number")
+    return repeat.astype(np.int64)

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 from bushfit.units import for_people, number
 
 #: Relative distance of an amplitude from its level that is told; chosen: |K| may then be 1 % off.
@@ -99,7 +99,7 @@ class Reduction:
         outliers: number of rows that were left out as outliers.
     """
 
-    direction: Direction
+    direction: Place
     steps: tuple[Step, ...]
     skipped: tuple[Skipped, ...]
     outliers: int = 0
@@ -156,7 +156,7 @@ def _warnings(reduction: Reduction) -> Iterator[str]:
 
 def _preload(reduction: Reduction) -> Iterator[str]:
     """A sentence on the means that the steps were recorded about, where they are no sensor's zero."""
-    (motion, force), units = reduction.direction.motion.words, reduction.direction.display
+    (motion, force, _), units = reduction.direction.motion.words, reduction.direction.display
     steps, means = reduction.steps, []
     for word, unit, found, largest in (
         (motion, units.displacement, [s.mean_displacement for s in steps], max(s.amplitude for s in steps)),

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 from bushfit.reading.measurement import Complex, Floats, Loop
 from bushfit.reduction.cycles import Cycles, keeps_changing, lone_outliers, mean_from_steady, pieces
 from bushfit.reduction.harmonics import HarmonicFit
@@ -216,7 +216,7 @@ def _creeps(values: Floats, least: float) -> bool:
     return bool(abs(slope) * values.size > least and abs(slope) > _REAL_CHANGE * error)
 
 
-def _check_reach(steps: Sequence[Step], levels: Sequence[float], direction: Direction) -> None:
+def _check_reach(steps: Sequence[Step], levels: Sequence[float], direction: Place) -> None:
     """Refuse a step far off every level that is stated."""
     unit, factor = direction.display.displacement
     for step in steps:

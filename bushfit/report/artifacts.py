@@ -40,7 +40,7 @@ def fit_files(
         from bushfit.report.plots import loops_figure, sweeps_figure, to_png
 
         draw: Mapping[str, Callable[[Model, Any, str], Figure]] = {"loops": loops_figure, "sweeps": sweeps_figure}
-        files[f"{kind}.png"] = to_png(draw[kind](model, data_sets, model.bushing.name))
+        files[f"{kind}.png"] = to_png(draw[kind](model, data_sets, model.name))
     return files
 
 
@@ -58,7 +58,7 @@ def prediction_files(
         curves = predict(result, prediction.direction, *fine_grid(prediction))
         rig = predict(result, prediction.direction, *fine_grid(prediction), rig=True) if rig_effects(result) else None
         note = ". ".join(text[0].upper() + text[1:] for text in (*caveats(result), *prediction.warnings))
-        figure = prediction_figure(prediction, measured, result.model.bushing.name, curves=curves, rig=rig, note=note)
+        figure = prediction_figure(prediction, measured, result.model.name, curves=curves, rig=rig, note=note)
         files[f"{prediction.direction}.png"] = to_png(figure)
     return files
 

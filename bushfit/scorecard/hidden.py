@@ -131,7 +131,7 @@ def _bushing(random: Generator) -> Model:
 def _plan(plain: Model, random: Generator, seed: int) -> SimulateSettings:
     """Two directions at three levels of like strain, two loops, three repeats."""
     top, directions = random.uniform(0.03, 0.06), (Direction.AXIAL, Direction.RADIAL)
-    axial, radial = (float(f"{top / plain.bushing.unit_strain(direction):.2g}") for direction in directions)
+    axial, radial = (float(f"{top / plain.unit_strain(direction):.2g}") for direction in directions)
     shared = random.random() < 0.5
     return SimulateSettings(
         seed=seed,
@@ -173,25 +173,25 @@ def _sized(
         for parameter in effect.parameters
         if parameter.neutral is None
     }
-    amount = next(parameter for parameter in effect.parameters if parameter.neutral is not None)
-    name, value = qualified(effect, amount), amount.typical
-    if amount.bounds[0] < 0.0 and random.random() < 0.5:
-        value = -value
+    amount = effect.amount
+    name, share = qualified(effect, amount), 1.0
+    if amount.bounds[0] < amount.sized(0.0) and random.random() < 0.5:
+        share = -share
     size = 0.0
     for _ in range(_SIZING_STEPS):
-        if not (amount.bounds[0] <= value <= amount.bounds[1] and abs(value) <= _LARGEST * amount.typical):
+        if not (amount.bounds[0] <= amount.sized(share) <= amount.bounds[1] and abs(share) <= _LARGEST):
             raise _OutOfReachError
-        model = plain.with_effect(effect.name, {**values, name: value})
+        model = plain.with_effect(effect.name, {**values, name: amount.sized(share)})
         if not _plausible(model, plan):
-            value *= 0.3
+            share *= 0.3
             continue
         size = _visible(plain, model, plan)
         if size <= 0.0 or abs(np.log(size / wanted)) < _NEAR:
             break
-        value *= float(np.clip(wanted / size, 0.1, 10.0))
+        share *= float(np.clip(wanted / size, 0.1, 10.0))
     if not 0.7 * _VISIBLE[0] < size < 2.0 * _VISIBLE[1]:
         raise _OutOfReachError
-    return {**values, name: value}, size
+    return {**values, name: amount.sized(share)}, size
 
 
 def _shape(plain: Model, plan: SimulateSettings, scale: str | None, typical: float, random: Generator) -> float:

@@ -56,7 +56,8 @@ def sized(model: Model, name: str, direction: Direction, amplitude: float, rng: 
     values = {}
     for parameter in LIBRARY[name].parameters:
         key = qualified(LIBRARY[name], parameter)
-        values[key] = by_hand.get(key, parameter.typical) * rng.uniform(0.5, 1.5)
+        share = rng.uniform(0.5, 1.5)
+        values[key] = by_hand[key] * share if key in by_hand else parameter.sized(share)
     return model.with_effect(name, values)
 
 
@@ -96,7 +97,7 @@ def effect(request: pytest.FixtureRequest) -> Effect:
 
 
 def test_file_stem_is_the_name(effect: Effect) -> None:
-    __import__(f"bushfit.effects.{effect.name}")
+    __import__(f"bushfit.effects.{effect.name.partition('.')[0]}")
 
 
 def test_record_is_complete(effect: Effect) -> None:
@@ -106,7 +107,7 @@ def test_record_is_complete(effect: Effect) -> None:
     assert sum(parameter.neutral is not None for parameter in effect.parameters) == 1
     for parameter in effect.parameters:
         low, high = parameter.bounds
-        assert low < parameter.typical < high
+        assert low < parameter.sized(1.0) < high
         assert parameter.log == (parameter.neutral is None)
         assert not parameter.log or low > 0.0
         assert parameter.neutral is None or low <= parameter.neutral <= high

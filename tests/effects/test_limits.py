@@ -163,7 +163,7 @@ def test_force_gain_tells_loops_from_sweeps() -> None:
 
 
 def test_radial_factor_leaves_the_other_directions_alone() -> None:
-    model = PLAIN.with_effect("radial_factor", {"radial_factor.excess": -0.08})
+    model = PLAIN.with_effect("stiffness_factor.radial", {"stiffness_factor.radial": 0.92})
     for direction, factor in ((Direction.AXIAL, 1.0), (Direction.RADIAL, 0.92), (Direction.TORSION, 1.0)):
         plain = PLAIN.stiffness(direction, FREQUENCY, AMPLITUDE)
         np.testing.assert_allclose(model.stiffness(direction, FREQUENCY, AMPLITUDE), factor * plain, rtol=1e-15)
@@ -226,8 +226,8 @@ def test_play_bends_the_waveform_and_friction_answers_to_it(direction: Direction
 @pytest.mark.parametrize("effect", [effect for effect in LIBRARY.values() if effect.corrects], ids=lambda one: one.name)
 def test_what_corrects_a_formula_scales_that_direction_and_no_other(effect: Effect) -> None:
     (parameter,) = effect.parameters
-    model = PLAIN.with_effect(effect.name, {qualified(effect, parameter): parameter.typical})
+    model = PLAIN.with_effect(effect.name, {qualified(effect, parameter): parameter.sized(1.0)})
     for direction in Direction:
         ratio = model.stiffness(direction, FREQUENCY, AMPLITUDE) / PLAIN.stiffness(direction, FREQUENCY, AMPLITUDE)
         assert np.ptp(np.abs(ratio)) < 1e-12, "a factor"
-        assert (abs(ratio[0] - 1.0) > 1e-6) == (direction is effect.corrects)
+        assert (abs(ratio[0] - 1.0) > 1e-6) == (direction == effect.corrects)

@@ -77,8 +77,8 @@ def test_a_parameter_that_no_test_sees_has_an_error_beyond_all_bounds(
 ) -> None:
     campaign = rig(paper_model)
     data_sets = Data.of(replace(campaign, sweeps=())).chosen(None)
-    model = paper_model.with_effect("radial_factor")
-    names = (*FIVE[:1], "radial_factor.excess")
+    model = paper_model.with_effect("stiffness_factor.radial")
+    names = (*FIVE[:1], "stiffness_factor.radial")
     found = covariance(model, [Stage(names, data_sets)])
-    assert found.stderr("radial_factor.excess") > 10.0  # type: ignore[operator]
+    assert found.stderr("stiffness_factor.radial") > 10.0  # type: ignore[operator]
     assert found.stderr("mu") < 1e-2 * model.values["mu"]  # type: ignore[operator]

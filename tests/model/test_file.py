@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from bushfit.errors import ModelError
-from bushfit.model.file import SCHEMA, from_document, load_result, model_document, to_document
+from bushfit.model.file import SCHEMAS, from_document, load_result, model_document, to_document
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
 
@@ -27,7 +27,7 @@ def test_schema_of_the_interface(document: dict[str, Any]) -> None:
         "schema", "bushing", "effects", "parameters", "covariance", "fit", "warnings", "outliers",
         "provenance",
     ]  # fmt: skip
-    assert document["schema"] == SCHEMA == "bushfit/model/1"
+    assert document["schema"] == SCHEMAS[0] == "bushfit/model/1"
     assert document["bushing"] == {
         "name": "CMP 15 961", "inner_radius_m": 0.01, "outer_radius_m": 0.018, "length_m": 0.034,
     }  # fmt: skip
@@ -71,14 +71,14 @@ def test_a_file_that_does_not_say_which_directions_were_fitted_is_read(
 
 def test_a_model_alone_is_a_result(paper_model: Model, tmp_path: Path) -> None:
     file = tmp_path / "m.json"
-    file.write_text(json.dumps({"schema": SCHEMA, **model_document(paper_model)}))
+    file.write_text(json.dumps({"schema": SCHEMAS[0], **model_document(paper_model)}))
     result = load_result(file)
     assert result.model == paper_model
     assert result.quality is None
     assert result.interval("mu") is None
 
 
-@pytest.mark.parametrize("schema", ["bushfit/model/2", "bushfit/diagnosis/1", None, 3])
+@pytest.mark.parametrize("schema", ["bushfit/model/3", "bushfit/diagnosis/1", None, 3])
 def test_an_unknown_schema_is_refused_by_name(document: dict[str, Any], tmp_path: Path, schema: object) -> None:
     document["schema"] = schema
     file = tmp_path / "model.json"

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import LoopData, SweepData
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.prediction import Band
 from bushfit.report.plots.points import (
@@ -136,12 +136,12 @@ def loops_figure(model: Model, data_sets: Sequence[LoopData], title: str) -> Fig
     return figure
 
 
-def _draw_loops(axes: Axes, model: Model, direction: Direction, data_sets: Sequence[LoopData]) -> None:
+def _draw_loops(axes: Axes, model: Model, direction: Place, data_sets: Sequence[LoopData]) -> None:
     """Force over displacement of one direction's loops."""
     (unit, length), force_units, _ = direction.display
     largest = max(float(np.abs(data_set.drive.force).max()) for data_set in data_sets)
     force_unit, factor = for_people(*force_units, largest)
-    motion_name, force_name = direction.motion.words
+    motion_name, force_name, _ = direction.motion.words
     dress(axes, f"{motion_name} [{unit}]", f"{direction} {force_name} [{force_unit}]")
     for data_set, style in zip(data_sets, styles(len(data_sets), "loop"), strict=True):
         drive, rows = data_set.drive, _drawn_rows(data_set)
@@ -188,7 +188,7 @@ def loop_labels(data_sets: Sequence[LoopData]) -> list[str]:
     return [f"{label}\n{file_name(data_set.test.name)}" for label, data_set in zip(labels, data_sets, strict=True)]
 
 
-def _model_lines(model: Model, direction: Direction, points: Points, axis: Axis) -> Points:
+def _model_lines(model: Model, direction: Place, points: Points, axis: Axis) -> Points:
     """The model over what was stepped through at each value that was held meanwhile, as far as it was measured."""
     along, held = getattr(points, axis), getattr(points, held_beside(axis))
     levels = np.unique(held)

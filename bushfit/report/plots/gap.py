@@ -17,7 +17,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import DataSet, LoopData, parted
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.report.plots.fits import loop_labels, loops_legend
 from bushfit.report.plots.misfit import Curve, Map, Side, columns, has_holes, side_of
@@ -218,7 +218,7 @@ def _cells(frequency: Array, *, logarithmic: bool) -> tuple[Array, Array]:
     return (np.exp(low), np.exp(high)) if logarithmic else (np.maximum(low, 0.0), high)
 
 
-def _label_maps(row: Sequence[Axes], direction: Direction, part: str, drawn: Map) -> None:
+def _label_maps(row: Sequence[Axes], direction: Place, part: str, drawn: Map) -> None:
     unit, length = direction.display.displacement
     levels = np.unique(drawn.points.amplitude)
     for axes in row:
@@ -261,7 +261,7 @@ def _draw_scale(figure: SubFigure, maps: Sequence[Axes], edges: Array, colors: S
 
 
 def _draw_loops(
-    row: Sequence[Axes], direction: Direction, data_sets: Sequence[LoopData], sides: Sequence[Sequence[Curve]]
+    row: Sequence[Axes], direction: Place, data_sets: Sequence[LoopData], sides: Sequence[Sequence[Curve]]
 ) -> None:
     """Draw what is left of one direction's loops over the phase of the cycle, before and after on one scale."""
     furthest = max(float(np.abs(curve.values).max()) for curves in sides for curve in curves)

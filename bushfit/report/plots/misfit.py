@@ -9,7 +9,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.report.plots.points import Repeats, over_sectors
 
@@ -47,8 +47,8 @@ class Side(NamedTuple):
 
     title: str
     gap: float
-    maps: Mapping[Direction, Map]
-    loops: Mapping[Direction, Sequence[Curve]]
+    maps: Mapping[Place, Map]
+    loops: Mapping[Place, Sequence[Curve]]
 
 
 def columns(before: Model, after: Model, data_sets: Sequence[DataSet]) -> list[tuple[Model, str]]:
@@ -63,8 +63,8 @@ def side_of(
     model: Model,
     name: str,
     data_sets: Sequence[DataSet],
-    sweeps: Mapping[Direction, Sequence[SweepData]],
-    loops: Mapping[Direction, Sequence[LoopData]],
+    sweeps: Mapping[Place, Sequence[SweepData]],
+    loops: Mapping[Place, Sequence[LoopData]],
 ) -> Side:
     """What is drawn of a model against all tests."""
     gap = float(np.sqrt(np.mean(np.square(np.concatenate([data_set.residual(model) for data_set in data_sets])))))
@@ -89,9 +89,7 @@ def _map(model: Model, data_sets: Sequence[SweepData]) -> Map:
     points = Repeats.at(frequency, row)
     merged = max(np.unique(amplitude[row == level]).size for level in np.unique(row))
     deviation = -np.concatenate([data_set.deviation(model) for data_set in data_sets])
-    noise = np.array(
-        [data_set.noise.random[data_set.name, float(x)] for data_set in data_sets for x in data_set.amplitude]
-    )
+    noise = np.array([data_set.noise.random[data_set.name, float(x)] for data_set in data_sets for x in data_set.held])
     shared = np.array([data_set.noise.shared for data_set in data_sets for _ in data_set.amplitude])
     variance = np.square(noise) + np.square(shared)
     storage, loss = (

@@ -10,7 +10,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import LoopData, SweepData
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 from bushfit.prediction import Band
 from bushfit.report.plots.style import MOST_NAMED
 
@@ -25,10 +25,10 @@ BINS = 1500
 Axis = Literal["frequency", "amplitude"]
 
 
-def by_direction(data_sets: Sequence[_T]) -> dict[Direction, list[_T]]:
+def by_direction(data_sets: Sequence[_T]) -> dict[Place, list[_T]]:
     """The tests of each direction, in the order of the tests."""
     return {
-        direction: [data_set for data_set in data_sets if data_set.direction is direction]
+        direction: [data_set for data_set in data_sets if data_set.direction == direction]
         for direction in dict.fromkeys(data_set.direction for data_set in data_sets)
     }
 

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import SweepData
-from bushfit.geometry import Direction
+from bushfit.geometry import Place
 from bushfit.prediction import Band, Prediction
 from bushfit.report.plots.points import Axis, Points, held_beside, means
 from bushfit.report.plots.style import (
@@ -82,7 +82,7 @@ def prediction_figure(
         note: what else a reader must know, such as what the prediction leaves out.
     """
     lines = prediction if curves is None else curves
-    mine = [data_set for data_set in measured if data_set.direction is prediction.direction]
+    mine = [data_set for data_set in measured if data_set.direction == prediction.direction]
     points = means(mine)
     frequencies, amplitudes = np.unique(prediction.frequency), np.unique(prediction.amplitude)
     rows: list[tuple[Axis, Array]] = []
@@ -107,7 +107,7 @@ def prediction_figure(
 
 def draw(
     pair: Sequence[Axes],
-    direction: Direction,
+    direction: Place,
     lines: Prediction | Points,
     points: Points,
     axis: Axis,
