@@ -247,6 +247,7 @@ def _campaign_toml(simulated: Simulated) -> str:
         lines += [
             f'{key} = "{getattr(bushing, key) * 1e3:.6g} mm"' for key in ("inner_radius", "outer_radius", "length")
         ]
+        lines += [f'shape = "{bushing.shape}"'] if bushing.shape != "paper" else []
     for kind, tests in (("loops", simulated.loops), ("sweeps", simulated.sweeps)):
         for test in tests:
             lines += ["", f"[[{kind}]]", f'file = "{test.name}.csv"', f'direction = "{test.direction}"']

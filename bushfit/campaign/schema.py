@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field
 
 from bushfit.errors import CampaignError, naming
-from bushfit.geometry import TRANSLATION, Direction
+from bushfit.geometry import TRANSLATION, Direction, Shape
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Waveform
@@ -163,12 +163,13 @@ Count = Annotated[int, Field(strict=True, ge=1, le=_LARGEST_COUNT)]
 
 @dataclass(frozen=True)
 class BushingTable:
-    """[bushing]: geometry [m]."""
+    """[bushing]: geometry [m], and the radial formulas to go by."""
 
     name: Name
     inner_radius: Length
     outer_radius: Length
     length: Length
+    shape: Shape = "paper"
 
 
 @dataclass(frozen=True)
