@@ -29,6 +29,7 @@ from bushfit.model.result import Result
 from bushfit.reading.measurement import Loop, Source, Sweep
 from bushfit.reading.resonance import ResonanceTest
 from bushfit.reading.runs import runs_of
+from bushfit.reduction.programme import programme
 from bushfit.reduction.resonance import reduce_resonance, response
 
 if TYPE_CHECKING:
@@ -45,6 +46,8 @@ PAPER_SWEEPS = tuple(
 _ROWS_PER_CYCLE = 1000
 #: Time steps of a simulated loop between two rows; the error of the time steps falls in proportion to them.
 _STEPS_PER_ROW = 2
+#: Time steps of a programme at most: they take seconds, and a gigabyte.
+_MOST_STEPS = 10_000_000
 #: Cycles before a loop is recorded, so that it has settled; none where an effect's settling is what there is to see.
 _RUN_IN_CYCLES = 40
 
@@ -96,7 +99,8 @@ class Simulated:
         """The measurements as a campaign in memory, without the truth; resonance tests are reduced to sweeps."""
         reduced = tuple(reduce_resonance(test, mass).sweep for mass, test in self.resonances)
         bushing, name = self.truth.bushing, self.result.name
-        return Campaign(name, Path(name), bushing, self.loops, self.sweeps + reduced, specimens=self.specimens)
+        loops = tuple(part for loop in self.loops for part in programme(loop))
+        return Campaign(name, Path(name), bushing, loops, self.sweeps + reduced, specimens=self.specimens)
 
 
 def model_of(campaign: Campaign) -> Model:
@@ -197,7 +201,9 @@ def _names(kind: str, tests: Sequence[SimulatedTest]) -> list[str]:
 
 
 def _clean_loop(truth: Model, test: SimulatedLoop) -> rig.Record:
-    """The record of a loop without noise, `_ROWS_PER_CYCLE` rows a cycle."""
+    """The record of a loop or a programme without noise, `_ROWS_PER_CYCLE` rows a cycle of its highest frequency."""
+    if len(test.parts) > 1:
+        return _clean_programme(truth, test)
     measured = rig.record(
         truth,
         test.direction,
@@ -209,8 +215,34 @@ def _clean_loop(truth: Model, test: SimulatedLoop) -> rig.Record:
         waveform=test.waveform,
         kind="loop",
     )
-    rows = slice(None, None, _STEPS_PER_ROW)
-    return rig.Record(measured.time[rows], measured.displacement[rows], measured.force[rows])
+    return _thinned(measured, _STEPS_PER_ROW)
+
+
+def _clean_programme(truth: Model, test: SimulatedLoop) -> rig.Record:
+    """The record of a programme from rest, without noise."""
+    fastest = max(frequency for frequency, _ in test.parts)
+    step = 1.0 / (fastest * _ROWS_PER_CYCLE * _STEPS_PER_ROW)
+    duration = sum(test.cycles / frequency + test.pause for frequency, _ in test.parts)
+    if duration > _MOST_STEPS * step:
+        raise CampaignError(
+            "a programme of loops is too long to simulate",
+            place="simulate.loops",
+            found=f"{duration:.3g} s at up to {fastest:.3g} Hz, {duration / step:.2g} steps",
+            expected=f"no more than {_MOST_STEPS} steps, {_ROWS_PER_CYCLE * _STEPS_PER_ROW} a cycle of the fastest",
+            hint="pause for less, or simulate slow and fast loops as programmes of their own",
+        )
+    rest = np.zeros(round(test.pause / step))
+    motions = []
+    for frequency, amplitude in test.parts:
+        phase = np.arange(round(test.cycles / (frequency * step))) * (frequency * step)
+        motions += [amplitude * rig.wave(test.waveform, phase), rest]
+    whole = rig.imposed(truth, test.direction, np.concatenate([*motions[:-1], [0.0]]), step, test.parts[0][0])
+    return _thinned(whole, _STEPS_PER_ROW)
+
+
+def _thinned(record: rig.Record, every: int) -> rig.Record:
+    """Every so many rows of a record."""
+    return rig.Record(record.time[::every], record.displacement[::every], record.force[::every])
 
 
 def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Array:
@@ -265,11 +297,12 @@ def _near(truth: Model, place: Place, frequency: Array, amplitude: Array, stiffn
 
 
 def _loop(test: SimulatedLoop, clean: rig.Record, number: int, plan: SimulateSettings, random: Generator) -> Loop:
+    largest = max(amplitude for _, amplitude in test.parts)
     return Loop(
         f"loop_{test.direction}_{number}",
         test.direction,
         clean.time,
-        clean.displacement + plan.displacement_noise * test.amplitude * random.standard_normal(clean.time.size),
+        clean.displacement + plan.displacement_noise * largest * random.standard_normal(clean.time.size),
         clean.force + plan.force_noise * np.ptp(clean.force) / 2.0 * random.standard_normal(clean.time.size),
     )
 

@@ -14,6 +14,7 @@ from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, Simulated
 from bushfit.effects import BASE
 from bushfit.errors import CampaignError, ModelError
 from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import loop_data, sources
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction, Specimen
 from bushfit.model import rig
@@ -257,6 +258,27 @@ def test_files_are_a_campaign_that_says_nothing_of_the_truth(
     assert load_result(tmp_path / "truth.json").model.values == pytest.approx(paper_model.values, rel=1e-12)
     text = (tmp_path / "campaign.toml").read_text()
     assert [name for name in FIVE if f"{name} =" in text] == []
+
+
+def test_a_programme_is_one_file_of_several_loops(paper_model: Model, tmp_path: Path) -> None:
+    sizes, rates = (2e-4, 1e-3), (0.1, 0.3)
+    loop = SimulatedLoop(Direction.AXIAL, cycles=4, amplitudes=sizes, frequencies=rates, pause=5.0)
+    simulated = simulate(paper_model, SimulateSettings(loops=(loop,)))
+    (record,) = simulated.loops
+    assert record.time[-1] == pytest.approx(2 * 4 / 0.1 + 2 * 4 / 0.3 + 3 * 5.0, abs=0.02)
+    for name, content in to_files(simulated).items():
+        (tmp_path / name).write_bytes(content)
+    read, in_memory = load_campaign(tmp_path / "campaign.toml").loops, simulated.campaign().loops
+    for loops in (read, in_memory):
+        assert [part.name for part in loops] == [f"loop_axial_1_part_{number}" for number in (1, 2, 3, 4)]
+        assert [np.ptp(part.displacement) / 2.0 for part in loops] == pytest.approx([*sizes, *sizes], rel=1e-3)
+    assert sources(loop_data(read)) == (read[0].source,)
+
+
+def test_a_programme_too_long_to_simulate_is_refused(paper_model: Model) -> None:
+    loop = SimulatedLoop(Direction.AXIAL, 1e-3, frequencies=(1e-3, 10.0))
+    with pytest.raises(CampaignError, match="too long to simulate"):
+        simulate(paper_model, SimulateSettings(loops=(loop,)))
 
 
 def test_sweeps_of_one_direction_have_names_of_their_own(paper_model: Model) -> None:

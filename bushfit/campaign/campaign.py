@@ -15,9 +15,9 @@ from bushfit.campaign.toml import read_toml
 from bushfit.errors import CampaignError, naming, typed
 from bushfit.geometry import Bushing, Specimen
 from bushfit.reading.layout import FileFormat
-from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.sweeps import read_sweep
+from bushfit.reduction.programme import read_programme
 from bushfit.units import CELSIUS, quantity
 
 #: Endings of test files, which `bushfit init` makes a campaign of.
@@ -58,7 +58,7 @@ class Campaign:
 
 
 def load_campaign(path: str | Path) -> Campaign:
-    """Read a campaign file and the measurements that it names, each once.
+    """Read a campaign file and the measurements that it names, each once; a record of several loops gives each.
 
     Raises:
         CampaignError: the file is missing, no TOML, or has keys or values that are not understood.
@@ -84,7 +84,9 @@ def load_campaign(path: str | Path) -> Campaign:
         content.name or (bushing or specimens[0]).name,
         path,
         bushing,
-        tuple(read_loop(**keywords) for keywords in reader_keywords(path, content.loops, specimens)),
+        tuple(
+            loop for keywords in reader_keywords(path, content.loops, specimens) for loop in read_programme(**keywords)
+        ),
         tuple(read_sweep(**keywords) for keywords in reader_keywords(path, content.sweeps, specimens)),
         content.fit,
         content.predict,

@@ -40,6 +40,8 @@ _LARGEST_COUNT = 1_000_000
 #: Mass [kg], acceleration [m/s^2] and frequency [Hz] of a resonance test at most, and their inverse at least; chosen:
 #: far beyond every shaker, and numbers stay finite.
 _LARGEST_SHAKEN = 1e6
+#: [s] Pause in a simulated programme at most: a day is more than any rig rests between two loops.
+_LONGEST_PAUSE = 86_400.0
 #: Ends the check of a list at its first error: those of a hundred thousand would fill the memory.
 _FIRST_ERROR = Field(fail_fast=True)
 
@@ -258,12 +260,34 @@ class SimulatedTest:
 
 @dataclass(frozen=True)
 class SimulatedLoop(SimulatedTest):
-    """[[simulate.loops]]: zero-to-peak amplitude [m or rad, or strain], frequency [Hz], cycles and waveform."""
+    """[[simulate.loops]]: zero-to-peak amplitude [m or rad, or strain], frequency [Hz], cycles and
+    waveform.
 
-    amplitude: Displacement
-    frequency: Frequency
+    In place of one amplitude or one frequency a programme has amplitudes or frequencies: all amplitudes in turn at each
+    frequency, `cycles` of each, recorded in one go from rest, with `pause` [s] at zero between them.
+    """
+
+    amplitude: Displacement = 0.0
+    frequency: Frequency = 0.0
     cycles: Count = 3
     waveform: Waveform = "sine"
+    amplitudes: Annotated[tuple[Displacement, ...], _FIRST_ERROR, Field(min_length=1)] = ()
+    frequencies: Annotated[tuple[Frequency, ...], _FIRST_ERROR, Field(min_length=1)] = ()
+    pause: Annotated[float, _si("s"), Field(ge=0, le=_LONGEST_PAUSE)] = 0.0
+
+    def __post_init__(self) -> None:
+        for one, several in (("amplitude", "amplitudes"), ("frequency", "frequencies")):
+            given = [key for key in (one, several) if getattr(self, key)]
+            if len(given) != 1:
+                message = "one of these keys is too many" if given else "a key is missing"
+                expected = f"{one} = ..., or {several} = [...] of a programme"
+                raise ValueError(CampaignError(message, found=" and ".join(given) or None, expected=expected))
+
+    @property
+    def parts(self) -> list[tuple[float, float]]:
+        """Frequency [Hz] and amplitude [m or rad] of each part of a programme; one of a single loop."""
+        amplitudes = self.amplitudes or (self.amplitude,)
+        return [(frequency, size) for frequency in self.frequencies or (self.frequency,) for size in amplitudes]
 
 
 @dataclass(frozen=True)

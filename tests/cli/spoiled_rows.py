@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from damage import column, entry, every, kept, row, text, without
 
 #: (text of the campaign, text instead of it, what the error says ...)
@@ -115,6 +116,13 @@ IN_MORE = [
     ('amplitude = "1 mm"', 'amplitude = "1 deg"', "more.toml, simulate.loops #1.amplitude: the unit does not fit", "a length, such as mm"),
     ('frequency = "0.1 Hz"', 'frequency = "0 Hz"', "more.toml, simulate.loops #1.frequency: this value is not understood", "greater than 0"),
     ('frequencies = ["5 Hz", "15 Hz"]', 'frequencies = ["5 Hz", "15"]', "more.toml, simulate.sweeps #1.frequencies #2: a number without a unit", 'write "15 Hz"'),
+    ('amplitude = "1 mm"', 'amplitudes = ["1 mm", "2 s"]', "more.toml, simulate.loops #1.amplitudes #2: the unit does not fit", "a length, such as mm"),
+    ('amplitude = "1 mm"', "amplitudes = []", "more.toml, simulate.loops #1.amplitudes: this value is not understood", "at least one value"),
+    ('amplitude = "1 mm"', 'amplitudes = "1 mm"', "more.toml, simulate.loops #1.amplitudes: this value is not understood", "a list"),
+    ('amplitude = "1 mm"', 'amplitude = "1 mm"\namplitudes = ["1 mm"]', "more.toml, simulate.loops #1: one of these keys is too many", "amplitude = ..., or amplitudes = [...] of a programme"),
+    ('frequency = "0.1 Hz"', "", "more.toml, simulate.loops #1: a key is missing", "frequency = ..., or frequencies = [...] of a programme"),
+    ('frequency = "0.1 Hz"', 'frequencies = ["0.001 Hz", "10 Hz"]', "simulate.loops: a programme of loops is too long to simulate", "pause for less, or simulate slow and fast loops as programmes of their own"),
+    ('frequency = "0.1 Hz"', 'frequency = "0.1 Hz"\npause = "1 mm"', "more.toml, simulate.loops #1.pause: the unit does not fit", "a time, such as s"),
     ('frequency = "0.1 Hz"', 'frequency = "0.1 Hz"\ncycles = 2000000', "more.toml, simulate.loops #1.cycles: this value is not understood", "less than or equal to 1000000"),
     ('specimen = "DMA"', 'specimen = "DMB"', "more.toml, simulate.sweeps #2: this specimen is not in the campaign", "one of DMA"),
     ('specimen = "DMA"', "specimen = [1]", "more.toml, simulate.sweeps #2: this specimen is not in the campaign", "one of DMA"),
@@ -266,6 +274,7 @@ IN_LOOP = [
     ("gives energy", lambda lines: text([lines[0], *(",".join([a, b, str(900 * float(b) - float(c))]) for a, b, c in (line.split(",") for line in lines[1:]))]), "loop.csv: the loop gives energy, which no bushing does", "are the columns of displacement and force swapped, or do the rows run backwards in time?"),
     ("no time", lambda lines: text([line.partition(",")[2] for line in lines]), "loop.csv, line 1: there is no column for the time", 'name the column in the campaign: columns = { time = "..." }, or state rate = "10 mm/min",'),
     ("metres for millimetres", every("displacement [mm]", "displacement [m]"), "eps_half: impossible value", "1e-06 to 10 (strain at half of sigma_fmax)"),
+    ("an amplitude of its own for every cycle", lambda lines: text([lines[0], *(f"{n / 50},{a * np.sin(n * np.pi / 25):.5f},{400 * a * np.sin(n * np.pi / 25 + 0.1):.3f}" for n in range(300) for a in [1 + n // 50])]), "loop.csv: no part of the record is a loop", "record more cycles of each amplitude, best five"),
 ]
 #: (name, change of the lines of the sweep, what the error says ...)
 IN_SWEEP = [
