@@ -54,9 +54,9 @@ def runs_of(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | No
         levels = _by_rank(frequency, amplitude, repeat)
     if np.mean((np.diff(frequency) == 0.0) | (np.diff(levels) == 0.0)) < _LEAST_HELD:
         passes = repeat if repeat is not None else np.cumsum(np.append(False, np.diff(frequency) < 0.0)) + 1
-        levels = _of_passes(amplitude, _number(passes))
-        if levels is None:
+        if (of_passes := _of_passes(amplitude, _number(passes))) is None:
             return Runs(None, amplitude, passes)
+        levels = of_passes
     of_frequency, of_level = (np.unique(values).size for values in (frequency, levels))
     counted = repeat if repeat is not None else _occurrence(frequency, levels)
     return Runs("amplitude" if of_level > of_frequency else "frequency", levels, counted)
@@ -107,7 +107,7 @@ def _middle(values: Floats, group: NDArray[np.intp]) -> Floats:
     return medians[group]
 
 
-def _number(*keys: NDArray[np.generic]) -> NDArray[np.intp]:
+def _number(*keys: Floats | NDArray[np.int64]) -> NDArray[np.intp]:
     """A number from 0 for each combination of keys, (n,)."""
     return np.unique(np.stack(keys), axis=1, return_inverse=True)[1].ravel()
 

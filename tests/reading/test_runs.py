@@ -68,6 +68,6 @@ def test_amplitudes_that_nothing_groups_are_their_own_levels(amplitude: np.ndarr
 
 def test_a_frequency_sweep_that_falls_short_by_a_quarter_is_one_run() -> None:
     frequency = np.geomspace(0.01, 100.0, 28)
-    runs = runs_of(frequency, np.where(frequency < 0.15, 0.124, 0.15) * (1.0 + 0.01 * np.sin(frequency)), None)
+    runs = runs_of(frequency, 0.15 * frequency**-0.03, None)
     assert runs.stepped == "frequency"
     assert np.unique(runs.amplitude).size == 1
