@@ -27,7 +27,7 @@ _TELLING = {role for role in RESONANCE_COLUMNS if role not in ("frequency", "pha
 #: Columns of which every value is above zero.
 _POSITIVE = ("frequency", "base_acceleration", "mass_acceleration", "transmissibility")
 #: Rows of the shortest test; chosen: a curve of five values over the frequency, and some scatter about it.
-_FEWEST_ROWS = 12
+FEWEST_ROWS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ def read_resonance(table: Table, direction: Place, base_acceleration: float | No
         MeasurementError, UnitError: a column, unit or value that cannot be used.
     """
     wanted = _wanted(table, stated=base_acceleration is not None)
-    values = table.read(wanted, fewest_rows=_FEWEST_ROWS)
+    values = table.read(wanted, fewest_rows=FEWEST_ROWS)
     for role in _POSITIVE:
         if role in values:
             problem = f"the {role.replace('_', ' ')} is not positive"

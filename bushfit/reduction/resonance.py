@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError
-from bushfit.reading.measurement import Complex, Floats
+from bushfit.reading.measurement import Complex, Floats, Sweep
 from bushfit.reading.resonance import ResonanceTest
 
 #: Points that a test is thinned to; chosen: some twenty lie within the resonance, and a fit has no use for more.
@@ -76,6 +76,13 @@ class Resonance:
     def transmissibility(self) -> Complex:
         """Complex T of each point [-], (k,), with loss that lags behind."""
         return transmissibility(self.stiffness, self.mass, self.frequency)
+
+    @property
+    def sweep(self) -> Sweep:
+        """The points as a sweep in which neither frequency nor amplitude is held."""
+        test, error = self.test, self.relative_error
+        points = self.frequency, self.amplitude, self.stiffness
+        return Sweep(test.name, test.direction, *points, source=test.source, stepped=None, relative_error=error)
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -54,6 +54,10 @@ amplitudes = ["0.1 mm"]
 torsion_amplitudes = ["0.5 deg"]
 directions = ["axial"]
 
+[[specimens]]
+name = "DMA"
+kind = "modulus"
+
 [simulate]
 seed = 1
 repeats = 3
@@ -79,6 +83,19 @@ frequency = "0.1 Hz"
 direction = "axial"
 amplitudes = ["0.1 mm"]
 frequencies = ["5 Hz", "15 Hz"]
+
+[[simulate.sweeps]]
+specimen = "DMA"
+amplitudes = ["0.1 %", "1 %", "5 %"]
+frequencies = ["10 Hz"]
+stepped = "amplitude"
+reached = "2 %"
+
+[[simulate.resonances]]
+direction = "radial"
+mass = "0.25 kg"
+base_acceleration = "0.1 g"
+frequencies = { start = "50 Hz", stop = "500 Hz", step = "10 Hz" }
 """
 MODEL: dict[str, Any] = {
     "schema": "bushfit/model/1",

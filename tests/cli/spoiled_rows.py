@@ -124,6 +124,22 @@ IN_MORE = [
     ('frequency = "0.1 Hz"', 'frequencies = ["0.001 Hz", "10 Hz"]', "simulate.loops: a programme of loops is too long to simulate", "pause for less, or simulate slow and fast loops as programmes of their own"),
     ('frequency = "0.1 Hz"', 'frequency = "0.1 Hz"\npause = "1 mm"', "more.toml, simulate.loops #1.pause: the unit does not fit", "a time, such as s"),
     ('frequency = "0.1 Hz"', 'frequency = "0.1 Hz"\ncycles = 2000000', "more.toml, simulate.loops #1.cycles: this value is not understood", "less than or equal to 1000000"),
+    ('specimen = "DMA"', 'specimen = "DMB"', "more.toml, simulate.sweeps #2: this specimen is not in the campaign", "one of DMA"),
+    ('specimen = "DMA"', "specimen = [1]", "more.toml, simulate.sweeps #2: this specimen is not in the campaign", "one of DMA"),
+    ('specimen = "DMA"', 'specimen = "DMA"\ndirection = "axial"', "more.toml, simulate.sweeps #2: a specimen has no such direction", 'direction = "shear", or none'),
+    ('specimen = "DMA"\n', "", "more.toml, simulate.sweeps #2: a test without a direction", 'or specimen = "DMA"'),
+    ('specimen = "DMA"', 'direction = "axial"\nspecimne = "DMA"', "more.toml, simulate.sweeps #2.specimne: unknown key", 'did you mean "specimen"?'),
+    ('"0.1 %", ', '"0.1 mm", ', "more.toml, simulate.sweeps #2.amplitudes #1: the unit does not fit", "a ratio, such as %"),
+    ('stepped = "amplitude"', 'stepped = "time"', "more.toml, simulate.sweeps #2.stepped: this value is not understood", "'frequency' or 'amplitude'"),
+    ('reached = "2 %"', 'reached = "2 mm"', "more.toml, simulate.sweeps #2.reached: the unit does not fit", "a ratio, such as %"),
+    ('reached = "2 %"', 'reachd = "2 %"', "more.toml, simulate.sweeps #2.reachd: unknown key", 'did you mean "reached"?'),
+    ('direction = "radial"', 'direction = "torsion"', "more.toml, simulate.resonances #1: no mass swings on this", "a direction with a displacement, or a specimen in shear"),
+    ('direction = "radial"', 'specimen = "DMA"', "more.toml, simulate.resonances #1: no mass swings on this", "a direction with a displacement, or a specimen in shear"),
+    ('mass = "0.25 kg"\n', "", "more.toml, simulate.resonances #1.mass: a key is missing", "mass = ..."),
+    ('mass = "0.25 kg"', 'mass = "0.25 m"', "more.toml, simulate.resonances #1.mass: the unit does not fit", "a mass, such as kg"),
+    ('mass = "0.25 kg"', 'mass = "1e300 kg"', "more.toml, simulate.resonances #1.mass: this value is not understood", "less than or equal to 1000000"),
+    ('"0.1 g"', '"0.1 kg"', "more.toml, simulate.resonances #1.base_acceleration: the unit does not fit", "an acceleration, such as m/s^2"),
+    ('"500 Hz"', '"60 Hz"', "more.toml, simulate.resonances #1: no frequencies of a shaker", "at least 12, through the resonance"),
 ]
 BUSHING = '[bushing]\nname = "x"\ninner_radius = "10 mm"\nouter_radius = "18 mm"\nlength = "34 mm"\n'
 #: (name, content of the campaign, what the error says ...)
