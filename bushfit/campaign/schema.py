@@ -37,11 +37,11 @@ _LARGEST_GRID = 100_000
 _ROUNDING = 1e-9
 #: Repeats or cycles at most: more than any rig runs.
 _LARGEST_COUNT = 1_000_000
-#: [s] Pause in a simulated programme at most: a day is more than any rig rests between two loops.
-_LONGEST_PAUSE = 86_400.0
 #: Mass [kg], acceleration [m/s^2] and frequency [Hz] of a resonance test at most, and their inverse at least; chosen:
 #: far beyond every shaker, and numbers stay finite.
 _LARGEST_SHAKEN = 1e6
+#: [s] Pause in a simulated programme at most: a day is more than any rig rests between two loops.
+_LONGEST_PAUSE = 86_400.0
 #: Ends the check of a list at its first error: those of a hundred thousand would fill the memory.
 _FIRST_ERROR = Field(fail_fast=True)
 
@@ -260,7 +260,8 @@ class SimulatedTest:
 
 @dataclass(frozen=True)
 class SimulatedLoop(SimulatedTest):
-    """[[simulate.loops]]: zero-to-peak amplitude [m or rad, or strain], frequency [Hz], cycles and waveform.
+    """[[simulate.loops]]: zero-to-peak amplitude [m or rad, or strain], frequency [Hz], cycles and
+    waveform.
 
     In place of one amplitude or one frequency a programme has amplitudes or frequencies: all amplitudes in turn at each
     frequency, `cycles` of each, recorded in one go from rest, with `pause` [s] at zero between them.
