@@ -91,9 +91,7 @@ def _map(model: Model, kind: Kind, data_sets: Sequence[SweepData]) -> Map:
     points = Repeats.at(along, row)
     merged = max(np.unique(held[row == level]).size for level in np.unique(row))
     deviation = -np.concatenate([data_set.deviation(model) for data_set in data_sets])
-    noise = np.array(
-        [data_set.noise.random[data_set.name, float(x)] for data_set in data_sets for x in data_set.amplitude]
-    )
+    noise = np.array([data_set.noise.random[data_set.name, float(x)] for data_set in data_sets for x in data_set.held])
     shared = np.array([data_set.noise.shared for data_set in data_sets for _ in data_set.amplitude])
     variance = np.square(noise) + np.square(shared)
     storage, loss = (
