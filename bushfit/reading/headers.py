@@ -13,13 +13,17 @@ from functools import lru_cache
 from typing import Literal
 
 from bushfit import units
+from bushfit.geometry import STRAINING, Motion
 
 #: How an amplitude is counted.
 AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak"]
 
 #: For each column of a loop, the headers it goes by.
 LOOP_COLUMNS = {
-    "time": ("time", "t", "zeit", "temps", "tiempo", "时间", "elapsed time", "running time", "test time", "Prüfzeit"),
+    "time": (
+        *("time", "t", "zeit", "temps", "tiempo", "时间", "elapsed time", "running time", "test time", "total time"),
+        *("Prüfzeit", "Messzeit", "x value", "time 1 default sample rate"),
+    ),
     "displacement": (
         *("displacement", "disp", "deflection", "stroke", "travel", "position", "extension"),
         *("rotation", "angle", "twist", "phi"),
@@ -39,10 +43,15 @@ LOOP_COLUMNS = {
 }
 #: For each column of a sweep, the headers it goes by.
 SWEEP_COLUMNS = {
-    "frequency": ("frequency", "freq", "f", "Frequenz", "Prüffrequenz", "fréquence", "frecuencia", "频率"),
+    "frequency": (
+        *("frequency", "freq", "f", "angular frequency", "ang frequency", "omega", "ω", "test frequency"),
+        *("Frequenz", "Prüffrequenz", "Kreisfrequenz", "fréquence", "pulsation", "frecuencia", "频率", "角频率"),
+    ),
     "amplitude": (
         *("amplitude", "ampl", "amp", "displacement amplitude", "rotation amplitude", "angle amplitude"),
-        *("dynamic amplitude", "Wegamplitude", "Winkelamplitude", "amplitude de déplacement", "amplitude dynamique"),
+        *("dynamic amplitude", "dynamic displacement amplitude", "dyn amplitude", "deflection amplitude"),
+        *("stroke amplitude", "travel amplitude", "Prüfamplitude", "dyn. Wegamplitude", "dynamische Amplitude"),
+        *("Wegamplitude", "Winkelamplitude", "amplitude de déplacement", "amplitude dynamique"),
         *("amplitud", "amplitud de desplazamiento", "amplitud dinámica", "振幅", "幅值"),
     ),
     "amplitude_reached": ("amplitude reached", "erreichte Amplitude", "amplitude atteinte", "amplitud alcanzada"),
@@ -51,12 +60,13 @@ SWEEP_COLUMNS = {
         *("Steifigkeit", "dynamische Steifigkeit", "Federsteifigkeit", "Drehsteifigkeit", "dyn Steifigkeit"),
         *("Federrate", "dynamische Federrate", "dyn Federrate", "dyn. Federrate", "Federkonstante", "|K*|", "c*"),
         *("Steifigkeit dyn", "Steifigkeit dynamisch", "dyn Federsteifigkeit", "dynamische Federsteifigkeit"),
-        *("dyn stiffness", "stiffness dyn"),
+        *("dyn stiffness", "stiffness dyn", "K abs", "dynamic spring rate", "dynamic rate", "raideur complexe"),
+        *("komplexe Steifigkeit", "Betrag der Steifigkeit", "rigidez compleja"),
         *("raideur", "rigidité", "raideur dynamique", "rigidité dynamique"),
         *("rigidez", "rigidez dinámica", "刚度", "动刚度"),
     ),
     "loss_factor": (
-        *("loss factor", "tan delta", "tandelta", "tan d", "eta", "η", "tan δ"),
+        *("loss factor", "tan delta", "tandelta", "tan d", "eta", "η", "tan δ", "damping factor", "damping"),
         *("Verlustfaktor", "Dämpfung tan d", "Dämpfung tan delta"),
         *("facteur de perte", "facteur de pertes", "facteur d'amortissement"),
         *("factor de pérdida", "factor de pérdidas", "损耗因子"),
@@ -77,10 +87,74 @@ SWEEP_COLUMNS = {
         *("raideur dissipative", "rigidité de perte", "rigidité de pertes"),
         *("rigidez de pérdida", "rigidez de pérdidas", "损耗刚度"),
     ),
+    "temperature": (
+        *("temperature", "temp", "T", "sample temperature", "specimen temperature", "test temperature"),
+        *("Temperatur", "Prüftemperatur", "Probentemperatur", "température", "température d'essai"),
+        *("temperatura", "temperatura de ensayo", "ϑ", "温度", "试验温度"),
+    ),
+    "relative_error": (
+        *("relative error", "rel error", "relative standard deviation", "relative uncertainty", "relativer Fehler"),
+        *("rel Fehler", "relative Standardabweichung", "relative Unsicherheit", "erreur relative"),
+        *("incertitude relative", "error relativo", "incertidumbre relativa", "相对误差"),
+    ),
     "repeat": (
         *("repeat", "repetition", "Wiederholung", "Wdh", "Messung", "répétition", "repetición", "重复"),
     ),
 }  # fmt: skip
+#: Names of a strain.
+_STRAINS = (
+    *("strain", "shear strain", "engineering strain", "tensile strain", "compressive strain", "deformation"),
+    *("Dehnung", "Scherung", "Scherdehnung", "Verzerrung", "Schubverzerrung", "Gleitung", "Stauchung", "Verformung"),
+    *("déformation", "cisaillement", "glissement", "deformación", "cizalladura", "应变", "剪应变", "剪切应变", "γ", "ε"),
+    *("gamma", "epsilon"),
+)
+#: For each column of a test of strain and modulus, the headers it goes by in place of those above.
+_STRAINING = {
+    "displacement": _STRAINS,
+    "force": (
+        *("stress", "shear stress", "engineering stress", "tensile stress", "compressive stress", "tau", "sigma"),
+        *("Spannung", "Schubspannung", "Scherspannung", "contrainte", "contrainte de cisaillement", "τ", "σ"),
+        *("esfuerzo", "esfuerzo cortante", "tensión", "tensión cortante", "应力", "剪应力", "剪切应力"),
+    ),
+    "amplitude": (
+        *SWEEP_COLUMNS["amplitude"],
+        *(f"{before}{strain}{after}"
+          for strain in _STRAINS
+          for before, after in (("", ""), ("", " amplitude"), ("", "samplitude"), ("", " dyn"), ("dyn ", ""),
+                                ("dynamic ", ""), ("dynamische ", ""), ("amplitude de ", ""), ("amplitud de ", ""))),
+        *("oscillation strain", "oscillatory strain", "complex shear strain", "complex strain", "peak strain", "gamma0"),
+        *("Scheramplitude", "Deformationsamplitude", "déformation dynamique", "deformación dinámica", "应变幅值"),
+    ),
+    "stiffness": (
+        *("complex modulus", "dynamic modulus", "complex shear modulus", "dynamic shear modulus", "modulus", "dyn modulus"),
+        *("absolute modulus", "|G*|", "|E*|", "G*", "E*", "|G|", "|E|", "G abs", "E abs", "shear modulus complex component"),
+        *("komplexer Modul", "komplexer Schubmodul", "dynamischer Modul", "dynamischer Schubmodul", "Modul", "Schubmodul"),
+        *("module complexe", "module dynamique", "module de cisaillement complexe", "módulo complejo", "módulo dinámico"),
+        *("复数模量", "复合模量", "动态模量"),
+    ),
+    "storage_stiffness": (
+        *("storage modulus", "shear storage modulus", "elastic modulus", "G'", "E'", "G storage", "E storage", "G stor"),
+        *("E stor", "Speichermodul", "Speicherschubmodul", "Schubspeichermodul", "module de conservation"),
+        *("module de stockage", "module élastique", "módulo de almacenamiento", "módulo elástico", "储能模量"),
+        *("shear modulus elastic component", "modulus'"),
+    ),
+    "loss_stiffness": (
+        *("loss modulus", "shear loss modulus", "viscous modulus", "G''", "E''", "G loss", "E loss", "Verlustmodul"),
+        *("Verlustschubmodul", "Schubverlustmodul", "module de perte", "module de pertes", "module visqueux"),
+        *("módulo de pérdida", "módulo de pérdidas", "módulo viscoso", "损耗模量", "损失模量"),
+        *("shear modulus viscous component", "modulus''"),
+    ),
+}  # fmt: skip
+#: The columns of which the headers depend on the motion: those of what moves and of what resists it.
+OF_MOTION = (*_STRAINING, "amplitude_reached")
+#: How the headers of a frequency in radians begin.
+_ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsation", "角频率")
+#: What a rig writes of a channel in brackets: "Load(Linear:Load) (kN)".
+_CHANNEL = re.compile(r"\([^()]*[:|][^()]*\)")
+#: The loss factor as a function, of which the brackets hold no unit.
+_TAN = re.compile(r"(?i)\btan\s*\(\s*(delta|d|δ)\s*\)")
+#: A quotation mark that stands for two primes: G".
+_TWO_PRIMES = re.compile(r"(?<![^\W_])([A-Za-z])\"")
 #: Words that tell where or how a channel was recorded, but not what it is.
 _ASIDES = re.compile(r"\b(?:axial|radial|torsional|measured|actual|gemessen|mesure|medido|ist)\b")
 #: For the roles that the symbol f may stand for, units by which it stands for the other one.
@@ -157,6 +231,16 @@ class Heading:
     convention: AmplitudeConvention | None = None
 
 
+def of_motion(names: Mapping[str, Sequence[str]], motion: Motion) -> dict[str, Sequence[str]]:
+    """The headers that columns go by in a test of one kind of motion: G' names a modulus, and no stiffness.
+
+    Args:
+        names: LOOP_COLUMNS or SWEEP_COLUMNS.
+        motion: what is tested; of strain and modulus, strains and moduli stand for displacements and stiffnesses.
+    """
+    return {role: _STRAINING.get(role, usual) if motion is STRAINING else usual for role, usual in names.items()}
+
+
 class Vocabulary:
     """What headers mean: the role, unit and convention that each states.
 
@@ -184,7 +268,8 @@ class Vocabulary:
         return {heading.role for cell in cells if (heading := self.heading(cell))}
 
     def _read(self, header: str) -> Heading | None:
-        whole = header.translate(_SPELLINGS)
+        marked = _TWO_PRIMES.sub(r"\1''", _TAN.sub("tan delta", _CHANNEL.sub("", header)))
+        whole = marked.translate(_SPELLINGS)
         text, convention = split_convention(whole)
         if plain(header) in self._roles:  # a campaign may name a header with its unit
             name, unit = units.split_header(text)
@@ -200,13 +285,31 @@ class Vocabulary:
                 without_asides,
                 *([bare + "amplitude"] if counted else []),
                 *(["amplitude"] if double else []),
+                *self._said_twice(name),
             ):
                 role = self._roles.get(candidate)
-                if role is None or not (certain or units.is_unit(unit or "")):
+                is_unit = units.is_unit if role != "temperature" else units.kelvin
+                if role is None or not (certain or is_unit(unit or "")):
                     continue
                 if not (candidate == "f" and unit and any(units.agrees(unit, si) for si in _UNITS_NOT_F[role])):
                     return Heading(role, unit, counted)
         return None
+
+
+    def _said_twice(self, name: str) -> Iterator[str]:
+        """The word of a header that says one thing in two ways, such as "Storage modulus G'" or "Weg s"."""
+        for blank in re.finditer(r"[\s,(]+", name):
+            word, symbol = plain(name[: blank.start()]), plain(name[blank.end() :])
+            if word in self._roles and self._roles[word] == self._roles.get(symbol):
+                yield word
+
+
+def is_angular(header: str, unit: str) -> bool:
+    """Whether a frequency counts radians: its unit does, or its header says so and the unit counts nothing (1/s)."""
+    name = plain(header)
+    return units.agrees(unit, "rad/s") or (
+        "hz" not in unit.lower() and any(name.startswith(word) for word in _ANGULAR) and units.agrees(unit, "Hz")
+    )
 
 
 @lru_cache(maxsize=4096)
@@ -232,7 +335,7 @@ def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
     name, unit = units.split_header(text)
     yield name, unit, True
     if unit is None:
-        for cut in _NAME_END.finditer(name):
+        for cut in reversed(list(_NAME_END.finditer(name))):  # strain_dyn_pct is no strain in dyn %
             yield name[: cut.start()], name[cut.end() :].replace("_", " "), False
 
 
