@@ -339,7 +339,7 @@ def _registry() -> pint.UnitRegistry[Any]:
 
 
 def kelvin(unit: str) -> tuple[float, float] | None:
-    """Kelvin per unit, and kelvin at zero of the unit, of a unit of temperature such as "°C"; None of any other text."""
+    """Kelvin per unit of temperature such as "°C", and kelvin at its zero; None for any other text."""
     return _TEMPERATURES.get(unit.replace("℃", "°C").replace("°", "deg").replace(" ", "").lower())
 
 

@@ -12,9 +12,10 @@ from pydantic import BeforeValidator, ConfigDict, Field
 
 from bushfit.errors import CampaignError, naming
 from bushfit.geometry import TRANSLATION, Direction
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
+from bushfit.reading.headers import AmplitudeConvention
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Waveform
+from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.units import quantity, temperature
 from bushfit.validation import Flag, Name, Text, converted, known_keys, standing_in_table, unknown_key
 

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from bushfit import units as si
 from bushfit.errors import UnitError
 from bushfit.geometry import Place, stated_strain
-from bushfit.reading.headers import OF_MOTION, SWEEP_COLUMNS, AmplitudeConvention, Column
+from bushfit.reading.headers import AmplitudeConvention, Column
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Complex, Floats, Sweep, source_of
 from bushfit.reading.table import Table
+from bushfit.reading.words import OF_MOTION, SWEEP_COLUMNS
 
 #: The pairs of columns that each make a complex stiffness, in order of preference.
 STIFFNESS_PAIRS = (("stiffness", "loss_factor"), ("stiffness", "phase"), ("storage_stiffness", "loss_stiffness"))
@@ -93,8 +94,8 @@ def read_sweep(
     """
     table = Table.open(file, SWEEP_COLUMNS, columns, units, written, direction.motion)
     pair = _stiffness_pair(table)
-    at = {"frequency": at_frequency, "amplitude": at_amplitude}
-    at = {role: value for role, value in at.items() if value is not None}
+    stated = {"frequency": at_frequency, "amplitude": at_amplitude}
+    at = {role: value for role, value in stated.items() if value is not None}
     wanted = _sweep_columns(table, direction, pair, at)
     to_peak = _ZERO_TO_PEAK[_convention(table, wanted.get("amplitude"), amplitude)]
     if at_amplitude is not None:  # as the file counts
@@ -141,9 +142,7 @@ def _stiffness_pair(table: Table) -> tuple[str, str]:
     )
 
 
-def _sweep_columns(
-    table: Table, direction: Place, pair: tuple[str, str], at: Mapping[str, float]
-) -> dict[str, Column]:
+def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str], at: Mapping[str, float]) -> dict[str, Column]:
     """The columns of a sweep with their units, in the order in which they are checked.
 
     Beside those that are needed, which a role that is stated (`at`) is not, the pairs that say the same are read, if
@@ -183,7 +182,7 @@ def _check_positive(table: Table, wanted: Mapping[str, Column], values: Mapping[
 
 
 def _check_loss(table: Table, column: Column, loss_factor: Floats) -> None:
-    """Refuse a loss that counts the other way throughout, ratios that are stated in %, and a loss that no bushing has."""
+    """Refuse a loss that counts the other way throughout, ratios stated in %, and a loss that no bushing has."""
     if np.mean(loss_factor < -_LEAST_LOSS_FACTOR) > _THROUGHOUT:
         raise table.error(
             "the loss counts the other way",
@@ -277,7 +276,7 @@ def _of_temperature(
         if rows.size >= _FEWEST_SWEEP_ROWS:
             return rows, stated
         problem = "too few rows are near the temperature that is stated"
-        expected = f"{stated - si.CELSIUS:.4g} degC, within {_SAME_TEMPERATURE:g} K, in {_FEWEST_SWEEP_ROWS} rows at least"
+        expected = f"{_FEWEST_SWEEP_ROWS} rows or more within {_SAME_TEMPERATURE:g} K of {stated - si.CELSIUS:.4g} degC"
     ordered = np.sort(kelvin) - si.CELSIUS
     groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > _SAME_TEMPERATURE) + 1)
     nearest = min((group.mean() for group in groups), key=lambda mean: abs(mean + si.CELSIUS - (stated or 0.0)))

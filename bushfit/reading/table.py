@@ -12,14 +12,15 @@ from pathlib import Path
 
 from bushfit import units
 from bushfit.errors import MeasurementError, NoColumnError, UnitError, naming
+from bushfit.geometry import STRAINING, TRANSLATION, Motion
 from bushfit.reading.columns import Columns
 from bushfit.reading.files import Bytes, sha256, view_bytes
-from bushfit.geometry import STRAINING, TRANSLATION, Motion
-from bushfit.reading.headers import OF_MOTION, Column, Heading, Vocabulary, is_angular, of_motion, plain, split_convention
+from bushfit.reading.headers import Column, Heading, Vocabulary, is_angular, plain, split_convention
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.source import RowSource, Text
 from bushfit.reading.wide import unfolded
+from bushfit.reading.words import OF_MOTION, of_motion
 from bushfit.reading.workbook import is_workbook, open_sheet
 
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
@@ -74,8 +75,10 @@ class Table(Columns):
         def lay_out(source: RowSource) -> tuple[RowSource, Layout, Vocabulary]:
             delimiter = "" if source.sheet else DELIMITERS[stated.delimiter] if stated.delimiter else None
             layout = find_layout(source.head(), vocabulary, delimiter=delimiter, header_line=stated.header_line)
-            if "frequency" in names and stated.header_line is None and (
-                wide := unfolded(source, file, vocabulary, layout, delimiter)
+            if (
+                "frequency" in names
+                and stated.header_line is None
+                and (wide := unfolded(source, file, vocabulary, layout, delimiter))
             ):
                 return *wide, Vocabulary({role: (role,) for role in names}, {})
             return source, layout, vocabulary

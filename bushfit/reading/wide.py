@@ -15,7 +15,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import accumulate, groupby
+from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
@@ -37,7 +37,7 @@ _LEVEL = re.compile(
     re.IGNORECASE,
 )
 #: What a symbol before a level stands for: "A = 0.1".
-_SYMBOLS = {"f": "frequency", "a": "amplitude", "x": "amplitude", "s": "amplitude", "γ": "amplitude"}
+_SYMBOLS = {"f": "frequency", "a": "amplitude", "x": "amplitude", "s": "amplitude", "\u03b3": "amplitude"}
 #: What joins a level to a quantity in a header, and says no more.
 _JOINTS = re.compile(r"(?<!\w)(?:at|bei|für|for|à|a|@|:|,|;|=|-)(?!\w)|[\[(]\s*[\])]")
 #: What parts the two roles that a corner names: "f [Hz] \ A [mm]".
@@ -56,7 +56,7 @@ class _Said(NamedTuple):
 
     def also(self, other: _Said) -> _Said:
         """What this says, and where it does not, the other."""
-        return _Said(*(mine if mine is not None else its for mine, its in zip(self, other, strict=True)))
+        return other._replace(**{name: said for name, said in self._asdict().items() if said is not None})
 
 
 class _Series(NamedTuple):
@@ -122,11 +122,8 @@ def _blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple[list
         padded = [(line, cells + [""] * (width - len(cells))) for line, cells in part]
         headers, data = padded[: -len(numbers)], padded[-len(numbers) :]
         bottom = headers[-1][1] if headers else [""] * width
-        down = _said(bottom[start], vocabulary)._replace(level_unit=None, convention=None)
-        edges = [start]
-        for column in range(start + 1, width):
-            again = _said(bottom[column], vocabulary)._replace(level_unit=None, convention=None)
-            edges += [column] * (down.stepped is not None and again == down)
+        corners = [[one.stepped for one in _corner(cell, vocabulary)] for cell in bottom]
+        edges = [start, *(at for at in range(start + 1, width) if any(corners[at]) and corners[at] == corners[start])]
         for first, last in zip(edges, [*edges[1:], width], strict=True):
             yield [(line, cells[first:last]) for line, cells in headers], [(n, cells[first:last]) for n, cells in data]
 
@@ -144,13 +141,12 @@ def _series(headers: Sequence[_Row], data: Sequence[_Row], vocabulary: Vocabular
     said = dict.fromkeys(columns, _Said())
     down, across = _Said(), _Said()
     for distance, (_, cells) in enumerate(reversed(headers)):
-        texts = list(accumulate(cells, lambda left, own: own or left)) if distance else cells
+        texts = _filled(cells) if distance else cells
         row = {column: _said(texts[column], vocabulary) for column in columns}
         if any(texts[column] and row[column] == _Said() for column in columns):
             break
         levels = {one.stepped for one in row.values() if one.level}
-        for part in _CORNER.split(cells[0]):
-            corner = _said(part, vocabulary)
+        for corner in _corner(cells[0], vocabulary):
             named = corner._replace(level_unit=corner.level_unit or corner.unit, role=None, unit=None)
             if corner.role is not None:
                 continue
@@ -168,6 +164,19 @@ def _series(headers: Sequence[_Row], data: Sequence[_Row], vocabulary: Vocabular
         return []
     down = down._replace(stepped=_STEPPED[stepped == _STEPPED[0]])
     return [_Series(one, down, [(line, cells[0], cells[c]) for line, cells in data]) for c, one in said.items()]
+
+
+def _filled(cells: Sequence[str]) -> list[str]:
+    """Cells of which an empty one is merged with the one before it."""
+    texts = [""]
+    for cell in cells:
+        texts.append(cell or texts[-1])
+    return texts[1:]
+
+
+def _corner(text: str, vocabulary: Vocabulary) -> list[_Said]:
+    """What the cells of a corner say that names one thing or two: "f [Hz]", "f [Hz] \\ A [mm]"; no level."""
+    return [one for part in _CORNER.split(text) if not (one := _said(part, vocabulary)).level]
 
 
 def _said(text: str, vocabulary: Vocabulary) -> _Said:
@@ -229,19 +238,15 @@ def _joined(series: Sequence[_Series], source: RowSource, file: Path, delimiter:
         if _points(first) != _points(other):
             expected = "the same frequencies and amplitudes in all blocks"
             raise error("the blocks of this wide table differ", _told(series), expected)
-    headers = []
     down, across = (
         {(said.stepped, said.level_unit, said.convention) for said in sayings}
         for sayings in ((one.down for one in series), (one.said for one in series))
     )
-    quantities = {(one.said.role, one.said.unit, None) for one in series}
+    quantities = {(one.said.role, one.said.unit, None): None for one in series}
     if len(down) > 1 or len(across) > 1 or len(quantities) > len(by_role):
         expected = "one unit for each quantity, and levels of one kind"
         raise error("this wide table counts one thing in two ways", _told(series), expected)
-    ordered = [next(entry for entry in quantities if entry[0] == role) for role in by_role]
-    for role, unit, convention in (*down, *across, *ordered):
-        counted = {"peak-to-peak": " p-p", "zero-to-peak": " 0-p", None: ""}[convention]
-        headers.append(f"{role}".replace("_", " ") + counted + (f" [{unit}]" if unit else ""))
+    headers = [_header(*said) for said in (*down, *across, *quantities)]
     rows = [
         (line, [value, columns[0].said.level or "", *(column.points[index][2] for column in columns)])
         for columns in zip(*by_role.values(), strict=True)
@@ -250,6 +255,12 @@ def _joined(series: Sequence[_Series], source: RowSource, file: Path, delimiter:
     header_line = min(line for line, _ in rows) - 1
     sheet = _Unfolded(source.sheet or "", [cells for _, cells in rows], numbers=[line for line, _ in rows])
     return sheet, Layout(delimiter, tuple(headers), header_line, ("",) * len(headers), None)
+
+
+def _header(role: str | None, unit: str | None, convention: AmplitudeConvention | None) -> str:
+    """The header of a long table's column: its role, how it counts, and its unit."""
+    counted = {"peak-to-peak": " p-p", "zero-to-peak": " 0-p", None: ""}[convention]
+    return (role or "").replace("_", " ") + counted + (f" [{unit}]" if unit else "")
 
 
 def _points(columns: Sequence[_Series]) -> list[tuple[float, list[float]]]:
@@ -269,6 +280,6 @@ def _told(series: Sequence[_Series]) -> str:
     """The columns of a wide table in words: what each holds, at which level, over how many rows."""
     counted = Counter((one.said.role, one.said.unit, one.said.stepped, len(one.points)) for one in series)
     return "; ".join(
-        f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of {count} {stepped} columns, {n} rows"
+        f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of {count} {stepped}s, {n} rows"
         for (role, unit, stepped, n), count in counted.items()
     )
