@@ -196,7 +196,7 @@ class TestFile(FileFormat):
         direction: of the bushing, or "shear" of a specimen.
         specimen: by its name in [[specimens]]; the bushing unless stated.
         noise: relative standard deviation of a point, where it is known.
-        weight: of the test in the fit.
+        weight: of the test in the fit, a share of the weight that its noise gives it.
         temperature: [K]; it selects the rows of a file that has several.
         preload, date, operator, specimen_number: carried on to results as they are written.
     """
@@ -207,7 +207,7 @@ class TestFile(FileFormat):
     direction: Direction | Literal["shear"] | None = None
     specimen: Name | None = None
     noise: Share | None = None
-    weight: Annotated[float, Field(ge=0, le=_LARGEST_NUMBER)] = 1.0
+    weight: Annotated[float, Field(gt=0, le=1)] = 1.0
     temperature: Temperature | None = None
     preload: Text | None = None
     date: Text | None = None

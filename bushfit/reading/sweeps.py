@@ -15,6 +15,7 @@ from bushfit.geometry import Place, stated_strain
 from bushfit.reading.headers import AmplitudeConvention, Column
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Complex, Floats, Sweep, source_of
+from bushfit.reading.runs import runs_of
 from bushfit.reading.table import Table
 from bushfit.reading.words import OF_MOTION, SWEEP_COLUMNS
 
@@ -110,18 +111,24 @@ def read_sweep(
     _check_agreement(table, pair, values, stiffness)
     repeat = _repeats(table, wanted, values)
     rows, temperature = _of_temperature(table, values, temperature)
-    reached, error = values.get("amplitude_reached"), values.get("relative_error")
+    frequency, level = values["frequency"][rows], to_peak * values["amplitude"][rows]
+    reached = to_peak * values["amplitude_reached"][rows] if "amplitude_reached" in values else None
+    runs = runs_of(frequency, level, None if repeat is None else repeat[rows])
+    if reached is None and not np.array_equal(runs.amplitude, level):
+        reached = level
+    source = source_of(file, listed_as, table.sha256, temperature, conditions)
     return Sweep(
         name or file.stem,
         direction,
-        values["frequency"][rows],
-        to_peak * values["amplitude"][rows],
+        frequency,
+        runs.amplitude,
         stiffness[rows],
-        repeat[rows],
+        runs.repeat,
         noise,
-        source_of(file, listed_as, table.sha256, temperature, conditions),
-        None if reached is None else to_peak * reached[rows],
-        relative_error=None if error is None else error[rows],
+        source,
+        reached,
+        runs.stepped,
+        values["relative_error"][rows] if "relative_error" in values else None,
         weight=weight,
     )
 
@@ -317,14 +324,11 @@ def _complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> t
             return first + 1j * second, second / first
 
 
-def _repeats(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> NDArray[np.int64]:
-    """Number of each row's repeat, (n,): as its column has it, or else its count at this frequency and amplitude."""
-    if "repeat" in values:
-        repeat = values["repeat"]
-        is_count = (repeat == np.round(repeat)) & (repeat >= 0) & (repeat < _MOST_REPEATS)
-        table.refuse(~is_count, wanted["repeat"], "this is no repeat number", "a whole number")
-        return repeat.astype(np.int64)
-    import pandas as pd
-
-    points = pd.DataFrame({role: values[role] for role in ("frequency", "amplitude")})
-    return np.asarray(points.groupby(["frequency", "amplitude"]).cumcount(), dtype=np.int64) + 1
+def _repeats(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> NDArray[np.int64] | None:
+    """Number of each row's repeat as its column has it, (n,); None where there is none."""
+    if "repeat" not in values:
+        return None
+    repeat = values["repeat"]
+    is_count = (repeat == np.round(repeat)) & (repeat >= 0) & (repeat < _MOST_REPEATS)
+    table.refuse(~is_count, wanted["repeat"], "this is no repeat number", "a whole number")
+    return repeat.astype(np.int64)
