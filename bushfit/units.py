@@ -64,7 +64,7 @@ _MOST_DIGITS = 15
 #: A decimal number with a decimal point, and perhaps a power of ten.
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 #: One unit and perhaps its power, such as kN, mm^2, s**-1 or m⁻¹.
-_FACTOR = r"(?:[^\W\d_]+|%|°|1)(?:(?:\^|\*\*)-?[1-9]|⁻?[¹²³])?"
+_FACTOR = r"(?:[^\W\d_]+|[%‰°1])(?:(?:\^|\*\*)-?[1-9]|⁻?[¹²³])?"
 #: The products and quotients of units that are handed on to pint, which would otherwise evaluate any arithmetic.
 _UNIT = re.compile(rf"{_FACTOR}(?:(?:\s*[*/·⋅]\s*|\s+){_FACTOR})*")
 #: Characters of a unit at most: longer texts are no units, and pint takes its time with them.

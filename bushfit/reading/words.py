@@ -13,13 +13,14 @@ from bushfit.geometry import STRAINING, Motion
 LOOP_COLUMNS = {
     "time": (
         *("time", "t", "zeit", "temps", "tiempo", "时间", "elapsed time", "running time", "test time", "total time"),
-        *("Prüfzeit", "Messzeit", "x value", "time 1 default sample rate"),
+        *("Prüfzeit", "Messzeit"),
     ),
     "displacement": (
         *("displacement", "disp", "deflection", "stroke", "travel", "position", "extension"),
         *("rotation", "angle", "twist", "phi"),
         *("Weg", "Verschiebung", "Auslenkung", "Hub", "Federweg", "Prüfweg", "Kolbenweg", "Winkel", "Drehwinkel"),
         *("Verdrehung", "Verdrehwinkel", "Standardweg", "Traversenweg", "Axialweg", "Radialweg", "Verformung"),
+        *("crosshead", "course standard", "traverse"),
         *("déplacement", "course", "flèche", "enfoncement", "rotation", "angle de torsion", "rotación"),
         *("desplazamiento", "recorrido", "carrera", "deformación", "ángulo", "giro", "ángulo de giro"),
         *("位移", "行程", "角度", "转角"),
@@ -27,7 +28,7 @@ LOOP_COLUMNS = {
     "force": (
         *("force", "load", "torque", "moment", "F"),
         *("Kraft", "Prüfkraft", "Standardkraft", "Axialkraft", "Radialkraft", "Last", "Drehmoment", "Torsionsmoment"),
-        *("effort", "charge", "couple", "moment de torsion"),
+        *("effort", "charge", "force standard", "couple", "moment de torsion"),
         *("fuerza", "carga", "par", "momento", "par de torsión"),
         *("力", "载荷", "负荷", "扭矩"),
     ),
@@ -42,7 +43,7 @@ SWEEP_COLUMNS = {
         *("amplitude", "ampl", "amp", "displacement amplitude", "rotation amplitude", "angle amplitude"),
         *("dynamic amplitude", "dynamic displacement amplitude", "dyn amplitude", "deflection amplitude"),
         *("A", "x0", "s0", "stroke amplitude", "travel amplitude", "Prüfamplitude", "dynamische Amplitude"),
-        *("dyn Wegamplitude", "Wegamplitude", "Winkelamplitude", "amplitude de déplacement", "amplitude dynamique"),
+        *("peak amplitude", "amplitude crête", "dyn Wegamplitude", "Wegamplitude", "Winkelamplitude", "amplitude de déplacement", "amplitude dynamique"),
         *("amplitud", "amplitud de desplazamiento", "amplitud dinámica", "振幅", "幅值"),
     ),
     "amplitude_reached": ("amplitude reached", "erreichte Amplitude", "amplitude atteinte", "amplitud alcanzada"),
