@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dialects import DIALECTS, MACHINES, NUMBERS, UNITS, Dialect, expected
+from dialects import DIALECTS, NUMBERS, UNITS, Dialect, expected
+from machines import MACHINES
 
 from bushfit import units
 from bushfit.errors import MeasurementError
