@@ -17,7 +17,7 @@ MACHINES = {
         others=[(0, "Axial Segment Count", "cycles", "2"), (2, "Temperature", "C", "23.4"),
                 (5, "Axial Strain", "mm/mm", "0.01"), (6, "Axial Stress", "MPa", "1.5")],
     ),
-    # MTS elastomer test system: from the description in the project's own specification of tests, header block and tabs
+    # MTS elastomer test system: from descriptions of its reports: tabs, a header block, p-p in the headers
     "MTS elastomer": Dialect(
         "sweep", language="mts", delimiter="\t", unit=None, end="\r\n", double=True,
         before=["Test Name{0}Dynamic Characterization", "Operator{0}A. B.", "Date{0}1/2/2026 10:00:00 AM",
@@ -61,7 +61,7 @@ MACHINES = {
     ),
     # Zwick testXpert with a servo-hydraulic machine: from the headers of the German dialects above
     "testXpert, dynamic": Dialect("sweep", language="test xpert", delimiter="\t", decimal=",", encoding="cp1252"),
-    # BOSE ElectroForce WinTest: header and units row that public scripts check, "Points,Elapsed Time,Scan Time,Disp,Load"
+    # BOSE ElectroForce WinTest: header and units row that public scripts check ("Points,Elapsed Time,Scan Time,Disp,...")
     "WinTest": Dialect(
         language="win test", unit=None, units={"s": "Sec"}, quoted_header=True, trailing=True,
         before=['"Timed Data"', ""], others=[(0, "Points", "", "1"), (2, "Scan Time", "Sec", "0.1")],
