@@ -134,10 +134,10 @@ def _blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple[list
 
 
 def _first_number(cells: Sequence[str | float]) -> int | None:
-    """Index of the first filled cell, if it is a number and so are two others, and half of the row or more."""
+    """Index of the first filled cell, if it is a number and so is another, and half of the row or more."""
     numbers = {index: is_like_number(str(cell)) for index, cell in enumerate(cells) if cell != ""}
     first = next(iter(numbers), 0)
-    return first if sum(numbers.values()) > max(2, len(numbers) / 2 - 1) and numbers[first] else None
+    return first if sum(numbers.values()) > max(1, len(numbers) / 2 - 1) and numbers[first] else None
 
 
 def _series(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: Vocabulary) -> list[_Series]:

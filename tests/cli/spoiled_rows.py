@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 
-from damage import column, entry, every, kept, row, text, without
+from damage import added, column, entry, every, kept, row, text, wide, without
 
 #: (text of the campaign, text instead of it, what the error says ...)
 IN_CAMPAIGN = [
@@ -74,6 +74,9 @@ IN_CAMPAIGN = [
     ('file = "sweep.csv"', 'file = "loop.csv"', "loop.csv, line 1: no pair of columns gives a complex stiffness", 'correct the header, or name the columns in the campaign: columns = { stiffness = "..." }'),
     ('file = "sweep.csv"', 'file = "sweep.csv"\nforce_sign = -1', "campaign.toml, sweeps #1.force_sign: unknown key", "one of encoding, delimiter, decimal, thousands, header_line, sheet, file, direction,"),
     ('[[sweeps]]\nfile = "sweep.csv"\ndirection = "axial"\n', '[[loops]]\nfile = "./loop.csv"\ndirection = "axial"\n', "campaign.toml: a file is listed twice", "each file once"),
+    ('file = "sweep.csv"', 'file = "sweep.csv"\nat_amplitude = "0.1 mm"', 'sweep.csv, line 8, column "amplitude [mm]": the amplitude is not the one that is stated', "take at_amplitude out of the campaign"),
+    ('file = "sweep.csv"', 'file = "sweep.csv"\nat_frequency = "5 Hz"', 'sweep.csv, line 3, column "frequency [Hz]": the frequency is not the one that is stated', "take at_frequency out of the campaign"),
+    ('file = "sweep.csv"', 'file = "sweep.csv"\nat_amplitude = "0.1 %"', "campaign.toml, sweep.csv: the unit does not fit", "a length, such as mm"),
 ]
 #: The same for keys that the plain campaign does not use.
 IN_MORE = [
@@ -269,6 +272,18 @@ IN_SWEEP = [
     ("a torsion sweep as axial", lambda lines: text(lines).replace("amplitude [mm]", "amplitude [deg]").replace("[N/mm]", "[N m/rad]"), 'sweep.csv, line 1, column "amplitude [deg]": the unit does not fit', "a length, such as mm"),
     ("repeat is a half", lambda lines: text([lines[0] + ",repeat", *(line + ",0.5" for line in lines[1:])]), 'sweep.csv, line 2, column "repeat": this is no repeat number', "a whole number"),
     ("loss factor of a hundred", column(3, "100"), 'sweep.csv, line 2, column "loss factor [-]": no bushing has this loss', "check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]"),
+    ("strain of a bushing", every("amplitude [mm]", "strain [%]"), "sweep.csv, line 1: this is a test of strain and modulus", "and specimen = \"its name\" at this test"),
+    ("modulus of a bushing", every("stiffness [N/mm]", "G* [MPa]"), "sweep.csv, line 1: this is a test of strain and modulus", "and specimen = \"its name\" at this test"),
+    ("no amplitude", lambda lines: text([line.replace(line.split(",")[1] + ",", "", 1) for line in lines]), "sweep.csv, line 1: there is no column for the amplitude", 'or state at_amplitude = "0.1 mm" if all rows have it'),
+    ("two temperatures", added("T [°C]", "-20", "22"), 'sweep.csv, column "T [°C]": this file holds tests at several temperatures', "-20.0, 22.0 degC", 'state temperature = "-20.0 degC"'),
+    ("unknown unit of temperature", added("temperature [degR]", "22"), 'sweep.csv, line 1, column "temperature [degR]": "degR" is no unit of temperature', "degC, K or degF"),
+    ("temperatures without unit", added("temperature", "-20", "22"), 'sweep.csv, line 1, column "temperature": the temperature has no unit', 'units = { temperature = "degC" }'),
+    ("negative relative error", added("relative error [-]", "-0.01"), 'sweep.csv, line 2, column "relative error [-]": the relative error is not positive', "a number above zero"),
+    ("loss the other way throughout", lambda lines: text(lines).replace(",0.1", ",-0.1").replace(",-0.1,", ",0.1,"), 'sweep.csv, column "loss factor [-]": the loss counts the other way', "turn the sign of this column in the file"),
+    ("wide table with a hole", wide("535,", ","), 'sweep.csv, line 4, column "stiffness [N/mm]": the cell is empty', "a number such as 12.5"),
+    ("wide table with a row less", wide("155,655,655\n", ""), "sweep.csv, line 2: the blocks of this wide table differ", "5 rows; loss factor of 2 amplitudes, 6 rows"),
+    ("wide table of what?", wide("tan delta\n", ""), "sweep.csv, line 2: a block of this wide table does not say what it holds", "tan delta above each block"),
+    ("wide table without units", wide("f [Hz],0.1 mm,0.2 mm", "f [Hz],A=0.1,A=0.2"), "sweep.csv, line 2: this wide table counts one thing in two ways", "one unit for each quantity"),
 ]
 #: (arguments parted by |, what the error says ...)
 USAGE = [
