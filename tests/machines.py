@@ -61,7 +61,7 @@ MACHINES = {
     ),
     # Zwick testXpert with a servo-hydraulic machine: from the headers of the German dialects above
     "testXpert, dynamic": Dialect("sweep", language="test xpert", delimiter="\t", decimal=",", encoding="cp1252"),
-    # BOSE ElectroForce WinTest: header and units row that public scripts check ("Points,Elapsed Time,Scan Time,Disp,...")
+    # BOSE ElectroForce WinTest: header and units row that public scripts check, "Points,Elapsed Time,..."
     "WinTest": Dialect(
         language="win test", unit=None, units={"s": "Sec"}, quoted_header=True, trailing=True,
         before=['"Timed Data"', ""], others=[(0, "Points", "", "1"), (2, "Scan Time", "Sec", "0.1")],
