@@ -46,7 +46,7 @@ IN_LOOP = [
 ]
 #: (name, change of the lines of the sweep, what the error says ...)
 IN_SWEEP = [
-    ("no file", lambda _: None, "sweep.csv: there is no such file", 'did you mean "shaker.csv"?'),
+    ("no file", lambda _: None, "sweep.csv: there is no such file", "an existing file"),
     ("header only", kept(1), "sweep.csv: too few rows", "at least 3"),
     ("one row", kept(2), "sweep.csv: too few rows", "at least 3"),
     ("frequency of zero", row(2, "5,", "0,"), 'sweep.csv, line 2, column "frequency [Hz]": the frequency is not positive', "a number above zero"),
