@@ -28,7 +28,7 @@ from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
 from bushfit.reading.measurement import Loop, Source, Sweep
 from bushfit.reading.resonance import ResonanceTest
-from bushfit.reading.runs import nominal
+from bushfit.reading.runs import runs_of
 from bushfit.reduction.resonance import reduce_resonance, response
 
 if TYPE_CHECKING:
@@ -287,7 +287,7 @@ def _sweep(
         stiffness = _near(truth, test.direction, frequency, level, stiffness.ravel())(reached).reshape(shape)
     measured = np.stack([_with_noise(stiffness[:, number], plan, random) for number in range(plan.repeats)], axis=1)
     if test.stepped == "amplitude" and reached is not None:
-        level = nominal(reached)
+        level = runs_of(frequency, reached, repeat).amplitude
     return Sweep(
         name, test.direction, frequency, level, measured.ravel(), repeat, reached=reached, stepped=test.stepped
     )
