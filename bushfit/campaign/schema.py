@@ -18,7 +18,7 @@ from bushfit.campaign.parameters import (
 )
 from bushfit.campaign.places import KEYS, with_places
 from bushfit.errors import CampaignError
-from bushfit.geometry import TRANSLATION, Direction, Place, Specimen
+from bushfit.geometry import TRANSLATION, Direction, Place, Shape, Specimen
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Stepped, Waveform
@@ -116,12 +116,13 @@ Count = Annotated[int, Field(strict=True, ge=1, le=_LARGEST_COUNT)]
 
 @dataclass(frozen=True)
 class BushingTable:
-    """[bushing]: geometry [m]."""
+    """[bushing]: geometry [m], and the radial formulas to go by."""
 
     name: Name
     inner_radius: Length
     outer_radius: Length
     length: Length
+    shape: Shape = "paper"
 
 
 @dataclass(frozen=True)

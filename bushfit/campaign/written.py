@@ -14,6 +14,7 @@ def body_lines(bushing: Bushing | None, specimens: Iterable[Specimen]) -> list[s
     if bushing:
         lines += ["[bushing]", f"name = {quoted(bushing.name)}"]
         lines += [f"{key} = {_mm(getattr(bushing, key))}" for key in ("inner_radius", "outer_radius", "length")]
+        lines += [f'shape = "{bushing.shape}"'] if bushing.shape != "paper" else []
     for specimen in specimens:
         lines += ["", "[[specimens]]", f"name = {quoted(specimen.name)}", f'kind = "{specimen.kind}"']
         if specimen.strain != "engineering":

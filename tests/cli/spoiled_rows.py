@@ -37,6 +37,8 @@ IN_CAMPAIGN = [
     ("length =", "length ==", "campaign.toml, line 5, column 9: this is not valid TOML", "put texts and quantities in quotes"),
     ('length = "34 mm"', 'length = "34 mm"\nlength = "35 mm"', "campaign.toml, line 6, column 17: this is not valid TOML", "put texts and quantities in quotes"),
     ('length = "34 mm"', 'length = "34 mm"\ncolour = "black"', "campaign.toml, bushing.colour: unknown key", "one of name, inner_radius, outer_radius, length"),
+    ('length = "34 mm"', 'length = "34 mm"\nshape = "exact"', "campaign.toml, bushing.shape: this value is not understood", "calibrated"),
+    ('length = "34 mm"', 'length = "1 mm"\nshape = "calibrated"', "campaign.toml, shape: no finite elements were computed for this shape", "inner/outer 0.15 to 0.92 and length/outer 0.1 to 60"),
     ("[[loops]]", "[loops]", "campaign.toml, loops: this value is not understood", "a list"),
     ("[[loops]]", "[[loop]]", "campaign.toml, loop: unknown key", 'did you mean "loops"?'),
     ("[[loops]]", "[[loops]", "campaign.toml, line 7, column 8: this is not valid TOML", "put texts and quantities in quotes"),
