@@ -138,8 +138,8 @@ def _resonance_table(file: Path, stated: Mapping[str, Any], moving: Mapping[str,
         MeasurementError, UnitError: a file that cannot be read, where a mass is stated.
     """
     from bushfit.inspection.recognition import open_table
-    from bushfit.reading.headers import RESONANCE_COLUMNS
     from bushfit.reading.resonance import is_resonance
+    from bushfit.reading.words import RESONANCE_COLUMNS
 
     said = any(value is not None for value in moving.values())
     try:

@@ -10,10 +10,11 @@ from typing import Any
 from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
 from bushfit.reading.directions import direction_of_file
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary
+from bushfit.reading.headers import Vocabulary
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.sweeps import STIFFNESS_PAIRS
 from bushfit.reading.table import Table
+from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 
 
 def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:

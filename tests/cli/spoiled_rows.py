@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from damage import column, entry, every, kept, row, text, without
+from damage import column, entry, kept, row, without
 
 #: (text of the campaign, text instead of it, what the error says ...)
 IN_CAMPAIGN = [
@@ -77,6 +76,9 @@ IN_CAMPAIGN = [
     ('file = "sweep.csv"', 'file = "loop.csv"', "loop.csv, line 1: no pair of columns gives a complex stiffness", 'correct the header, or name the columns in the campaign: columns = { stiffness = "..." }'),
     ('file = "sweep.csv"', 'file = "sweep.csv"\nforce_sign = -1', "campaign.toml, sweeps #1.force_sign: unknown key", "one of encoding, delimiter, decimal, thousands, header_line, sheet, file, direction,"),
     ('[[sweeps]]\nfile = "sweep.csv"\ndirection = "axial"\n', '[[loops]]\nfile = "./loop.csv"\ndirection = "axial"\n', "campaign.toml: a file is listed twice", "each file once"),
+    ('file = "sweep.csv"', 'file = "sweep.csv"\nat_amplitude = "0.1 mm"', 'sweep.csv, line 8, column "amplitude [mm]": the amplitude is not the one that is stated', "take at_amplitude out of the campaign"),
+    ('file = "sweep.csv"', 'file = "sweep.csv"\nat_frequency = "5 Hz"', 'sweep.csv, line 3, column "frequency [Hz]": the frequency is not the one that is stated', "take at_frequency out of the campaign"),
+    ('file = "sweep.csv"', 'file = "sweep.csv"\nat_amplitude = "0.1 %"', "campaign.toml, sweep.csv: the unit does not fit", "a length, such as mm"),
 ]
 #: The same for keys that the plain campaign does not use.
 IN_MORE = [
@@ -244,65 +246,6 @@ WHOLE_MODELS = [
     ("a model in latin-1", '{"name": "f\u00fcr"}'.encode("latin-1"), "model.json, line 1: the file is not UTF-8 text", "save it as UTF-8, or convert it: iconv -f LATIN1 -t UTF-8 old > new"),
     ("a campaign for a model", BUSHING, "model.json, line 1, column 2: this is not valid JSON", "give the file as bushfit fit wrote it"),
     ("a model of 10 MB", " " * 10_000_001 + "{}", "model.json: the file is too large", "bushfit fit writes a model.json"),
-]
-#: (name, change of the lines of the loop, what the error says ...)
-IN_LOOP = [
-    ("no file", lambda _: None, "loop.csv: there is no such file", "check the path for a typing error"),
-    ("empty", lambda _: "", "loop.csv: the file is empty", "export it again"),
-    ("header only", kept(1), "loop.csv: too few rows", "at least 10"),
-    ("two rows", kept(3), "loop.csv: too few rows", "at least 10"),
-    ("a tenth of a cycle", kept(12), "loop.csv: the loop does not hold a whole cycle", "export the whole cycle, or several"),
-    ("binary", lambda _: b"\x00\x01\x02" * 100, "loop.csv, line 1: this is not text", 'export it as "CSV UTF-8", or state encoding = "..." in the campaign'),
-    ("a picture", lambda _: b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 4, "loop.csv, line 3: this is not text", 'export it as "CSV UTF-8", or state encoding = "..." in the campaign'),
-    ("a workbook cut short", lambda _: b"PK\x03\x04" + b"x" * 100, "loop.csv: this is no xlsx workbook", "save it as xlsx"),
-    ("a web page", lambda _: "<html><body>503 Service Unavailable</body></html>\n", "loop.csv, line 1: there is only one column", 'a header row such as "time [s],displacement [mm],force [N]", separated by comma,'),
-    ("no header", lambda lines: text(lines[1:]), "loop.csv, line 1: there is no header", 'a header row such as "time [s],displacement [mm],force [N]"'),
-    ("no units", every("time [s],displacement [mm],force [N]", "time,displacement,force"), 'loop.csv, line 1, column "displacement": the displacement has no unit', 'write "displacement [mm]" in the header, or units = { displacement = "mm" } in the'),
-    ("unknown unit", every("force [N]", "force [Nn]"), 'loop.csv, line 1, column "force [Nn]": unknown unit', "a unit such as mm, N, kN/mm, deg, Hz or %"),
-    ("unit of another kind", every("force [N]", "force [mm]"), 'loop.csv, line 1, column "force [mm]": the unit does not fit', "a force, such as N"),
-    ("unknown columns", every("force [N]", "gadget [N]"), "loop.csv, line 1: there is no column for the force", 'name the column in the campaign: columns = { force = "..." }'),
-    ("two force columns", lambda lines: text([line + "," + line.split(",")[2] for line in lines]), "loop.csv, line 1: more than one column could be the force", 'choose it in the campaign: columns = { force = "force [N]" }'),
-    ("column missing", lambda lines: text([",".join(line.split(",")[:2]) for line in lines]), "loop.csv, line 1: there is no column for the force", 'name the column in the campaign: columns = { force = "..." }'),
-    ("a cell of text", row(7, "0.", "abc"), 'loop.csv, line 7, column "time [s]": this is no finite number', "a number such as 12.5"),
-    ("a cell that is empty", lambda lines: text([*lines[:5], ",".join([*lines[5].split(",")[:2], ""]), *lines[6:]]), 'loop.csv, line 6, column "force [N]": the cell is empty', "a number such as 12.5"),
-    ("a cell too many", lambda lines: text([*lines[:5], lines[5] + ",1", *lines[6:]]), "loop.csv, line 6: the row does not match the header", "part the columns by semicolons where numbers have a decimal comma"),
-    ("a cell too few", lambda lines: text([*lines[:5], lines[5].rpartition(",")[0], *lines[6:]]), "loop.csv, line 6: the row does not match the header", "3 cells"),
-    ("not a number", lambda lines: text([*lines[:5], "0.4,nan,1", *lines[6:]]), 'loop.csv, line 6, column "displacement [mm]": this is no finite number', "a number such as 12.5"),
-    ("infinite", lambda lines: text([*lines[:5], "0.4,inf,1", *lines[6:]]), 'loop.csv, line 6, column "displacement [mm]": this is no finite number', "a number such as 12.5"),
-    ("overflow", lambda lines: text([*lines[:5], "0.4,1e999,1", *lines[6:]]), 'loop.csv, line 6, column "displacement [mm]": this is no finite number', "a number such as 12.5"),
-    ("spreadsheet error", lambda lines: text([*lines[:5], "0.4,#DIV/0!,1", *lines[6:]]), 'loop.csv, line 6, column "displacement [mm]": this is no finite number', "a number such as 12.5"),
-    ("decimal commas in a comma file", every(".", ","), "loop.csv, line 2: the row does not match the header", "part the columns by semicolons where numbers have a decimal comma"),
-    ("time stands still", column(0, "1.0"), 'loop.csv, line 3, column "time [s]": time does not increase', "a later time on every row"),
-    ("time runs back", lambda lines: text([lines[0], *reversed(lines[1:])]), 'loop.csv, line 3, column "time [s]": time does not increase', "a later time on every row"),
-    ("no displacement", column(1, "0"), 'loop.csv, column "displacement [mm]": the displacement never changes', "a loop"),
-    ("no force", column(2, "0"), 'loop.csv, column "force [N]": the force never changes', "a loop"),
-    ("force falls with displacement", lambda lines: text([lines[0], *(",".join([*line.split(",")[:2], str(-float(line.split(",")[2]))]) for line in lines[1:])]), 'loop.csv, column "force [N]": the force falls where the displacement rises', "if the load cell counts the other way round, write force_sign = -1 in the campaign"),
-    ("displacement and force swapped", every("displacement [mm],force [N]", "force [N],displacement [mm]"), "loop.csv: the loop gives energy, which no bushing does", "are the columns of displacement and force swapped, or do the rows run backwards in time?"),
-    ("gives energy", lambda lines: text([lines[0], *(",".join([a, b, str(900 * float(b) - float(c))]) for a, b, c in (line.split(",") for line in lines[1:]))]), "loop.csv: the loop gives energy, which no bushing does", "are the columns of displacement and force swapped, or do the rows run backwards in time?"),
-    ("no time", lambda lines: text([line.partition(",")[2] for line in lines]), "loop.csv, line 1: there is no column for the time", 'name the column in the campaign: columns = { time = "..." }, or state rate = "10 mm/min",'),
-    ("metres for millimetres", every("displacement [mm]", "displacement [m]"), "campaign.toml: the tests are of a size that no rubber shows", "times the modulus of loop, which no rubber does: check the units"),
-    ("an amplitude of its own for every cycle", lambda lines: text([lines[0], *(f"{n / 50},{a * np.sin(n * np.pi / 25):.5f},{400 * a * np.sin(n * np.pi / 25 + 0.1):.3f}" for n in range(300) for a in [1 + n // 50])]), "loop.csv: no part of the record is a loop", "record more cycles of each amplitude, best five"),
-]
-#: (name, change of the lines of the sweep, what the error says ...)
-IN_SWEEP = [
-    ("no file", lambda _: None, "sweep.csv: there is no such file", "an existing file"),
-    ("header only", kept(1), "sweep.csv: too few rows", "at least 3"),
-    ("one row", kept(2), "sweep.csv: too few rows", "at least 3"),
-    ("frequency of zero", row(2, "5,", "0,"), 'sweep.csv, line 2, column "frequency [Hz]": the frequency is not positive', "a number above zero"),
-    ("negative frequency", row(2, "5,", "-5,"), 'sweep.csv, line 2, column "frequency [Hz]": the frequency is not positive', "a number above zero"),
-    ("amplitude of zero", row(2, ",0.1,", ",0,"), 'sweep.csv, line 2, column "amplitude [mm]": the amplitude is not positive', "a number above zero"),
-    ("negative amplitude", row(2, ",0.1,", ",-0.1,"), 'sweep.csv, line 2, column "amplitude [mm]": the amplitude is not positive', "a number above zero"),
-    ("negative stiffness", row(2, "505", "-505"), 'sweep.csv, line 2, column "stiffness [N/mm]": the stiffness is not positive', "a number above zero"),
-    ("stiffness of zero", row(2, "505", "0"), 'sweep.csv, line 2, column "stiffness [N/mm]": the stiffness is not positive', "a number above zero"),
-    ("loss factor as an angle", every("loss factor [-]", "loss factor [deg]"), 'sweep.csv, line 1, column "loss factor [deg]": the unit does not fit', "a ratio, such as %"),
-    ("loss factor missing", lambda lines: text([line.rpartition(",")[0] for line in lines]), "sweep.csv, line 1: no pair of columns gives a complex stiffness", 'correct the header, or name the columns in the campaign: columns = { stiffness = "..." }'),
-    ("stiffness without unit", every("stiffness [N/mm]", "stiffness"), 'sweep.csv, line 1, column "stiffness": the stiffness has no unit', 'write "stiffness [N/mm]" in the header, or units = { stiffness = "N/mm" } in the campaign'),
-    ("stiffness in newtons", every("stiffness [N/mm]", "stiffness [N]"), 'sweep.csv, line 1, column "stiffness [N]": the unit does not fit', "a stiffness, such as N/mm"),
-    ("a cell of text", row(4, "565", "high"), 'sweep.csv, line 4, column "stiffness [N/mm]": this is no finite number', "a number such as 12.5"),
-    ("semicolons in the header alone", row(1, ",", ";"), "sweep.csv, line 1: there is no column for the frequency", 'name the column in the campaign: columns = { frequency = "..." }'),
-    ("a torsion sweep as axial", lambda lines: text(lines).replace("amplitude [mm]", "amplitude [deg]").replace("[N/mm]", "[N m/rad]"), 'sweep.csv, line 1, column "amplitude [deg]": the unit does not fit', "a length, such as mm"),
-    ("repeat is a half", lambda lines: text([lines[0] + ",repeat", *(line + ",0.5" for line in lines[1:])]), 'sweep.csv, line 2, column "repeat": this is no repeat number', "a whole number"),
-    ("loss factor of a hundred", column(3, "100"), 'sweep.csv, line 2, column "loss factor [-]": no bushing has this loss', "check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]"),
 ]
 #: (arguments parted by |, what the error says ...)
 USAGE = [
