@@ -24,6 +24,9 @@ from bushfit.reading.measurement import loss_factor
 _MOST_GROWTH = 100.0
 #: Condition number of the remaining information beyond which its inverse is rounding.
 _SINGULAR = 1e14
+#: Step of a parameter, in coordinates, which are of order one, beyond which one Gauss-Newton step tells nothing of a
+#: refit: chosen, a third of its value.
+_LONGEST_STEP = 0.3
 #: Share of the points, those that lie nearest, that a model is usable within: chosen, as of all intervals.
 _SHARE = 0.95
 #: Share of the points of a place that have to be held out for these to speak for it.
@@ -119,8 +122,9 @@ def _misfits(model: Model, data_set: DataSet, *, was_fitted: bool) -> Iterator[M
 def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[DataSet] = ()) -> tuple[Usable, ...]:
     """Within what a fitted model meets the measured stiffness and loss factor, 95 % of the points, place by place.
 
-    Each run is predicted from the fit without it where the rest tells all parameters; a test that was not fitted is
-    predicted anyway. Where fewer than half the points of a place are predicted so, all count as the fit has them.
+    Each run is predicted from the fit without it where the rest tells all parameters and moves none far; a test that
+    was not fitted is predicted anyway. Where fewer than half the points of a place are predicted so, all count as the
+    fit has them.
 
     Args:
         solution: the fit.
@@ -135,6 +139,8 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
         for run in _runs(data_set):
             points = np.broadcast_to(run.points, (data_set.parts, data_set.size // data_set.parts))
             step = whole.step(begin + np.flatnonzero(points))
+            if step is not None and np.abs(step).max(initial=0.0) > _LONGEST_STEP:
+                step = None
             moved = modelled if step is None else modelled * np.exp(step @ slopes)
             counted = run.points & _counted(data_set)
             off = _off(moved[counted], data_set.measured[counted])

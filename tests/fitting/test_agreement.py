@@ -111,6 +111,18 @@ def test_one_level_alone_counts_as_fitted(campaign: Campaign) -> None:
     assert not place.held_out
 
 
+def test_a_run_without_which_the_rest_says_something_else_counts_as_fitted(campaign: Campaign) -> None:
+    """Two levels that contradict each other: one Gauss-Newton step to the other is no refit."""
+    axial = campaign.sweeps[0]
+    at = axial.amplitude != 5e-4
+    parts = {name: getattr(axial, name)[at] for name in ("frequency", "amplitude", "stiffness", "repeat")}
+    two = replace(campaign, loops=(), sweeps=(replace(axial, **parts, reached=None),))
+    (place,) = fit_joint(Data.of(level_off(two, 0, 2e-4, 1.1))).usable
+    print(place)
+    assert not place.held_out
+    assert place.stiffness < 0.2
+
+
 def test_values_that_are_given_are_predictions(campaign: Campaign, paper_model: Model) -> None:
     held = {name: ParameterSetting(value=value, vary=False) for name, value in paper_model.values.items()}
     result = fit_joint(Data.of(replace(campaign, fit=FitSettings(parameters=held))))
