@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import reduce, wraps
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import click
 
 from bushfit.cli.common import direction_option
 from bushfit.errors import BushfitError, MeasurementError
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
 
 F = TypeVar("F", bound=Callable[..., Any])
 #: Keys of a campaign's tables that are an option of the same name here, and its help.
@@ -22,7 +22,14 @@ _SAME_NAME = {
     "rate": 'Of a loop without time: a triangle at this speed, such as "10 mm/min".',
     "frequency": 'Of a loop without time, with --waveform, such as "0.1 Hz".',
     "waveform": "sine or triangle.",
-    "amplitude": "Of sweeps whose header does not say: zero-to-peak or peak-to-peak.",
+    "amplitude": "How sweeps count theirs whose header does not say: zero-to-peak or peak-to-peak.",
+    "at_amplitude": 'Of sweeps without a column for it, such as "0.1 mm" [the number with a unit in their names].',
+    "at_frequency": 'Of sweeps without a column for it, such as "10 Hz" [likewise].',
+    "temperature": 'Of the test, such as "23 degC"; it selects the rows of a file with several.',
+    "specimen": "Name of the specimen of which these are tests [coupon, of moduli].",
+    "area": 'Of one rubber block in shear, such as "772 mm^2"; then stiffnesses are those of the specimen.',
+    "thickness": 'Of one rubber block in shear, such as "6 mm".',
+    "elements": "Rubber blocks in parallel [1].",
     "encoding": 'Such as "cp1252" [detected].',
     "delimiter": "comma, semicolon, tab, pipe or blanks [detected].",
     "decimal": '"." or "," [detected].',
@@ -31,7 +38,7 @@ _SAME_NAME = {
     "sheet": "Of a workbook [the only one with such a table].",
 }
 #: Keys that are whole numbers.
-_NUMBERS = ("force_sign", "header_line")
+_NUMBERS = ("force_sign", "header_line", "elements")
 #: An inline table of TOML in the hint of an error.
 _TABLE = re.compile(r"\{[^}]*\}")
 #: One entry of such a table that is an option here.
@@ -52,6 +59,7 @@ def file_options(*keys: str, sweeps: bool = True) -> Callable[[F], F]:
             stated = {key: kwargs.pop(key) for key in ("direction", *keys)}
             stated["columns"] = _pairs(kwargs.pop("columns"), "--column", "force=Kraft")
             stated["units"] = _pairs(kwargs.pop("units"), "--unit", "force=kN")
+            _check_amplitude(stated.get("amplitude"))
             return function(*args, stated={key: value for key, value in stated.items() if value}, **kwargs)
 
         return reduce(lambda command, option: option(command), reversed(_options(keys, sweeps=sweeps)), wrapped)  # type: ignore[return-value]
@@ -98,20 +106,37 @@ def options_named() -> Iterator[None]:
         named = [f'--{kind} "{role}={text}"' for kind, role, text in _PAIRED.findall(hint)]
         keys = _TABLE.sub("", hint)  # in a table, amplitude is a role
         named += ["--" + key.replace("_", "-") for key in _SAME_NAME if re.search(rf"\b{key} = ", keys)]
+        if error.file is None and error.place in _SAME_NAME:
+            error.place = "--" + error.place.replace("_", "-")
         if named:
             error.hint = f"{hint}; for this command: {', '.join(dict.fromkeys(named))}"
         raise
 
 
-def direction_error(file: Path) -> MeasurementError:
-    """The error for a file of a direction that nothing settles."""
+def direction_error(file: Path, sheet: str | None = None) -> MeasurementError:
+    """The error for a file, or a sheet of it, of a direction that nothing settles."""
     return MeasurementError(
         "nothing says in which direction this was tested",
         file=file,
+        place=sheet and f'sheet "{sheet}"',
         found="neither its name nor its columns say axial, radial or torsion",
         expected="a direction",
         hint="state it: --direction axial (or radial, torsion)",
     )
+
+
+def _check_amplitude(counting: str | None) -> None:
+    """Refuse a value where the counting of amplitudes is stated."""
+    known = get_args(AmplitudeConvention)
+    if counting and counting not in known:
+        raise MeasurementError(
+            "this does not say how amplitudes are counted",
+            place="--amplitude",
+            found=f'"{counting}"',
+            expected=" or ".join(known),
+            hint=f'--at-amplitude "{counting if counting[0].isdigit() else "0.1 mm"}" states the amplitude of files '
+            "that have no column for it",
+        )
 
 
 def _pairs(texts: Sequence[str], option: str, example: str) -> Mapping[str, str]:

@@ -82,13 +82,15 @@ def command(
 
 def _read(files: Sequence[Path], stated: Mapping[str, Any]) -> list[Loop]:
     """The histories, of one direction, named by their stems, or by their paths where stems agree."""
-    from bushfit.inspection.opening import read_history, stated_of_each
+    from bushfit.inspection.gathering import Source, stated_of_each
+    from bushfit.inspection.opening import read_history
 
     stems = [file.stem for file in files]
     histories: list[Loop] = []
-    for file, stem, own in zip(files, stems, stated_of_each(files, stated), strict=True):
+    sources = stated_of_each([Source(file) for file in files], stated)
+    for file, stem, source in zip(files, stems, sources, strict=True):
         with options_named():
-            history, direction = read_history(file, own)
+            history, direction = read_history(file, source.stated or {})
         if direction is None:
             raise direction_error(file)
         if histories and direction is not histories[0].direction:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from bushfit.inspection.channels import clock, odd_channels
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.record import Looked
 from bushfit.reading.measurement import Loop
+from bushfit.reading.names import Said
 from bushfit.reduction.cycles import least_prominence
 from bushfit.units import alike, for_people, number
 
@@ -33,8 +33,8 @@ _HARMONICS = 7
 _ROWS_PER_HARMONIC = 5
 
 
-def look_at_loop(loop: Loop, file: Path) -> Looked:
-    """Facts and oddities of a loop; `file` is where it was read.
+def look_at_loop(loop: Loop, named: Said) -> Looked:
+    """Facts and oddities of a loop; `named` is what the names of its file and sheet say.
 
     Raises:
         FitError: no whole cycle, or a loop that runs the wrong way round.
@@ -58,7 +58,7 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
         "noise": f"{number(100 * drive.noise / half_force, 2)} % of half the {names[1]}'s range, a row",
     }
     odd = [
-        *wrong_labels(file, loop.direction, [amplitude, half_motion], [drive.frequency]),
+        *wrong_labels(named, loop.direction, [amplitude, half_motion], [drive.frequency]),
         *odd_channels(loop),
         *drive.notes,
         *_changing(drive),
