@@ -259,6 +259,11 @@ def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
     return _present(bushing, place).stiffness_per_modulus(place)
 
 
+def stated_strain(place: Place) -> float:
+    """What one unit of displacement or strain in a test's file is as it is counted: 2 of the tensor's shear, else 1."""
+    return place.stated_strain if isinstance(place, Specimen) else 1.0
+
+
 def _present(bushing: Bushing | None, place: Direction) -> Bushing:
     if bushing is None:
         raise ModelError(

@@ -112,7 +112,10 @@ _EXACT = {
         "s": "SEC Sec",
         "rpm": "RPM",
         "inch": "Inch INCH",
-        "MPa": "Mpa MPA",
+        "Pa": "pa PA",
+        "kPa": "kpa KPA KPa",
+        "MPa": "Mpa MPA mpa",
+        "GPa": "gpa GPA Gpa",
         "lbf": "LBF Lbf",
     }.items()
     for spelling in spellings.split()
@@ -335,6 +338,11 @@ def _registry() -> pint.UnitRegistry[Any]:
     return pint.UnitRegistry(str(Path(__file__).with_name("units.txt")), cache_folder=None)
 
 
+def kelvin(unit: str) -> tuple[float, float] | None:
+    """Kelvin per unit of temperature such as "°C", and kelvin at its zero; None for any other text."""
+    return _TEMPERATURES.get(unit.replace("℃", "°C").replace("°", "deg").replace(" ", "").lower())
+
+
 def temperature(raw: object) -> float:
     """The temperature [K] that a text such as "22 degC", "295 K" or "72 degF" states.
 
@@ -342,8 +350,8 @@ def temperature(raw: object) -> float:
         UnitError: no text of a number and one of these units, or one below absolute zero.
     """
     found = re.fullmatch(r"\s*([+-]?\d+(?:[.,]\d+)?)\s*(.*?)\s*", raw) if isinstance(raw, str) else None
-    scale = _TEMPERATURES.get(found[2].replace("°", "deg").replace(" ", "").lower()) if found else None
-    kelvin = scale[0] * float(found[1].replace(",", ".")) + scale[1] if found and scale else -1.0
-    if kelvin < 0.0:
+    scale = kelvin(found[2]) if found else None
+    value = scale[0] * float(found[1].replace(",", ".")) + scale[1] if found and scale else -1.0
+    if value < 0.0:
         raise UnitError("this is no temperature", found=repr(raw), expected='such as "22 degC" or "295 K"')
-    return kelvin
+    return value

@@ -12,9 +12,10 @@ from pydantic import BeforeValidator, ConfigDict, Field
 
 from bushfit.errors import CampaignError, naming
 from bushfit.geometry import TRANSLATION, Direction
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
+from bushfit.reading.headers import AmplitudeConvention
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Waveform
+from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.units import quantity, temperature
 from bushfit.validation import Flag, Name, Text, converted, known_keys, standing_in_table, unknown_key
 
@@ -195,7 +196,7 @@ class TestFile(FileFormat):
         direction: of the bushing, or "shear" of a specimen.
         specimen: by its name in [[specimens]]; the bushing unless stated.
         noise: relative standard deviation of a point, where it is known.
-        weight: of the test in the fit.
+        weight: of the test in the fit, a share of the weight that its noise gives it.
         temperature: [K]; it selects the rows of a file that has several.
         preload, date, operator, specimen_number: carried on to results as they are written.
     """
@@ -206,7 +207,7 @@ class TestFile(FileFormat):
     direction: Direction | Literal["shear"] | None = None
     specimen: Name | None = None
     noise: Share | None = None
-    weight: Annotated[float, Field(ge=0, le=_LARGEST_NUMBER)] = 1.0
+    weight: Annotated[float, Field(gt=0, le=1)] = 1.0
     temperature: Temperature | None = None
     preload: Text | None = None
     date: Text | None = None

@@ -13,7 +13,8 @@ import click
 
 from bushfit.cli.common import direction_option
 from bushfit.errors import BushfitError, MeasurementError
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
+from bushfit.reading.headers import AmplitudeConvention
+from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 
 F = TypeVar("F", bound=Callable[..., Any])
 #: Keys of a campaign's tables that are an option of the same name here, and its help.

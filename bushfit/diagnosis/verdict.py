@@ -220,7 +220,7 @@ def _notes(search: Search, after: Evidence) -> tuple[str, ...]:
     _, sweeps = parted(after.data_sets)
     if sweeps and sweeps[0].noise.origin == "assumed":
         notes.append(
-            "nothing was repeated at three frequencies or more: "
-            "errors shared by a block are assumed, 0.5 % gain and 0.25 deg phase"
+            "nothing was repeated at three points or more: "
+            "errors shared by a run are assumed, 0.5 % gain and 0.25 deg phase"
         )
     return tuple(notes)

@@ -12,8 +12,8 @@ from bushfit.errors import BushfitError, NoColumnError, NoTestError
 from bushfit.inspection.opening import inspect
 from bushfit.inspection.recognition import open_table, recognised
 from bushfit.inspection.record import Inspected
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.names import Said, stated_above
+from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.workbook import sheets
 
 

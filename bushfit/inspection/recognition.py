@@ -12,10 +12,11 @@ from bushfit.campaign.schema import SpecimenTable
 from bushfit.errors import BushfitError, NoTestError
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
 from bushfit.reading.directions import direction_of_file
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary, of_motion
+from bushfit.reading.headers import Vocabulary
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.sweeps import STIFFNESS_PAIRS
 from bushfit.reading.table import Table
+from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS, of_motion
 from bushfit.validation import check_tables
 
 #: What an error says besides its problem.

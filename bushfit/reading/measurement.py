@@ -136,9 +136,9 @@ class Sweep:
 
     @property
     def held(self) -> Floats:
-        """What every point of a run has in common, (n,): amplitude [m or rad] or frequency [Hz]; 0 where neither."""
+        """What every point of a run has in common, (n,): amplitude [m or rad] or frequency [Hz], or else its number."""
         if self.stepped is None:
-            return np.zeros_like(self.frequency)
+            return self.repeat.astype(float)
         return self.amplitude if self.stepped == "frequency" else self.frequency
 
     @property

@@ -13,8 +13,9 @@ from bushfit import units
 from bushfit.errors import UnitError
 from bushfit.geometry import Direction
 from bushfit.reading.directions import named_direction
-from bushfit.reading.headers import SWEEP_COLUMNS, AmplitudeConvention, Vocabulary, plain, split_convention
+from bushfit.reading.headers import AmplitudeConvention, Vocabulary, plain, split_convention
 from bushfit.reading.layout import Line
+from bushfit.reading.words import SWEEP_COLUMNS
 
 #: Units as names have them, in lower case, with the usual spelling of those that have another one elsewhere.
 _UNITS = {

@@ -72,7 +72,7 @@ def test_noise_about_no_loss_is_no_loss_the_other_way(tmp_path: Path) -> None:
 
 BAD_SWEEPS = [
     ("no pair", SWEEP.replace("loss factor [-]", "x"), ["line 1", "no pair", "storage stiffness"]),
-    ("frequency unit", SWEEP.replace("[Hz]", "[rad/s]"), ["line 1", "does not fit", "a frequency"]),
+    ("frequency unit", SWEEP.replace("[Hz]", "[rad]"), ["line 1", "does not fit", "a frequency"]),
     ("phase unit", SWEEP.replace("loss factor [-]", "phase"), ["line 1", "the phase has no unit", "phase [deg]"]),
     ("decibel", SWEEP.replace("[-]", "[dB]"), ["line 1", "unknown unit", "dB"]),
     ("frequency", with_line(SWEEP, 3, "-15,0.1,600,0.1"), ["line 3", "frequency is not positive", '"-15"']),
