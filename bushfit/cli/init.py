@@ -48,20 +48,14 @@ def command(
 ) -> None:
     """Write a campaign from test files and the geometry of the bushing.
 
-    FILE may be a workbook with several tests, or a folder; sheets and files without a test are told and left out.
+    FILE may be a folder, or a workbook with several tests; what holds no test is told and left out. The columns tell
+    what a test is; names of file and sheet, or columns, its direction, and names an amplitude or frequency without a
+    column (Dyn_axial_A0,05mm.csv). What only you can know, such as a unit, is asked for in an error that names the
+    option. An option holds for all files of its kind, and goes before names; numbers have a decimal point. Where files
+    differ otherwise, edit the campaign. Raw stepped-sine histories go through `bushfit reduce` first. Tests of a
+    modulus, or with --area and --thickness of a stiffness, are of a specimen and need no size of a bushing.
 
-    Loops and sweeps are told apart by their columns, the direction by the names of file and sheet or by the columns. An
-    amplitude or frequency that has no column is read from the name, such as Dyn_axial_A0,05mm.csv, and that is said.
-    What only you can know, such as a unit, the rate of a loop without time, or the direction, is asked for in an error
-    that names the option. An option holds for all files of its kind, and goes before what names say; where files
-    differ otherwise, edit the campaign. Numbers are written with a decimal point. Raw stepped-sine histories go through
-    `bushfit reduce` first.
-
-    Tests of a modulus, and with --area and --thickness those of rubber blocks in shear, are tests of a specimen, which
-    need no size of a bushing.
-
-    Writes campaign.toml, which names the files as seen from its folder; -o may also name the file itself, such as
-    -o my_bushing.toml.
+    Writes campaign.toml, which names the files as seen from its folder; -o may name it: -o my_bushing.toml.
     """
     from bushfit.geometry import Specimen
     from bushfit.inspection.draft import campaign_text
@@ -71,13 +65,8 @@ def command(
     sizes = (inner_radius, inner_diameter, outer_radius, outer_diameter, length)
     bushing = _bushing(name, *sizes) if any(sizes) else None
     options.require_free(folder, [target])
-    seen, left_out = _usable(files, stated)
+    seen, left_out = _usable(files, stated, is_bushing=bushing is not None or "specimen" not in stated)
     if bushing is None and not all(isinstance(one.direction, Specimen) for one in seen):
-        if "specimen" in stated:
-            raise click.UsageError(
-                "These are tests of a stiffness: of a specimen in shear, which needs --area and --thickness, or of a "
-                "bushing, which needs --inner-radius, --outer-radius and --length."
-            )
         bushing = _bushing(name, *sizes)
     text = campaign_text(name, bushing and bushing[1], seen, folder)
     if bushing:
@@ -153,12 +142,18 @@ def _bushing(
         raise
 
 
-def _usable(files: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Inspected], list[str]]:
+def _usable(files: Sequence[Path], stated: Mapping[str, Any], *, is_bushing: bool) -> tuple[list[Inspected], list[str]]:
     """The loops and sweeps among files, each of a known direction or specimen, and why others are left out.
+
+    Args:
+        files: files and folders.
+        stated: keys of their tables in a campaign that the user states.
+        is_bushing: whether a bushing may have been tested, and not specimens alone.
 
     Raises:
         MeasurementError: a file that the user names is another, with the way on.
     """
+    from bushfit.geometry import Specimen
     from bushfit.inspection.gathering import gather
 
     sources, left_out = gather(files, stated)
@@ -170,6 +165,11 @@ def _usable(files: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Insp
     for source in sources:
         with options_named():
             one = source.inspect()
+        if not (is_bushing or isinstance(one.direction, Specimen)):
+            raise click.UsageError(
+                "These are tests of a stiffness: of a specimen in shear, which needs --area and --thickness, or of a "
+                "bushing, which needs --inner-radius, --outer-radius and --length."
+            )
         if one.kind != "history":
             if one.direction is None:
                 raise direction_error(source.file, source.sheet)

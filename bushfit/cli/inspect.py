@@ -17,11 +17,13 @@ from bushfit.errors import BushfitError
 if TYPE_CHECKING:
     from bushfit.inspection.record import Inspected
 
+#: Keys of a campaign's tables that say how a file is written.
+FORMAT_KEYS = ("encoding", "delimiter", "decimal", "thousands", "header_line", "sheet")
 #: Keys of a campaign's tables that inspect and init take as options.
 KEYS = (
     *("force_sign", "rate", "frequency", "waveform", "amplitude", "at_amplitude", "at_frequency", "temperature"),
     *("specimen", "area", "thickness", "elements"),
-    *("encoding", "delimiter", "decimal", "thousands", "header_line", "sheet"),
+    *FORMAT_KEYS,
 )
 #: Kinds of test file, in words.
 _KINDS = {"loop": "a hysteresis loop", "sweep": "a sweep", "history": "a raw stepped-sine history"}
@@ -39,12 +41,11 @@ _FILES_A_PICTURE = 5
 def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options) -> None:
     """Look at test files before a campaign names them: loops, sweeps, raw stepped-sine histories, in any mixture.
 
-    FILE may be a workbook with several tests, or a folder; sheets and files without a test are told and left out.
-
-    For each test: how every column was understood, in which unit, and its range; cycles, sampling, waveform, noise,
-    frequencies, amplitudes, repeats; and what is odd beyond noise, in sentences with figures. Odd is an amplitude or
-    frequency other than the file's name says, a gap, rows that stand still, cut-off tops, outliers, drift, cycles that
-    still settle, a motion off zero, a force that counts the other way; in sweeps copied rows, missing frequencies, a
+    FILE may be a folder, or a workbook with several tests; what holds no test is told and left out. For each test:
+    how every column was understood, in which unit, and its range; cycles, sampling, waveform, noise, frequencies,
+    amplitudes, repeats; and what is odd beyond noise, in sentences with figures. Odd is an amplitude or frequency
+    other than the file's name says, a gap, rows that stand still, cut-off tops, outliers, drift, cycles that still
+    settle, a motion off zero, a force that counts the other way; in sweeps copied rows, missing frequencies, a
     repeat that is off or drifts, loss factors below zero. Rows count from 1 below the header.
 
     The text for the campaign goes to standard output; it names the files by their full path, to be pasted into a

@@ -20,23 +20,23 @@ F = TypeVar("F", bound=Callable[..., Any])
 #: Keys of a campaign's tables that are an option of the same name here, and its help.
 _SAME_NAME = {
     "force_sign": "-1: the load cell counts the other way.",
-    "rate": 'Of a loop without time: a triangle at this speed, such as "10 mm/min".',
-    "frequency": 'Of a loop without time, with --waveform, such as "0.1 Hz".',
+    "rate": 'Of a loop without time, a triangle: "10 mm/min".',
+    "frequency": 'Of a loop without time, with --waveform: "0.1 Hz".',
     "waveform": "sine or triangle.",
-    "amplitude": "How sweeps count theirs whose header does not say: zero-to-peak or peak-to-peak.",
-    "at_amplitude": 'Of sweeps without a column for it, such as "0.1 mm" [the number with a unit in their names].',
-    "at_frequency": 'Of sweeps without a column for it, such as "10 Hz" [likewise].',
-    "temperature": 'Of the test, such as "23 degC"; it selects the rows of a file with several.',
-    "specimen": "Name of the specimen of which these are tests [coupon, of moduli].",
-    "area": 'Of one rubber block in shear, such as "772 mm^2"; then stiffnesses are those of the specimen.',
+    "amplitude": "zero-to-peak or peak-to-peak, if headers do not say.",
+    "at_amplitude": 'Without a column: "0.1 mm" [found in the name].',
+    "at_frequency": 'Without a column: "10 Hz" [found in the name].',
+    "temperature": 'Of the test, or of the rows to take: "23 degC".',
+    "specimen": "Name of the specimen, if no bushing [coupon].",
+    "area": 'Of one rubber block in shear, such as "772 mm^2".',
     "thickness": 'Of one rubber block in shear, such as "6 mm".',
     "elements": "Rubber blocks in parallel [1].",
     "encoding": 'Such as "cp1252" [detected].',
     "delimiter": "comma, semicolon, tab, pipe or blanks [detected].",
     "decimal": '"." or "," [detected].',
-    "thousands": 'What parts thousands: ".", ",", " ", "\'" or none [detected].',
+    "thousands": '".", ",", " ", "\'" or none [detected].',
     "header_line": "Line of the header, from 1 [found].",
-    "sheet": "Of a workbook [the only one with such a table].",
+    "sheet": "Of a workbook [all with a test].",
 }
 #: Keys that are whole numbers.
 _NUMBERS = ("force_sign", "header_line", "elements")
@@ -70,12 +70,11 @@ def file_options(*keys: str, sweeps: bool = True) -> Callable[[F], F]:
 
 def _options(keys: Sequence[str], *, sweeps: bool) -> list[Callable[[Any], Any]]:
     """The options that state what a file does not say itself."""
-    roles, of_all = f"ROLEs: {', '.join(LOOP_COLUMNS)}", "all files given"
+    roles = f"ROLEs: {', '.join(LOOP_COLUMNS)}"
     if sweeps:
         roles = f"ROLEs of loops: {', '.join(LOOP_COLUMNS)}; of sweeps: {', '.join(SWEEP_COLUMNS)}"
-        of_all = "all files given that have the role"
     return [
-        direction_option(help="{directions}, of all files given [found from their names and columns]."),
+        direction_option(help="{directions} [found in names or columns]."),
         click.option(
             "--column",
             "columns",
@@ -88,7 +87,7 @@ def _options(keys: Sequence[str], *, sweeps: bool) -> list[Callable[[Any], Any]]
             "units",
             multiple=True,
             metavar="ROLE=UNIT",
-            help=f'Such as "force=kN", of {of_all}; ROLEs as above.',
+            help='Such as "force=kN"; ROLEs as above.',
         ),
         *(
             click.option("--" + key.replace("_", "-"), key, type=int if key in _NUMBERS else str, help=_SAME_NAME[key])

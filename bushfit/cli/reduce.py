@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bushfit.cli.common import Options, example, shared_options
-from bushfit.cli.inspect import KEYS
+from bushfit.cli.inspect import FORMAT_KEYS
 from bushfit.cli.raw import direction_error, file_options, options_named
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import MeasurementError
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @click.command("reduce", epilog=example("bushfit reduce data/cmp_15961_raw/stepped_sine_axial.csv"))
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@file_options(*(key for key in KEYS if key not in ("rate", "frequency", "waveform", "amplitude")), sweeps=False)
+@file_options("force_sign", *FORMAT_KEYS, sweeps=False)
 @click.option(
     "--levels",
     help='Amplitudes that were asked for, such as "0.1, 0.2, 0.5 mm", where the rig missed them by more than 10 %; a '
