@@ -199,7 +199,7 @@ def _tell_bushing(options: Options, bushing: Bushing) -> None:
 def _tell(options: Options, seen: Inspected) -> None:
     """One line of what a file is, what was assumed, and what is odd."""
     facts = seen.looked.facts
-    wanted = ("cycles", "frequency", "frequencies", "amplitude", "amplitudes")
+    wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
     kept = [f"{key}: {value}" for key, value in facts.items() if key in wanted or key.startswith("from ")]
     place = seen.file.parent / seen.label
     options.console.print(f"{place}: {seen.kind}, {seen.direction}; {'; '.join(kept)}", markup=False)

@@ -19,7 +19,7 @@ from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.search import SAME, Search, Step
 from bushfit.effects import effect_of
 from bushfit.fitting.assess import Stage, covariance, measured_range, quality
-from bushfit.fitting.data_sets import parted
+from bushfit.fitting.data_sets import parted, sources
 from bushfit.fitting.procedures import cautions
 from bushfit.fitting.solve import Bounds
 from bushfit.model.result import Result
@@ -208,7 +208,7 @@ def _result(evidence: Evidence, bounds: Bounds) -> Result:
         quality(model, evidence.data_sets, len(moving)),
         measured_range(model, evidence.data_sets),
         tuple(cautions(model, evidence.solution, evidence.data_sets, bounds, cov)),
-        tuple(data_set.source for data_set in evidence.data_sets if data_set.source is not None),
+        sources(evidence.data_sets),
         at_bound=evidence.solution.at_bound,
     )
 

@@ -13,11 +13,11 @@ from bushfit.fitting.loop_data import LoopData
 from bushfit.fitting.noise import sweep_noise
 from bushfit.fitting.sweep_data import Residuals, SweepData
 from bushfit.geometry import Specimen
-from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.measurement import Loop, Source, Sweep
 
 Kind = TypeVar("Kind", LoopData, SweepData)
 
-__all__ = ["DataSet", "LoopData", "Residuals", "SweepData", "loop_data", "parted", "sweep_data"]
+__all__ = ["DataSet", "LoopData", "Residuals", "SweepData", "loop_data", "parted", "sources", "sweep_data"]
 
 
 def loop_data(loops: Sequence[Loop], *, without_outliers: bool = False) -> list[LoopData]:
@@ -43,3 +43,9 @@ def parted(data_sets: Iterable[DataSet]) -> tuple[list[LoopData], list[SweepData
     every = list(data_sets)
     loops = [data_set for data_set in every if isinstance(data_set, LoopData)]
     return loops, [data_set for data_set in every if isinstance(data_set, SweepData)]
+
+
+def sources(data_sets: Iterable[DataSet]) -> tuple[Source, ...]:
+    """The files that data sets came from, each once: a record may hold several loops."""
+    found = [data_set.source for data_set in data_sets if data_set.source is not None]
+    return tuple(source for place, source in enumerate(found) if source not in found[:place])

@@ -16,9 +16,9 @@ from bushfit.campaign.schema import LoopFile, SweepFile
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.inspection.histories import look_at_history
-from bushfit.inspection.loops import look_at_loop
+from bushfit.inspection.loops import look_at_loop, look_at_programme
 from bushfit.inspection.outside import keys_outside, names_of
-from bushfit.inspection.recognition import place_of, recognised
+from bushfit.inspection.recognition import direction_of, place_of, recognised
 from bushfit.inspection.record import ColumnSeen, Inspected, Kind, Looked
 from bushfit.inspection.sweeps import look_at_sweep
 from bushfit.reading.loops import read_loop
@@ -27,13 +27,12 @@ from bushfit.reading.names import Said
 from bushfit.reading.sweeps import STIFFNESS_PAIRS, read_sweep
 from bushfit.reading.table import Table
 from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
+from bushfit.reduction.programme import clock_stated, programme
 from bushfit.reduction.steps import sines
 from bushfit.validation import check_tables
 
 #: [Hz] Frequency above which a motion in steps is a stepped sine; chosen: quasi-static loops are slower.
 _QUASI_STATIC = 1.0
-#: Ratio of two frequencies above which a motion in steps is a stepped sine; chosen: a loop keeps to one.
-_OTHER_FREQUENCY = 1.2
 #: The key of a loop whose load cell counts the other way.
 _TURNED = {"force_sign": -1}
 #: Names of delimiters as they are told.
@@ -71,7 +70,7 @@ def inspect(file: Path, stated: Mapping[str, Any], beside: Said | None = None) -
         kind, looked = "sweep", look_at_sweep(measured, by_name)
     else:
         measured, entry, odd = _read_loop(file, read_as, entry, table)
-        kind, looked = _look(measured, by_name)
+        kind, looked = _look(measured, by_name, clock_stated(_keywords(file, read_as, entry, LoopFile)))
     columns = _columns(table, is_sweep=is_sweep)
     named = by_name.direction
     if direction and named and not isinstance(direction, Specimen) and named is not direction:
@@ -100,9 +99,7 @@ def read_history(file: Path, stated: Mapping[str, Any]) -> tuple[Loop, Direction
             expected="a raw history: time, displacement, force",
             hint="name it in the campaign under [[sweeps]]",
         )
-    direction = place_of(file, table, stated)
-    if isinstance(direction, Specimen):
-        raise table.error("a raw history of a specimen is not reduced", found=str(direction), expected="a bushing's")
+    direction = direction_of(file, table, stated)
     entry = _entry(LoopFile, stated, table, direction)
     return read_loop(**_keywords(file, direction or Direction.AXIAL, entry, LoopFile)), direction
 
@@ -155,16 +152,19 @@ def _read_loop(
     return turned, {**entry, **_TURNED}, [odd]
 
 
-def _look(measured: Loop, by_name: Said) -> tuple[Kind, Looked]:
-    """The kind of a recorded test, a loop or a history, with its facts and oddities."""
+def _look(measured: Loop, by_name: Said, clock: Mapping[str, Any]) -> tuple[Kind, Looked]:
+    """The kind of a recorded test, a loop, a programme of loops or a history, with its facts and oddities."""
     found = sines(measured)
     points = {(round(np.log(frequency), 2), round(np.log(amplitude), 1)) for frequency, amplitude, _ in found}
     frequencies = [frequency for frequency, *_ in found] or [0.0]
     fast = max(frequencies) > _QUASI_STATIC
-    if len(points) > 1 and (fast or max(frequencies) > _OTHER_FREQUENCY * min(frequencies)):
+    if len(points) > 1 and fast:
         with suppress(MeasurementError):  # no steady sine after all
             return "history", look_at_history(measured, by_name)
-    looked = look_at_loop(measured, by_name)
+    loops = programme(measured, **clock)
+    if len(loops) > 1:
+        return "loop", look_at_programme(measured, loops, by_name)
+    looked = look_at_loop(loops[0], by_name)
     if fast or len(points) > 1:
         what = f"at {max(frequencies):.3g} Hz" if fast else "of several amplitudes"
         either = f"a motion {what} is taken for a loop; should it be a stepped sine, bushfit reduce makes points of it"

@@ -86,6 +86,15 @@ def place_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Place | Non
         return Specimen(**vars(check_tables({**body, "kind": "modulus"}, None, SpecimenTable)))
     if sizes:
         return Specimen(**vars(check_tables({**body, **sizes, "kind": "shear"}, None, SpecimenTable)))
+    return direction_of(file, table, stated)
+
+
+def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Direction | None:
+    """The direction of a test of the bushing as the user states it, or else as its file does; None where neither does.
+
+    Raises:
+        MeasurementError: units of torsion where the user states another direction.
+    """
     turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
     if "direction" not in stated:
         return direction_of_file(file, table.headers, turns=turns, sheet=stated.get("sheet"))

@@ -168,7 +168,7 @@ def is_angular(header: str, unit: str) -> bool:
     """Whether a frequency counts radians: its unit does, or its header says so and the unit counts nothing (1/s)."""
     name = plain(header)
     return units.agrees(unit, "rad/s") or (
-        "hz" not in unit.lower() and any(name.startswith(word) for word in _ANGULAR) and units.agrees(unit, "Hz")
+        "hz" not in unit.lower() and any(name.startswith(plain(word)) for word in _ANGULAR) and units.agrees(unit, "Hz")
     )
 
 

@@ -52,6 +52,23 @@ def source_of(
     return Source(listed_as or Path(file.name), sha256, {**(conditions or {}), **degrees})
 
 
+@dataclass(frozen=True)
+class Part:
+    """Where a loop stands in a record that holds several, one after the other.
+
+    Args:
+        number: of the loop in its record, from 1.
+        of: how many loops the record holds.
+        first_row: row of the record that it begins with, from 0.
+        left_out: a sentence on what of the record around it belongs to no loop; None where all does.
+    """
+
+    number: int
+    of: int
+    first_row: int
+    left_out: str | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Loop:
     """A hysteresis loop, or any other record of time, displacement and force.
@@ -66,6 +83,9 @@ class Loop:
         source: the file it came from; None where it came from none.
         timed: whether time was recorded; else it was rebuilt from the displacement.
         weight: of the test in a fit, relative to that of others.
+        part: where it stands in a record of several loops; None where the record is one loop.
+        softening: by how much its first cycle is stiffer than its last, relative to the last; None where no more than
+            noise and the memory of rubber make.
 
     Raises:
         MeasurementError: arrays of different length.
@@ -80,6 +100,8 @@ class Loop:
     source: Source | None = None
     timed: bool = True
     weight: float = 1.0
+    part: Part | None = None
+    softening: float | None = None
 
     def __post_init__(self) -> None:
         _check_lengths(self.name, self.time, self.displacement, self.force)

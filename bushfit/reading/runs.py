@@ -17,8 +17,10 @@ from bushfit.reading.measurement import Floats, Stepped
 _WIDEST_LEVEL = 0.08
 #: Distance in ln X from a level to the next over the span of a level, at least; chosen: below, they may be one.
 _LEAST_GAP = 3.0
-#: Points of a run at least, on average, for something to count as held.
-_FEWEST_POINTS = 2.0
+#: Share of the rows, at least, with the frequency or the level of the row before, where one of them is held.
+_LEAST_HELD = 0.1
+#: Points of a run at least for its levels to be told by their place in it.
+_FEWEST_POINTS = 3
 
 
 class Runs(NamedTuple):
@@ -45,12 +47,13 @@ def runs_of(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | No
             frequency and level is a repeat.
     """
     levels = nominal(amplitude)
-    of_frequency, of_level = (np.unique(values).size for values in (frequency, levels))
-    counted = repeat if repeat is not None else _occurrence(frequency, levels)
-    runs = np.unique(counted).size
-    if max(frequency.size / of_frequency, frequency.size / of_level) < _FEWEST_POINTS * runs and frequency.size > runs:
+    if (levels == amplitude).all():
+        levels = _by_rank(frequency, amplitude, repeat)
+    if np.mean((np.diff(frequency) == 0.0) | (np.diff(levels) == 0.0)) < _LEAST_HELD:
         restarts = np.cumsum(np.append(False, np.diff(frequency) < 0.0)) + 1
         return Runs(None, amplitude, restarts if repeat is None else repeat)
+    of_frequency, of_level = (np.unique(values).size for values in (frequency, levels))
+    counted = repeat if repeat is not None else _occurrence(frequency, levels)
     return Runs("amplitude" if of_level > of_frequency else "frequency", levels, counted)
 
 
@@ -59,24 +62,43 @@ def nominal(amplitude: Floats) -> Floats:
 
     Amplitudes that no gaps part into narrow levels of several points keep their own values.
     """
-    distinct, place, count = np.unique(amplitude, return_inverse=True, return_counts=True)
+    distinct, place = np.unique(amplitude, return_inverse=True)
     gaps = np.diff(np.log(distinct))
     for gap in np.unique(gaps[gaps <= _WIDEST_LEVEL])[::-1]:
         group = np.append(0, np.cumsum(gaps > gap))
-        first, last = np.flatnonzero(np.diff(group, prepend=-1)), np.flatnonzero(np.diff(group, append=group[-1] + 1))
-        span = float(np.log(distinct[last] / distinct[first]).max())
+        span = max(float(np.ptp(np.log(distinct[group == one]))) for one in np.unique(group))
         between = float(np.min(gaps, where=gaps > gap, initial=np.inf))
         if span <= _WIDEST_LEVEL and between >= _LEAST_GAP * span and np.median(np.bincount(group)) > 1:
-            middle = np.array([np.median(np.repeat(*of)) for of in _parts(distinct, count, first, last)])
-            return middle[group][place]
+            return _middle(amplitude, group[place])
     return amplitude
 
 
-def _parts(
-    values: Floats, count: NDArray[np.int64], first: NDArray[np.intp], last: NDArray[np.intp]
-) -> list[tuple[Floats, NDArray[np.int64]]]:
-    """Values and counts of each group, from its first to its last place."""
-    return [(values[a : b + 1], count[a : b + 1]) for a, b in zip(first, last, strict=True)]
+def _by_rank(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | None) -> Floats:
+    """The level of each amplitude by its place in its run, (n,), where all runs at all frequencies have as many.
+
+    Amplitudes keep their own values where there is one run alone, or where a level reaches into the next.
+    """
+    falls = np.append(False, (np.diff(amplitude) < 0.0) | (np.diff(frequency) != 0.0))
+    run = np.cumsum(falls) if repeat is None else _number(frequency, repeat)
+    counts = np.bincount(run)
+    if counts.size < 2 or np.ptp(counts[counts > 0]) > 0 or counts.max() < _FEWEST_POINTS:
+        return amplitude
+    order = np.lexsort((amplitude, run))
+    rank = np.empty(order.size, dtype=np.intp)
+    rank[order] = np.tile(np.arange(counts.max()), order.size // counts.max())
+    table = np.sort(amplitude[order].reshape(-1, counts.max()), axis=0)
+    return _middle(amplitude, rank) if (table[-1, :-1] < table[0, 1:]).all() else amplitude
+
+
+def _middle(values: Floats, group: NDArray[np.intp]) -> Floats:
+    """The median of the group of each value, (n,)."""
+    medians = np.array([np.median(values[group == one]) for one in range(group.max() + 1)])
+    return medians[group]
+
+
+def _number(*keys: NDArray[np.generic]) -> NDArray[np.intp]:
+    """A number from 0 for each combination of keys, (n,)."""
+    return np.unique(np.stack(keys), axis=1, return_inverse=True)[1].ravel()
 
 
 def _occurrence(*keys: Floats) -> NDArray[np.int64]:

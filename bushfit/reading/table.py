@@ -76,7 +76,7 @@ class Table(Columns):
             delimiter = "" if source.sheet else DELIMITERS[stated.delimiter] if stated.delimiter else None
             layout = find_layout(source.head(), vocabulary, delimiter=delimiter, header_line=stated.header_line)
             if (
-                "frequency" in names
+                "amplitude" in names
                 and stated.header_line is None
                 and (wide := unfolded(source, file, vocabulary, layout, delimiter))
             ):

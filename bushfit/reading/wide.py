@@ -39,7 +39,9 @@ _LEVEL = re.compile(
 #: What a symbol before a level stands for: "A = 0.1".
 _SYMBOLS = {"f": "frequency", "a": "amplitude", "x": "amplitude", "s": "amplitude", "\u03b3": "amplitude"}
 #: What joins a level to a quantity in a header, and says no more.
-_JOINTS = re.compile(r"(?<!\w)(?:at|bei|für|for|à|a|@|:|,|;|=|-)(?!\w)|[\[(]\s*[\])]")
+_JOINTS = re.compile(r"[\[(]\s*(?:at|bei)?\s*[\])]|(?<!\w)(?:at|bei|für|for|à|a|@|:|,|;|=|-)(?!\w)")
+#: A level that may have thousands: 1,250.
+_OPEN = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
 #: What parts the two roles that a corner names: "f [Hz] \ A [mm]".
 _CORNER = re.compile(r"\s*[\\|]\s*|\s+/\s+")
 
@@ -60,15 +62,15 @@ class _Said(NamedTuple):
 
 
 class _Series(NamedTuple):
-    """A column of a wide table: what its header says of it and of the column down beside it; lines and cells."""
+    """A column of a wide table: what its header says of it and of the column down; line, value down and cell each."""
 
     said: _Said
     down: _Said
-    points: list[tuple[int, str, str]]
+    points: list[tuple[int, str | float, str | float]]
 
 
 #: A row of a wide table: its line and cells.
-_Row = tuple[int, list[str]]
+_Row = tuple[int, list[str | float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,14 +104,16 @@ def unfolded(
         return None
     for mark in DELIMITERS.values() if delimiter is None else (delimiter,):
         lines = (line for line in source.head() if not is_comment(line.content, mark))
-        rows = [(line.number, split(line.content, mark)) for line in lines]
+        rows: list[_Row] = [
+            (number, [*split(content, mark)] if isinstance(content, str) else [*content]) for number, content in lines
+        ]
         if series := [one for block in _blocks(rows, vocabulary) for one in _series(*block, vocabulary)]:
             return _joined(series, source, file, mark)
     return None
 
 
-def _blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple[list[_Row], list[_Row]]]:
-    """Header rows and rows of numbers of each block, without the columns before and after it."""
+def _blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple[list[list[str]], list[_Row]]]:
+    """Header cells and rows of numbers of each block, without the columns before and after it."""
     starts = [_first_number(cells) for _, cells in rows]
     done = 0
     for start, run in groupby(range(len(rows)), key=starts.__getitem__):
@@ -120,27 +124,28 @@ def _blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple[list
         done = numbers[-1] + 1
         width = max(len(cells) for _, cells in part)
         padded = [(line, cells + [""] * (width - len(cells))) for line, cells in part]
-        headers, data = padded[: -len(numbers)], padded[-len(numbers) :]
-        bottom = headers[-1][1] if headers else [""] * width
+        headers = [[str(cell) for cell in cells] for _, cells in padded[: -len(numbers)]]
+        bottom = headers[-1] if headers else [""] * width
         corners = [[one.stepped for one in _corner(cell, vocabulary)] for cell in bottom]
         edges = [start, *(at for at in range(start + 1, width) if any(corners[at]) and corners[at] == corners[start])]
         for first, last in zip(edges, [*edges[1:], width], strict=True):
-            yield [(line, cells[first:last]) for line, cells in headers], [(n, cells[first:last]) for n, cells in data]
+            data = [(line, cells[first:last]) for line, cells in padded[-len(numbers) :]]
+            yield [cells[first:last] for cells in headers], data
 
 
-def _first_number(cells: Sequence[str]) -> int | None:
-    """Index of the first filled cell, if it is a number and so are two others, and half of the row or more."""
-    filled = [index for index, cell in enumerate(cells) if cell]
-    numbers = sum(is_like_number(cells[index]) for index in filled)
-    return filled[0] if numbers > 2 and 2 * numbers >= len(filled) and is_like_number(cells[filled[0]]) else None
+def _first_number(cells: Sequence[str | float]) -> int | None:
+    """Index of the first filled cell, if it is a number and so is another, and half of the row or more."""
+    numbers = {index: is_like_number(str(cell)) for index, cell in enumerate(cells) if cell != ""}
+    first = next(iter(numbers), 0)
+    return first if sum(numbers.values()) > max(1, len(numbers) / 2 - 1) and numbers[first] else None
 
 
-def _series(headers: Sequence[_Row], data: Sequence[_Row], vocabulary: Vocabulary) -> list[_Series]:
+def _series(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: Vocabulary) -> list[_Series]:
     """The columns of a block; none where it is no block of a wide table."""
-    columns = [index for index in range(1, len(data[0][1])) if any(cells[index] for _, cells in data)]
+    columns = [index for index in range(1, len(data[0][1])) if any(cells[index] != "" for _, cells in data)]
     said = dict.fromkeys(columns, _Said())
     down, across = _Said(), _Said()
-    for distance, (_, cells) in enumerate(reversed(headers)):
+    for distance, cells in enumerate(reversed(headers)):
         texts = _filled(cells) if distance else cells
         row = {column: _said(texts[column], vocabulary) for column in columns}
         if any(texts[column] and row[column] == _Said() for column in columns):
@@ -152,10 +157,8 @@ def _series(headers: Sequence[_Row], data: Sequence[_Row], vocabulary: Vocabular
                 continue
             if corner.stepped in levels - {None} or (levels and down.stepped not in (None, corner.stepped)):
                 across = across.also(named)
-            elif corner.stepped or not levels:
-                down = down.also(named)
             else:
-                across = across.also(named)
+                down = down.also(named)
         said = {column: one.also(row[column]) for column, one in said.items()}
     stepped = next((one.stepped for one in (*said.values(), across) if one.stepped), None)
     stepped = stepped or next((role for role in _STEPPED if down.stepped and role != down.stepped), None)
@@ -184,7 +187,8 @@ def _said(text: str, vocabulary: Vocabulary) -> _Said:
     whole, convention = split_convention(text.replace("_", " "))
     if is_like_number(text):
         return _Said(level=text)
-    if heading := vocabulary.heading(text):
+    heading = vocabulary.heading(text)
+    if heading and (heading.unit is None or units.is_unit(heading.unit) or heading.role == "temperature"):
         if heading.role in _STEPPED:
             return _Said(stepped=heading.role, level_unit=heading.unit, convention=heading.convention)
         return _Said(heading.role, heading.unit)
@@ -248,7 +252,7 @@ def _joined(series: Sequence[_Series], source: RowSource, file: Path, delimiter:
         raise error("this wide table counts one thing in two ways", _told(series), expected)
     headers = [_header(*said) for said in (*down, *across, *quantities)]
     rows = [
-        (line, [value, columns[0].said.level or "", *(column.points[index][2] for column in columns)])
+        (line, [value, _level(columns[0].said.level or ""), *(column.points[index][2] for column in columns)])
         for columns in zip(*by_role.values(), strict=True)
         for index, (line, value, _) in enumerate(columns[0].points)
     ]
@@ -268,12 +272,18 @@ def _points(columns: Sequence[_Series]) -> list[tuple[float, list[float]]]:
     return [(_value(one.said.level), [_value(text) for _, text, _ in one.points]) for one in columns]
 
 
-def _value(text: str | None) -> float:
+def _value(text: str | float | None) -> float:
     """A number of a header, whichever its decimal mark; nan where it has separators between thousands."""
     try:
-        return float((text or "").replace(",", "."))
+        return float(str(text).replace(",", "."))
     except ValueError:
         return math.nan
+
+
+def _level(text: str) -> str | float:
+    """A level as a number, whatever the decimal mark of the cells; a text where it may have thousands."""
+    value = _value(text)
+    return text if math.isnan(value) or _OPEN.fullmatch(text) else value
 
 
 def _told(series: Sequence[_Series]) -> str:

@@ -13,13 +13,14 @@ from bushfit.geometry import STRAINING, Motion
 LOOP_COLUMNS = {
     "time": (
         *("time", "t", "zeit", "temps", "tiempo", "时间", "elapsed time", "running time", "test time", "total time"),
-        *("Prüfzeit", "Messzeit", "x value", "time 1 default sample rate"),
+        *("Prüfzeit", "Messzeit"),
     ),
     "displacement": (
         *("displacement", "disp", "deflection", "stroke", "travel", "position", "extension"),
         *("rotation", "angle", "twist", "phi"),
         *("Weg", "Verschiebung", "Auslenkung", "Hub", "Federweg", "Prüfweg", "Kolbenweg", "Winkel", "Drehwinkel"),
         *("Verdrehung", "Verdrehwinkel", "Standardweg", "Traversenweg", "Axialweg", "Radialweg", "Verformung"),
+        *("crosshead", "course standard", "traverse"),
         *("déplacement", "course", "flèche", "enfoncement", "rotation", "angle de torsion", "rotación"),
         *("desplazamiento", "recorrido", "carrera", "deformación", "ángulo", "giro", "ángulo de giro"),
         *("位移", "行程", "角度", "转角"),
@@ -27,7 +28,7 @@ LOOP_COLUMNS = {
     "force": (
         *("force", "load", "torque", "moment", "F"),
         *("Kraft", "Prüfkraft", "Standardkraft", "Axialkraft", "Radialkraft", "Last", "Drehmoment", "Torsionsmoment"),
-        *("effort", "charge", "couple", "moment de torsion"),
+        *("effort", "charge", "force standard", "couple", "moment de torsion"),
         *("fuerza", "carga", "par", "momento", "par de torsión"),
         *("力", "载荷", "负荷", "扭矩"),
     ),
@@ -42,7 +43,8 @@ SWEEP_COLUMNS = {
         *("amplitude", "ampl", "amp", "displacement amplitude", "rotation amplitude", "angle amplitude"),
         *("dynamic amplitude", "dynamic displacement amplitude", "dyn amplitude", "deflection amplitude"),
         *("A", "x0", "s0", "stroke amplitude", "travel amplitude", "Prüfamplitude", "dynamische Amplitude"),
-        *("dyn Wegamplitude", "Wegamplitude", "Winkelamplitude", "amplitude de déplacement", "amplitude dynamique"),
+        *("peak amplitude", "amplitude crête", "dyn Wegamplitude", "Wegamplitude", "Winkelamplitude"),
+        *("amplitude de déplacement", "amplitude dynamique"),
         *("amplitud", "amplitud de desplazamiento", "amplitud dinámica", "振幅", "幅值"),
     ),
     "amplitude_reached": ("amplitude reached", "erreichte Amplitude", "amplitude atteinte", "amplitud alcanzada"),
@@ -91,6 +93,59 @@ SWEEP_COLUMNS = {
     "repeat": (
         *("repeat", "repetition", "Wiederholung", "Wdh", "Messung", "répétition", "repetición", "重复"),
     ),
+}  # fmt: skip
+
+
+def _said(bodies: str, words: str) -> tuple[str, ...]:
+    """Every word, such as "acceleration", before and after every body, such as "base"; words and bodies part at |."""
+    return tuple(
+        way for body in bodies.split("|") for word in words.split("|") for way in (f"{body} {word}", word + body)
+    )
+
+
+#: Names of the base of a mount on a shaker.
+_BASE = (
+    "base|input|table|shaker|drive|excitation|control|Basis|Fußpunkt|Tisch|Anregung|Eingang|Anregungs|Fußpunkts"
+    "|de la base|d'entrée|entrée|de la table|d'excitation|excitation"
+)
+#: Names of the mass on it.
+_MASS = "mass|output|response|top|Masse|Massen|Antwort|Ausgang|de la masse|masse|de réponse|réponse|de sortie|sortie"
+_ACCELERATION = "acceleration|accel|acc|Beschleunigung|Beschl|accélération"
+_PHASE = "phase|phase angle|Phasenwinkel|déphasage"
+#: For each column of a resonance test (a mass on a mount on a shaker), the headers it goes by.
+RESONANCE_COLUMNS = {
+    "frequency": SWEEP_COLUMNS["frequency"],
+    "base_acceleration": _said(_BASE, _ACCELERATION),
+    "mass_acceleration": _said(_MASS, _ACCELERATION),
+    "base_phase": _said(_BASE, _PHASE),
+    "mass_phase": _said(_MASS, _PHASE),
+    "phase": (
+        *("phase", "phase angle", "phase difference", "relative phase", "transmissibility phase", "phase of T", "phi"),
+        *("Phasenwinkel", "Phasendifferenz", "Phasenverschiebung", "Phase Transmissibilität", "Phase Übertragung"),
+        *("déphasage", "angle de phase", "phase transmissibilité", "phase de la transmissibilité"),
+    ),
+    "transmissibility": (
+        *("transmissibility", "transmissibility magnitude", "transmissibility amplitude", "|T|", "transmission ratio"),
+        *("Transmissibilität", "Übertragungsfaktor", "Vergrößerungsfaktor", "Betrag Transmissibilität"),
+        *("transmissibilité", "module de la transmissibilité", "facteur de transmission"),
+    ),
+    "transmissibility_real": (
+        *("transmissibility real", "real transmissibility", "Re T", "real part of T", "Realteil T"),
+        *("Realteil Transmissibilität", "partie réelle transmissibilité"),
+    ),
+    "transmissibility_imaginary": (
+        *("transmissibility imaginary", "transmissibility imag", "imaginary transmissibility", "Im T"),
+        *("imaginary part of T", "Imaginärteil T", "Imaginärteil Transmissibilität"),
+        *("partie imaginaire transmissibilité",),
+    ),
+    **{
+        f"{role}_{part}": tuple(f"{name} {word}" for name in _said(bodies, _ACCELERATION) for word in words)
+        for role, bodies in (("base", _BASE), ("mass", _MASS))
+        for part, words in (
+            ("real", ("real", "re", "Realteil", "réel", "partie réelle")),
+            ("imaginary", ("imaginary", "imag", "im", "Imaginärteil", "imaginaire", "partie imaginaire")),
+        )
+    },
 }  # fmt: skip
 #: Names of a strain.
 _STRAINS = (
