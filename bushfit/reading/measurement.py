@@ -57,14 +57,10 @@ class Part:
     """Where a loop stands in a record that holds several, one after the other.
 
     Args:
-        number: of the loop in its record, from 1.
-        of: how many loops the record holds.
         first_row: row of the record that it begins with, from 0.
         left_out: a sentence on what of the record around it belongs to no loop; None where all does.
     """
 
-    number: int
-    of: int
     first_row: int
     left_out: str | None = None
 

@@ -17,6 +17,9 @@ from bushfit.reading.measurement import Floats, Stepped
 _WIDEST_LEVEL = 0.08
 #: Distance in ln X from a level to the next over the span of a level, at least; chosen: below, they may be one.
 _LEAST_GAP = 3.0
+#: Span of the amplitudes of a pass over the frequencies in ln X, up to which it counts as held; chosen: a weak rig
+#: falls short by a third, and a mass on a mount moves through more.
+_WIDEST_PASS = 0.4
 #: Share of the rows, at least, with the frequency or the level of the row before, where one of them is held.
 _LEAST_HELD = 0.1
 #: Points of a run at least for its levels to be told by their place in it.
@@ -50,8 +53,10 @@ def runs_of(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | No
     if (levels == amplitude).all():
         levels = _by_rank(frequency, amplitude, repeat)
     if np.mean((np.diff(frequency) == 0.0) | (np.diff(levels) == 0.0)) < _LEAST_HELD:
-        restarts = np.cumsum(np.append(False, np.diff(frequency) < 0.0)) + 1
-        return Runs(None, amplitude, restarts if repeat is None else repeat)
+        passes = repeat if repeat is not None else np.cumsum(np.append(False, np.diff(frequency) < 0.0)) + 1
+        if (of_passes := _of_passes(amplitude, _number(passes))) is None:
+            return Runs(None, amplitude, passes)
+        levels = of_passes
     of_frequency, of_level = (np.unique(values).size for values in (frequency, levels))
     counted = repeat if repeat is not None else _occurrence(frequency, levels)
     return Runs("amplitude" if of_level > of_frequency else "frequency", levels, counted)
@@ -90,13 +95,19 @@ def _by_rank(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | N
     return _middle(amplitude, rank) if (table[-1, :-1] < table[0, 1:]).all() else amplitude
 
 
+def _of_passes(amplitude: Floats, passes: NDArray[np.intp]) -> Floats | None:
+    """The level of each amplitude where every pass over the frequencies nearly keeps to one, (n,); else None."""
+    spans = [float(np.ptp(np.log(amplitude[passes == one]))) for one in np.unique(passes)]
+    return nominal(_middle(amplitude, passes)) if max(spans) < _WIDEST_PASS else None
+
+
 def _middle(values: Floats, group: NDArray[np.intp]) -> Floats:
     """The median of the group of each value, (n,)."""
     medians = np.array([np.median(values[group == one]) for one in range(group.max() + 1)])
     return medians[group]
 
 
-def _number(*keys: NDArray[np.generic]) -> NDArray[np.intp]:
+def _number(*keys: Floats | NDArray[np.int64]) -> NDArray[np.intp]:
     """A number from 0 for each combination of keys, (n,)."""
     return np.unique(np.stack(keys), axis=1, return_inverse=True)[1].ravel()
 

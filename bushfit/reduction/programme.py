@@ -37,9 +37,10 @@ _MOST_CREEP = 1.5
 _MOST_DRIFT = 3.0
 #: Half cycles between crossings, fewer than which make no part: a whole cycle.
 _FEWEST_HALVES = 2
-#: Strokes from which on a record without a part is refused, where their ranges differ by more than the natural log
-#: after it; chosen: two cycles show what changes, and no rig misses its amplitude by a third.
-_FEWEST_CHANGING, _CHANGING = 4, 0.3
+#: Strokes from which on a record without a part is refused; chosen: two cycles show what changes.
+_FEWEST_CHANGING = 4
+#: [ln of a range] Difference between their ranges from which on it is; chosen: no rig misses its amplitude by a third.
+_CHANGING = 0.3
 #: Relative difference of the ranges of two parts up to which they have one amplitude; chosen: rigs step by more.
 _SAME_AMPLITUDE = 0.08
 #: Cycles between two parts alike up to which they are one that was disturbed; chosen: an outlier disturbs no more.
@@ -56,9 +57,11 @@ _THREE = 2.95
 _TWO = 1.95
 #: Softening from which on it is told; chosen: less does not matter to a fit.
 _LEAST_SOFTENING = 0.02
-#: The same relative to the loss factor, for a part that begins from rest, and for one after other cycles; chosen: the
-#: memory of a springpot and of friction make up to 0.6 and 0.15 of it.
-_MEMORY_FROM_REST, _MEMORY = 0.75, 0.25
+#: The same relative to the loss factor, for a part that begins from rest; chosen: the memory of a springpot and of
+#: friction makes up to 0.6 of it.
+_MEMORY_FROM_REST = 0.75
+#: The same for a part after other cycles; chosen: there they make up to 0.15 of it.
+_MEMORY = 0.25
 #: Standard errors beyond which a softening is none of noise.
 _CERTAIN = 6.0
 #: Harmonics that are fitted to a cycle of force; chosen: a loop of rubber has next to nothing beyond.
@@ -76,14 +79,11 @@ class _Span:
     """A part of a record: crossings of the middle it lies between, and what they settle.
 
     Args:
-        first, last: numbers of the strokes whose crossings it surely holds.
         begin, end: of its cycles, on the clock of the record.
         period: of its cycles, on that clock.
         range: peak to peak [m or rad].
     """
 
-    first: int
-    last: int
     begin: float
     end: float
     period: float
@@ -171,27 +171,36 @@ def _spans(loop: Loop, time: Floats, motion: Floats) -> list[_Span]:
                 first, last = strokes.start + run.start, strokes.start + run.stop
                 period = 2.0 * float(across[last] - across[first]) / (last - first)
                 part = float(np.median(size[first : last + 1]))
-                found.append(_Span(first, last, float(across[first]), float(across[last]), period, part))
-    inner = size[1:-1]
-    if not found and inner.size >= _FEWEST_CHANGING and np.ptp(np.log(inner)) > _CHANGING:
-        unit, factor = loop.direction.display.displacement
-        raise MeasurementError(
-            "no part of the record is a loop",
-            file=loop.source.file if loop.source else loop.name,
-            found=f"{inner.size / 2.0:.2g} cycles from {factor * inner.min() / 2.0:.3g} to "
-            f"{factor * inner.max() / 2.0:.3g} {unit}, no two in a row alike",
-            expected="at least two cycles of one amplitude and rate",
-            hint="record more cycles of each amplitude, best five",
-        )
+                found.append(_Span(float(across[first]), float(across[last]), period, part))
+    if not found:
+        _check_not_changing(loop, size[1:-1])
     joined: list[_Span] = []
     for span in found:
         goes_on = bool(joined) and _goes_on(joined[-1], span)
-        joined[-1:] = [replace(joined[-1], last=span.last, end=span.end)] if goes_on else [*joined[-1:], span]
+        joined[-1:] = [replace(joined[-1], end=span.end)] if goes_on else [*joined[-1:], span]
     limits = [time[0], *(span.end for span in joined)], [*(span.begin for span in joined), time[-1]]
     return [
         _to_its_ends(span, time, motion, float(before), float(after))
         for span, before, after in zip(joined, limits[0][:-1], limits[1][1:], strict=True)
     ]
+
+
+def _check_not_changing(loop: Loop, size: Floats) -> None:
+    """Refuse a record without a part whose strokes, of these ranges [m or rad], go up and down by ever other amounts.
+
+    Raises:
+        MeasurementError: they do.
+    """
+    if size.size >= _FEWEST_CHANGING and np.ptp(np.log(size)) > _CHANGING:
+        unit, factor = loop.direction.display.displacement
+        raise MeasurementError(
+            "no part of the record is a loop",
+            file=loop.source.file if loop.source else loop.name,
+            found=f"{size.size / 2.0:.2g} cycles from {factor * size.min() / 2.0:.3g} to "
+            f"{factor * size.max() / 2.0:.3g} {unit}, no two in a row alike",
+            expected="at least two cycles of one amplitude and rate",
+            hint="record more cycles of each amplitude, best five",
+        )
 
 
 def _alike(values: Floats, reach: Floats) -> Iterator[slice]:
@@ -272,7 +281,7 @@ def _loops(loop: Loop, time: Floats, spans: Sequence[_Span], clock: dict[str, An
             loop,
             **{name: getattr(loop, name)[rows] for name in every},
             name=f"{loop.name}_part_{number}",
-            part=Part(number, len(spans), rows.start, said),
+            part=Part(rows.start, said),
             softening=_softening(loop, span, from_rest=number == 1),
         )
         yield part if loop.timed else replace(part, time=rebuild_time(part.displacement, **clock))

@@ -64,3 +64,10 @@ def test_a_mass_on_a_mount_holds_neither_and_each_pass_is_a_run() -> None:
 )
 def test_amplitudes_that_nothing_groups_are_their_own_levels(amplitude: np.ndarray) -> None:
     assert np.array_equal(nominal(amplitude), amplitude)
+
+
+def test_a_frequency_sweep_that_falls_short_by_a_quarter_is_one_run() -> None:
+    frequency = np.geomspace(0.01, 100.0, 28)
+    runs = runs_of(frequency, 0.15 * frequency**-0.03, None)
+    assert runs.stepped == "frequency"
+    assert np.unique(runs.amplitude).size == 1
