@@ -163,7 +163,7 @@ def _tests(parts: Sequence[Source]) -> tuple[list[Source], list[str]]:
             recognised(part.file, part.stated or {})
         except NoTestError as error:
             without.add(part.sheet)
-            why = f"{error.problem} ({error.found})" if error.found else error.problem
+            why = f"{error.problem} ({error.found})" if error.found else f"{error.problem}; {error.hint}"
             left_out.append(f"{part}: {why}")
             continue
         except BushfitError:  # which the inspection of the test tells

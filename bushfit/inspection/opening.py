@@ -24,7 +24,7 @@ from bushfit.inspection.sweeps import look_at_sweep
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import Said
-from bushfit.reading.sweeps import STIFFNESS_PAIRS, read_sweep
+from bushfit.reading.sweeps import ONE_TEST, STIFFNESS_PAIRS, read_sweep
 from bushfit.reading.table import Table
 from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reduction.programme import clock_stated, programme
@@ -118,6 +118,9 @@ def _entry(
     needless = {"specimen"} | {f"at_{role}" for role in table.roles}
     if "time" in table.roles:
         needless |= {"rate", "frequency", "waveform"}
+    if column := table.roles.get("temperature"):
+        found = table.read({"temperature": column}, fewest_rows=1)["temperature"]
+        needless |= {"temperature"} if np.ptp(found) <= ONE_TEST else set()
     entry = {key: value for key, value in entry.items() if key not in needless}
     return {**({"specimen": place.name} if isinstance(place, Specimen) else {}), **entry}
 
@@ -174,7 +177,8 @@ def _look(measured: Loop, by_name: Said, clock: Mapping[str, Any]) -> tuple[Kind
 
 def _columns(table: Table, *, is_sweep: bool) -> tuple[ColumnSeen, ...]:
     """All columns of a file in order, with the range of their values as the file has them."""
-    ranged = {*chain(*STIFFNESS_PAIRS), "frequency", "amplitude", "repeat"} if is_sweep else set(table.roles)
+    of_sweeps = {*chain(*STIFFNESS_PAIRS), "frequency", "amplitude", "temperature", "repeat"}
+    ranged = of_sweeps if is_sweep else set(table.roles)
     wanted = {role: column for role, column in table.roles.items() if role in ranged}
     values = table.read(wanted, fewest_rows=1)  # the scales of `roles` are 1: not in SI
     columns = [ColumnSeen(header, None, None) for header in table.headers]

@@ -9,14 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from bushfit.campaign.schema import SpecimenTable
-from bushfit.errors import BushfitError, NoTestError
+from bushfit.errors import BushfitError, NoTestError, typed
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
 from bushfit.reading.directions import direction_of_file
 from bushfit.reading.headers import Vocabulary
 from bushfit.reading.layout import FileFormat
+from bushfit.reading.resonance import is_resonance
 from bushfit.reading.sweeps import STIFFNESS_PAIRS
 from bushfit.reading.table import Table
-from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS, of_motion
+from bushfit.reading.words import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS, of_motion
 from bushfit.validation import check_tables
 
 #: What an error says besides its problem.
@@ -51,6 +52,7 @@ def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
         opened.append((table, is_sweep))
         if _missing(table, is_sweep=is_sweep) is None:
             return table, is_sweep
+    _refuse_resonance(file, stated)
     if not opened:
         reason = failed[0][1]
         raise NoTestError(reason.problem, **{key: getattr(reason, key) for key in _PARTS})
@@ -67,6 +69,21 @@ def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
         expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
         hint=f"correct the header, or name the column: --column {_missing(best, is_sweep=is_sweep)}=...",
     )
+
+
+def _refuse_resonance(file: Path, stated: Mapping[str, Any]) -> None:
+    """Refuse a resonance test, with the way to make a sweep of it."""
+    try:
+        table = open_table(file, RESONANCE_COLUMNS, stated)
+    except BushfitError:  # then it is none
+        return
+    if is_resonance(table):
+        raise table.error(
+            "this is a resonance test, not a sweep",
+            kind=NoTestError,
+            expected="loops and sweeps",
+            hint=f'bushfit reduce {typed(file)} --mass "..." makes a sweep of it',
+        )
 
 
 def place_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Place | None:

@@ -41,7 +41,7 @@ _STATED_AGREEMENT = 0.1
 #: [K] Distance from the stated temperature within which a row was tested at it; chosen: chambers keep to less.
 _SAME_TEMPERATURE = 2.0
 #: [K] Range of temperatures that one test may have; chosen: a rubber warms up by as much while it is tested.
-_ONE_TEST = 5.0
+ONE_TEST = 5.0
 #: Share of |K| within which columns that say the same agree; chosen: some are rounded to few digits.
 _AGREEMENT = 0.02
 #: What else may be done about a column that is not there.
@@ -262,7 +262,7 @@ def _of_temperature(
         return rows, stated
     column, found = table.roles["temperature"], values["temperature"]
     scale = si.kelvin(column.unit or "")
-    if scale is None and (column.unit or stated or np.ptp(found) > _ONE_TEST):
+    if scale is None and (column.unit or stated or np.ptp(found) > ONE_TEST):
         raise UnitError(
             f'"{column.unit}" is no unit of temperature' if column.unit else "the temperature has no unit",
             file=table.file,
@@ -275,7 +275,7 @@ def _of_temperature(
         return rows, stated
     kelvin = scale[0] * found + scale[1]
     if stated is None:
-        if np.ptp(kelvin) <= _ONE_TEST:
+        if np.ptp(kelvin) <= ONE_TEST:
             return rows, round(float(kelvin.mean()), 2)
         problem, expected = "this file holds tests at several temperatures", "one temperature"
     else:
