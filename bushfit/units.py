@@ -33,6 +33,7 @@ _KINDS = {
     "Pa": ("a stress", "MPa"),
     "kg": ("a mass", "kg"),
     "m/s^2": ("an acceleration", "m/s^2"),
+    "K": ("a temperature", "degC"),
     "1": ("a ratio", "%"),
 }
 #: By SI unit: the unit in which people write it, and the factor from SI to it; MPa*s^alpha is the paper's.
@@ -150,7 +151,7 @@ def split_header(text: str) -> tuple[str, str | None]:
 
 
 def factor(text: str, expected: str) -> float:
-    """The number that turns values in the unit `text` into SI.
+    """The number that turns values in the unit `text` into SI; of a temperature, differences of values.
 
     Args:
         text: a unit such as "kN" or "N/mm"; "-" and "" stand for a ratio.
@@ -159,6 +160,8 @@ def factor(text: str, expected: str) -> float:
     Raises:
         UnitError: an unknown unit, or a unit of another dimension.
     """
+    if expected == "K" and (degree := kelvin(text)):
+        return degree[0]
     if expected == "m/s^2":
         text = _OF_ACCELERATION.get(text.strip(), text)
     scale, base = _resolve(text)

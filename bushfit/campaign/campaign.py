@@ -138,7 +138,7 @@ def reader_keywords(
         file = campaign.parent / test.file
         if (place := (os.path.normpath(file), test.sheet, test.temperature)) in seen:
             raise CampaignError(
-                "a file is listed twice", file=campaign, found=test.file, expected="each file, or sheet of it, once"
+                "a file is listed twice", file=campaign, found=test.file, expected="each file once, or each sheet of it"
             )
         seen.add(place)
         stated = {key: value for key, value in vars(test).items() if value is not None}

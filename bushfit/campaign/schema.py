@@ -151,7 +151,7 @@ class TestFile(FileFormat):
 
     Args:
         file: from the campaign's folder.
-        direction: of the bushing, or "shear" of a specimen.
+        direction: of the bushing; a specimen has none, which may be written "shear".
         specimen: by its name in [[specimens]]; the bushing unless stated.
         noise: relative standard deviation of a point, where it is known.
         weight: of the test in the fit, a share of the weight that its noise gives it.
@@ -162,7 +162,7 @@ class TestFile(FileFormat):
     __test__ = False
 
     file: Text
-    direction: Direction | Literal["shear"] | None = None
+    direction: Annotated[Direction | None, converted(lambda raw, _: None if raw == "shear" else raw)] = None
     specimen: Name | None = None
     noise: Share | None = None
     weight: Annotated[float, Field(gt=0, le=1)] = 1.0

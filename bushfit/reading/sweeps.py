@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit import units as si
-from bushfit.errors import UnitError
 from bushfit.geometry import Place, stated_strain
 from bushfit.reading.headers import AmplitudeConvention, Column
 from bushfit.reading.layout import FileFormat
@@ -153,7 +152,7 @@ def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str], at: Ma
     """The columns of a sweep with their units, in the order in which they are checked.
 
     Beside those that are needed, which a role that is stated (`at`) is not, the pairs that say the same are read, if
-    their units fit. A temperature is left in its unit.
+    their units fit. Of a temperature, the zero is still that of its unit.
     """
     length, stiffness = direction.motion.displacement_unit, direction.motion.stiffness_unit
     units = dict.fromkeys(SWEEP_COLUMNS, stiffness) | {
@@ -164,16 +163,19 @@ def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str], at: Ma
         "loss_factor": "1",
         "repeat": "1",
         "relative_error": "1",
+        "temperature": "K",
     }
     needed = [role for role in ("frequency", "amplitude") if role in table.roles or role not in at]
     optional = [role for role in ("amplitude_reached", "repeat", "relative_error") if role in table.roles]
+    degrees = table.roles.get("temperature")
+    optional += ["temperature"] * (degrees is not None and degrees.unit is not None)
     again = [role for other in STIFFNESS_PAIRS if set(other) <= set(table.roles) for role in other]
     again = [role for role in again if units[role] == "1" or table.agrees(role, units[role])]
     found = {role: table.column(role, units[role], _HINTS.get(role)) for role in (*needed, *pair, *optional, *again)}
     for role in ("amplitude", "amplitude_reached"):
         if role in found:
             found[role] = replace(found[role], scale=stated_strain(direction) * found[role].scale)
-    return found | {role: column for role, column in table.roles.items() if role == "temperature"}
+    return found if degrees is None else {"temperature": degrees, **found}
 
 
 def _check_positive(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> None:
@@ -255,42 +257,33 @@ def _of_temperature(
 
     Raises:
         MeasurementError: several temperatures of which none is stated, or too few rows near the one that is.
-        UnitError: a column without its unit where it matters, or with one that is no temperature's.
+        UnitError: a column without its unit where it matters.
     """
     rows = np.arange(values["frequency"].size)
     if "temperature" not in values:
         return rows, stated
-    column, found = table.roles["temperature"], values["temperature"]
-    scale = si.kelvin(column.unit or "")
-    if scale is None and (column.unit or stated or np.ptp(found) > ONE_TEST):
-        raise UnitError(
-            f'"{column.unit}" is no unit of temperature' if column.unit else "the temperature has no unit",
-            file=table.file,
-            place=table.place(table.layout.header_line, column),
-            found=f'"{column.header}"',
-            expected="degC, K or degF",
-            hint='write "temperature [degC]" in the header, or units = { temperature = "degC" } in the campaign',
-        )
-    if scale is None:
-        return rows, stated
-    kelvin = scale[0] * found + scale[1]
+    found, unit = values["temperature"], table.roles["temperature"].unit
+    if unit is None and stated is None and np.ptp(found) <= ONE_TEST:
+        return rows, None
+    column = table.column("temperature", "K")
+    celsius = found + (si.kelvin(unit or "") or (1.0, 0.0))[1] - si.CELSIUS
     if stated is None:
-        if np.ptp(kelvin) <= ONE_TEST:
-            return rows, round(float(kelvin.mean()), 2)
+        if np.ptp(celsius) <= ONE_TEST:
+            return rows, round(float(celsius.mean()), 2) + si.CELSIUS
         problem, expected = "this file holds tests at several temperatures", "one temperature"
     else:
-        rows = np.flatnonzero(np.abs(kelvin - stated) <= _SAME_TEMPERATURE)
+        rows = np.flatnonzero(np.abs(celsius + si.CELSIUS - stated) <= _SAME_TEMPERATURE)
         if rows.size >= _FEWEST_SWEEP_ROWS:
             return rows, stated
         problem = "too few rows are near the temperature that is stated"
         expected = f"{_FEWEST_SWEEP_ROWS} rows or more within {_SAME_TEMPERATURE:g} K of {stated - si.CELSIUS:.4g} degC"
-    ordered = np.sort(kelvin) - si.CELSIUS
-    groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > _SAME_TEMPERATURE) + 1)
-    nearest = min((group.mean() for group in groups), key=lambda mean: abs(mean + si.CELSIUS - (stated or 0.0)))
+    ordered = np.sort(celsius)
+    means = [part.mean() for part in np.split(ordered, np.flatnonzero(np.diff(ordered) > _SAME_TEMPERATURE) + 1)]
+    nearest = min(means, key=lambda mean: abs(mean + si.CELSIUS - (stated or 0.0)))
     raise table.error(
         problem,
         column=column,
-        found=", ".join(f"{group.mean():.1f}" for group in groups) + " degC",
+        found=", ".join(f"{mean:.1f}" for mean in means) + " degC",
         expected=expected,
         hint=f'state temperature = "{nearest:.1f} degC" in the campaign; several tests may name one file',
     )

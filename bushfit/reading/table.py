@@ -127,7 +127,7 @@ class Table(Columns):
         unit = column.unit or "1"
         others = ("m", "rad", "N/m", "N*m/rad") if self.motion is STRAINING else ("1", "Pa")
         if role in OF_MOTION and role != "force" and any(units.agrees(unit, other) for other in others):
-            raise self._other_motion(role, column.header)
+            self.refuse_other_motion(role, [column.header])
         with naming(self.file, self.place(self.layout.header_line, column)):
             if expected == "Hz" and is_angular(column.header, unit):
                 per_second = "rad/s" if units.agrees(unit, "rad/s") else "Hz"
@@ -150,37 +150,34 @@ class Table(Columns):
             hint=f'name the column in the campaign: columns = {{ {role} = "..." }}' + (f", {hint}" if hint else ""),
         )
 
-    def refuse_other_motion(self, role: str) -> None:
-        """Refuse a header that would name a role, for which there is no column, in a test of the other kind of motion.
+    def refuse_other_motion(self, role: str, headers: Sequence[str] | None = None) -> None:
+        """Refuse headers that would name a role in a test of the other kind of motion: strain, or displacement.
+
+        Args:
+            role: for which there is no column.
+            headers: that are known to do so; else those of the table that do.
 
         Raises:
-            MeasurementError: there is such a header: strain where displacement is expected, or the reverse.
+            MeasurementError: there is such a header.
         """
-        other = TRANSLATION if self.motion is STRAINING else STRAINING
-        vocabulary = Vocabulary({role: of_motion(self.names, other)[role]} if role in OF_MOTION else {}, {})
-        for header in self.headers:
-            if vocabulary.roles([header]):
-                raise self._other_motion(role, header)
-
-    def _other_motion(self, role: str, header: str) -> MeasurementError:
-        """The error for a test of strain and modulus where displacement and force are expected, or the reverse."""
-        own, other = ("strain and modulus", "displacement and force or stiffness")
+        kinds = ("displacement and force or stiffness", "strain and modulus")
         if self.motion is STRAINING:
-            expected, found = own, other
+            other, (found, expected) = TRANSLATION, kinds
             hint = 'take specimen out of the campaign, or give it kind = "shear" with its area and thickness'
         else:
-            expected, found = other, own
+            other, (expected, found) = STRAINING, kinds
             hint = (
-                "a coupon is a specimen of the compound: write [[specimens]] with a name and kind = "
-                '"modulus" in the campaign, and specimen = "its name" at this test'
+                'write [[specimens]] with a name and kind = "modulus" in the campaign, and specimen = "its name" here'
             )
-        return self.error(
-            f"this is a test of {found}",
-            line=self.layout.header_line,
-            found=f'"{header}" for the {_label(role)}',
-            expected=expected,
-            hint=hint,
-        )
+        words = Vocabulary({role: of_motion(self.names, other)[role]} if role in OF_MOTION else {}, {})
+        for header in headers or filter(words.heading, self.headers):
+            raise self.error(
+                f"this is a test of {found}",
+                line=self.layout.header_line,
+                found=f'"{header}" for the {_label(role)}',
+                expected=expected,
+                hint=hint,
+            )
 
     def _check_header(self) -> None:
         """Refuse a header of one cell, or of numbers alone."""

@@ -46,7 +46,7 @@ IN_LOOP = [
 ]
 #: (name, change of the lines of the sweep, what the error says ...)
 IN_SWEEP = [
-    ("no file", lambda _: None, "sweep.csv: there is no such file", "check the path for a typing error"),
+    ("no file", lambda _: None, "sweep.csv: there is no such file", "an existing file"),
     ("header only", kept(1), "sweep.csv: too few rows", "at least 3"),
     ("one row", kept(2), "sweep.csv: too few rows", "at least 3"),
     ("frequency of zero", row(2, "5,", "0,"), 'sweep.csv, line 2, column "frequency [Hz]": the frequency is not positive', "a number above zero"),
@@ -64,11 +64,11 @@ IN_SWEEP = [
     ("a torsion sweep as axial", lambda lines: text(lines).replace("amplitude [mm]", "amplitude [deg]").replace("[N/mm]", "[N m/rad]"), 'sweep.csv, line 1, column "amplitude [deg]": the unit does not fit', "a length, such as mm"),
     ("repeat is a half", lambda lines: text([lines[0] + ",repeat", *(line + ",0.5" for line in lines[1:])]), 'sweep.csv, line 2, column "repeat": this is no repeat number', "a whole number"),
     ("loss factor of a hundred", column(3, "100"), 'sweep.csv, line 2, column "loss factor [-]": no bushing has this loss', "check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]"),
-    ("strain of a bushing", every("amplitude [mm]", "strain [%]"), "sweep.csv, line 1: this is a test of strain and modulus", "and specimen = \"its name\" at this test"),
-    ("modulus of a bushing", every("stiffness [N/mm]", "G* [MPa]"), "sweep.csv, line 1: this is a test of strain and modulus", "and specimen = \"its name\" at this test"),
+    ("strain of a bushing", every("amplitude [mm]", "strain [%]"), "sweep.csv, line 1: this is a test of strain and modulus", 'and specimen = "its name" here'),
+    ("modulus of a bushing", every("stiffness [N/mm]", "G* [MPa]"), "sweep.csv, line 1: this is a test of strain and modulus", 'and specimen = "its name" here'),
     ("no amplitude", lambda lines: text([line.replace(line.split(",")[1] + ",", "", 1) for line in lines]), "sweep.csv, line 1: there is no column for the amplitude", 'or state at_amplitude = "0.1 mm" if all rows have it'),
     ("two temperatures", added("T [°C]", "-20", "22"), 'sweep.csv, column "T [°C]": this file holds tests at several temperatures', "-20.0, 22.0 degC", 'state temperature = "-20.0 degC"'),
-    ("unknown unit of temperature", added("temperature [degR]", "22"), 'sweep.csv, line 1, column "temperature [degR]": "degR" is no unit of temperature', "degC, K or degF"),
+    ("unknown unit of temperature", added("temperature [degR]", "22"), 'sweep.csv, line 1, column "temperature [degR]": unknown unit', 'found: "degR"'),
     ("temperatures without unit", added("temperature", "-20", "22"), 'sweep.csv, line 1, column "temperature": the temperature has no unit', 'units = { temperature = "degC" }'),
     ("negative relative error", added("relative error [-]", "-0.01"), 'sweep.csv, line 2, column "relative error [-]": the relative error is not positive', "a number above zero"),
     ("loss the other way throughout", lambda lines: text(lines).replace(",0.1", ",-0.1").replace(",-0.1,", ",0.1,"), 'sweep.csv, column "loss factor [-]": the loss counts the other way', "turn the sign of this column in the file"),

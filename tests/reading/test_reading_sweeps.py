@@ -210,7 +210,7 @@ STATED = [
         {"temperature": 313.15},
         ["near the temperature", "-10.0, 18.4 degC", "2 K of 40 degC", 'temperature = "18.4 degC"'],
     ),
-    ("unknown degrees", at_temperatures(20.0, unit="degX"), {}, ["line 1", '"degX" is no unit of temperature', "degC"]),
+    ("unknown degrees", at_temperatures(20.0, unit="degX"), {}, ["line 1", '"Temperature [degX]"', "unknown unit"]),
     (
         "degrees without unit",
         at_temperatures(20.0, 40.0).replace(" [degC]", ""),
