@@ -79,18 +79,17 @@ class Inspected:
 
     @property
     def assumed(self) -> str | None:
-        """What was assumed, in a sentence with the option or key that says otherwise; None where nothing was."""
+        """What was assumed, with the option or key that says otherwise; None where nothing was."""
+        said = []
         if isinstance(self.direction, Specimen) and self.direction.kind == "modulus":
-            taken = (
-                "Young's modulus and the strain in tension" if self.direction.strain == "tension" else "shear strain"
-            )
-            return (
-                f'its strain is taken as {taken}, else strain = "engineering", "tensor" or "tension" in [[specimens]]'
-            )
-        if self.kind != "sweep" or self.counted or "amplitude" in self.entry:
-            return None
-        what = "name" if "at_amplitude" in self.entry else "header"
-        return f"its {what} does not say how amplitudes are counted: taken zero-to-peak, else --amplitude peak-to-peak"
+            in_tension = self.direction.strain == "tension"
+            taken = "that of a bar in tension" if in_tension else "the engineering shear strain"
+            other = "engineering" if in_tension else "tension"
+            said.append(f'its strain is taken as {taken}, else strain = "{other}" or "tensor" in [[specimens]]')
+        if self.kind == "sweep" and not self.counted and "amplitude" not in self.entry:
+            what = "nothing says" if "at_amplitude" in self.entry else "its header does not say"
+            said.append(f"{what} how amplitudes are counted: taken zero-to-peak, else --amplitude peak-to-peak")
+        return "; ".join(said) or None
 
     def to_document(self) -> dict[str, Any]:
         """All of it but the content, as JSON has it."""
