@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from bushfit.errors import UnitError, did_you_mean
-from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Motion
 from bushfit.units import agrees, quantity
 from bushfit.validation import converted
 
@@ -23,13 +23,18 @@ class Point:
         place: direction, or name of the specimen.
         frequency: [Hz].
         amplitude: zero-to-peak [m or rad], or strain.
-        motion: of the direction, or as the unit of the amplitude tells.
+        unit: of the amplitude, SI.
     """
 
     place: str
     frequency: float
     amplitude: float
-    motion: Motion
+    unit: str
+
+    @property
+    def motion(self) -> Motion:
+        """That of the direction, or as the unit of the amplitude tells."""
+        return next(motion for motion in (TRANSLATION, ROTATION, STRAINING) if motion.displacement_unit == self.unit)
 
     def __str__(self) -> str:
         unit, factor = self.motion.display.displacement
@@ -51,7 +56,7 @@ def parse_point(text: str) -> Point:
     frequency, amplitude = quantity(match[2], "Hz"), quantity(match[3], motion.displacement_unit)
     if not (frequency > 0.0 and amplitude > 0.0):
         raise UnitError("frequency and amplitude have to be above zero", found=repr(text), expected=expected)
-    return Point(match[1], frequency, amplitude, motion)
+    return Point(match[1], frequency, amplitude, motion.displacement_unit)
 
 
 def _motion(amplitude: str) -> Motion:
