@@ -6,7 +6,7 @@ Eqs. 7, 8, 10, 11, 12. Source: Garcia Tarrago, Kari, Vinolas, Gil-Negrete, Polym
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property, lru_cache
@@ -266,6 +266,18 @@ class Specimen:
 
 #: Where a response is measured or predicted: a direction of the bushing, or a specimen of its compound.
 Place = Direction | Specimen
+
+
+def place_named(name: str, specimens: Iterable[Specimen]) -> Place:
+    """The specimen of this name, or else the direction.
+
+    Raises:
+        ModelError: it is neither.
+    """
+    known: dict[str, Place] = {str(place): place for place in (*Direction, *specimens)}
+    if name not in known:
+        raise ModelError("no such direction or specimen", found=name, expected="one of " + ", ".join(known))
+    return known[name]
 
 
 def unit_strain(bushing: Bushing | None, place: Place) -> float:

@@ -23,7 +23,6 @@ from bushfit.campaign.schema import Share
 from bushfit.campaign.toml import read_toml
 from bushfit.effects import effect_named
 from bushfit.errors import CampaignError
-from bushfit.geometry import Direction
 from bushfit.reading.files import read_utf8
 from bushfit.validation import Text, check_tables, converted, unknown_key
 
@@ -73,7 +72,7 @@ class Settings:
     """
 
     commands: Annotated[tuple[Command, ...], Words, Field(min_length=1)] | None = None
-    directions: Annotated[tuple[Direction, ...], Words] | None = None
+    directions: Annotated[tuple[Text, ...], Words] | None = None
     effects: Effects | None = None
     adopt: Effects | None = None
     without: Effects | None = None

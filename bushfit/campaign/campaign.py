@@ -13,7 +13,7 @@ from bushfit.campaign.places import place_tested
 from bushfit.campaign.schema import CampaignFile, FitSettings, LoopFile, PredictSettings, SimulateSettings, SweepFile
 from bushfit.campaign.toml import read_toml
 from bushfit.errors import CampaignError, naming, typed
-from bushfit.geometry import Bushing, Specimen
+from bushfit.geometry import Bushing, Specimen, place_named
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.sweeps import read_sweep
@@ -80,6 +80,9 @@ def load_campaign(path: str | Path) -> Campaign:
         bushing = Bushing(**vars(content.bushing)) if content.bushing else None
         specimens = tuple(Specimen(**vars(table)) for table in content.specimens)
         _check_bodies(bushing, specimens)
+        with naming(place="predict.directions"):
+            for name in content.predict.directions or ():
+                place_named(name, specimens)
     return Campaign(
         content.name or (bushing or specimens[0]).name,
         path,
@@ -93,6 +96,21 @@ def load_campaign(path: str | Path) -> Campaign:
         content.simulate,
         specimens,
     )
+
+
+def load_bushing(path: Path) -> Bushing:
+    """The bushing of a campaign file, or of a file with a [bushing] table alone; its tests are not read.
+
+    Raises:
+        CampaignError: the file is missing, no TOML, or has no [bushing].
+        ModelError: an impossible bushing.
+    """
+    table = read_toml(path, CampaignFile).bushing
+    if table is None:
+        expected = "a [bushing] table with name, inner_radius, outer_radius and length"
+        raise CampaignError("there is no bushing in it", file=path, expected=expected)
+    with naming(path):
+        return Bushing(**vars(table))
 
 
 def _check_bodies(bushing: Bushing | None, specimens: Sequence[Specimen]) -> None:

@@ -40,6 +40,15 @@ class _Direction(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows 
         return Direction(click.Choice([str(direction) for direction in Direction]).convert(value, param, ctx))
 
 
+class _Place(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows none
+    """A direction, or a specimen of a campaign, which only the campaign knows."""
+
+    name = "place"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        return str(value) if str(value).strip() else self.fail("this is no direction: an empty text", param, ctx)
+
+
 class _DirectionOption(click.Option):
     """An option that takes directions; they stand in its help in place of "{directions}"."""
 
@@ -72,6 +81,8 @@ class _Share(click.FloatRange):
 
 #: Decorator of a command that takes a direction, or several.
 direction_option = partial(click.option, "--direction", cls=_DirectionOption, type=_Direction())
+#: The same of a command that takes specimens by their names, too.
+place_option = partial(click.option, "--direction", cls=_DirectionOption, type=_Place())
 
 
 @contextmanager

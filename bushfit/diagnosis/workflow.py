@@ -8,10 +8,9 @@ from bushfit.diagnosis.evidence import fit
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import judge
-from bushfit.effects import BASE, effect_named, qualified
+from bushfit.effects import effect_named, qualified
 from bushfit.fitting.data import Data
 from bushfit.fitting.robust import estimate, outliers_at, told
-from bushfit.fitting.starts import start_values
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 
@@ -21,7 +20,8 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
 
     Args:
         data: the campaign; all directions are used.
-        model: where to start; the paper's three branches unless told. Its effects are kept, its values refitted.
+        model: where to start; the paper's three branches, and what [fit] adds, unless told. Its effects are kept, its
+            values refitted.
         settings: limits, and effects to adopt or to leave out.
 
     Raises:
@@ -34,8 +34,8 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     hint = "add measured tests to the campaign"
     data_sets = data.some([*data.loops, *data.sweeps], "there is nothing to diagnose", hint)
     held = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
-    start = {**start_values(data.campaign.bushing, data_sets, {}), **data.given}
-    model = model or Model.started(data.campaign.bushing, BASE, start)
+    start = data.start(data_sets, {})
+    model = model or Model.started(data.campaign.bushing, data.effects, start)
     start = {name: value for name, value in start.items() if name in model.values and name not in held}
     for name in settings.adopt:
         if name not in model.effects:  # at a tenth of its typical size: at its neutral value a fit may not see it
@@ -52,4 +52,5 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     if not data.robust:
         outliers = outliers_at(found.after.model, found.after.data_sets)
     notes = (*found.notes, *told(outliers, robust=data.robust))
-    return replace(found, notes=notes, result=replace(found.result, outliers=outliers))
+    result = replace(found.result, outliers=outliers, specimens=data.campaign.specimens)
+    return replace(found, notes=notes, result=result)

@@ -41,7 +41,7 @@ IN_LOOP = [
     ("displacement and force swapped", every("displacement [mm],force [N]", "force [N],displacement [mm]"), "loop.csv: the loop gives energy, which no bushing does", "are the columns of displacement and force swapped, or do the rows run backwards in time?"),
     ("gives energy", lambda lines: text([lines[0], *(",".join([a, b, str(900 * float(b) - float(c))]) for a, b, c in (line.split(",") for line in lines[1:]))]), "loop.csv: the loop gives energy, which no bushing does", "are the columns of displacement and force swapped, or do the rows run backwards in time?"),
     ("no time", lambda lines: text([line.partition(",")[2] for line in lines]), "loop.csv, line 1: there is no column for the time", 'name the column in the campaign: columns = { time = "..." }, or state rate = "10 mm/min",'),
-    ("metres for millimetres", every("displacement [mm]", "displacement [m]"), "eps_half: impossible value", "1e-06 to 10 (strain at half of sigma_fmax)"),
+    ("metres for millimetres", every("displacement [mm]", "displacement [m]"), "campaign.toml: the tests are of a size that no rubber shows", "times the modulus of loop, which no rubber does: check the units"),
     ("an amplitude of its own for every cycle", lambda lines: text([lines[0], *(f"{n / 50},{a * np.sin(n * np.pi / 25):.5f},{400 * a * np.sin(n * np.pi / 25 + 0.1):.3f}" for n in range(300) for a in [1 + n // 50])]), "loop.csv: no part of the record is a loop", "record more cycles of each amplitude, best five"),
 ]
 #: (name, change of the lines of the sweep, what the error says ...)
