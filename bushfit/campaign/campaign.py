@@ -166,7 +166,10 @@ def reader_keywords(
         with naming(campaign, place=test.file):
             stated["direction"] = place_tested(test.specimen, test.direction, specimens)
             if amplitude := stated.pop("at_amplitude", None):
-                stated["at_amplitude"] = quantity(amplitude, stated["direction"].motion.displacement_unit)
+                held = quantity(amplitude, stated["direction"].motion.displacement_unit)
+                if held <= 0.0:
+                    raise CampaignError("at_amplitude is not positive", found=f'"{amplitude}"', expected="above zero")
+                stated["at_amplitude"] = held
         yield {
             **stated,
             "file": file,

@@ -263,8 +263,8 @@ def open_model(file: Path) -> Result:
     from bushfit.model.file import load_result
 
     ending = file.suffix.lower()
-    if file.is_file() and ending in (".toml", *TEST_FILES):
-        found = "a campaign" if ending == ".toml" else "a test file"
+    if file.is_dir() or (file.is_file() and ending in (".toml", *TEST_FILES)):
+        found = "a folder" if file.is_dir() else "a campaign" if ending == ".toml" else "a test file"
         way = f"bushfit run {typed(file)}" if ending == ".toml" else f"bushfit init {typed(file)} ..., then bushfit run"
         raise ModelError(
             "a fitted model is needed",

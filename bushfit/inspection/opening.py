@@ -13,7 +13,7 @@ import numpy as np
 
 from bushfit.campaign.campaign import reader_keywords
 from bushfit.campaign.schema import LoopFile, SweepFile
-from bushfit.errors import BushfitError, MeasurementError
+from bushfit.errors import BushfitError, MeasurementError, naming
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.inspection.histories import look_at_history
 from bushfit.inspection.loops import look_at_loop, look_at_programme
@@ -132,7 +132,8 @@ def _keywords(
     specimens = [direction] if isinstance(direction, Specimen) else []
     tested = {} if specimens else {"direction": str(direction)}
     test = check_tables({**entry, "file": str(file), **tested}, file, schema)
-    return {**next(reader_keywords(Path(), [test], specimens)), "name": file.stem}
+    with naming(file, "at_amplitude"):  # which alone is converted there
+        return {**next(reader_keywords(Path(), [test], specimens)), "name": file.stem}
 
 
 def _read_loop(

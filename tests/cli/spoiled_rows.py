@@ -338,6 +338,7 @@ USAGE = [
     ("run|loop.csv|campaign.toml", "loop.csv: a campaign is needed", "found: a test file", "try: bushfit init loop.csv --inner-radius"),
     ("fit|campaign.toml|more.toml", "Got unexpected extra argument (more.toml). bushfit batch takes several campaigns."),
     ("batch|loop.csv|sweep.csv", "loop.csv: this is no campaign", "try: bushfit init FILE... makes a campaign of test files"),
+    ("predict|.", ".: a fitted model is needed", "found: a folder", "try: bushfit init . ..., then bushfit run makes one"),
     ("init|loop.csv|--direction|axial", "Missing option '--length'."),
     ("init|loop.csv|--length|34 mm", "Missing option '--inner-radius' or '--inner-diameter'."),
     ("init|loop.csv|--length|34 mm|--inner-radius|10 mm|--inner-diameter|20 mm", "'--inner-radius' and '--inner-diameter' are one size; give one of them."),

@@ -149,3 +149,31 @@ def test_sizes_of_a_block_make_a_specimen_of_it(sweep: Sweep, tmp_path: Path) ->
     seen = inspect(tmp_path / "x.csv", sizes)
     assert seen.direction == Specimen("mount", "shear", area=7.72e-4, thickness=6e-3, elements=2)
     assert seen.entry == {"specimen": "mount"}
+
+
+@pytest.mark.parametrize("text", ["0 mm", "-0.1 mm", "0.1", "0.1 N", "wide"])
+def test_an_amplitude_that_is_none_is_refused(sweep: Sweep, tmp_path: Path, text: str) -> None:
+    with pytest.raises(BushfitError, match=r"axial\.csv, at_amplitude: "):
+        inspect(held(sweep, tmp_path / "axial.csv"), {"at_amplitude": text})
+
+
+def test_a_temperature_is_stated_for_files_with_several(tmp_path: Path) -> None:
+    """Of files with one temperature in a column, and with several."""
+    rows = [f"{f},0.1,{600 + f},0.1,{t}" for t in (10, 25) for f in range(5, 60, 5)]
+    head = "f [Hz],amplitude [mm],K* [N/mm],tan delta,temperature [degC]"
+    for name, kept in (("several", rows), ("one", rows[:11])):
+        (tmp_path / f"axial_{name}.csv").write_text("\n".join([head, *kept]) + "\n", encoding="utf-8")
+    sources, _ = gather([tmp_path], {"temperature": "25 degC"})
+    entries = {source.file.stem: source.inspect().entry for source in sources}
+    assert entries == {"axial_several": {"temperature": "25 degC"}, "axial_one": {}}
+    with pytest.raises(BushfitError, match=r"several temperatures(.|\n)*temperature = "):
+        inspect(tmp_path / "axial_several.csv", {})
+
+
+def test_a_resonance_test_is_left_out_with_the_way_on(sweep: Sweep, root: Path, tmp_path: Path) -> None:
+    measured = root / "data/measured/epdm_70/shaker_1g_573g.csv"
+    (tmp_path / measured.name).write_bytes(measured.read_bytes())
+    held(sweep, tmp_path / "axial_0.1mm.csv")
+    sources, (told,) = gather([tmp_path], {})
+    assert [source.file.stem for source in sources] == ["axial_0.1mm"]
+    assert "this is a resonance test, not a sweep; bushfit reduce" in told
