@@ -98,6 +98,11 @@ def place_files(places: Sequence[Place]) -> list[str]:
     return names
 
 
+def resonance_files(places: Sequence[Place]) -> list[str]:
+    """The names of the tables of a mass on each place."""
+    return [f"{name}_resonance.csv" for name in place_files(places)]
+
+
 def diagnosis_files(diagnosis: Diagnosis, title: str, formats: Collection[str]) -> dict[str, bytes]:
     """`gap.csv`, `candidates.csv` and `gap.png` of a diagnosis."""
     before, after = diagnosis.before, diagnosis.after

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
     from bushfit.geometry import Place
     from bushfit.model.model import Model
-    from bushfit.prediction import Prediction
+    from bushfit.prediction import PredictedResonance, Prediction
     from bushfit.reduction.resonance import Resonance
     from bushfit.reduction.result import Reduction
 
@@ -54,6 +54,23 @@ def prediction_table(prediction: Prediction) -> pd.DataFrame:
                 for name, (band, scale) in bands.items()
                 for end in ("low", "high")
             },
+        }
+    )
+
+
+def shaken_table(found: PredictedResonance) -> pd.DataFrame:
+    """The table of a mass on a mount: transmissibility, deformation and stiffness over frequency."""
+    import pandas as pd
+
+    (length, length_factor), _, (stiffness, factor) = found.place.display
+    return pd.DataFrame(
+        {
+            "frequency [Hz]": found.frequency,
+            "transmissibility [-]": np.abs(found.transmissibility),
+            "phase [deg]": np.degrees(np.angle(found.transmissibility)),
+            f"amplitude [{length}]": found.amplitude * length_factor,
+            f"stiffness [{stiffness}]": np.abs(found.stiffness) * factor,
+            "loss factor [-]": loss_factor(found.stiffness),
         }
     )
 
