@@ -1,0 +1,232 @@
+"""Mistakes in the record: would the tests agree if one of them were read in another way?
+
+A mistake has no free parameter, so it costs only the logarithm of how many were looked at; in turn it has to close the
+whole gap, and to beat every effect and every fault. Nothing is mended here unless the user adopts it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from bushfit.effects import BASE
+from bushfit.effects.contract import Array
+from bushfit.effects.mistakes import MISTAKES, SEPARATOR, Mistake, labelled, mistake_named, shown
+from bushfit.errors import ModelError
+from bushfit.fitting.data import Data
+from bushfit.fitting.data_set import DataSet
+from bushfit.fitting.data_sets import SweepData, loop_data, sweep_data
+from bushfit.geometry import Bushing, Place
+from bushfit.model.model import Model
+from bushfit.reading.measurement import Loop, Sweep
+
+#: Values of alpha that are tried before any fit: those of all rubbers.
+_ALPHA = np.linspace(0.05, 0.6, 10)
+#: Values of eps_half that are tried before any fit: those of all filled rubbers, with room for amplitudes 2 times off.
+_EPS_HALF = np.geomspace(2e-4, 0.2, 24)
+#: Least relative error of a point that is tried before any fit: half of what the grid of values misses by.
+_COARSE = 3e-3
+#: Points of a test that are tried before any fit at most: they show its shape.
+_MOST_POINTS = 60
+#: Share of the misfit that a claim must take off before any fit: one that closes the gap takes more.
+_LEAST_GAIN = 0.3
+#: Share of mu in a modulus that keeps three columns from being one.
+_RIDGE = 1e-12
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One mistake, made alike in some tests.
+
+    Args:
+        mistake: which.
+        tests: the data sets it was made in, by their place; none for [bushing].
+    """
+
+    mistake: Mistake
+    tests: tuple[int, ...]
+
+    @property
+    def each(self) -> list[Claim]:
+        """The same of each test alone."""
+        return [Claim(self.mistake, (place,)) for place in self.tests] or [self]
+
+    def test(self, data: Data) -> str | None:
+        """The name of its one test; None of [bushing]."""
+        return [*data.loops, *data.sweeps][self.tests[0]].name if self.tests else None
+
+    def labels(self, data: Data) -> tuple[str, ...]:
+        """The mistake with each of its tests, as --adopt takes it."""
+        return tuple(labelled(self.mistake.name, one.test(data)) for one in self.each)
+
+    def words(self, data: Data) -> str:
+        """What would be so, in words."""
+        every = [*data.loops, *data.sweeps]
+        files = [shown(every[place].test) for place in self.tests]
+        return self.mistake.sentence.format(files=" and ".join(filter(None, (", ".join(files[:-1]), *files[-1:]))))
+
+    def corrections(self, data: Data) -> tuple[str, ...]:
+        """What to write into the campaign, a line each."""
+        every = [*data.loops, *data.sweeps]
+        return tuple(self.mistake.corrected(every[place].test) for place in self.tests) or (
+            self.mistake.corrected(None),
+        )
+
+    def mended(self, data: Data) -> Data:
+        """The campaign as it was measured if the mistake was made."""
+        campaign = data.campaign
+        if not self.tests:
+            bushing = campaign.bushing and self.mistake.mended_bushing(campaign.bushing)
+            return replace(data, campaign=replace(campaign, bushing=bushing))
+        loops, sweeps, count = list(data.loops), [sweep.test for sweep in data.sweeps], len(data.loops)
+        for place in self.tests:
+            test = self.mistake.mended([*data.loops, *data.sweeps][place].test)
+            if isinstance(test, Loop):
+                loops[place] = loop_data([test], without_outliers=data.robust)[0]
+            elif isinstance(test, Sweep):
+                sweeps[place - count] = test
+        if all(place < count for place in self.tests):
+            return replace(data, loops=tuple(loops))
+        return replace(data, loops=tuple(loops), sweeps=tuple(sweep_data(sweeps, campaign.fit.residuals)))
+
+
+def adopted(data: Data, names: Collection[str]) -> tuple[Data, list[str]]:
+    """The campaign with mistakes mended that the user adopts, and a sentence on each.
+
+    Raises:
+        ModelError: a mistake that was not made in the test named, or no such test.
+    """
+    said = []
+    for name in names:
+        claim = _claimed(data, name)
+        said.append(f"mended by --adopt {name}: read as if {claim.words(data)}; {claim.corrections(data)[0]}")
+        data = claim.mended(data)
+    return data, said
+
+
+def _claimed(data: Data, name: str) -> Claim:
+    """What one --adopt claims."""
+    mistake, test = mistake_named(name), name.partition(SEPARATOR)[2]
+    every = [*data.loops, *data.sweeps]
+    possible = [place for place, one in enumerate(every) if mistake and mistake.mended(one.test)]
+    tests = tuple(place for place in possible if every[place].name == test)
+    if mistake is None or bool(tests) != bool(mistake.kinds) or (test and not tests):
+        expected = [labelled(name.partition(SEPARATOR)[0], every[place].name) for place in possible]
+        raise ModelError(
+            "this mistake cannot have been made there",
+            found=name,
+            expected="one of " + ", ".join(expected) if expected else "another mistake: no test has room for this one",
+        )
+    return Claim(mistake, tests)
+
+
+def claims(data: Data, without: Collection[str]) -> list[Claim]:
+    """Every mistake that may have been made: in one test, in all of a kind or of a direction, or in all."""
+    every: list[DataSet] = [*data.loops, *data.sweeps]
+    found = []
+    for mistake in MISTAKES.values():
+        if mistake.name in without:
+            continue
+        if not mistake.kinds:
+            found += [Claim(mistake, ())] if data.campaign.bushing else []
+            continue
+        places = [
+            place
+            for place, data_set in enumerate(every)
+            if mistake.mended(data_set.test) and labelled(mistake.name, data_set.name) not in without
+        ]
+        groups: list[tuple[int, ...]] = [(place,) for place in places]
+        groups += [tuple(p for p in places if every[p].kind == kind) for kind in ("loop", "sweep")]
+        directions = dict.fromkeys(data_set.direction for data_set in every)
+        groups += [tuple(p for p in places if every[p].direction == direction) for direction in directions]
+        found += [Claim(mistake, group) for group in dict.fromkeys([*groups, tuple(places)]) if group]
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Screen:
+    """How well the plain model could meet the tests under each claim, before any fit.
+
+    The stiffness is linear in mu, m and sigma_fmax; alpha and eps_half are tried on a grid. What a test adds to the
+    normal equations depends on that test alone, so that claims about many tests are sums.
+    """
+
+    data: Data
+
+    @cached_property
+    def usual(self) -> float:
+        """The misfit of a claim at most that is worth a fit."""
+        return (1.0 - _LEAST_GAIN) * self.misfit(None)
+
+    def misfit(self, claim: Claim | None) -> float:
+        """Least sum of squares over the grid, in units of a coarse noise."""
+        bushing = self.data.campaign.bushing
+        if claim and not claim.tests and bushing:
+            bushing = claim.mistake.mended_bushing(bushing)
+        every = [*self.data.loops, *self.data.sweeps]
+        parts = [
+            self._part(place, claim.mistake if claim and place in claim.tests else None, bushing)
+            for place in range(len(every))
+        ]
+        gram, along = np.sum([part[0] for part in parts], axis=0), np.sum([part[1] for part in parts], axis=0)
+        total = sum(part[2] for part in parts)
+        scale = np.sqrt(np.einsum("gii->gi", gram)) + 1e-300
+        unit = gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(3)
+        right = along / scale
+        explained = np.einsum("gi,gi->g", right, np.linalg.solve(unit, right[..., None])[..., 0])
+        return float(total - explained.max())
+
+    @cached_property
+    def _known(self) -> dict[tuple[int, str, Bushing | None], tuple[Array, Array, float]]:
+        return {}
+
+    def _part(self, place: int, mistake: Mistake | None, bushing: Bushing | None) -> tuple[Array, Array, float]:
+        """What a test adds to the normal equations at each point of the grid, (g, 3, 3) and (g, 3), and its size."""
+        key = (place, mistake.name if mistake else "", bushing)
+        if key not in self._known:
+            data_set = [*self.data.loops, *self.data.sweeps][place]
+            direction, frequency, amplitude, stiffness, error = _points(data_set, mistake)
+            columns = _columns(bushing, direction, frequency, amplitude) / (stiffness * error)
+            columns = np.concatenate((columns.real, columns.imag), axis=-1)
+            wanted = np.concatenate((1.0 / error, np.zeros_like(error)))
+            gram = np.einsum("gin,gjn->gij", columns, columns)
+            self._known[key] = gram, columns @ wanted, float(wanted @ wanted)
+        return self._known[key]
+
+
+def _columns(bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
+    """Stiffness for each unit of mu, m and sigma_fmax at every alpha and eps_half of the grid, (g, 3, n)."""
+    names = ("mu", "m", "sigma_fmax")
+    alpha, eps_half = (axis.reshape(-1, 1) for axis in np.meshgrid(_ALPHA, _EPS_HALF))
+    model = Model.started(bushing, BASE, {})
+    none = {**dict.fromkeys(names, 0.0), "alpha": alpha, "eps_half": eps_half}
+    each = [
+        np.broadcast_to(
+            model.stiffness(direction, frequency, amplitude, values={**none, name: 1.0}), (alpha.size, frequency.size)
+        )
+        for name in names
+    ]
+    return np.stack(each, axis=1)
+
+
+def _points(data_set: DataSet, mistake: Mistake | None) -> tuple[Place, Array, Array, Array, Array]:
+    """Direction, frequency, amplitude, stiffness and relative error of a test's points, (n,) each, as mended."""
+    if isinstance(data_set, SweepData):
+        sweep, noise = data_set.sweep, np.hypot(data_set.relative_noise, max(data_set.noise.shared))
+        mended = (mistake and mistake.mended_sweep(sweep)) or sweep
+    else:
+        sweep, noise = (
+            Sweep(data_set.name, data_set.direction, data_set.frequency, data_set.amplitude, data_set.measured),
+            0.0,
+        )
+        mended = mistake.mended_cycle(sweep) if mistake else sweep
+    points = np.stack((mended.frequency, mended.amplitude_reached))
+    distinct, place, count = np.unique(points, axis=1, return_inverse=True, return_counts=True)
+    place = place.ravel()
+    mean = (np.bincount(place, mended.stiffness.real) + 1j * np.bincount(place, mended.stiffness.imag)) / count
+    thin = np.unique(np.linspace(0, count.size - 1, min(count.size, _MOST_POINTS)).round().astype(int))
+    error = np.hypot(noise / np.sqrt(count[thin]), _COARSE)
+    return mended.direction, *distinct[:, thin], mean[thin], error
