@@ -27,8 +27,8 @@ from bushfit.reading.measurement import Loop, Sweep
 _ALPHA = np.linspace(0.05, 0.6, 10)
 #: Values of eps_half that are tried before any fit: those of all filled rubbers, with room for amplitudes 2 times off.
 _EPS_HALF = np.geomspace(2e-4, 0.2, 24)
-#: Least relative error of a point that is tried before any fit: half of what the grid of values misses by.
-_COARSE = 3e-3
+#: Least relative error of a point that is tried before any fit: what the grid of values misses by.
+_COARSE = 1e-3
 #: Points of a test that are tried before any fit at most: they show its shape.
 _MOST_POINTS = 60
 #: Share of the misfit that a claim must take off before any fit: one that closes the gap takes more.
@@ -177,7 +177,7 @@ class Screen:
         unit = gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(3)
         right = along / scale
         explained = np.einsum("gi,gi->g", right, np.linalg.solve(unit, right[..., None])[..., 0])
-        return float(total - explained.max())
+        return max(_least((total - explained).reshape(_EPS_HALF.size, _ALPHA.size)), 0.0)
 
     @cached_property
     def _known(self) -> dict[tuple[int, str, Bushing | None], tuple[Array, Array, float]]:
@@ -195,6 +195,23 @@ class Screen:
             gram = np.einsum("gin,gjn->gij", columns, columns)
             self._known[key] = gram, columns @ wanted, float(wanted @ wanted)
         return self._known[key]
+
+
+def _least(misfit: Array) -> float:
+    """The least value between the points of a grid, by a paraboloid through the least point and its neighbours."""
+    row, column = (
+        int(np.clip(i, 1, n - 2))
+        for i, n in zip(np.unravel_index(int(np.argmin(misfit)), misfit.shape), misfit.shape, strict=True)
+    )
+    y, x = (axis.ravel() for axis in np.mgrid[-1:2, -1:2])
+    near = misfit[row - 1 : row + 2, column - 1 : column + 2].ravel()
+    terms = np.stack((np.ones(9), x, y, x**2, x * y, y**2), axis=1)
+    _, *slope, xx, xy, yy = np.linalg.lstsq(terms, near, rcond=None)[0].tolist()
+    if xx <= 0.0 or 4.0 * xx * yy <= xy**2:
+        return float(near.min())
+    step = np.clip(np.linalg.solve([[2.0 * xx, xy], [xy, 2.0 * yy]], np.negative(slope)), -1.0, 1.0)
+    fall = float(np.dot(slope, step) + xx * step[0] ** 2 + xy * step[0] * step[1] + yy * step[1] ** 2)
+    return float(near[4]) + min(fall, 0.0)
 
 
 def _columns(bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
