@@ -162,15 +162,18 @@ class Screen:
         return (1.0 - _LEAST_GAIN) * self.misfit(None)
 
     def misfit(self, claim: Claim | None) -> float:
-        """Least sum of squares over the grid, in units of a coarse noise."""
+        """Least sum of squares over the grid, in units of a coarse noise; infinite where no model has a response."""
         bushing = self.data.campaign.bushing
         if claim and not claim.tests and bushing:
             bushing = claim.mistake.mended_bushing(bushing)
         every = [*self.data.loops, *self.data.sweeps]
-        parts = [
-            self._part(place, claim.mistake if claim and place in claim.tests else None, bushing)
-            for place in range(len(every))
-        ]
+        try:
+            parts = [
+                self._part(place, claim.mistake if claim and place in claim.tests else None, bushing)
+                for place in range(len(every))
+            ]
+        except ModelError:  # a shape for which a formula was not checked
+            return np.inf
         gram, along = np.sum([part[0] for part in parts], axis=0), np.sum([part[1] for part in parts], axis=0)
         total = sum(part[2] for part in parts)
         scale = np.sqrt(np.einsum("gii->gi", gram)) + 1e-300

@@ -46,8 +46,8 @@ class Weighed:
         return self.evidence.bic + self.price
 
 
-def mistaken(search: Search, data: Data, fitted: Fitted) -> tuple[Diagnosis | None, list[Judged]]:
-    """The finding where a mistake in the record explains the whole gap, None where none does; and what was tried.
+def mistaken(search: Search, data: Data, fitted: Fitted) -> Diagnosis | None:
+    """The finding where a mistake in the record explains the whole gap; None where none does.
 
     Args:
         search: has tried every effect alone.
@@ -68,14 +68,14 @@ def mistaken(search: Search, data: Data, fitted: Fitted) -> tuple[Diagnosis | No
             break
         if _closes(one.evidence, search):
             closing.append(one)
-    judged = _judged(search, data, weighed, closing)
     if not closing:
-        return None, judged
+        return None
     best = closing[0].bic
     closing.sort(key=lambda one: len(one.claim.tests))
     others = [name for name, bic in rivals.items() if bic < best + SAME]
     told = _doubtful(search, data, closing, others) if others or len(closing) > 1 else _told(search, data, weighed)
-    return told, judged
+    candidates = [*told.candidates, *_judged(search, data, weighed, closing)]
+    return replace(told, candidates=tuple(sorted(candidates, key=lambda judged: -judged.score)))
 
 
 def _weighed(search: Search, data: Data, fitted: Fitted) -> list[Weighed]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from bushfit.diagnosis.claims import adopted
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.mistakes import mistaken
-from bushfit.diagnosis.record import Diagnosis, Judged, Settings
+from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import is_consistent, judge
 from bushfit.effects import BASE, effect_named, qualified
@@ -39,15 +39,13 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     data, said = adopted(data, mended)
     begun = _begin(data, model, settings)
     search = Search.begin(begun.evidence, settings, begun.start, begun.held, data.bounds)
-    found, tried = None, list[Judged]()
-    if not is_consistent(search):
-        found, tried = mistaken(search, data, lambda mended: _begin(mended, model, settings).evidence)
+    found = None if is_consistent(search) else mistaken(search, data, lambda d: _begin(d, model, settings).evidence)
     found = found or judge(search, *search.reconsider(*search.grow()))
     outliers = begun.outliers if data.robust else outliers_at(found.result.model, search.base.data_sets)
     notes = (*said, *found.notes, *told(outliers, robust=data.robust))
     warnings = (*said, *found.result.warnings)
     result = replace(found.result, outliers=outliers, warnings=warnings)
-    return replace(found, notes=notes, candidates=(*found.candidates, *tried), result=result)
+    return replace(found, notes=notes, result=result)
 
 
 class _Begun(NamedTuple):

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.effects.mistakes import MISTAKES, shown
 from bushfit.fitting.drive import Drive, drive_of
 from bushfit.fitting.waveform import waveform
 from bushfit.geometry import Unit
@@ -29,6 +30,8 @@ _OFF_ZERO = 0.02
 _MOST_END_CYCLES = 6
 #: Harmonics that are fitted to a cycle; chosen: a loop of rubber has next to nothing beyond.
 _HARMONICS = 7
+#: [s] A cycle that takes longer is in doubt; chosen: quasi-static tests take minutes.
+_LONGEST_CYCLE = 3000.0
 #: Rows of a cycle for each harmonic that is fitted; chosen: twice the unknowns and some.
 _ROWS_PER_HARMONIC = 5
 
@@ -62,6 +65,7 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
         *odd_channels(loop),
         *drive.notes,
         *_changing(drive),
+        *_crawling(drive),
     ]
     if abs(mean_motion) > _OFF_ZERO * half_motion and not drive.from_rest:
         odd.append(
@@ -69,6 +73,14 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
             f"{number(100 * mean_motion / half_motion, 2)} % of its amplitude: the loop counts from its own middle"
         )
     return Looked(facts, tuple(odd))
+
+
+def _crawling(drive: Drive) -> Iterator[str]:
+    """A sentence on a loop that takes longer than any laboratory waits, and on what the file may say instead."""
+    if drive.frequency * _LONGEST_CYCLE < 1.0:
+        mistakes = [mistake for mistake in MISTAKES.values() if mistake.time < 1.0]
+        unless = ", or ".join(mistake.sentence.format(files=shown(drive.loop)) for mistake in mistakes)
+        yield f"one cycle takes {number(1.0 / drive.frequency / 60.0, 2)} min, as hardly any test does, unless {unless}"
 
 
 class _EndCycles(NamedTuple):
