@@ -222,7 +222,7 @@ def test_mistakes_are_told_and_none_is_made_up(mistaken: list[Outcome]) -> None:
     peaks, inches, clean, refused = mistaken
     assert peaks.mistake_alone
     assert inches.mistake_alone
-    assert not (peaks.single_wrong or inches.single_wrong)
+    assert not any(outcome.single_wrong for outcome in mistaken)
     assert (clean.verdict, clean.named) == ("consistent", ())
     assert refused.verdict == "refused"
     rows = {row.measure: row for row in card(mistaken)}
@@ -236,6 +236,6 @@ def test_mistakes_are_told_and_none_is_made_up(mistaken: list[Outcome]) -> None:
 def test_another_mistake_counts_as_wrong(mistaken: list[Outcome]) -> None:
     wrong = replace(mistaken[1], named=("pound_per_inch:sweep_axial",), sets=(("pound_per_inch:sweep_axial",),))
     assert wrong.single_wrong
-    assert not (wrong.mistake_told or wrong.mistake_alone)
+    assert not any((wrong.mistake_told, wrong.mistake_alone))
     rows = {row.measure: row for row in card([wrong, mistaken[2]])}
     assert not rows["another mistake or an effect named"].met
