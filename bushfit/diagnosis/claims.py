@@ -6,7 +6,7 @@ whole gap, and to beat every effect and every fault. Nothing is mended here unle
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -31,8 +31,11 @@ _EPS_HALF = np.geomspace(2e-4, 0.2, 24)
 _COARSE = 1e-3
 #: Points of a test that are tried before any fit at most: they show its shape.
 _MOST_POINTS = 60
-#: Share of the misfit that a claim must take off before any fit: one that closes the gap takes more.
-_LEAST_GAIN = 0.3
+#: Misfit of a claim over that of the tests as they are, before any fit, up to which it is worth a fit: the grid misses
+#: what is small.
+_WORTH_A_FIT = 1.3
+#: Share by which a claim changes the misfit at least; one that does not has a twin among the parameters.
+_LEAST_CHANGE = 1e-6
 #: Share of mu in a modulus that keeps three columns from being one.
 _RIDGE = 1e-12
 
@@ -156,10 +159,12 @@ class Screen:
 
     data: Data
 
-    @cached_property
-    def usual(self) -> float:
-        """The misfit of a claim at most that is worth a fit."""
-        return (1.0 - _LEAST_GAIN) * self.misfit(None)
+    def best(self, found: Sequence[Claim], most: int) -> list[Claim]:
+        """The claims under which the tests could agree best, as far as these are worth a fit."""
+        before, misfits = self.misfit(None), np.array([self.misfit(claim) for claim in found])
+        changed = np.abs(misfits - before) > _LEAST_CHANGE * before
+        order = np.argsort(misfits, kind="stable")
+        return [found[place] for place in order if changed[place] and misfits[place] < _WORTH_A_FIT * before][:most]
 
     def misfit(self, claim: Claim | None) -> float:
         """Least sum of squares over the grid, in units of a coarse noise; infinite where no model has a response."""
@@ -192,12 +197,23 @@ class Screen:
         if key not in self._known:
             data_set = [*self.data.loops, *self.data.sweeps][place]
             direction, frequency, amplitude, stiffness, error = _points(data_set, mistake)
-            columns = _columns(bushing, direction, frequency, amplitude) / (stiffness * error)
+            columns = self._columns(bushing, direction, frequency, amplitude) / (stiffness * error)
             columns = np.concatenate((columns.real, columns.imag), axis=-1)
             wanted = np.concatenate((1.0 / error, np.zeros_like(error)))
-            gram = np.einsum("gin,gjn->gij", columns, columns)
+            gram = columns @ columns.transpose(0, 2, 1)
             self._known[key] = gram, columns @ wanted, float(wanted @ wanted)
         return self._known[key]
+
+    def _columns(self, bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
+        """`_columns`, once for all mistakes that leave the operating points as they are."""
+        key = (bushing, direction, frequency.tobytes(), amplitude.tobytes())
+        if key not in self._responses:
+            self._responses[key] = _columns(bushing, direction, frequency, amplitude)
+        return self._responses[key]
+
+    @cached_property
+    def _responses(self) -> dict[tuple[Bushing | None, Place, bytes, bytes], Array]:
+        return {}
 
 
 def _least(misfit: Array) -> float:

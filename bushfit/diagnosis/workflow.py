@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from bushfit.diagnosis.claims import adopted
-from bushfit.diagnosis.evidence import Evidence, fit
+from bushfit.diagnosis.evidence import Evidence, fit_from
 from bushfit.diagnosis.mistakes import mistaken
 from bushfit.diagnosis.record import Diagnosis, Settings
+from bushfit.diagnosis.refit import can_reach
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import is_consistent, judge
 from bushfit.effects import BASE, effect_named, qualified
@@ -39,7 +42,9 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     data, said = adopted(data, mended)
     begun = _begin(data, model, settings)
     search = Search.begin(begun.evidence, settings, begun.start, begun.held, data.bounds)
-    found = None if is_consistent(search) else mistaken(search, data, lambda d: _begin(d, model, settings).evidence)
+    found = None
+    if not is_consistent(search):
+        found = mistaken(search, data, lambda mended, goal: _begin(mended, model, settings, goal).evidence)
     found = found or judge(search, *search.reconsider(*search.grow()))
     outliers = begun.outliers if data.robust else outliers_at(found.result.model, search.base.data_sets)
     notes = (*said, *found.notes, *told(outliers, robust=data.robust))
@@ -64,8 +69,9 @@ class _Begun(NamedTuple):
     outliers: tuple[Outlier, ...]
 
 
-def _begin(data: Data, model: Model | None, settings: Settings) -> _Begun:
-    """Fit the model as it came, with the effects that the user adopts."""
+def _begin(data: Data, model: Model | None, settings: Settings, goal: float = np.inf) -> _Begun:
+    """Fit the model as it came, with the effects that the user adopts; no further than it may come below a goal of
+    chi-square."""
     hint = "add measured tests to the campaign"
     data_sets = data.some([*data.loops, *data.sweeps], "there is nothing to diagnose", hint)
     held = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
@@ -82,4 +88,7 @@ def _begin(data: Data, model: Model | None, settings: Settings) -> _Begun:
         names = [name for name in model.parameters if name not in held]
         robust = estimate(model, data_sets, names, data.bounds, robust=True)
         outliers, data_sets = robust.outliers, [data_set.standing() for data_set in robust.data_sets]
-    return _Begun(fit(model, data_sets, held, data.bounds), start, held, outliers)
+    descent = fit_from(model, data_sets, held, data.bounds)
+    while can_reach(descent, goal):
+        descent = descent.stepped()
+    return _Begun(Evidence(descent.solution, tuple(data_sets)), start, held, outliers)
