@@ -114,7 +114,7 @@ def _claimed(data: Data, name: str) -> Claim:
     """What one --adopt claims."""
     mistake, test = mistake_named(name), name.partition(SEPARATOR)[2]
     every = [*data.loops, *data.sweeps]
-    possible = [place for place, one in enumerate(every) if mistake and mistake.mended(one.test)]
+    possible = [place for place, one in enumerate(every) if mistake and mistake.possible(one.test)]
     tests = tuple(place for place in possible if every[place].name == test)
     if mistake is None or bool(tests) != bool(mistake.kinds) or (test and not tests):
         expected = [labelled(name.partition(SEPARATOR)[0], every[place].name) for place in possible]
@@ -139,7 +139,7 @@ def claims(data: Data, without: Collection[str]) -> list[Claim]:
         places = [
             place
             for place, data_set in enumerate(every)
-            if mistake.mended(data_set.test) and labelled(mistake.name, data_set.name) not in without
+            if mistake.possible(data_set.test) and labelled(mistake.name, data_set.name) not in without
         ]
         groups: list[tuple[int, ...]] = [(place,) for place in places]
         groups += [tuple(p for p in places if every[p].kind == kind) for kind in ("loop", "sweep")]
@@ -171,21 +171,28 @@ class Screen:
         bushing = self.data.campaign.bushing
         if claim and not claim.tests and bushing:
             bushing = claim.mistake.mended_bushing(bushing)
-        every = [*self.data.loops, *self.data.sweeps]
         try:
-            parts = [
-                self._part(place, claim.mistake if claim and place in claim.tests else None, bushing)
-                for place in range(len(every))
-            ]
+            gram, along, total = self._whole(bushing)
+            for place in claim.tests if claim else ():
+                plain, mended = self._part(place, None, bushing), self._part(place, claim and claim.mistake, bushing)
+                gram, along, total = (
+                    gram + mended[0] - plain[0],
+                    along + mended[1] - plain[1],
+                    total + mended[2] - plain[2],
+                )
         except ModelError:  # a shape for which a formula was not checked
             return np.inf
-        gram, along = np.sum([part[0] for part in parts], axis=0), np.sum([part[1] for part in parts], axis=0)
-        total = sum(part[2] for part in parts)
         scale = np.sqrt(np.einsum("gii->gi", gram)) + 1e-300
         unit = gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(3)
         right = along / scale
         explained = np.einsum("gi,gi->g", right, np.linalg.solve(unit, right[..., None])[..., 0])
         return max(_least((total - explained).reshape(_EPS_HALF.size, _ALPHA.size)), 0.0)
+
+    def _whole(self, bushing: Bushing | None) -> tuple[Array, Array, float]:
+        """What all tests as they are add to the normal equations."""
+        parts = [self._part(place, None, bushing) for place in range(len(self.data.loops) + len(self.data.sweeps))]
+        gram, along = (np.sum([part[i] for part in parts], axis=0) for i in (0, 1))
+        return gram, along, sum(part[2] for part in parts)
 
     @cached_property
     def _known(self) -> dict[tuple[int, str, Bushing | None], tuple[Array, Array, float]]:

@@ -20,8 +20,8 @@ from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data import Data
 from bushfit.units import number
 
-#: Claims that are refitted at most, those first under which the tests could agree best; chosen for time: the truth ranks
-#: second at worst on the score card.
+#: Claims that are refitted at most, those first under which the tests could agree best; chosen for time: the truth
+#: ranks second at worst on the score card.
 _MOST_REFITTED = 4
 
 #: Fits the model to a campaign that may have been mended, no further than it may come below a chi-square.
@@ -63,18 +63,15 @@ def mistaken(search: Search, data: Data, fitted: Fitted) -> Diagnosis | None:
     rivals = {effect.name: effect.evidence.bic} if effect else {}
     rivals |= {f"fault: {fault.suspect.words}": search.base.bic - fault.worth} if fault else {}
     weighed = _weighed(search, data, fitted, min(rivals.values(), default=search.base.bic) + SAME)
-    closing: list[Weighed] = []
-    for one in weighed:
-        if closing and one.bic > min(other.bic for other in closing) + SAME:
-            break
-        if _closes(one.evidence, search):
-            closing.append(one)
+    closing = [one for one in weighed if one.bic < weighed[0].bic + SAME and _closes(one.evidence, search)]
     if not closing:
         return None
-    best = closing[0].bic
+    others = [name for name, bic in rivals.items() if bic < closing[0].bic + SAME]
     closing.sort(key=lambda one: len(one.claim.tests))
-    others = [name for name, bic in rivals.items() if bic < best + SAME]
-    told = _doubtful(search, data, closing, others) if others or len(closing) > 1 else _told(search, data, weighed)
+    if others or len(closing) > 1:
+        told = _doubtful(search, data, closing, others)
+    else:
+        told = _told(search, data, closing[0], [one for one in weighed if one is not closing[0]])
     candidates = [*told.candidates, *_judged(search, data, weighed, closing)]
     return replace(told, candidates=tuple(sorted(candidates, key=lambda judged: -judged.score)))
 
@@ -116,9 +113,8 @@ def _gain(search: Search, one: Weighed) -> str:
     return f"takes {search.base.chi_square - one.evidence.chi_square:.0f} off chi-square without a parameter"
 
 
-def _told(search: Search, data: Data, weighed: Sequence[Weighed]) -> Diagnosis:
-    """The finding that names one mistake, the best: the gap shrinks if it was made; the model stays as it was."""
-    one, *behind = weighed
+def _told(search: Search, data: Data, one: Weighed, behind: Sequence[Weighed]) -> Diagnosis:
+    """The finding that names one mistake: the gap shrinks if it was made; the model stays as it was."""
     evidence = _gain(search, one)
     if behind:
         next_best = f"{' + '.join(behind[0].claim.labels(data))}, {number(behind[0].bic - one.bic, 3)} behind by BIC"

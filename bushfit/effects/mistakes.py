@@ -74,8 +74,8 @@ class Mistake(Effect):
         return self.mended_loop(test) if isinstance(test, Loop) else self.mended_sweep(test)
 
     def mended_loop(self, loop: Loop) -> Loop | None:
-        """`mended` of a loop."""
-        if "loop" not in self.kinds or not self._fits(loop.direction):
+        """The same of a loop."""
+        if not self.possible(loop):
             return None
         return replace(
             loop,
@@ -86,9 +86,8 @@ class Mistake(Effect):
         )
 
     def mended_sweep(self, sweep: Sweep) -> Sweep | None:
-        """`mended` of a sweep."""
-        doubtful = self.doubt is None or self.doubt(sweep.stiffness)
-        if "sweep" not in self.kinds or not self._fits(sweep.direction) or not doubtful:
+        """The same of a sweep."""
+        if not self.possible(sweep):
             return None
         return replace(
             sweep,
@@ -108,11 +107,12 @@ class Mistake(Effect):
             stiffness=self.force / self.displacement * cycle.stiffness,
         )
 
-    def _fits(self, place: Place) -> bool:
-        """Whether it can have been made in a test of this direction."""
-        return (self.motion is None or place.motion is self.motion) and not (
-            self.swaps and other_direction(place) is None
-        )
+    def possible(self, test: Loop | Sweep) -> bool:
+        """Whether it can have been made in a test."""
+        kind, place = "loop" if isinstance(test, Loop) else "sweep", test.direction
+        fits = kind in self.kinds and self.motion in (None, place.motion)
+        doubtful = self.doubt is None or (isinstance(test, Sweep) and self.doubt(test.stiffness))
+        return fits and doubtful and not (self.swaps and other_direction(place) is None)
 
     def _direction(self, place: Place) -> Place:
         return (other_direction(place) if self.swaps else None) or place

@@ -206,7 +206,7 @@ def _negative(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
 
 def _doubtful_loss(sweep: Sweep) -> Iterator[str]:
     """A sentence on a loss that hardly any filled rubber has, and on what the file may say instead."""
-    mistakes = [mistake for mistake in MISTAKES.values() if mistake.doubt and mistake.mended_sweep(sweep)]
+    mistakes = [mistake for mistake in MISTAKES.values() if mistake.doubt and mistake.possible(sweep)]
     if mistakes:
         unless = ", or ".join(mistake.sentence.format(files=shown(sweep)) for mistake in mistakes)
         loss = float(np.median(loss_factor(sweep.stiffness)))
