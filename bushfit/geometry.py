@@ -15,7 +15,10 @@ from typing import Literal, NamedTuple
 from scipy.special import ive, kve
 
 from bushfit.errors import ModelError
+from bushfit.shape import NO_CORRECTION, Correction, radial_correction
 
+#: Which radial formulas a bushing goes by: the paper's as they are, or corrected by finite elements.
+Shape = Literal["paper", "calibrated"]
 #: Inner over outer radius for which the radial formula was checked against 60-digit arithmetic.
 RADIUS_RATIO_RANGE = (0.1, 0.97)
 #: Length over outer radius for which the radial formula was checked against 60-digit arithmetic.
@@ -118,15 +121,18 @@ class Bushing:
         inner_radius: a, radius of the inner sleeve [m].
         outer_radius: b, radius of the outer sleeve [m].
         length: L, mean length of the rubber [m].
+        shape: whether the radial formulas are the paper's, or corrected by finite elements.
 
     Raises:
-        ModelError: a radius or length that is not positive and finite, or a >= b.
+        ModelError: a radius or length that is not positive and finite, or a >= b; a calibrated shape that no finite
+            elements were computed for.
     """
 
     name: str
     inner_radius: float
     outer_radius: float
     length: float
+    shape: Shape = "paper"
 
     def __post_init__(self) -> None:
         for key in ("inner_radius", "outer_radius", "length"):
@@ -141,11 +147,34 @@ class Bushing:
                 expected="inner_radius below outer_radius",
                 hint="check that radii were given, not diameters, and that they are not swapped",
             )
+        if self.shape == "calibrated" and self.correction is None:
+            raise ModelError(
+                "no finite elements were computed for this shape",
+                place="shape",
+                found='"calibrated" for inner/outer = {:.3g}, length/outer = {:.3g}'.format(*self.proportions),
+                expected="inner/outer 0.15 to 0.92 and length/outer 0.1 to 60",
+                hint='check the units of the geometry, or take shape = "paper"',
+            )
 
     @cached_property
     def log_ratio(self) -> float:
         """ln(b/a), with full precision for thin bushings too."""
         return math.log1p((self.outer_radius - self.inner_radius) / self.inner_radius)
+
+    @property
+    def proportions(self) -> tuple[float, float]:
+        """Inner over outer radius, and length over outer radius."""
+        return self.inner_radius / self.outer_radius, self.length / self.outer_radius
+
+    @cached_property
+    def correction(self) -> Correction | None:
+        """What finite elements make of the radial formulas, applied or not; None where none were computed."""
+        return radial_correction(*self.proportions)
+
+    @property
+    def applied(self) -> Correction:
+        """The correction of the radial formulas that this bushing goes by."""
+        return self.correction if self.shape == "calibrated" and self.correction else NO_CORRECTION
 
     def unit_strain(self, direction: Direction) -> float:
         """Equivalent strain per unit displacement [1/m], or per unit rotation [1/rad]."""
@@ -282,7 +311,7 @@ def _axial_stiffness(tube: Bushing) -> float:
 
 @lru_cache(maxsize=_CACHED_BUSHINGS)
 def _radial_strain(tube: Bushing) -> float:
-    """e/d = sqrt((a^2 + b^2) / ((b^4 - a^4) ln(b/a) - (a^2 - b^2)^2)) (Eq. 8).
+    """e/d = sqrt((a^2 + b^2) / ((b^4 - a^4) ln(b/a) - (a^2 - b^2)^2)) (Eq. 8), corrected where the shape is calibrated.
 
     Notes: with q = (b^2 - a^2)/(b^2 + a^2) this is 1 / sqrt((b^2 - a^2) (ln(b/a) - q)). Where ln(b/a) and q cancel, the
     difference is summed as q^3/3 + q^5/5 + ..., because ln(b/a) = atanh(q).
@@ -290,7 +319,7 @@ def _radial_strain(tube: Bushing) -> float:
     q = _q(tube)
     series = (q ** (2 * j + 3) / (2 * j + 3) for j in range(_SERIES_TERMS))
     difference = tube.log_ratio - q if q > _LARGEST_Q_OF_SERIES else math.fsum(series)
-    return 1.0 / math.sqrt(_area(tube) * difference)
+    return tube.applied.strain / math.sqrt(_area(tube) * difference)
 
 
 @lru_cache(maxsize=_CACHED_BUSHINGS)
@@ -324,7 +353,8 @@ def _radial_stiffness(tube: Bushing) -> float:
         - inner * (3.0 * b**2 + a**2) * (i1a * k0b * twice + i0b * k1a)
     )
     denominator = inner * outer * (b**2 + a**2) * (i1b * k1a - i1a * k1b * twice)
-    return 10.0 * math.pi * length / (3.5 * tube.log_ratio - 1.5 * _q(tube) + float(numerator / denominator))
+    paper = 10.0 * math.pi * length / (3.5 * tube.log_ratio - 1.5 * _q(tube) + float(numerator / denominator))
+    return tube.applied.stiffness * paper
 
 
 def _torsion_strain(tube: Bushing) -> float:

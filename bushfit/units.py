@@ -31,6 +31,8 @@ _KINDS = {
     "m/s": ("a speed", "mm/min"),
     "rad/s": ("an angular speed", "deg/min"),
     "Pa": ("a stress", "MPa"),
+    "kg": ("a mass", "kg"),
+    "m/s^2": ("an acceleration", "m/s^2"),
     "1": ("a ratio", "%"),
 }
 #: By SI unit: the unit in which people write it, and the factor from SI to it; MPa*s^alpha is the paper's.
@@ -98,10 +100,14 @@ _EVERYDAY = {
         "kilogram * meter ** 2 / second ** 2": {"N*m": 1.0, "N m": 1.0, "Nm": 1.0},
         "kilogram / second ** 2": {"N/m": 1.0, "N/mm": 1e3, "kN/mm": 1e6},
         "kilogram * meter ** 2 / radian / second ** 2": {"N*m/rad": 1.0, "N m/deg": 180.0 / math.pi},
+        "kilogram": {"kg": 1.0, "g": 1e-3},
+        "meter / second ** 2": {"m/s^2": 1.0},
         "kilogram / meter / second ** 2": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6},
     }.items()
     for unit, scale in scales.items()
 }
+#: What an acceleration is written in that is another quantity elsewhere (a gram, square milliseconds), as pint has it.
+_OF_ACCELERATION = {"g": "gravity", "G": "gravity", "gn": "gravity", "ms2": "m/s^2", "ms-2": "m/s^2", "ms^-2": "m/s^2"}
 #: Units whose capitals matter, by the spelling of users: pint takes Grad for a billion radians.
 _EXACT = {
     spelling: unit
@@ -150,6 +156,8 @@ def factor(text: str, expected: str) -> float:
     Raises:
         UnitError: an unknown unit, or a unit of another dimension.
     """
+    if expected == "m/s^2":
+        text = _OF_ACCELERATION.get(text.strip(), text)
     scale, base = _resolve(text)
     if base != _resolve(expected)[1]:
         hint = 'a pound of force is "lbf"' if {"lb", "lbs"} & set(_WORD.findall(text)) else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,16 +10,28 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign, load_campaign
-from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulateSettings
+from bushfit.effects import BASE
 from bushfit.errors import CampaignError, ModelError
-from bushfit.geometry import Bushing, Direction
+from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import loop_data, sources
+from bushfit.fitting.procedures import fit_joint
+from bushfit.geometry import Bushing, Direction, Specimen
+from bushfit.model import rig
 from bushfit.model.file import load_result
 from bushfit.model.model import FIVE, Model
-from bushfit.simulation import Undisturbed, measure, model_of, simulate, to_files, undisturbed
+from bushfit.reading.csvfile import raw_sweep_table
+from bushfit.reading.measurement import Sweep
+from bushfit.simulation import Simulated, Undisturbed, measure, model_of, simulate, to_files, undisturbed
 
 LOOP = SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=2)
 SWEEP = SimulatedSweep(Direction.AXIAL, (1e-4, 5e-4), (5.0, 50.0, 155.0))
 PLAN = SimulateSettings(loops=(LOOP,), sweeps=(SWEEP,))
+COUPON = Specimen("DMA", "modulus")
+MOUNT = Specimen("mount", "shear", area=772e-6, thickness=6e-3, elements=2)
+STRAINS = tuple(np.geomspace(1e-3, 0.1, 12).tolist())
+STRAIN_SWEEP = SimulatedSweep(COUPON, STRAINS, (1.0, 10.0, 100.0), stepped="amplitude", reached=0.02)
+SHAKEN = SimulatedResonance(MOUNT, 0.25, 9.81, tuple(np.linspace(60.0, 600.0, 40).tolist()))
 
 
 @pytest.fixture(scope="module")
@@ -62,8 +75,8 @@ def test_noise_is_as_large_as_asked_for(clean: Undisturbed) -> None:
     assert np.std(noisy.loops[0].displacement - ideal.loops[0].displacement) == pytest.approx(1e-6, rel=0.05)
 
 
-def test_gain_and_phase_errors_are_shared_by_a_block(clean: Undisturbed) -> None:
-    """A block is one repeat at one amplitude: its points are off by one factor, those of other blocks by others."""
+def test_gain_and_phase_errors_are_shared_by_a_run(clean: Undisturbed) -> None:
+    """A run is one repeat at one amplitude: its points are off by one factor, those of other runs by others."""
     ideal = measure(clean, PLAN).sweeps[0].stiffness.reshape(2, 1, 3)
     plan = replace(PLAN, repeats=2000, gain_error=0.01, phase_error=0.02)
     off = np.log(measure(clean, plan).sweeps[0].stiffness.reshape(2, 2000, 3) / ideal)
@@ -73,19 +86,199 @@ def test_gain_and_phase_errors_are_shared_by_a_block(clean: Undisturbed) -> None
     assert np.std(off.imag) == pytest.approx(0.02, rel=0.1)
 
 
+@pytest.fixture(scope="module")
+def coupon(paper_model: Model) -> Undisturbed:
+    return undisturbed(Model(None, BASE, paper_model.values), SimulateSettings(sweeps=(STRAIN_SWEEP,)))
+
+
+def runs(sweep: Sweep) -> tuple[int, int, int]:
+    """Shape of an amplitude sweep: frequencies, repeats, amplitudes."""
+    return np.unique(sweep.frequency).size, int(sweep.repeat.max()), -1
+
+
+def test_an_amplitude_sweep_has_the_stiffness_at_the_amplitudes_reached(coupon: Undisturbed) -> None:
+    """It is carried there from the nominal amplitudes, to 1e-5 of what the rig measures there itself."""
+    (sweep,) = measure(coupon, SimulateSettings(repeats=2, seed=1)).sweeps
+    assert sweep.stepped == "amplitude"
+    some = np.s_[3::11]
+    points = sweep.frequency[some], sweep.amplitude_reached[some]
+    itself = rig.dynamic_stiffness(coupon.truth, COUPON, *points)
+    off = np.abs(sweep.stiffness[some] / itself - 1.0).max()
+    print(f"stiffness carried to the amplitude reached: off the rig by {off:.1e}")
+    assert off < 2e-5
+    closed = coupon.truth.stiffness(COUPON, sweep.frequency, sweep.amplitude_reached)
+    np.testing.assert_allclose(sweep.stiffness, closed, rtol=2e-3)
+
+
+def test_amplitudes_are_missed_at_a_frequency_and_at_a_point(coupon: Undisturbed) -> None:
+    off = []
+    for seed in range(200):
+        (sweep,) = measure(coupon, SimulateSettings(repeats=2, seed=seed)).sweeps
+        off.append(np.log(sweep.amplitude_reached.reshape(runs(sweep)) / STRAINS))
+    missed = np.array(off)
+    assert np.std(missed) == pytest.approx(0.02, rel=0.05)
+    assert np.std(missed.mean(axis=(2, 3))) == pytest.approx(0.02 * np.sqrt(0.5), rel=0.1)
+    assert np.unique(missed).size == missed.size
+
+
+def test_a_frequency_sweep_that_misses_its_amplitudes_has_levels_and_what_was_reached(paper_model: Model) -> None:
+    plan = SimulateSettings(repeats=2, sweeps=(replace(SWEEP, reached=0.02),))
+    (sweep,) = simulate(paper_model, plan).sweeps
+    assert {*sweep.amplitude} == {*SWEEP.amplitudes}
+    assert sweep.reached is not None
+    missed = np.log(sweep.reached / sweep.amplitude)
+    assert 0.005 < np.std(missed) < 0.05
+    closed = paper_model.stiffness(Direction.AXIAL, sweep.frequency, sweep.reached)
+    np.testing.assert_allclose(sweep.stiffness, closed, rtol=2e-3)
+
+
+def test_gain_and_phase_errors_are_shared_by_a_run_of_amplitudes(coupon: Undisturbed) -> None:
+    """A run is one repeat at one frequency."""
+    gains, phases = [], []
+    for seed in range(150):
+        (sweep,) = measure(coupon, SimulateSettings(repeats=3, gain_error=0.01, phase_error=0.02, seed=seed)).sweeps
+        ideal = coupon.truth.stiffness(COUPON, sweep.frequency, sweep.amplitude_reached)
+        off = np.log(sweep.stiffness / ideal).reshape(runs(sweep))
+        assert np.ptp(off.real, axis=-1).max() < 1e-3  # the rig is that near to the closed form
+        gains.append(off.real.mean(axis=-1))
+        phases.append(off.imag.mean(axis=-1))
+    assert np.std(gains) == pytest.approx(0.01, rel=0.06)
+    assert np.std(phases) == pytest.approx(0.02, rel=0.06)
+    between = np.corrcoef(np.reshape(gains, (150, 9)), rowvar=False)
+    assert np.abs(between - np.eye(9)).max() < 0.35  # and each run has its own
+
+
+def test_a_resonance_test_reduces_to_the_stiffness_at_the_amplitude_reached(paper_model: Model) -> None:
+    plan = SimulateSettings(resonances=(SHAKEN, replace(SHAKEN, direction=Direction.RADIAL, mass=1.5)))
+    simulated = simulate(paper_model.with_effect("force_gain", {"force_gain.loops": 0.1}), plan)
+    assert [test.name for _, test in simulated.resonances] == ["resonance_mount", "resonance_radial"]
+    for sweep in simulated.campaign().sweeps:
+        assert sweep.stepped is None
+        assert np.ptp(np.log(sweep.amplitude)) > np.log(5.0)
+        closed = paper_model.stiffness(sweep.direction, sweep.frequency, sweep.amplitude)
+        np.testing.assert_allclose(sweep.stiffness, closed, rtol=2e-3)
+
+
+def test_a_resonance_test_is_one_run_a_repeat(paper_model: Model) -> None:
+    plan = SimulateSettings(repeats=400, noise=0.01, gain_error=0.03, resonances=(SHAKEN,))
+    clean = undisturbed(paper_model, plan)
+    measured = [test.transmissibility for _, test in measure(clean, plan).resonances]
+    off = np.array(measured) / clean.resonances[0][1] - 1.0
+    assert np.std(off.real.mean(axis=1)) == pytest.approx(0.03, rel=0.1)
+    assert np.std(off.imag) == pytest.approx(0.01, rel=0.05)
+
+
+def written(simulated: Simulated, folder: Path) -> Campaign:
+    for name, content in to_files(simulated).items():
+        (folder / name).write_bytes(content)
+    return load_campaign(folder / "campaign.toml")
+
+
+TOLERANCE = {"mu": 0.04, "m": 0.15, "alpha": 0.08, "sigma_fmax": 0.12, "eps_half": 0.12}
+AXIAL_SWEEP = SimulatedSweep(Direction.AXIAL, (1e-4, 2e-4, 5e-4), tuple(np.arange(5.0, 156.0, 15.0).tolist()))
+TENSION = Specimen("bar, tension", "modulus", strain="tension")
+
+
+@pytest.mark.parametrize(
+    ("sweeps", "loops"),
+    [
+        pytest.param((STRAIN_SWEEP,), (), id="coupon alone"),
+        pytest.param((STRAIN_SWEEP, AXIAL_SWEEP), (), id="coupon and bushing"),
+        pytest.param(
+            (
+                replace(STRAIN_SWEEP, direction=MOUNT, amplitudes=tuple(6e-3 * strain for strain in STRAINS)),
+                replace(STRAIN_SWEEP, direction=TENSION),
+            ),
+            (SimulatedLoop(MOUNT, 5e-4, 0.1), SimulatedLoop(COUPON, 0.05, 0.1)),
+            id="specimens of each kind",
+        ),
+    ],
+)
+def test_what_is_fitted_to_simulated_tests_is_the_truth(
+    sweeps: tuple[SimulatedSweep, ...], loops: tuple[SimulatedLoop, ...], paper_model: Model, tmp_path: Path
+) -> None:
+    assert paper_model.bushing is not None
+    bushing = replace(paper_model.bushing, shape="calibrated") if AXIAL_SWEEP in sweeps else None
+    plan = SimulateSettings(
+        repeats=3, noise=5e-3, force_noise=3e-3, gain_error=3e-3, phase_error=2e-3, sweeps=sweeps, loops=loops, seed=4
+    )
+    simulated = simulate(Model(bushing, BASE, paper_model.values), plan)
+    campaign, in_memory = written(simulated, tmp_path), simulated.campaign()
+    assert (campaign.name, campaign.bushing) == (in_memory.name, bushing)
+    assert campaign.specimens == in_memory.specimens
+    for read, measured in zip(campaign.sweeps, simulated.sweeps, strict=True):
+        assert (read.direction, read.stepped) == (measured.direction, measured.stepped)
+        np.testing.assert_allclose(read.amplitude, measured.amplitude, rtol=1e-6)
+        np.testing.assert_allclose(read.amplitude_reached, measured.amplitude_reached, rtol=1e-6)
+        np.testing.assert_allclose(read.stiffness, measured.stiffness, rtol=1e-6)
+    for looped, loop in zip(campaign.loops, simulated.loops, strict=True):
+        np.testing.assert_allclose(looped.force, loop.force, atol=1e-5 * np.ptp(loop.force))
+    places = [test.direction for test in (*campaign.sweeps, *campaign.loops)]
+    fitted = fit_joint(Data.of(campaign), directions=places).model.values
+    assert {name: fitted[name] / paper_model.values[name] - 1.0 for name in FIVE} == {
+        name: pytest.approx(0.0, abs=TOLERANCE[name]) for name in FIVE
+    }
+    truth = load_result(tmp_path / "truth.json")
+    assert truth.model.bushing == bushing
+    assert truth.specimens == in_memory.specimens
+    assert json.loads((tmp_path / "truth.json").read_text())["schema"] == "bushfit/model/2"
+
+
+def test_strains_are_written_as_files_of_the_specimen_state_them(coupon: Undisturbed) -> None:
+    """Tensor strain is half the engineering strain; the modulus is the same."""
+    (sweep,) = measure(coupon, SimulateSettings()).sweeps
+    tensor = raw_sweep_table(replace(sweep, direction=replace(COUPON, strain="tensor")))
+    np.testing.assert_allclose(tensor["amplitude [%]"], 50.0 * sweep.amplitude_reached)
+    np.testing.assert_allclose(tensor["stiffness [MPa]"], 1e-6 * np.abs(sweep.stiffness))
+
+
+def test_names_of_specimens_are_names_of_files(paper_model: Model, tmp_path: Path) -> None:
+    sweep = SimulatedSweep(Specimen('a/b "c"', "modulus"), STRAINS[:3], (10.0,), stepped="amplitude")
+    other = replace(sweep, direction=Specimen("CON", "modulus"))
+    campaign = written(simulate(paper_model, SimulateSettings(sweeps=(sweep, sweep, other))), tmp_path)
+    assert [each.name for each in campaign.sweeps] == ["sweep_a_b _c__1", "sweep_a_b _c__2", "sweep__CON"]
+    assert [specimen.name for specimen in campaign.specimens] == ['a/b "c"', "CON"]
+
+
+def test_specimens_alone_have_no_tests_of_the_paper(coupon: Undisturbed) -> None:
+    with pytest.raises(CampaignError, match="nothing says what to test"):
+        simulate(coupon.truth, SimulateSettings())
+    with pytest.raises(ModelError, match="there is no bushing"):
+        simulate(coupon.truth, PLAN)
+
+
 def test_files_are_a_campaign_that_says_nothing_of_the_truth(
     clean: Undisturbed, paper_model: Model, tmp_path: Path
 ) -> None:
     simulated = measure(clean, replace(PLAN, noise=0.005, repeats=2))
-    for name, content in to_files(simulated).items():
-        (tmp_path / name).write_bytes(content)
-    campaign = load_campaign(tmp_path / "campaign.toml")
+    campaign = written(simulated, tmp_path)
     assert campaign.bushing == paper_model.bushing
     np.testing.assert_allclose(campaign.sweeps[0].stiffness, simulated.sweeps[0].stiffness, rtol=1e-6)
     np.testing.assert_allclose(campaign.loops[0].force, simulated.loops[0].force, rtol=1e-5, atol=1e-3)
     assert load_result(tmp_path / "truth.json").model.values == pytest.approx(paper_model.values, rel=1e-12)
     text = (tmp_path / "campaign.toml").read_text()
     assert [name for name in FIVE if f"{name} =" in text] == []
+
+
+def test_a_programme_is_one_file_of_several_loops(paper_model: Model, tmp_path: Path) -> None:
+    sizes, rates = (2e-4, 1e-3), (0.1, 0.3)
+    loop = SimulatedLoop(Direction.AXIAL, cycles=4, amplitudes=sizes, frequencies=rates, pause=5.0)
+    simulated = simulate(paper_model, SimulateSettings(loops=(loop,)))
+    (record,) = simulated.loops
+    assert record.time[-1] == pytest.approx(2 * 4 / 0.1 + 2 * 4 / 0.3 + 3 * 5.0, abs=0.02)
+    for name, content in to_files(simulated).items():
+        (tmp_path / name).write_bytes(content)
+    read, in_memory = load_campaign(tmp_path / "campaign.toml").loops, simulated.campaign().loops
+    for loops in (read, in_memory):
+        assert [part.name for part in loops] == [f"loop_axial_1_part_{number}" for number in (1, 2, 3, 4)]
+        assert [np.ptp(part.displacement) / 2.0 for part in loops] == pytest.approx([*sizes, *sizes], rel=1e-3)
+    assert sources(loop_data(read)) == (read[0].source,)
+
+
+def test_a_programme_too_long_to_simulate_is_refused(paper_model: Model) -> None:
+    loop = SimulatedLoop(Direction.AXIAL, 1e-3, frequencies=(1e-3, 10.0))
+    with pytest.raises(CampaignError, match="too long to simulate"):
+        simulate(paper_model, SimulateSettings(loops=(loop,)))
 
 
 def test_sweeps_of_one_direction_have_names_of_their_own(paper_model: Model) -> None:

@@ -35,7 +35,8 @@ from bushfit.batch.quantities import (
     at_point,
     figures,
 )
-from bushfit.campaign.schema import Share, parameter_value
+from bushfit.campaign.parameters import parameter_value
+from bushfit.campaign.schema import Share
 from bushfit.campaign.toml import read_toml
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError

@@ -9,14 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from bushfit.campaign.naming import folder_name
+from bushfit.campaign.places import place_tested
 from bushfit.campaign.schema import CampaignFile, FitSettings, LoopFile, PredictSettings, SimulateSettings, SweepFile
 from bushfit.campaign.toml import read_toml
 from bushfit.errors import CampaignError, naming, typed
-from bushfit.geometry import Bushing, Direction, Place, Specimen
+from bushfit.geometry import Bushing, Specimen
 from bushfit.reading.layout import FileFormat
-from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.sweeps import read_sweep
+from bushfit.reduction.programme import read_programme
 from bushfit.units import CELSIUS, quantity
 
 #: Endings of test files, which `bushfit init` makes a campaign of.
@@ -57,7 +58,7 @@ class Campaign:
 
 
 def load_campaign(path: str | Path) -> Campaign:
-    """Read a campaign file and the measurements that it names, each once.
+    """Read a campaign file and the measurements that it names, each once; a record of several loops gives each.
 
     Raises:
         CampaignError: the file is missing, no TOML, or has keys or values that are not understood.
@@ -83,7 +84,9 @@ def load_campaign(path: str | Path) -> Campaign:
         content.name or (bushing or specimens[0]).name,
         path,
         bushing,
-        tuple(read_loop(**keywords) for keywords in reader_keywords(path, content.loops, specimens)),
+        tuple(
+            loop for keywords in reader_keywords(path, content.loops, specimens) for loop in read_programme(**keywords)
+        ),
         tuple(read_sweep(**keywords) for keywords in reader_keywords(path, content.sweeps, specimens)),
         content.fit,
         content.predict,
@@ -136,7 +139,7 @@ def reader_keywords(
         file = campaign.parent / test.file
         if (place := (os.path.normpath(file), test.sheet, test.temperature)) in seen:
             raise CampaignError(
-                "a file is listed twice", file=campaign, found=test.file, expected="each file, or sheet of it, once"
+                "a file is listed twice", file=campaign, found=test.file, expected="each file once, or each sheet of it"
             )
         seen.add(place)
         stated = {key: value for key, value in vars(test).items() if value is not None}
@@ -144,7 +147,7 @@ def reader_keywords(
         conditions = {key: stated.pop(key) for key in _CONDITIONS if key in stated}
         stated.pop("specimen", None)
         with naming(campaign, place=test.file):
-            stated["direction"] = _tested(test, specimens)
+            stated["direction"] = place_tested(test.specimen, test.direction, specimens)
             if amplitude := stated.pop("at_amplitude", None):
                 stated["at_amplitude"] = quantity(amplitude, stated["direction"].motion.displacement_unit)
         yield {
@@ -167,28 +170,3 @@ def _test_names(tests: Sequence[LoopFile | SweepFile]) -> list[str]:
             at = None if test.temperature is None else f"{test.temperature - CELSIUS:.4g} degC"
             names[place] = " ".join(filter(None, (stems[place], test.sheet, at)))
     return names
-
-
-def _tested(test: LoopFile | SweepFile, specimens: Sequence[Specimen]) -> Place:
-    """What a test was made on: a direction of the bushing, or a specimen.
-
-    Raises:
-        CampaignError: an unknown specimen, a bushing without a direction, or a specimen with one of the bushing's.
-    """
-    known = {specimen.name: specimen for specimen in specimens}
-    if test.specimen is None:
-        if isinstance(test.direction, Direction):
-            return test.direction
-        expected = "direction = " + " or ".join(f'"{direction}"' for direction in Direction)
-        hint = f'or specimen = "{next(iter(known))}"' if known else None
-        raise CampaignError("a test without a direction", found=test.direction or "none", expected=expected, hint=hint)
-    if test.specimen not in known:
-        raise CampaignError(
-            "this specimen is not in the campaign",
-            found=test.specimen,
-            expected="one of " + ", ".join(known) if known else "a [[specimens]] table with this name",
-        )
-    if test.direction not in (None, "shear"):
-        expected = 'direction = "shear", or none: a specimen is tested in one way only'
-        raise CampaignError("a specimen has no such direction", found=str(test.direction), expected=expected)
-    return known[test.specimen]

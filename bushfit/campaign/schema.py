@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, ConfigDict, Field, InstanceOf
 
-from bushfit.errors import CampaignError, naming
-from bushfit.geometry import TRANSLATION, Direction
+from bushfit.campaign.parameters import (
+    effect_values,
+    is_parameter,
+    known_parameters,
+    parameter_settings,
+    parameter_values,
+)
+from bushfit.campaign.places import KEYS, with_places
+from bushfit.errors import CampaignError
+from bushfit.geometry import TRANSLATION, Direction, Place, Shape, Specimen
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
 from bushfit.reading.layout import FileFormat
-from bushfit.reading.measurement import Waveform
+from bushfit.reading.measurement import Stepped, Waveform
+from bushfit.reading.resonance import FEWEST_ROWS
 from bushfit.units import quantity, temperature
 from bushfit.validation import Flag, Name, Text, converted, known_keys, standing_in_table, unknown_key
 
@@ -25,16 +33,17 @@ Loss = Literal["linear", "soft_l1"]
 
 #: Steps of a range of frequencies at most: more than any sweep has, and quick to predict.
 _LARGEST_GRID = 100_000
-#: Size of a plain number at most: no parameter comes near it, and its square is still finite.
-_LARGEST_NUMBER = 1e100
 #: Relative width by which a range of frequencies is widened, so that rounding does not drop its last step.
 _ROUNDING = 1e-9
 #: Repeats or cycles at most: more than any rig runs.
 _LARGEST_COUNT = 1_000_000
+#: Mass [kg], acceleration [m/s^2] and frequency [Hz] of a resonance test at most, and their inverse at least; chosen:
+#: far beyond every shaker, and numbers stay finite.
+_LARGEST_SHAKEN = 1e6
+#: [s] Pause in a simulated programme at most: a day is more than any rig rests between two loops.
+_LONGEST_PAUSE = 86_400.0
 #: Ends the check of a list at its first error: those of a hundred thousand would fill the memory.
 _FIRST_ERROR = Field(fail_fast=True)
-#: The second to the power of alpha, at the end of the unit of m.
-_S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
 
 
 def _si(*units: str) -> BeforeValidator:
@@ -43,10 +52,10 @@ def _si(*units: str) -> BeforeValidator:
 
 
 def _motion(per: str = "") -> BeforeValidator:
-    """A validator as `_si("m")`, but for [rad] in a table whose direction is a rotation; with "/s" for a speed."""
+    """A validator as `_si("m")`, but by the motion of the table's direction: [rad], or a strain; "/s" for a speed."""
 
     def unit(direction: object) -> str:
-        return (direction.motion if isinstance(direction, Direction) else TRANSLATION).displacement_unit + per
+        return (direction.motion if isinstance(direction, Place) else TRANSLATION).displacement_unit + per
 
     return converted(lambda raw, info: quantity(raw, unit(info.data.get("direction"))))
 
@@ -68,72 +77,11 @@ def _frequencies(raw: dict[str, Any]) -> list[str]:
     return [f"{value!r} Hz" for value in (start + step * np.arange(count)).tolist()]
 
 
-def _parameter_names() -> tuple[str, ...]:
-    """Names of all parameters of the library; a stiffness factor may have other places than are listed."""
-    from bushfit.effects import parameter_names
-
-    return parameter_names()
-
-
-def _is_parameter(name: str) -> bool:
-    from bushfit.effects import is_parameter
-
-    return is_parameter(name)
-
-
-def parameter_value(place: str, name: str, raw: Any) -> float:
-    """The SI value of a model parameter by its name in files; an error names the place.
-
-    Ratios, and parameters of added effects, may be plain numbers.
-    """
-    from bushfit.effects import parameter_named
-
-    with naming(place=place):
-        if not _is_parameter(name):
-            raise unknown_key(name, _parameter_names())
-        unit = _S_TO_ALPHA.sub("", parameter_named(name).unit)
-        is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
-        if is_number and (unit == "1" or "." in name) and abs(raw) <= _LARGEST_NUMBER:
-            return float(raw)
-        return quantity(_S_TO_ALPHA.sub("", raw) if name == "m" and isinstance(raw, str) else raw, unit)
-
-
-def _parameters(raw: dict[str, Any]) -> dict[str, float]:
-    """Values by parameter, in SI."""
-    return {name: parameter_value(name, name, value) for name, value in raw.items()}
-
-
-def _effects(raw: dict[str, Any]) -> dict[str, Any]:
-    """Values by effect and parameter, in SI."""
-    return {
-        effect: {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in table.items()}
-        if isinstance(table, dict)
-        else table
-        for effect, table in raw.items()
-    }
-
-
-def _parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
-    """Tables of value, min, max and vary by parameter, with the first three in SI."""
-    settings = {}
-    for name, table in raw.items():
-        if isinstance(table, dict):
-            given = [key for key in ("min", "value", "max") if key in table]
-            numbers = {key: parameter_value(f"{name}.{key}", name, table[key]) for key in given}
-            ordered = list(numbers.values())
-            if ordered != sorted(ordered) or numbers.get("min", -np.inf) == numbers.get("max", np.inf):
-                expected = "min below max, and value between them"
-                raise CampaignError("these limits hold no value", place=name, found=str(table), expected=expected)
-            table = {**table, **numbers}
-        settings[name] = table
-    return settings
-
-
 def _fit_table(raw: dict[str, Any]) -> dict[str, Any]:
     """[fit] with its tables by parameter, such as [fit.mu] or [fit."inertia.mass"], under the key "parameters"."""
     if "parameters" in raw:
         raise unknown_key("parameters", known_keys(FitSettings))
-    settings = {key: value for key, value in raw.items() if not _is_parameter(key)}
+    settings = {key: value for key, value in raw.items() if not is_parameter(key)}
     return {**settings, "parameters": {key: value for key, value in raw.items() if key not in settings}}
 
 
@@ -149,24 +97,34 @@ def _roles(known: Collection[str]) -> BeforeValidator:
     return _table(check_keys)
 
 
+#: Puts the direction or specimen itself into each test of [simulate].
+_SIMULATED_PLACES = converted(
+    lambda raw, info: with_places(
+        raw,
+        ("loops", "sweeps", "resonances"),
+        (Specimen(**vars(table)) for table in info.data.get("specimens", ())),
+    )
+)
 Temperature = Annotated[float, converted(lambda raw, _: temperature(raw))]
 Length = Annotated[float, _si("m"), Field(gt=0)]
 Angle = Annotated[float, _si("rad"), Field(gt=0)]
 Frequency = Annotated[float, _si("Hz"), Field(gt=0)]
 Frequencies = Annotated[tuple[Frequency, ...], _FIRST_ERROR, _table(_frequencies), Field(min_length=1)]
 Displacement = Annotated[float, _motion(), Field(gt=0)]
+_SHAKEN = Field(ge=1.0 / _LARGEST_SHAKEN, le=_LARGEST_SHAKEN)
 Share = Annotated[float, _si("1"), Field(ge=0, lt=1)]
 Count = Annotated[int, Field(strict=True, ge=1, le=_LARGEST_COUNT)]
 
 
 @dataclass(frozen=True)
 class BushingTable:
-    """[bushing]: geometry [m]."""
+    """[bushing]: geometry [m], and the radial formulas to go by."""
 
     name: Name
     inner_radius: Length
     outer_radius: Length
     length: Length
+    shape: Shape = "paper"
 
 
 @dataclass(frozen=True)
@@ -192,10 +150,10 @@ class TestFile(FileFormat):
 
     Args:
         file: from the campaign's folder.
-        direction: of the bushing, or "shear" of a specimen.
+        direction: of the bushing; a specimen has none, which may be written "shear".
         specimen: by its name in [[specimens]]; the bushing unless stated.
         noise: relative standard deviation of a point, where it is known.
-        weight: of the test in the fit.
+        weight: of the test in the fit, a share of the weight that its noise gives it.
         temperature: [K]; it selects the rows of a file that has several.
         preload, date, operator, specimen_number: carried on to results as they are written.
     """
@@ -203,10 +161,10 @@ class TestFile(FileFormat):
     __test__ = False
 
     file: Text
-    direction: Direction | Literal["shear"] | None = None
+    direction: Annotated[Direction | None, converted(lambda raw, _: None if raw == "shear" else raw)] = None
     specimen: Name | None = None
     noise: Share | None = None
-    weight: Annotated[float, Field(ge=0, le=_LARGEST_NUMBER)] = 1.0
+    weight: Annotated[float, Field(gt=0, le=1)] = 1.0
     temperature: Temperature | None = None
     preload: Text | None = None
     date: Text | None = None
@@ -278,8 +236,8 @@ class FitSettings:
     residuals: Residuals = "complex"
     loss: Loss = "linear"
     effects: tuple[Text, ...] = ()
-    parameters: Annotated[Mapping[str, ParameterSetting], _table(_parameter_settings)] = field(
-        default_factory=dict, metadata=standing_in_table(_parameter_names)
+    parameters: Annotated[Mapping[str, ParameterSetting], _table(parameter_settings)] = field(
+        default_factory=dict, metadata=standing_in_table(known_parameters)
     )
 
 
@@ -294,23 +252,93 @@ class PredictSettings:
 
 
 @dataclass(frozen=True)
-class SimulatedLoop:
-    """[[simulate.loops]]: zero-to-peak amplitude [m or rad], frequency [Hz], cycles and waveform."""
+class SimulatedTest:
+    """What [[simulate.loops]], [[simulate.sweeps]] and [[simulate.resonances]] say alike: what is tested."""
 
-    direction: Direction
-    amplitude: Displacement
-    frequency: Frequency
-    cycles: Count = 3
-    waveform: Waveform = "sine"
+    direction: Annotated[Place, InstanceOf[Place]] = field(metadata=standing_in_table(lambda: KEYS))
 
 
 @dataclass(frozen=True)
-class SimulatedSweep:
-    """[[simulate.sweeps]]: zero-to-peak amplitudes [m or rad] and frequencies [Hz], all combinations."""
+class SimulatedLoop(SimulatedTest):
+    """[[simulate.loops]]: zero-to-peak amplitude [m or rad, or strain], frequency [Hz], cycles and
+    waveform.
 
-    direction: Direction
+    In place of one amplitude or one frequency a programme has amplitudes or frequencies: all amplitudes in turn at each
+    frequency, `cycles` of each, recorded in one go from rest, with `pause` [s] at zero between them.
+    """
+
+    amplitude: Displacement = 0.0
+    frequency: Frequency = 0.0
+    cycles: Count = 3
+    waveform: Waveform = "sine"
+    amplitudes: Annotated[tuple[Displacement, ...], _FIRST_ERROR, Field(min_length=1)] = ()
+    frequencies: Annotated[tuple[Frequency, ...], _FIRST_ERROR, Field(min_length=1)] = ()
+    pause: Annotated[float, _si("s"), Field(ge=0, le=_LONGEST_PAUSE)] = 0.0
+
+    def __post_init__(self) -> None:
+        for one, several in (("amplitude", "amplitudes"), ("frequency", "frequencies")):
+            given = [key for key in (one, several) if getattr(self, key)]
+            if len(given) != 1:
+                message = "one of these keys is too many" if given else "a key is missing"
+                expected = f"{one} = ..., or {several} = [...] of a programme"
+                raise ValueError(CampaignError(message, found=" and ".join(given) or None, expected=expected))
+
+    @property
+    def parts(self) -> list[tuple[float, float]]:
+        """Frequency [Hz] and amplitude [m or rad] of each part of a programme; one of a single loop."""
+        amplitudes = self.amplitudes or (self.amplitude,)
+        return [(frequency, size) for frequency in self.frequencies or (self.frequency,) for size in amplitudes]
+
+
+@dataclass(frozen=True)
+class SimulatedSweep(SimulatedTest):
+    """[[simulate.sweeps]]: all combinations of amplitudes and frequencies.
+
+    Args:
+        amplitudes: zero-to-peak [m or rad, or strain].
+        frequencies: [Hz].
+        stepped: what changes from point to point of a run; the other is held.
+        reached: standard deviation of the amplitude that a point really reached, relative to the one that was asked.
+    """
+
     amplitudes: Annotated[tuple[Displacement, ...], _FIRST_ERROR, Field(min_length=1)]
     frequencies: Frequencies
+    stepped: Stepped = "frequency"
+    reached: Share = 0.0
+
+    @property
+    def held(self) -> tuple[float, ...]:
+        """What the points of a run have in common: amplitudes [m or rad, or strain] or frequencies [Hz]."""
+        return self.amplitudes if self.stepped == "frequency" else self.frequencies
+
+    @property
+    def steps(self) -> tuple[float, ...]:
+        """What changes from point to point of a run: frequencies [Hz] or amplitudes [m or rad, or strain]."""
+        return self.frequencies if self.stepped == "frequency" else self.amplitudes
+
+
+@dataclass(frozen=True)
+class SimulatedResonance(SimulatedTest):
+    """[[simulate.resonances]]: a mass on the bushing, or on blocks in shear, whose base is shaken with a sine.
+
+    Args:
+        mass: that moves on the mount [kg].
+        base_acceleration: zero-to-peak [m/s^2], the same at all frequencies.
+        frequencies: [Hz].
+    """
+
+    mass: Annotated[float, _si("kg"), _SHAKEN]
+    base_acceleration: Annotated[float, _si("m/s^2"), _SHAKEN]
+    frequencies: Frequencies
+
+    def __post_init__(self) -> None:
+        if self.direction.motion is not TRANSLATION:
+            expected = "a direction with a displacement, or a specimen in shear"
+            raise ValueError(CampaignError("no mass swings on this", found=str(self.direction), expected=expected))
+        known = [f for f in self.frequencies if 1.0 / _LARGEST_SHAKEN <= f <= _LARGEST_SHAKEN]
+        if len(known) < max(FEWEST_ROWS, len(self.frequencies)):
+            expected = f"at least {FEWEST_ROWS}, through the resonance"
+            raise ValueError(CampaignError("no frequencies of a shaker", found=f"{len(known)}", expected=expected))
 
 
 @dataclass(frozen=True)
@@ -321,16 +349,17 @@ class SimulateSettings:
         parameters: values by name [SI].
         effects: added effects, each with the values of its parameters [SI].
         seed: of the random numbers.
-        repeats: of each sweep.
-        noise: standard deviation of a sweep point's real and imaginary part, relative to |K|.
+        repeats: of each sweep and resonance test.
+        noise: standard deviation of a sweep point's real and imaginary part, relative to |K|; of a resonance test's
+            transmissibility likewise.
         force_noise, displacement_noise: standard deviation of a loop's samples, relative to the amplitude.
-        gain_error: standard deviation of the gain of a block (one repeat of one level).
-        phase_error: standard deviation of the phase of a block [rad].
-        loops, sweeps: the tests; empty for the rig's own choice.
+        gain_error: standard deviation of the gain of a run: of one repeat of what is held, or of a resonance test.
+        phase_error: standard deviation of the phase of a run [rad].
+        loops, sweeps, resonances: the tests; empty for the rig's own choice.
     """
 
-    parameters: Annotated[Mapping[str, float], _table(_parameters)] = field(default_factory=dict)
-    effects: Annotated[Mapping[str, Mapping[str, float]], _table(_effects)] = field(default_factory=dict)
+    parameters: Annotated[Mapping[str, float], _table(parameter_values)] = field(default_factory=dict)
+    effects: Annotated[Mapping[str, Mapping[str, float]], _table(effect_values)] = field(default_factory=dict)
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
     repeats: Count = 1
     noise: Share = 0.0
@@ -340,6 +369,7 @@ class SimulateSettings:
     phase_error: Annotated[float, _si("rad"), Field(ge=0)] = 0.0
     loops: tuple[SimulatedLoop, ...] = ()
     sweeps: tuple[SimulatedSweep, ...] = ()
+    resonances: tuple[SimulatedResonance, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -355,4 +385,4 @@ class CampaignFile:
     sweeps: tuple[SweepFile, ...] = ()
     fit: Annotated[FitSettings, _table(_fit_table)] = field(default_factory=FitSettings)
     predict: PredictSettings = field(default_factory=PredictSettings)
-    simulate: SimulateSettings | None = None
+    simulate: Annotated[SimulateSettings | None, _SIMULATED_PLACES] = None

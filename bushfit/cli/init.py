@@ -159,7 +159,7 @@ def _check_once(files: Sequence[Path]) -> None:
 def _tell(options: Options, seen: Inspected) -> None:
     """One line of what a file is, what was assumed, and what is odd."""
     facts = seen.looked.facts
-    wanted = ("cycles", "frequency", "frequencies", "amplitude", "amplitudes")
+    wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
     kept = [f"{key}: {facts[key]}" for key in wanted if key in facts]
     options.console.print(f"{seen.file}: {seen.kind}, {seen.direction}; {'; '.join(kept)}", markup=False)
     warn(options, [f"{seen.file.name}: {sentence}" for sentence in seen.looked.odd])

@@ -13,7 +13,7 @@ import click
 
 from bushfit.cli.common import direction_option
 from bushfit.errors import BushfitError, MeasurementError
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
+from bushfit.reading.headers import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
 
 F = TypeVar("F", bound=Callable[..., Any])
 #: Keys of a campaign's tables that are an option of the same name here, and its help.
@@ -43,15 +43,17 @@ def file_options(*keys: str, sweeps: bool = True) -> Callable[[F], F]:
 
     Args:
         keys: of [[loops]] and [[sweeps]], as a campaign would have them.
-        sweeps: whether the command takes sweeps.
+        sweeps: whether the command takes sweeps, or else resonance tests, beside loops.
     """
+
+    known = tuple(dict.fromkeys((*LOOP_COLUMNS, *(SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS))))
 
     def decorate(function: F) -> F:
         @wraps(function)
         def wrapped(*args: Any, **kwargs: Any) -> Any:
             stated = {key: kwargs.pop(key) for key in ("direction", *keys)}
-            stated["columns"] = _pairs(kwargs.pop("columns"), "--column", "force=Kraft")
-            stated["units"] = _pairs(kwargs.pop("units"), "--unit", "force=kN")
+            stated["columns"] = _pairs(kwargs.pop("columns"), "--column", "force=Kraft", known)
+            stated["units"] = _pairs(kwargs.pop("units"), "--unit", "force=kN", known)
             return function(*args, stated={key: value for key, value in stated.items() if value}, **kwargs)
 
         return reduce(lambda command, option: option(command), reversed(_options(keys, sweeps=sweeps)), wrapped)  # type: ignore[return-value]
@@ -61,7 +63,10 @@ def file_options(*keys: str, sweeps: bool = True) -> Callable[[F], F]:
 
 def _options(keys: Sequence[str], *, sweeps: bool) -> list[Callable[[Any], Any]]:
     """The options that state what a file does not say itself."""
-    roles, of_all = f"ROLEs: {', '.join(LOOP_COLUMNS)}", "all files given"
+    roles, of_all = (
+        f"ROLEs: {', '.join(LOOP_COLUMNS)}; of resonance tests: {', '.join(RESONANCE_COLUMNS)}",
+        "all files given",
+    )
     if sweeps:
         roles = f"ROLEs of loops: {', '.join(LOOP_COLUMNS)}; of sweeps: {', '.join(SWEEP_COLUMNS)}"
         of_all = "all files given that have the role"
@@ -114,8 +119,7 @@ def direction_error(file: Path) -> MeasurementError:
     )
 
 
-def _pairs(texts: Sequence[str], option: str, example: str) -> Mapping[str, str]:
-    known = (*LOOP_COLUMNS, *SWEEP_COLUMNS)
+def _pairs(texts: Sequence[str], option: str, example: str, known: Sequence[str]) -> Mapping[str, str]:
     pairs = {}
     for text in texts:
         role, equals, value = text.partition("=")

@@ -1,36 +1,55 @@
-"""`bushfit reduce`: raw stepped-sine histories -> a sweep."""
+"""`bushfit reduce`: raw stepped-sine histories, or a resonance test -> a sweep."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from bushfit.cli.common import Options, example, shared_options
+from bushfit.cli.common import Options, example, naming_option, shared_options
 from bushfit.cli.inspect import KEYS
 from bushfit.cli.raw import direction_error, file_options, options_named
 from bushfit.cli.show import new_table, warn
-from bushfit.errors import MeasurementError
-from bushfit.units import alike, number
+from bushfit.errors import BushfitError, MeasurementError
+from bushfit.units import alike, number, quantity
 
 if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from bushfit.geometry import Direction
     from bushfit.reading.measurement import Loop
+    from bushfit.reading.table import Table
+    from bushfit.reduction.resonance import Resonance
     from bushfit.reduction.result import Reduction, Step
 
+#: Lines an octave in which a resonance test is shown; chosen: a dozen lines for most tests.
+_LINES_AN_OCTAVE = 3
 
-@click.command("reduce", epilog=example("bushfit reduce data/cmp_15961_raw/stepped_sine_axial.csv"))
+
+@click.command(
+    "reduce",
+    epilog=example(
+        "bushfit reduce data/cmp_15961_raw/stepped_sine_axial.csv",
+        'bushfit reduce data/measured/epdm_70/shaker_1g_573g.csv --mass "0.5878 kg" --specimen mount',
+    ),
+)
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @file_options(*(key for key in KEYS if key not in ("rate", "frequency", "waveform", "amplitude")), sweeps=False)
 @click.option(
     "--levels",
-    help='Amplitudes that were asked for, such as "0.1, 0.2, 0.5 mm", where the rig missed them by more than 10 %; a '
-    "step more than 30 % off all of them is refused [found from the data].",
+    help='Amplitudes that were asked for, such as "0.1, 0.2 mm" [found].',
 )
 @click.option("--cycles", type=click.IntRange(3, 1000), default=3, show_default=True, help="Fewest steady cycles.")
+@click.option("--mass", help='Of a resonance test, such as "0.5 kg".')
+@click.option("--mass-added", help='What moves with it, such as "15 g".')
+@click.option("--specimen", help="What was tested, where it is no bushing.")
+@click.option("--base-acceleration", help='Such as "0.1 g", where no column says it.')
 @shared_options
 def command(
     files: tuple[Path, ...],
@@ -38,46 +57,177 @@ def command(
     levels: str | None,
     cycles: int,
     options: Options,
+    **moving: str | None,
 ) -> None:
-    """Reduce raw stepped-sine histories (columns time, displacement, force) to a sweep.
+    """Reduce raw stepped-sine histories or a resonance test to a sweep.
 
-    One FILE may hold one step or many, joined by ramps and pauses; several files of one direction make one sweep, and
-    what occurs again is a repeat. The steady whole cycles of each step are found, its transient left out, and stiffness
-    and loss factor of the fundamental computed by least squares. A step needs five or six cycles: three steady ones
-    and what its start and end take. A swept sine is refused; single outliers are left out and counted.
+    Time, displacement, force: one FILE may hold many steps, joined by ramps and pauses; several files of one direction
+    make one sweep, and what occurs again is a repeat. The steady whole cycles of each step are found, its transient
+    left out, and stiffness and loss factor of the fundamental computed by least squares; a step needs five or six
+    cycles. A swept sine is refused, single outliers are left out. Told of each point: its noise (standard error), THD
+    (overtones of the force over its fundamental) and the amplitude reached.
 
-    Shows and writes with each point its noise (the standard error, from the scatter of its cycles and rows), THD (the
-    overtones of the force over its fundamental: friction makes some, a loose fixture many), and the amplitude that the
-    rig really reached.
+    A mass on the mount on a shaker (--mass, one FILE): frequency, acceleration and phase of base and mass, or their
+    transmissibility. Told of each point: the amplitude reached and its standard error.
 
-    Writes sweep.csv, which a campaign names under [[sweeps]] and `bushfit init` takes, and reduce.png.
+    Writes sweep.csv, for [[sweeps]] of a campaign or `bushfit init`, and reduce.png.
     """
     from bushfit.campaign.naming import folder_name
-    from bushfit.cli.grids import parse_grid
     from bushfit.reading.csvfile import to_csv
-    from bushfit.reduction.steps import reduce
-    from bushfit.report.tables import reduced_table
 
     folder = options.folder(folder_name(files[0].stem))
     options.require_free(folder, ["sweep.csv", *(["reduce.png"] if options.plots else [])])
+    table = _resonance_table(files[0], stated, moving)
+    found = (
+        _histories(files, stated, levels, cycles) if table is None else _resonance(files, table, stated, moving, levels)
+    )
+    found.tell(options)
+    output = {"sweep.csv": to_csv(found.points)}
+    if options.plots:
+        from bushfit.report.plots import to_png
+
+        output["reduce.png"] = to_png(found.figure())
+    options.write(folder, output)
+    snippet = f'[[sweeps]]\nfile = "sweep.csv"\n{found.body} = {json.dumps(found.name, ensure_ascii=False)}\n'
+    options.console.print(f"for a campaign in {folder} (elsewhere, with the way there):\n\n{snippet}", markup=False)
+    document = {found.body: found.name, "points": found.points.to_dict(orient="list"), **found.document}
+    options.tell({**document, "warnings": list(found.warnings), "campaign": snippet})
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What files were reduced to: the points as a table, how to show and draw them, and what --json has besides.
+
+    What was tested is told by `body` and `name`, as in a campaign: direction = "axial", or specimen = "mount".
+    """
+
+    body: Literal["direction", "specimen"]
+    name: str
+    points: pd.DataFrame
+    warnings: Sequence[str]
+    tell: Callable[[Options], None]
+    figure: Callable[[], Figure]
+    document: Mapping[str, Any] = field(default_factory=dict)
+
+
+def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | None, cycles: int) -> _Found:
+    """Raw stepped-sine histories, reduced."""
+    from bushfit.cli.grids import parse_grid
+    from bushfit.reduction.steps import reduce
+    from bushfit.report.tables import reduced_table
+
     histories = _read(files, stated)
     direction = histories[0].direction
     asked = parse_grid(levels, "--levels", direction.motion.displacement_unit) or ()
     reduction = reduce(histories, fewest_cycles=cycles, levels=asked)
-    _tell(options, reduction)
-    points = reduced_table(reduction)
-    output = {"sweep.csv": to_csv(points)}
-    if options.plots:
-        from bushfit.report.plots import reduction_figure, to_png
+
+    def figure() -> Figure:
+        from bushfit.report.plots import reduction_figure
 
         names = histories[0].name if len(histories) == 1 else f"{len(histories)} histories"
-        title = f"{names}: {len(reduction.steps)} points, {direction}"
-        output["reduce.png"] = to_png(reduction_figure(reduction, histories, title))
-    options.write(folder, output)
-    snippet = f'[[sweeps]]\nfile = "sweep.csv"\ndirection = "{direction}"\n'
-    options.console.print(f"for a campaign in {folder} (elsewhere, with the way there):\n\n{snippet}", markup=False)
-    document = {"direction": str(direction), "points": points.to_dict(orient="list")}
-    options.tell({**document, "warnings": list(reduction.warnings), "campaign": snippet})
+        return reduction_figure(reduction, histories, f"{names}: {len(reduction.steps)} points, {direction}")
+
+    points, warnings = reduced_table(reduction), reduction.warnings
+    return _Found("direction", str(direction), points, warnings, lambda options: _tell(options, reduction), figure)
+
+
+def _resonance_table(file: Path, stated: Mapping[str, Any], moving: Mapping[str, str | None]) -> Table | None:
+    """The table of a resonance test; None of a file that has none of its columns, unless a mass or the like is stated.
+
+    Raises:
+        MeasurementError, UnitError: a file that cannot be read, where a mass is stated.
+    """
+    from bushfit.inspection.recognition import open_table
+    from bushfit.reading.headers import RESONANCE_COLUMNS
+    from bushfit.reading.resonance import is_resonance
+
+    said = any(value is not None for value in moving.values())
+    try:
+        with options_named():
+            table = open_table(file, RESONANCE_COLUMNS, stated)
+    except BushfitError:  # which the reading of a history tells as well
+        if said:
+            raise
+        return None
+    return table if said or is_resonance(table) else None
+
+
+def _resonance(
+    files: Sequence[Path], table: Table, stated: Mapping[str, Any], moving: Mapping[str, str | None], levels: str | None
+) -> _Found:
+    """A resonance test, reduced."""
+    from bushfit.geometry import Direction
+    from bushfit.inspection.recognition import direction_of
+    from bushfit.reading.resonance import read_resonance
+    from bushfit.reduction.resonance import reduce_resonance
+    from bushfit.report.tables import resonance_table
+
+    if len(files) > 1 or levels is not None:
+        raise MeasurementError(
+            "a resonance test is reduced by itself",
+            file=table.file,
+            found=f"{len(files)} files" if len(files) > 1 else f"--levels {levels}",
+            expected="one file, and no levels: the amplitude follows the resonance",
+            hint="call bushfit reduce for each of them, with its own mass",
+        )
+    direction, specimen = direction_of(table.file, table, stated), moving["specimen"] or None
+    if direction is None and specimen is None:
+        error = direction_error(table.file)
+        error.hint = f'{error.hint}; or name the specimen that was tested: --specimen "mount"'
+        raise error
+    mass, base_acceleration = _mass(table, direction, moving), _positive("base_acceleration", "m/s^2", moving)
+    read_as = direction or Direction.AXIAL  # which translation it is makes no difference to reading
+    with options_named():
+        reduction = reduce_resonance(read_resonance(table, read_as, base_acceleration), mass)
+
+    def figure() -> Figure:
+        from bushfit.report.plots import resonance_figure
+
+        return resonance_figure(
+            reduction, f"{table.file.stem}, {specimen or direction}: {number(mass, 4)} kg on a shaker"
+        )
+
+    frequency, largest = reduction.peak
+    return _Found(
+        "specimen" if specimen else "direction",
+        specimen or str(direction),
+        resonance_table(reduction),
+        reduction.warnings,
+        lambda options: _tell_resonance(options, reduction),
+        figure,
+        {"mass_kg": mass, "resonance_Hz": frequency, "transmissibility_at_resonance": largest},
+    )
+
+
+def _mass(table: Table, direction: Direction | None, moving: Mapping[str, str | None]) -> float:
+    """The mass that moves [kg]."""
+    mass = _positive("mass", "kg", moving)
+    if direction is not None and direction.is_rotation:
+        raise MeasurementError(
+            "a mass resists no rotation", file=table.file, found=str(direction), expected="a translation"
+        )
+    if mass is None:
+        raise MeasurementError(
+            "this is a resonance test, and nothing says how large the mass is",
+            file=table.file,
+            place=f"line {table.layout.header_line}",
+            found=", ".join(table.headers),
+            expected="the mass that moves on the mount",
+            hint='state it: --mass "0.5 kg"',
+        )
+    return mass + (_positive("mass_added", "kg", moving) or 0.0)
+
+
+def _positive(key: str, unit: str, moving: Mapping[str, str | None]) -> float | None:
+    """The value of an option in SI, above zero; None where it is not given."""
+    option = "--" + key.replace("_", "-")
+    if (text := moving[key]) is None:
+        return None
+    with naming_option(option):
+        value = quantity(text, unit)
+        if value <= 0.0:
+            raise MeasurementError("this is not positive", found=f'"{text}"', expected="a value above zero")
+    return value
 
 
 def _read(files: Sequence[Path], stated: Mapping[str, Any]) -> list[Loop]:
@@ -134,6 +284,41 @@ def _tell(options: Options, reduction: Reduction) -> None:
         for skip in reduction.skipped:
             text = f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s makes no point: {skip.why}"
             options.console.print(text, markup=False)
+
+
+def _tell_resonance(options: Options, found: Resonance) -> None:
+    """A line a third of an octave, with -v a line a point."""
+    import numpy as np
+
+    from bushfit.geometry import TRANSLATION
+    from bushfit.reading.measurement import loss_factor
+
+    (unit, length), _, (stiffness_unit, factor) = TRANSLATION.display
+    frequency, largest = found.peak
+    count = found.frequency.size
+    table = new_table(
+        f"{count} point{'s' * (count > 1)} of {found.test.frequency.size} rows; resonance at {frequency:.1f} Hz, "
+        f"|T| {largest:.2f}\nof each line the median of |K| and loss factor, and the largest error",
+        "f [Hz]", "points", f"amplitude [{unit}]", "|T|", f"|K| [{stiffness_unit}]", "loss factor", "error [%]",
+    )  # fmt: skip
+    lines = range(count) if options.verbose else (_LINES_AN_OCTAVE * np.log2(found.frequency)).round().tolist()
+    for _, group in groupby(range(count), lambda place: lines[place]):
+        rows = list(group)
+        amplitudes, ratios = (
+            _span(alike(sorted(values[rows].tolist(), reverse=True), 3, least=3)[::-1])
+            for values in (length * found.amplitude, np.abs(found.transmissibility))
+        )
+        table.add_row(
+            _span([number(float(end), 4) for end in found.frequency[rows]]),
+            f"{len(rows)}",
+            amplitudes,
+            ratios,
+            number(factor * float(np.median(np.abs(found.stiffness[rows]))), 4),
+            number(float(np.median(loss_factor(found.stiffness[rows]))), 3),
+            number(100 * float(found.relative_error[rows].max()), 2),
+        )
+    options.console.print(table)
+    warn(options, found.warnings)
 
 
 def _span(rising: Sequence[str]) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bushfit.cli.common import Options, example, naming_option, open_model, shared_options
+from bushfit.errors import naming
 
 if TYPE_CHECKING:
     from bushfit.campaign.schema import SimulateSettings
@@ -26,8 +27,11 @@ if TYPE_CHECKING:
 @click.option(
     "--displacement-noise", help='Scatter of a loop\'s displacement relative to its amplitude, such as "0.02 %".'
 )
-@click.option("--gain-error", help='Gain error shared by a block (one repeat of one level), such as "0.4 %".')
-@click.option("--phase-error", help='Phase error shared by a block, such as "0.2 deg".')
+@click.option(
+    "--gain-error",
+    help='Gain error shared by a run (one repeat of one amplitude, or of what is held), such as "0.4 %".',
+)
+@click.option("--phase-error", help='Phase error shared by a run, such as "0.2 deg".')
 @click.option(
     "--effect",
     "effects",
@@ -54,8 +58,10 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
     plan = _with_options(plan, settings)
     for text in effects:
         truth = _with_effect(truth, text)
-    files = to_files(simulate(truth, plan))
-    folder = options.folder(f"simulated {folder_name(truth.name)}")
+    with naming(source):
+        simulated = simulate(truth, plan)
+    files = to_files(simulated)
+    folder = options.folder(f"simulated {folder_name(simulated.result.name)}")
     options.console.print(truth.equation(), markup=False)
     options.write(folder, files)
     options.tell({"truth": model_document(truth), "files": sorted(files)})
@@ -87,21 +93,26 @@ def _with_options(plan: SimulateSettings, settings: dict[str, Any]) -> SimulateS
 
 
 def _with_effect(model: Model, text: str) -> Model:
-    from bushfit.effects import effect_named
+    from bushfit.effects import effect_named, effect_of, is_parameter, qualified
     from bushfit.errors import ModelError
     from bushfit.units import is_number, quantity
 
     name, found, value = text.replace(" ", "").partition("=")
-    effect, dot, short = name.partition(".")
-    parameters = {parameter.name: parameter for parameter in effect_named(effect).parameters}
-    if not (found and dot and short in parameters):
+    known = "." in name and is_parameter(name)
+    effect = effect_named(effect_of(name) if known else name.partition(".")[0])
+    if not (found and known):
         raise ModelError(
             "not an effect with a value",
             place="--effect",
             found=repr(text),
-            expected='such as "inertia.mass=0.1 kg"; parameters of ' + f"{effect}: {', '.join(parameters)}",
+            expected='such as "inertia.mass=0.1 kg"; parameters of '
+            + f"{effect.name}: {', '.join(parameter.name for parameter in effect.parameters)}",
         )
-    unit = parameters[short].unit
+    unit = next(parameter.unit for parameter in effect.parameters if qualified(effect, parameter) == name)
     with naming_option("--effect"):
         size = float(value) if is_number(value) and unit == "1" else quantity(text.partition("=")[2].strip(), unit)
-    return model.with_values({name: size}) if effect in model.effects else model.with_effect(effect, {name: size})
+    return (
+        model.with_values({name: size})
+        if effect.name in model.effects
+        else model.with_effect(effect.name, {name: size})
+    )

@@ -9,12 +9,14 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
-from bushfit.effects.mistakes import MISTAKES, SEPARATOR, Mistake, labelled, mistake_named, shown
+from bushfit.effects.mistake import Mistake, shown
+from bushfit.effects.mistakes import MISTAKES, SEPARATOR, labelled, mistake_named
 from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_set import DataSet
@@ -149,6 +151,26 @@ def claims(data: Data, without: Collection[str]) -> list[Claim]:
     return found
 
 
+class _Normal(NamedTuple):
+    """Normal equations at each point of a grid.
+
+    Args:
+        gram: products of the columns, (g, 3, 3).
+        along: products of the columns and what is to be met, (g, 3).
+        total: sum of squares of what is to be met.
+    """
+
+    gram: Array
+    along: Array
+    total: float
+
+    @classmethod
+    def summed(cls, parts: Sequence[_Normal]) -> _Normal:
+        """The equations of several tests together."""
+        gram, along = np.sum([part.gram for part in parts], axis=0), np.sum([part.along for part in parts], axis=0)
+        return cls(gram, along, sum(part.total for part in parts))
+
+
 @dataclass(frozen=True, eq=False)
 class Screen:
     """How well the plain model could meet the tests under each claim, before any fit.
@@ -172,34 +194,32 @@ class Screen:
         if claim and not claim.tests and bushing:
             bushing = claim.mistake.mended_bushing(bushing)
         try:
-            gram, along, total = self._whole(bushing)
-            for place in claim.tests if claim else ():
-                plain, mended = self._part(place, None, bushing), self._part(place, claim and claim.mistake, bushing)
-                gram, along, total = (
-                    gram + mended[0] - plain[0],
-                    along + mended[1] - plain[1],
-                    total + mended[2] - plain[2],
-                )
+            whole = self._whole(bushing)
+            if claim:
+                mended = [self._part(place, claim.mistake, bushing) for place in claim.tests]
+                plain = [self._part(place, None, bushing) for place in claim.tests]
+                whole = _Normal.summed([whole, *mended, *(_Normal(-g, -a, -t) for g, a, t in plain)])
         except ModelError:  # a shape for which a formula was not checked
             return np.inf
-        scale = np.sqrt(np.einsum("gii->gi", gram)) + 1e-300
-        unit = gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(3)
-        right = along / scale
+        scale = np.sqrt(np.einsum("gii->gi", whole.gram)) + 1e-300
+        unit = whole.gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(3)
+        right = whole.along / scale
         explained = np.einsum("gi,gi->g", right, np.linalg.solve(unit, right[..., None])[..., 0])
-        return max(_least((total - explained).reshape(_EPS_HALF.size, _ALPHA.size)), 0.0)
+        return max(_least((whole.total - explained).reshape(_EPS_HALF.size, _ALPHA.size)), 0.0)
 
-    def _whole(self, bushing: Bushing | None) -> tuple[Array, Array, float]:
-        """What all tests as they are add to the normal equations."""
-        parts = [self._part(place, None, bushing) for place in range(len(self.data.loops) + len(self.data.sweeps))]
-        gram, along = (np.sum([part[i] for part in parts], axis=0) for i in (0, 1))
-        return gram, along, sum(part[2] for part in parts)
+    def _whole(self, bushing: Bushing | None) -> _Normal:
+        """The normal equations of all tests as they are."""
+        key, count = (-1, "", bushing), len(self.data.loops) + len(self.data.sweeps)
+        if key not in self._known:
+            self._known[key] = _Normal.summed([self._part(place, None, bushing) for place in range(count)])
+        return self._known[key]
 
     @cached_property
-    def _known(self) -> dict[tuple[int, str, Bushing | None], tuple[Array, Array, float]]:
+    def _known(self) -> dict[tuple[int, str, Bushing | None], _Normal]:
         return {}
 
-    def _part(self, place: int, mistake: Mistake | None, bushing: Bushing | None) -> tuple[Array, Array, float]:
-        """What a test adds to the normal equations at each point of the grid, (g, 3, 3) and (g, 3), and its size."""
+    def _part(self, place: int, mistake: Mistake | None, bushing: Bushing | None) -> _Normal:
+        """What a test adds to the normal equations."""
         key = (place, mistake.name if mistake else "", bushing)
         if key not in self._known:
             data_set = [*self.data.loops, *self.data.sweeps][place]
@@ -208,7 +228,7 @@ class Screen:
             columns = np.concatenate((columns.real, columns.imag), axis=-1)
             wanted = np.concatenate((1.0 / error, np.zeros_like(error)))
             gram = columns @ columns.transpose(0, 2, 1)
-            self._known[key] = gram, columns @ wanted, float(wanted @ wanted)
+            self._known[key] = _Normal(gram, columns @ wanted, float(wanted @ wanted))
         return self._known[key]
 
     def _columns(self, bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:

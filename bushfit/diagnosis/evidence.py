@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_set import DataSet
+from bushfit.fitting.data_set import DataSet, Freedoms
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.solve import Bounds, Solution
 from bushfit.model.model import Model
@@ -80,14 +80,14 @@ class Evidence:
         return {data_set: slice(end - data_set.size, end) for end, data_set in zip(ends, self.data_sets, strict=True)}
 
     @cached_property
-    def blocks(self) -> list[Array]:
-        """Indices of the residuals that share an error of the rig, a group each."""
-        return [place.start + block for data_set, place in self.place.items() for block in data_set.blocks]
-
-    @property
-    def shared_freedom(self) -> int:
-        """Degrees of freedom behind the errors that blocks share; 0 where these are not measured."""
-        return max(data_set.shared_freedom for data_set in self.data_sets)
+    def rigs(self) -> list[tuple[Freedoms, Array, list[Array]]]:
+        """Per rig how well its noise is known, the indices of its residuals, and of those that share an error each."""
+        found: dict[Freedoms, tuple[list[Array], list[Array]]] = {}
+        for data_set, place in self.place.items():
+            rows, blocks = found.setdefault(data_set.freedoms, ([], []))
+            rows.append(np.arange(place.start, place.stop))
+            blocks += [place.start + block for block in data_set.blocks]
+        return [(freedoms, np.concatenate(rows), blocks) for freedoms, (rows, blocks) in found.items()]
 
     def embedded(self, values: Array, data_set: DataSet) -> Array:
         """Residuals of one data set among those of all, 0 elsewhere, (n,)."""

@@ -1,6 +1,7 @@
 """Hold-out: does what was added also close the gap where it was not fitted?
 
-An amplitude level, the top third of the frequencies, a direction and a loop are held out in turn, and predicted from
+A line (an amplitude level, or a frequency where amplitudes are stepped), the top third of the steps, a direction and a
+loop are held out in turn, and predicted from
 the rest.
 
 Notes:
@@ -18,6 +19,7 @@ import numpy as np
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import DataSet, parted
+from bushfit.reading.measurement import Stepped
 
 #: A part without which some parameter's variance would grow by more than this factor is not held out: what is left does
 #: not determine that parameter, so a prediction would say nothing.
@@ -30,8 +32,14 @@ _CLOSED = 1.2
 _SHRUNK = 0.5
 #: Factor by which the gap of a single part may grow: chance makes about a tenth.
 _MOST_WORSENED = 1.1
-#: Share of all sweep points, the highest frequencies, that is one part.
+#: Share of all sweep points, those of the highest steps, that is one part.
 _TOP = 1.0 / 3.0
+#: By what is stepped in sweeps: what is held, and what the top third is of.
+_NAMES: dict[Stepped | None, tuple[str, str]] = {
+    "frequency": ("amplitude level", "frequencies"),
+    "amplitude": ("frequency", "amplitudes"),
+    None: ("run", ""),
+}
 #: Every point of a data set.
 _ALL = np.array(True)
 
@@ -90,14 +98,16 @@ def _predicted(evidence: Evidence, chosen: Array) -> Array:
 
 
 def _parts(evidence: Evidence) -> Iterator[tuple[str, Array]]:
-    """Name and rows of each part: levels, the top third of the frequencies, directions, loops."""
+    """Name and rows of each part: lines, the top third of what they step through, directions, loops."""
     loops, sweeps = parted(evidence.data_sets)
-    ranks = [np.unique(sweep.amplitude, return_inverse=True)[1] for sweep in sweeps]
-    for rank in range(max((int(r.max()) + 1 for r in ranks), default=0)):
-        yield f"amplitude level {rank + 1}", _rows(evidence, zip(sweeps, [r == rank for r in ranks], strict=True))
-    if sweeps:
-        top = np.quantile(np.concatenate([sweep.frequency for sweep in sweeps]), 1.0 - _TOP)
-        yield "top third of the frequencies", _rows(evidence, ((sweep, sweep.frequency > top) for sweep in sweeps))
+    for stepped, (held, top) in _NAMES.items():
+        mine = [sweep for sweep in sweeps if sweep.sweep.stepped == stepped]
+        ranks = [np.unique(sweep.held, return_inverse=True)[1] for sweep in mine]
+        for rank in range(max((int(r.max()) + 1 for r in ranks), default=0)):
+            yield f"{held} {rank + 1}", _rows(evidence, zip(mine, [r == rank for r in ranks], strict=True))
+        if mine and top:
+            limit = np.quantile(np.concatenate([sweep.step for sweep in mine]), 1.0 - _TOP)
+            yield f"top third of the {top}", _rows(evidence, ((sweep, sweep.step > limit) for sweep in mine))
     for direction in dict.fromkeys(data_set.direction for data_set in evidence.data_sets):
         whole = [data_set for data_set in evidence.data_sets if data_set.direction == direction]
         if len(whole) < len(evidence.data_sets):

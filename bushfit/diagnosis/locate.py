@@ -1,4 +1,4 @@
-"""Where model and measurement disagree: smooth misfit per level and part, ranked, and put into words."""
+"""Where model and measurement disagree: smooth misfit per line and part, ranked, and put into words."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.record import Where
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import parted
-from bushfit.fitting.sweep_data import Level
+from bushfit.fitting.sweep_data import Line
 from bushfit.units import number
 
 #: Smooth misfit, in units of the noise of its root mean square, from which a region is worth a line.
@@ -57,69 +57,77 @@ def locate(evidence: Evidence) -> tuple[Where, ...]:
 def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
     """Per direction, where the storage and the loss stiffness of its sweeps depart smoothly from the model."""
     _, sweeps = parted(evidence.data_sets)
-    levels = [level for sweep in sweeps for level in sweep.levels(evidence.model)]
-    for direction in dict.fromkeys(level.direction for level in levels):
-        mine = [level for level in levels if level.direction == direction]
+    lines = [line for sweep in sweeps for line in sweep.lines(evidence.model)]
+    for direction, stepped in dict.fromkeys((line.direction, line.stepped) for line in lines):
+        mine = [line for line in lines if line.direction == direction and line.stepped == stepped]
         for part, name in enumerate(_PARTS):
-            pieces = [(np.real if part == 0 else np.imag)(level.smooth) for level in mine]
-            sizes = [piece / level.noise[part] for piece, level in zip(pieces, mine, strict=True)]
+            pieces = [(np.real if part == 0 else np.imag)(line.smooth) for line in mine]
+            sizes = [piece / line.noise[part] for piece, line in zip(pieces, mine, strict=True)]
             excess = float(np.sqrt(np.mean(np.square(np.concatenate(sizes)))))
             strongest = max(float(np.abs(size).max()) for size in sizes)
             touched = [i for i, size in enumerate(sizes) if np.abs(size).max() > _STRONG * strongest]
-            strong = [mine[i].frequency[np.abs(sizes[i]) > _STRONG * strongest] for i in touched]
-            band = float(min(f.min() for f in strong)), float(max(f.max() for f in strong))
+            strong = [np.abs(sizes[i]) > _STRONG * strongest for i in touched]
+            frequencies, amplitudes = (
+                np.concatenate([getattr(mine[i], axis)[at] for i, at in zip(touched, strong, strict=True)])
+                for axis in ("frequency", "amplitude")
+            )
             if max(float(np.abs(piece).max()) for piece in pieces) < _LEAST:
                 continue
+            band = float(frequencies.min()), float(frequencies.max())
+            span = float(amplitudes.min()), float(amplitudes.max())
             yield Where(
-                direction,
-                "sweep",
-                band,
-                (mine[touched[0]].amplitude, mine[touched[-1]].amplitude),
-                name,
-                excess,
-                _read_sweep(name, direction, mine, pieces, touched, band),
+                direction, "sweep", band, span, name, excess, _read_sweep(name, mine, pieces, touched, (band, span))
             )
 
 
 def _read_sweep(
     part: str,
-    direction: object,
-    levels: Sequence[Level],
+    lines: Sequence[Line],
     pieces: Sequence[Array],
     touched: Sequence[int],
-    band: tuple[float, float],
+    spans: tuple[tuple[float, float], tuple[float, float]],
 ) -> str:
-    """A sentence: which way, how much, how it goes with frequency and with amplitude."""
+    """A sentence: which way, how much, how it goes along the lines and from line to line.
+
+    Args:
+        part: storage or loss.
+        lines: of one direction.
+        pieces: smooth misfit along each, (n,).
+        touched: numbers of the lines that belong to the region.
+        spans: least and largest frequency [Hz] and amplitude [m or rad] of the region.
+    """
     what = "stiffness" if part == "storage" else "loss"
     worst = max(touched, key=lambda i: float(np.abs(pieces[i]).max()))
     largest = max(pieces[worst].tolist(), key=abs)
     size = f"{number(100 * abs(largest), 2)} % of |K| {'above' if largest > 0 else 'below'} the model"
-    level = f"at every amplitude{_over_amplitude(pieces)}"
-    if len(touched) < len(levels):
-        unit, factor = levels[0].direction.display.displacement
-        level = "at " + ", ".join(f"{levels[i].amplitude * factor:.3g}" for i in touched) + f" {unit}"
-    trend = _trend(levels[worst].frequency, pieces[worst])
-    span = f"{band[0]:.3g} to {band[1]:.3g} Hz"
-    return f"measured {direction} {what} is up to {size}, {trend} ({span}), {level}"
+    line = lines[worst]
+    held = {"frequency": "amplitude", "amplitude": "frequency", None: "run"}[line.stepped]
+    level = f"at every {held}{_over_lines(pieces, held)}"
+    if len(touched) < len(lines):
+        level = "at " + ", ".join(lines[i].words for i in touched)
+    unit, factor = ("Hz", 1.0) if line.stepped != "amplitude" else line.direction.display.displacement
+    low, high = (factor * end for end in spans[line.stepped == "amplitude"])
+    trend = _trend(line.stepped or "frequency", line.step, pieces[worst])
+    return f"measured {line.direction} {what} is up to {size}, {trend} ({low:.3g} to {high:.3g} {unit}), {level}"
 
 
-def _trend(frequency: Array, misfit: Array) -> str:
-    """How a misfit goes with frequency: flat, or as the line over it that leaves the least."""
+def _trend(stepped: str, step: Array, misfit: Array) -> str:
+    """How a misfit goes with what is stepped: flat, or as the line over it that leaves the least."""
     if np.var(misfit) < _FLAT * np.mean(np.square(misfit)):
-        return "much the same at every frequency"
+        return f"much the same at every {stepped}"
     shapes = {
-        "changing with the logarithm of frequency": np.log(frequency),
-        "changing in proportion to frequency": frequency,
-        "changing with the square of frequency": frequency**2,
+        f"changing with the logarithm of {stepped}": np.log(step),
+        f"changing in proportion to {stepped}": step,
+        f"changing with the square of {stepped}": step**2,
     }
     return max(shapes, key=lambda words: abs(float(np.corrcoef(shapes[words], misfit)[0, 1])))
 
 
-def _over_amplitude(pieces: Sequence[Array]) -> str:
+def _over_lines(pieces: Sequence[Array], held: str) -> str:
     means = [float(np.mean(piece)) for piece in pieces]
     if len(means) < 2 or np.ptp(means) < _CHANGES * max(abs(mean) for mean in means):
         return ""
-    return ", rising with amplitude" if means[-1] > means[0] else ", falling with amplitude"
+    return f", {'rising' if means[-1] > means[0] else 'falling'} with {held}"
 
 
 def _loop_regions(evidence: Evidence) -> Iterator[Where]:

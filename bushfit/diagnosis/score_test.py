@@ -3,8 +3,8 @@
 Notes:
     A pattern is a group of columns, whitened residuals that are free to move together: a candidate's sensitivity, a
     fault's gain and phase, smooth contrasts. How far the best pattern gets by chance comes from a parametric
-    bootstrap: noise is drawn as the campaign has it, independent residuals, and blocks whose shared variance was
-    itself estimated from a few repeats, which makes the tails of what acts on whole blocks heavier. Only the columns'
+    bootstrap: noise is drawn as the campaign has it, in units of a noise that was itself estimated, from a few repeats
+    or a few points, which makes the tails heavier. Only the columns'
     inner products enter, so thousands of draws cost one small matrix product. The underlying draws depend on their
     number alone and are kept.
 """
@@ -108,15 +108,17 @@ class ScoreTest:
 
 
 def _draw(evidence: Evidence, rows: Array) -> Array:
-    """Amounts of noise along rows, (c, DRAWS)."""
-    columns = [rows[:, block].sum(axis=1) / np.sqrt(block.size) for block in evidence.blocks]
-    shared = np.reshape(columns, (-1, len(rows))).T
-    freedom = evidence.shared_freedom
-    scale = np.sqrt(freedom / _chi_squares(freedom)) if freedom else 1.0
-    size, vectors = np.linalg.eigh(rows @ rows.T - shared @ shared.T)
-    kept = size > _ROUNDING * max(float(size.max()), 1e-300)
-    root = vectors[:, kept] * np.sqrt(size[kept])
-    return shared @ _normals(shared.shape[1], 0) * scale + root @ _normals(root.shape[1], 1)
+    """Amounts of noise along rows, (c, DRAWS): what blocks share, and what scatters from point to point."""
+    drawn = np.zeros((len(rows), DRAWS))
+    for number, (freedoms, own, blocks) in enumerate(evidence.rigs):
+        columns = [rows[:, block].sum(axis=1) / np.sqrt(block.size) for block in blocks]
+        shared = np.reshape(columns, (-1, len(rows))).T
+        size, vectors = np.linalg.eigh(rows[:, own] @ rows[:, own].T - shared @ shared.T)
+        kept = size > _ROUNDING * max(float(size.max()), 1e-300)
+        root = vectors[:, kept] * np.sqrt(size[kept])
+        drawn += shared @ _normals(shared.shape[1], 4 * number) * _unknown(freedoms.shared, 4 * number + 2)
+        drawn += root @ _normals(root.shape[1], 4 * number + 1) * _unknown(freedoms.scatter, 4 * number + 3)
+    return drawn
 
 
 @lru_cache(maxsize=32)
@@ -125,5 +127,8 @@ def _normals(rows: int, stream: int) -> Array:
 
 
 @lru_cache(maxsize=32)
-def _chi_squares(freedom: int) -> Array:
-    return np.random.default_rng([_SEED, 2]).chisquare(freedom, DRAWS)
+def _unknown(freedom: int, stream: int) -> Array:
+    """True over estimated standard deviation, as far as so many degrees of freedom tell it: (DRAWS,); 1 if known."""
+    if not freedom:
+        return np.ones(DRAWS)
+    return np.sqrt(freedom / np.random.default_rng([_SEED, stream]).chisquare(freedom, DRAWS))

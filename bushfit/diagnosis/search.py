@@ -155,13 +155,19 @@ class Search:
             current, added = best.evidence, [*added, best.name]
         return current, added
 
+    @cached_property
+    def matters(self) -> bool:
+        """Whether the best candidate on the base model is real and large enough to matter."""
+        best = self.first.real
+        return best is not None and footprint(self.base, best.evidence) > self.settings.tolerance
+
     def trace(self) -> Candidate | None:
         """The best candidate on the base model where it is real but too small to matter.
 
         One whose amount comes to rest on its bound is none: it would close more of the gap than it may.
         """
         best = self.first.real
-        if best is None or footprint(self.base, best.evidence) > self.settings.tolerance:
+        if best is None or self.matters:
             return None
         effect = effect_named(best.name)
         return None if qualified(effect, effect.amount) in best.evidence.solution.at_bound else best

@@ -19,7 +19,7 @@ from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.search import SAME, Search, Step
 from bushfit.effects import effect_of
 from bushfit.fitting.assess import Stage, covariance, measured_range, quality
-from bushfit.fitting.data_sets import parted
+from bushfit.fitting.data_sets import parted, sources
 from bushfit.fitting.procedures import cautions
 from bushfit.fitting.solve import Bounds
 from bushfit.model.result import Result
@@ -91,8 +91,8 @@ def _ambiguous(search: Search, final: Evidence, steps: Sequence[Step], names: Se
 
 def is_consistent(search: Search) -> bool:
     """Whether nothing is missing beyond noise and tolerance."""
-    real, trace = search.first.real, search.trace()
-    return real is trace and find_remainder(search, trace.evidence if trace else search.base) is None
+    trace = search.trace()
+    return not search.matters and find_remainder(search, trace.evidence if trace else search.base) is None
 
 
 def find_remainder(search: Search, evidence: Evidence) -> Remainder | None:
@@ -215,7 +215,7 @@ def _result(evidence: Evidence, bounds: Bounds) -> Result:
         quality(model, evidence.data_sets, len(moving)),
         measured_range(model, evidence.data_sets),
         tuple(cautions(model, evidence.solution, evidence.data_sets, bounds, cov)),
-        tuple(data_set.source for data_set in evidence.data_sets if data_set.source is not None),
+        sources(evidence.data_sets),
         at_bound=evidence.solution.at_bound,
     )
 
@@ -227,7 +227,7 @@ def _notes(search: Search, after: Evidence) -> tuple[str, ...]:
     _, sweeps = parted(after.data_sets)
     if sweeps and sweeps[0].noise.origin == "assumed":
         notes.append(
-            "nothing was repeated at three frequencies or more: "
-            "errors shared by a block are assumed, 0.5 % gain and 0.25 deg phase"
+            "nothing was repeated at three points or more: "
+            "errors shared by a run are assumed, 0.5 % gain and 0.25 deg phase"
         )
     return tuple(notes)

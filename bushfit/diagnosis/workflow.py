@@ -13,7 +13,7 @@ from bushfit.diagnosis.mistakes import mistaken
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.refit import can_reach
 from bushfit.diagnosis.search import Search
-from bushfit.diagnosis.verdict import is_consistent, judge
+from bushfit.diagnosis.verdict import judge
 from bushfit.effects import BASE, effect_named, qualified
 from bushfit.effects.mistakes import candidate_named, mistake_named
 from bushfit.fitting.data import Data
@@ -42,10 +42,10 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     data, said = adopted(data, mended)
     begun = _begin(data, model, settings)
     search = Search.begin(begun.evidence, settings, begun.start, begun.held, data.bounds)
-    found = None
-    if not is_consistent(search):
-        found = mistaken(search, data, lambda mended, goal: _begin(mended, model, settings, goal).evidence)
-    found = found or judge(search, *search.reconsider(*search.grow()))
+    found = None if search.matters else judge(search, search.base, ())
+    if found is None or found.verdict != "consistent":
+        told_wrong = mistaken(search, data, lambda mended, goal: _begin(mended, model, settings, goal).evidence)
+        found = told_wrong or found or judge(search, *search.reconsider(*search.grow()))
     outliers = begun.outliers if data.robust else outliers_at(found.result.model, search.base.data_sets)
     notes = (*said, *found.notes, *told(outliers, robust=data.robust))
     warnings = (*said, *found.result.warnings)

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 from bushfit.effects.contract import Array, Values
 from bushfit.geometry import Place
@@ -40,6 +40,20 @@ class Suspect:
     frequency: tuple[float, float]
     amplitude: tuple[float, float]
     looked: int = 0
+
+
+class Freedoms(NamedTuple):
+    """Degrees of freedom behind the noise of a rig.
+
+    Args:
+        rig: what tests of one rig have in common; None where nothing is estimated.
+        shared: behind the errors that blocks share; 0 where these are not measured.
+        scatter: behind what scatters from point to point; 0 where it counts as known.
+    """
+
+    rig: Hashable
+    shared: int
+    scatter: int
 
 
 #: Kinds of suspects, in the order in which they are listed.
@@ -121,9 +135,9 @@ class DataSet(ABC):
         return ()
 
     @property
-    def shared_freedom(self) -> int:
-        """Degrees of freedom behind the errors that blocks share; 0 where these are not measured."""
-        return 0
+    def freedoms(self) -> Freedoms:
+        """How well the noise of the rig is known that the test was made on."""
+        return Freedoms(None, 0, 0)
 
     @abstractmethod
     def residual(self, model: Model, values: Values | None = None) -> Array:

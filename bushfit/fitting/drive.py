@@ -7,7 +7,7 @@ turning points that friction needs are those of the motion and not of the sensor
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -22,10 +22,12 @@ from bushfit.fitting.loop_harmonics import MOST_ROWS, loop_harmonics
 from bushfit.fitting.loop_outliers import OutlierRows
 from bushfit.fitting.noise import FLOOR
 from bushfit.fitting.phase_bins import phase_bins
+from bushfit.fitting.preload import mean_of_preload, preload
 from bushfit.fitting.runin import steady_part, thinned
 from bushfit.fitting.waveform import wrong_clock
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.cycles import HOLE
+from bushfit.units import number
 
 #: Distance from a turning point up to which rows carry no weight [steps of the grid]: one step, and the half by which
 #: the point may lie beside its sample.
@@ -65,8 +67,9 @@ class Drive:
         noise: standard deviation of one row's force [N or N m].
         coefficients: complex harmonics of the displacement, mean first.
         half_range: half of the range of the measured force, outliers aside [N or N m].
-        datum: mean of the measured force where the motion lies off zero, else None. Whether a sensor's zero or
-            a preload put it there is not known, so such a loop counts from its own middle.
+        datum: mean of the measured force where the motion lies off zero, the force is a preload's, or other cycles
+            went before in the record; else None. Whether a sensor's zero, a preload or the memory of rubber put it
+            there is not known, so such a loop counts from its own middle.
         notes: sentences on what of the record was left out, and on a time that does not go with its rows.
         outliers: by column, rows of the loop that are faults of the record, and how far they lie off [noise].
         first_row: row of the whole record that the loop begins with.
@@ -107,9 +110,15 @@ class Drive:
     def history(self, settles: bool) -> History:
         """The motion as the model wants it, GRID samples a cycle.
 
-        One settled cycle, or the whole record where it begins at rest or the model `settles` over the cycles.
+        One settled cycle, or the whole record where it begins at rest or the model `settles` over the cycles; in a part
+        after other cycles it has.
         """
-        return self._settling if settles and not self.from_rest else self._motion
+        return self._settling if settles and not (self.from_rest or self.follows) else self._motion
+
+    @property
+    def follows(self) -> bool:
+        """Whether other rows of its record went before, which the rubber remembers."""
+        return self.loop.part is not None and self.loop.part.first_row > 0
 
     @cached_property
     def _motion(self) -> History:
@@ -175,14 +184,24 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
         noise=max(noise, FLOOR * half_force),
         coefficients=found.motion,
         half_range=half_force,
-        datum=found.force_mean if not from_rest and abs(found.motion[0]) > _CENTRED * half_motion else None,
-        notes=tuple(filter(None, (left_out, wrong_clock(loop, found.motion)))),
+        notes=tuple(filter(None, (*_of_the_record(loop), left_out, wrong_clock(loop, found.motion)))),
         outliers=found.outliers,
         first_row=first_row,
     )
     drive = replace(drive, weight=np.where(_at_reversal(drive), 0.0, drive.weight))
     _check_loses_energy(drive)
-    return drive
+    if not from_rest:
+        unknown = drive.follows or abs(found.motion[0]) > _CENTRED * half_motion
+        drive = replace(drive, datum=found.force_mean if unknown else mean_of_preload(drive))
+    return replace(drive, notes=(*drive.notes, *preload(drive)))
+
+
+def _of_the_record(loop: Loop) -> Iterator[str]:
+    """What is to be said of the record that a loop was taken from, and of its first cycle."""
+    if loop.part and loop.part.left_out:
+        yield loop.part.left_out
+    if loop.softening is not None:
+        yield f"the first cycle is {number(100 * loop.softening, 2)} % stiffer than the last (Mullins)"
 
 
 def _check_no_hole(loop: Loop, clock: Array, frequency: float) -> None:

@@ -116,9 +116,10 @@ class LoopData(DataSet):
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
         file = str(self.source.file) if self.source else None
+        before = self.drive.first_row + (self.test.part.first_row if self.test.part else 0)
         for column, (rows, distance) in self.drive.outliers.items():
             for row, off in zip(rows.tolist(), distance.tolist(), strict=True):
-                yield Outlier(self.name, file, row + self.drive.first_row + 1, column, off)
+                yield Outlier(self.name, file, row + before + 1, column, off)
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
         return {} if self.test.noise is not None else {self.name: np.sqrt(2.0 / self.counted) * influence}

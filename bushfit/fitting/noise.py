@@ -1,8 +1,8 @@
-"""Measurement noise of sweeps: what scatters from point to point, and what a whole block shares.
+"""Measurement noise of sweeps: what scatters from point to point, and what a whole run shares.
 
-A block is one run of the rig: one direction, amplitude and repeat. Its points share a gain and a phase error.
-Everything is counted on ln K = ln|K| + i phase, so gain errors are real and phase errors imaginary, both
-relative to |K|.
+A run is what was recorded in one go: one of frequency and amplitude is stepped, the other held. Its points share a gain
+and a phase error. Runs that hold the same are repeats of one line. Everything is counted on ln K = ln|K| + i phase, so
+gain errors are real and phase errors imaginary, both relative to |K|.
 """
 
 from __future__ import annotations
@@ -20,14 +20,18 @@ from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 
 #: Least noise of any rig, relative to the largest force or to |K|.
 FLOOR = 1e-4
-#: Errors that a block shares where nothing was repeated, relative gain and phase [rad]; chosen: those of most rigs.
+#: Errors that a run shares where nothing was repeated, relative gain and phase [rad]; chosen: those of most rigs.
 ASSUMED_SHARED = (5e-3, float(np.radians(0.25)))
 #: Probability of unequal variances by chance, below which levels get noise of their own.
 _EQUAL_NOISE_P = 1e-3
-#: Degree in ln f of the smooth curve that stands in for repeats; chosen: it follows stiffness over two decades.
+#: Degree, in the logarithm of what is stepped, of the smooth curve that stands in for repeats; chosen: it follows
+#: stiffness over two decades.
 _SMOOTH_DEGREE = 4
-#: Common frequencies of two repeats from which on their difference tells a variance and a mean.
-_FEWEST_FREQUENCIES = 3
+#: Degrees in ln f and ln X of the smooth surface that carries points to the amplitude of their level; chosen: it need
+#: only follow the slope over ln X.
+_SURFACE_DEGREES = (1, 3)
+#: Common steps of two repeats from which on their difference tells a variance and a mean.
+_FEWEST_STEPS = 3
 #: Distance of an outlier from the other points [robust standard deviations]: noise alone reaches it once in 1e9.
 _OUTLIER = 6.0
 #: Shared variance of an outlying pair of repeats over the median of all pairs: noise alone reaches it once in 500
@@ -39,11 +43,12 @@ _ROUNDS = 25
 #: Least distance relative to the median distance, so that no point takes all the weight.
 _LEAST_DISTANCE = 1e-3
 
-LevelKey = tuple[str, float]
+#: A line: the name of the sweep, and what its runs hold.
+LineKey = tuple[str, float]
 _ORIGINS = {
     "repeats": "from repeats",
     "stated": "stated in the campaign",
-    "assumed": "no repeats of three frequencies or more: points against a smooth curve, shared part assumed",
+    "assumed": "no repeats of three points or more: points against a smooth curve, shared part assumed",
 }
 
 
@@ -52,14 +57,14 @@ class SweepNoise:
     """Noise of all sweeps of a campaign.
 
     Args:
-        random: standard deviation from point to point of (ln|K|, phase), per level (sweep name, amplitude).
-        shared: standard deviation of what a block shares, (ln|K|, phase [rad]).
+        random: standard deviation from point to point of (ln|K|, phase), per line.
+        shared: standard deviation of what a run shares, (ln|K|, phase [rad]).
         origin: "repeats", "stated" or "assumed": where it comes from.
         freedom: degrees of freedom behind the shared part; 0 where it is not measured.
-        scatter_freedom: the same of the random part of each level; 0 where it is stated.
+        scatter_freedom: the same of the random part of each line; 0 where it is stated.
     """
 
-    random: dict[LevelKey, tuple[float, float]]
+    random: dict[LineKey, tuple[float, float]]
     shared: tuple[float, float]
     origin: str
     freedom: int
@@ -70,13 +75,13 @@ class SweepNoise:
         point = 100.0 * np.sqrt(np.mean(np.square(list(self.random.values()))))
         return (
             f"{point:.2g} % from point to point, {100 * self.shared[0]:.2g} % gain and "
-            f"{np.degrees(self.shared[1]):.2g} deg phase shared by a block ({_ORIGINS[self.origin]})"
+            f"{np.degrees(self.shared[1]):.2g} deg phase shared by a run ({_ORIGINS[self.origin]})"
         )
 
 
 @dataclass(frozen=True)
-class _Level:
-    """What one amplitude of one sweep tells about the noise.
+class _Line:
+    """What the repeats of one line of a sweep tell about the noise.
 
     Args:
         scatter: deviations of gain and phase from point to point, (k, 2).
@@ -99,26 +104,27 @@ class _Level:
 
 
 def sweep_noise(sweeps: Sequence[Sweep]) -> SweepNoise:
-    """Noise of a campaign's sweeps, estimated from their repeats.
+    """Noise of the sweeps of one rig, estimated from their repeats.
 
-    Without repeats the random part is the scatter about a smooth curve in ln f, and the shared part is ASSUMED_SHARED.
-    A `noise` stated in the campaign replaces the random part.
+    Without repeats the random part is the scatter about a smooth curve in the logarithm of what is stepped, and the
+    shared part is ASSUMED_SHARED. A `noise` stated in the campaign, or in the file for each point, replaces the random
+    part.
 
     Notes:
-        With D_f the difference of ln K between two repeats at the frequency f, the variance of D_f over f is twice
-        the random variance, and the square of its mean estimates twice (shared variance + random variance / number of
-        frequencies). Pairs are pooled within a level and over levels; levels keep a random part of their own where
-        Bartlett's test finds them unequal.
+        With D the difference of ln K between two repeats at one step, the variance of D over the steps is twice the
+        random variance, and the square of its mean estimates twice (shared variance + random variance / number of
+        steps). Pairs are pooled within a line and over lines; lines keep a random part of their own where Bartlett's
+        test finds them unequal.
     """
-    levels = {
-        (sweep.name, float(amplitude)): _level(sweep, amplitude)
-        for sweep in sweeps
-        for amplitude in np.unique(sweep.amplitude)
+    lines = {
+        (sweep.name, float(held)): _line(sweep, log_stiffness, held)
+        for sweep, log_stiffness in [(sweep, _at_nominal(sweep)) for sweep in sweeps]
+        for held in np.unique(sweep.held)
     }
-    repeated = [level for level in levels.values() if level.repeats > 1]
-    measured = repeated or [level for level in levels.values() if level.calmer is not None]
-    variances, scatter_freedom = _pooled(levels, measured)
-    stated = {sweep.name: sweep.noise for sweep in sweeps if sweep.noise is not None}
+    repeated = [line for line in lines.values() if line.repeats > 1]
+    measured = repeated or [line for line in lines.values() if line.calmer is not None]
+    variances, scatter_freedom = _pooled(lines, measured)
+    stated = {sweep.name: noise for sweep in sweeps if (noise := _stated(sweep)) is not None}
     if stated:
         scatter_freedom = 0
     random = {
@@ -126,28 +132,60 @@ def sweep_noise(sweeps: Sequence[Sweep]) -> SweepNoise:
         for key, variance in variances.items()
     }
     if repeated:
-        shared_freedom = sum(level.repeats - 1 for level in repeated)
+        shared_freedom = sum(line.repeats - 1 for line in repeated)
         return SweepNoise(random, _shared(repeated), "repeats", shared_freedom, scatter_freedom)
-    shared, origin = ((0.0, 0.0), "stated") if len(stated) == len(sweeps) else (ASSUMED_SHARED, "assumed")
+    by_campaign = all(sweep.noise is not None for sweep in sweeps)
+    shared, origin = ((0.0, 0.0), "stated") if by_campaign else (ASSUMED_SHARED, "assumed")
     return SweepNoise(random, shared, origin, 0, scatter_freedom)
 
 
-def _pooled(levels: Mapping[LevelKey, _Level], measured: Sequence[_Level]) -> tuple[dict[LevelKey, Array], int]:
-    """Variance of gain and phase of each level, (2,), and the degrees of freedom behind it.
+def _stated(sweep: Sweep) -> float | None:
+    """The noise that the campaign states of a sweep, or the root mean square of what its file states of each point."""
+    if sweep.noise is not None or sweep.relative_error is None:
+        return sweep.noise
+    return float(np.sqrt(np.mean(np.square(sweep.relative_error))))
 
-    One variance for all where the levels that measure it agree, else each level's own.
+
+def _at_nominal(sweep: Sweep) -> Array:
+    """ln K of each point as it would be at the amplitude of its level, complex (n,).
+
+    Notes:
+        From the amplitude that was reached it is carried there along a smooth surface over ln f and ln X, which tells
+        how K goes with amplitude; without two levels or more there is none.
+    """
+    value = np.log(sweep.stiffness)
+    off = np.log(sweep.amplitude_reached / sweep.amplitude)
+    distinct = np.unique(sweep.amplitude).size
+    if distinct < 2 or not off.any():
+        return value
+    degrees = min(_SURFACE_DEGREES[0], np.unique(sweep.frequency).size - 1), min(_SURFACE_DEGREES[1], distinct - 1)
+    low, span = np.log(sweep.amplitude).min(), float(np.ptp(np.log(sweep.amplitude)))
+
+    def surface(amplitude: Array) -> Array:
+        unit = 2.0 * (np.log(amplitude) - low) / span - 1.0
+        return np.polynomial.legendre.legvander2d(_unit(np.log(sweep.frequency)), unit, degrees)
+
+    reached = surface(sweep.amplitude_reached)
+    solution = np.linalg.lstsq(reached.astype(complex), value, rcond=None)[0]
+    return value - (reached - surface(sweep.amplitude)) @ solution
+
+
+def _pooled(lines: Mapping[LineKey, _Line], measured: Sequence[_Line]) -> tuple[dict[LineKey, Array], int]:
+    """Variance of gain and phase of each line, (2,), and the degrees of freedom behind it.
+
+    One variance for all where the lines that measure it agree, else each line's own.
     """
     alike = _of_equal_noise(measured)
     if not alike:
-        return {key: level.variance for key, level in levels.items()}, min(level.freedom for level in levels.values())
-    freedoms = [level.freedom for level in alike]
-    pooled = np.average([level.variance for level in alike], axis=0, weights=freedoms)
-    return dict.fromkeys(levels, pooled), sum(freedoms)
+        return {key: line.variance for key, line in lines.items()}, min(line.freedom for line in lines.values())
+    freedoms = [line.freedom for line in alike]
+    pooled = np.average([line.variance for line in alike], axis=0, weights=freedoms)
+    return dict.fromkeys(lines, pooled), sum(freedoms)
 
 
-def _shared(repeated: Sequence[_Level]) -> tuple[float, float]:
-    """Standard deviation of what a block shares in gain and phase, outlying pairs of repeats left out."""
-    pairs = np.concatenate([level.shared for level in repeated])
+def _shared(repeated: Sequence[_Line]) -> tuple[float, float]:
+    """Standard deviation of what a run shares in gain and phase, outlying pairs of repeats left out."""
+    pairs = np.concatenate([line.shared for line in repeated])
     usual = np.abs(pairs) <= _OUTLYING_PAIR * np.median(np.abs(pairs), axis=0)
     variance = np.where(usual.any(axis=0), np.mean(pairs, axis=0, where=usual), 0.0)
     return _pair(np.sqrt(np.maximum(variance, 0.0)))
@@ -159,24 +197,24 @@ def _pair(values: Array) -> tuple[float, float]:
     return gain, phase
 
 
-def _level(sweep: Sweep, amplitude: float) -> _Level:
-    """What one amplitude of a sweep tells: by pairs of repeats, or about a smooth curve where there is no pair."""
-    chosen = sweep.amplitude == amplitude
-    frequencies, column = np.unique(sweep.frequency[chosen], return_inverse=True)
+def _line(sweep: Sweep, log_stiffness: Array, held: float) -> _Line:
+    """What one line of a sweep tells: by pairs of repeats, or about a smooth curve where there is no pair."""
+    chosen = sweep.held == held
+    steps, column = np.unique(sweep.step[chosen], return_inverse=True)
     numbers, row = np.unique(sweep.repeat[chosen], return_inverse=True)
-    table = np.full((numbers.size, frequencies.size), np.nan + 0j)
-    table[row, column] = np.log(sweep.stiffness[chosen])
+    table = np.full((numbers.size, steps.size), np.nan + 0j)
+    table[row, column] = log_stiffness[chosen]
     pairs = [_without_outliers(one - other) for one, other in combinations(table, 2)]
-    pairs = [difference for difference in pairs if difference.size >= _FEWEST_FREQUENCIES]
+    pairs = [difference for difference in pairs if difference.size >= _FEWEST_STEPS]
     if not pairs:
-        return _about_smooth_curve(np.log(frequencies), np.nanmean(table, axis=0))
+        return _about_smooth_curve(np.log(steps), np.nanmean(table, axis=0))
     scatter = [_parts(difference - difference.mean()) for difference in pairs]
     shared = [
         (_parts(difference).mean(axis=0) ** 2 - np.square(spread).sum(axis=0) / (len(spread) - 1) / len(spread)) / 2.0
         for difference, spread in zip(pairs, scatter, strict=True)
     ]
     freedom = (numbers.size - 1) * (pairs[0].size - 1)
-    return _Level(np.concatenate(scatter) / np.sqrt(numbers.size), freedom, np.array(shared), int(numbers.size))
+    return _Line(np.concatenate(scatter) / np.sqrt(numbers.size), freedom, np.array(shared), int(numbers.size))
 
 
 def _without_outliers(difference: Array) -> Array:
@@ -193,18 +231,16 @@ def _without_outliers(difference: Array) -> Array:
     return difference[np.all((off <= _OUTLIER * scale) | (scale == 0.0), axis=1)]
 
 
-def _about_smooth_curve(log_frequency: Array, log_stiffness: Array) -> _Level:
-    """What one amplitude without repeats tells: its scatter about a smooth curve, outliers left out.
+def _about_smooth_curve(log_step: Array, log_stiffness: Array) -> _Line:
+    """What one line without repeats tells: its scatter about a smooth curve, outliers left out.
 
     Of one or two points the scatter is assumed.
     """
-    degree = min(_SMOOTH_DEGREE, log_frequency.size - 2)
+    degree = min(_SMOOTH_DEGREE, log_step.size - 2)
     if degree < 1:
-        return _Level(np.full((1, 2), ASSUMED_SHARED[0]), 1, np.empty((0, 2)), 1)
+        return _Line(np.full((1, 2), ASSUMED_SHARED[0]), 1, np.empty((0, 2)), 1)
     values = _parts(log_stiffness)
-    basis = np.polynomial.legendre.legvander(
-        2.0 * (log_frequency - log_frequency.min()) / np.ptp(log_frequency) - 1.0, degree
-    )
+    basis = np.polynomial.legendre.legvander(_unit(log_step), degree)
     residual = np.abs(values - basis @ _least_absolute(basis, values))
     usual = np.median(np.sort(residual, axis=0)[degree + 1 :], axis=0)  # the curve goes through degree + 1 points
     inliers = np.all(residual <= np.maximum(_OUTLIER * MEDIAN_TO_SIGMA * usual, FLOOR), axis=1)
@@ -214,7 +250,12 @@ def _about_smooth_curve(log_frequency: Array, log_stiffness: Array) -> _Level:
     falls = np.square(free @ (free.T @ values)).sum(axis=1) / np.maximum(np.square(free).sum(axis=1), FLOOR**2)
     worst = int(np.argmax(falls))  # the point without which the sum of squares about the curve falls most
     calmer = _complement(np.delete(basis, worst, axis=0)).T @ np.delete(values, worst, axis=0)
-    return _Level(scatter, len(scatter), np.empty((0, 2)), 1, calmer)
+    return _Line(scatter, len(scatter), np.empty((0, 2)), 1, calmer)
+
+
+def _unit(values: Array) -> Array:
+    """Values spread from -1 to 1, (n,); all -1 where they are one."""
+    return 2.0 * (values - values.min()) / max(float(np.ptp(values)), np.finfo(float).tiny) - 1.0
 
 
 def _complement(basis: Array) -> Array:
@@ -243,19 +284,19 @@ def _parts(values: Array) -> Array:
     return np.stack([np.real(values), np.imag(values)], axis=-1)
 
 
-def _of_equal_noise(levels: Sequence[_Level]) -> list[_Level]:
-    """Levels of equal noise, those that a single outlier sets apart without it; none where they are unequal."""
-    alike = sorted(levels, key=lambda level: -float(level.variance.sum()))
-    for place, level in enumerate(alike):
-        if level.calmer is not None and level.calmer.size and _unequal(alike):
-            alike[place] = replace(level, scatter=level.calmer, freedom=len(level.calmer))
+def _of_equal_noise(lines: Sequence[_Line]) -> list[_Line]:
+    """Lines of equal noise, those that a single outlier sets apart without it; none where they are unequal."""
+    alike = sorted(lines, key=lambda line: -float(line.variance.sum()))
+    for place, line in enumerate(alike):
+        if line.calmer is not None and line.calmer.size and _unequal(alike):
+            alike[place] = replace(line, scatter=line.calmer, freedom=len(line.calmer))
     return [] if _unequal(alike) else alike
 
 
-def _unequal(levels: Sequence[_Level]) -> bool:
-    """Bartlett's test (1937) of the variances of levels, each with as many degrees of freedom in gain as in phase."""
-    variance = np.array([level.variance.mean() for level in levels])
-    freedom = np.array([2.0 * level.freedom for level in levels])
+def _unequal(lines: Sequence[_Line]) -> bool:
+    """Bartlett's test (1937) of the variances of lines, each with as many degrees of freedom in gain as in phase."""
+    variance = np.array([line.variance.mean() for line in lines])
+    freedom = np.array([2.0 * line.freedom for line in lines])
     if variance.size < 2 or not variance.all():
         return False
     pooled = np.average(variance, weights=freedom)

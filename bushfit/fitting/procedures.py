@@ -12,7 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import Stage, covariance, lack_of_fit, measured_range, misfit, quality
 from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import DataSet, parted
+from bushfit.fitting.data_sets import DataSet, parted, sources
 from bushfit.fitting.identify import left_open
 from bushfit.fitting.plausible import implausible, unfitted
 from bushfit.fitting.profile import profile95
@@ -235,7 +235,7 @@ def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = Non
                 for line in cautions(model, step.solution, step.data_sets, data.bounds, cov, _NEXT)
             ),
         ),
-        tuple(data_set.source for data_set in data_sets if data_set.source is not None),
+        sources(data_sets),
         outliers,
         at_bound={name: end for step in steps for name, end in step.solution.at_bound.items()},
     )

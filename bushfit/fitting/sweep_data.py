@@ -12,19 +12,19 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from bushfit.effects.contract import Array, Values
-from bushfit.fitting.data_set import DataSet, Suspect, kept, shown_amplitude
-from bushfit.fitting.noise import SweepNoise
+from bushfit.fitting.data_set import DataSet, Freedoms, Suspect, kept, shown_amplitude
+from bushfit.fitting.noise import FLOOR, SweepNoise
 from bushfit.fitting.sweep_outliers import outlying_points
 from bushfit.fitting.whitening import Whitening
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.model.sensitivity import stiffness_jacobian
-from bushfit.reading.measurement import Sweep
+from bushfit.reading.measurement import Stepped, Sweep
 
 Residuals = Literal["complex", "magnitude_loss_factor"]
 
-#: Degree in ln f of the Legendre polynomials that count as smooth misfit.
+#: Degree, in the logarithm of what is stepped, of the Legendre polynomials that count as smooth misfit.
 _SMOOTH_DEGREE = 3
 #: A single point is a suspect beyond so many standard deviations: noise makes one in 16,000.
 _FAR = 4.0
@@ -33,27 +33,41 @@ _MOST_ROWS = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
-    """Mean misfit of one amplitude of a sweep over its repeats.
+class Line:
+    """Mean misfit of one line of a sweep over its repeats: of all that its runs stepped through while they held one.
 
     Args:
         direction: of the sweep.
-        amplitude: zero-to-peak [m or rad].
-        frequency: [Hz], (n,), each once.
+        stepped: what changes along the line; None where frequency and amplitude do.
+        frequency: [Hz], (n,).
+        amplitude: zero-to-peak [m or rad], (n,).
         misfit: measured over model less 1, complex, (n,).
         noise: standard deviation of the gain and the phase of one of these means, (2,).
     """
 
     direction: Place
-    amplitude: float
+    stepped: Stepped | None
     frequency: Array
+    amplitude: Array
     misfit: Array
     noise: Array
 
+    @property
+    def step(self) -> Array:
+        """What changes along the line, (n,)."""
+        return self.amplitude if self.stepped == "amplitude" else self.frequency
+
+    @property
+    def words(self) -> str:
+        """What the line holds, for people: "0.1 mm" or "10 Hz"; "one run" where neither."""
+        if self.stepped == "frequency":
+            return shown_amplitude(self.direction, float(self.amplitude[0]))
+        return f"{self.frequency[0]:.4g} Hz" if self.stepped else "one run"
+
     @cached_property
     def smooth(self) -> Array:
-        """The part of the misfit that is a polynomial in ln f, complex, (n,)."""
-        basis = _polynomials(self.frequency)
+        """The part of the misfit that is a polynomial in the logarithm of the step, complex, (n,)."""
+        basis = _polynomials(self.step)
         return basis @ np.linalg.lstsq(basis.astype(complex), self.misfit, rcond=None)[0]
 
 
@@ -61,8 +75,8 @@ class Level:
 class SweepData(DataSet):
     """Dynamic stiffness of a sweep, as relative complex residual or as magnitude and loss factor; see `DataSet`.
 
-    Points stand sorted by block (amplitude, repeat), then frequency. The residual (K - K_meas)/K_meas has the gain
-    error in its real and the phase error in its imaginary part.
+    Points stand sorted by run (what it holds, repeat), then step; a run is a block. The residual
+    (K - K_meas)/K_meas has the gain error in its real and the phase error in its imaginary part.
 
     Args:
         sweep: as measured.
@@ -98,8 +112,8 @@ class SweepData(DataSet):
         return float(np.sqrt(np.mean(np.square(list(self.noise.random.values())))))
 
     @property
-    def shared_freedom(self) -> int:
-        return self.noise.freedom
+    def freedoms(self) -> Freedoms:
+        return Freedoms(id(self.noise), self.noise.freedom, self.noise.scatter_freedom)
 
     @property
     def blocks(self) -> list[Array]:
@@ -131,9 +145,9 @@ class SweepData(DataSet):
 
     @cached_property
     def order(self) -> Array:
-        """Row of the sweep at which each point stands, from 0, (n,): by block (amplitude, repeat), then frequency."""
-        by_block = np.lexsort((self.sweep.frequency, self.sweep.repeat, self.sweep.amplitude))
-        return by_block if self.part is None else self.part
+        """Row of the sweep at which each point stands, from 0, (n,): by run (what it holds, repeat), then step."""
+        by_run = np.lexsort((self.sweep.step, self.sweep.repeat, self.sweep.held))
+        return by_run if self.part is None else self.part
 
     @cached_property
     def frequency(self) -> Array:
@@ -144,6 +158,16 @@ class SweepData(DataSet):
     def amplitude(self) -> Array:
         """Of the level, zero-to-peak [m or rad], (n,)."""
         return self.sweep.amplitude[self.order]
+
+    @cached_property
+    def held(self) -> Array:
+        """What each point's run holds, (n,): amplitude [m or rad] or frequency [Hz], or else the number of the run."""
+        return self.sweep.held[self.order]
+
+    @cached_property
+    def step(self) -> Array:
+        """What changes within each point's run, (n,): frequency [Hz] or amplitude [m or rad]."""
+        return self.sweep.step[self.order]
 
     @cached_property
     def repeat(self) -> Array:
@@ -157,8 +181,8 @@ class SweepData(DataSet):
 
     @cached_property
     def block_starts(self) -> Array:
-        """Index of the first point of each block."""
-        label = np.stack((self.amplitude, self.repeat.astype(float)))
+        """Index of the first point of each run."""
+        label = np.stack((self.held, self.repeat.astype(float)))
         return np.concatenate(([0], 1 + np.flatnonzero(np.any(np.diff(label), axis=0))))
 
     @kept
@@ -234,8 +258,11 @@ class SweepData(DataSet):
     @cached_property
     def _whitening(self) -> Whitening:
         counts = np.diff(self.block_starts, append=self.frequency.size)
-        levels = [self.noise.random[self.name, float(x)] for x in self.amplitude[self.block_starts]]
-        return Whitening(self.block_starts, np.repeat(np.array(levels).T, counts, axis=1), self.noise, self.weights)
+        lines = [self.noise.random[self.name, float(held)] for held in self.held[self.block_starts]]
+        random = np.repeat(np.array(lines).T, counts, axis=1)
+        if self.sweep.relative_error is not None and self.sweep.noise is None:
+            random = np.maximum(np.tile(self.sweep.relative_error[self.order], (2, 1)), FLOOR)
+        return Whitening(self.block_starts, random, self.noise, self.weights)
 
     @cached_property
     def weights(self) -> Array:
@@ -252,36 +279,37 @@ class SweepData(DataSet):
         for row, off in sorted(zip((self.order[points] + 1).tolist(), distance, strict=True)):
             yield Outlier(self.name, file, row, "stiffness", off)
 
-    def levels(self, model: Model) -> list[Level]:
-        """Mean misfit of each amplitude over its repeats."""
-        ratio, levels = self.measured / self.stiffness(model) - 1.0, []
-        for amplitude in np.unique(self.amplitude):
-            chosen = self.amplitude == amplitude
-            frequency, place, counts = np.unique(self.frequency[chosen], return_inverse=True, return_counts=True)
+    def lines(self, model: Model) -> list[Line]:
+        """Mean misfit of each line over its repeats."""
+        ratio, lines = self.measured / self.stiffness(model) - 1.0, []
+        for held in np.unique(self.held):
+            chosen = self.held == held
+            _, first, place, counts = np.unique(
+                self.step[chosen], return_index=True, return_inverse=True, return_counts=True
+            )
             mean = np.bincount(place, ratio[chosen].real) + 1j * np.bincount(place, ratio[chosen].imag)
-            of_one = np.square(self.noise.random[self.name, float(amplitude)]) + np.square(self.noise.shared)
+            of_one = np.square(self.noise.random[self.name, float(held)]) + np.square(self.noise.shared)
+            frequency, amplitude = (values[chosen][first] for values in (self.frequency, self.amplitude))
             noise = np.sqrt(of_one / np.median(counts))
-            levels.append(Level(self.direction, float(amplitude), frequency, mean / counts, noise))
-        return levels
+            lines.append(Line(self.direction, self.sweep.stepped, frequency, amplitude, mean / counts, noise))
+        return lines
 
     def contrasts(self) -> Array:
-        """Gain and phase of each level as polynomials in ln f, as whitened residuals, (c, 2 n)."""
-        levels = np.split(self.frequency, np.flatnonzero(np.diff(self.amplitude)) + 1)
-        columns = block_diag(*(_polynomials(frequency).T for frequency in levels))
+        """Gain and phase of each line as polynomials in the logarithm of its step, as whitened residuals, (c, 2 n)."""
+        lines = np.split(self.step, np.flatnonzero(np.diff(self.held)) + 1)
+        columns = block_diag(*(_polynomials(step).T for step in lines))
         return self.whiten(np.concatenate((columns, 1.0j * columns)))
 
     def smooth_misfit(self, model: Model) -> float:
-        return max(float(np.abs(level.smooth).max()) for level in self.levels(model))
+        return max(float(np.abs(line.smooth).max()) for line in self.lines(model))
 
     def suspects(self, residual: Array) -> Iterator[Suspect]:
-        """One amplitude wrong as a whole, one repeat of one, and single points that lie far out."""
-        levels = np.unique(self.amplitude)
-        for level in levels:
-            words, here = (
-                f"the {self.direction} level {shown_amplitude(self.direction, level)}",
-                self.amplitude == level,
-            )
-            if levels.size > 1:
+        """One line wrong as a whole, one repeat of one, and single points that lie far out."""
+        every = np.unique(self.held)
+        for held in every:
+            here = self.held == held
+            words = self._line_words(int(np.argmax(here)))
+            if every.size > 1:
                 yield self._suspect(words, "level", here)
             numbers = np.unique(self.repeat[here])
             for number in numbers if numbers.size > 2 else ():
@@ -295,6 +323,14 @@ class SweepData(DataSet):
                 f"repeat {self.repeat[row]}, {self.direction}"
             )
             yield replace(self._suspect(words, "row", np.arange(count) == row), looked=count)
+
+    def _line_words(self, point: int) -> str:
+        """The line that a point belongs to, for people."""
+        if self.sweep.stepped == "frequency":
+            return f"the {self.direction} level {shown_amplitude(self.direction, self.amplitude[point])}"
+        if self.sweep.stepped == "amplitude":
+            return f"the {self.direction} sweep of amplitudes at {self.frequency[point]:.4g} Hz"
+        return f"run {self.repeat[point]} of {self.name}, {self.direction}"
 
     def _suspect(self, words: str, kind: str, chosen: Array) -> Suspect:
         frequency, amplitude = self.frequency[chosen], self.amplitude[chosen]
@@ -324,8 +360,8 @@ class SweepData(DataSet):
         return {"storage": storage, "loss": loss}
 
 
-def _polynomials(frequency: Array) -> Array:
-    """Legendre polynomials in ln f over the range of these frequencies, (n, degree + 1)."""
-    x = np.log(frequency)
+def _polynomials(step: Array) -> Array:
+    """Legendre polynomials in the logarithm of steps over their range, (n, degree + 1)."""
+    x = np.log(step)
     unit = 2.0 * (x - x.min()) / max(float(np.ptp(x)), 1e-300) - 1.0
     return np.polynomial.legendre.legvander(unit, min(_SMOOTH_DEGREE, np.unique(x).size - 1))

@@ -70,7 +70,7 @@ class Whitening:
             along = np.add.reduceat(parts * self._scale, self.starts, axis=-1)
             reactions["shared"] = (along * error)[..., self._block] * self._scale
         return {
-            (kind, which): _flat(reaction * only)
+            (id(self.noise), kind, which): _flat(reaction * only)
             for kind, reaction in reactions.items()
             for which, only in enumerate(np.eye(2)[..., None])
         }

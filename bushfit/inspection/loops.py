@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.effects.mistakes import MISTAKES, shown
+from bushfit.effects.mistake import shown
+from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.drive import Drive, drive_of
+from bushfit.fitting.preload import TOLD_MEAN
 from bushfit.fitting.waveform import waveform
 from bushfit.geometry import Unit
 from bushfit.inspection.channels import clock, odd_channels
@@ -24,7 +26,7 @@ from bushfit.units import alike, for_people, number
 _REAL_CHANGE = 6.0
 #: Share of half the force's range beyond which cycles differ; chosen: less does not matter to a fit.
 _WORTH_TELLING = 2e-3
-#: Share of half its range by which a loop's zero is off; chosen: less does not matter to a fit.
+#: Share of half its range by which a loop's zero is off; chosen: less does not matter to a fit. A preload is more.
 _OFF_ZERO = 0.02
 #: Cycles that are looked at from either end of a loop; chosen: what settles shows in them.
 _MOST_END_CYCLES = 6
@@ -67,7 +69,7 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
         *_changing(drive),
         *_crawling(drive),
     ]
-    if abs(mean_motion) > _OFF_ZERO * half_motion and not drive.from_rest:
+    if _OFF_ZERO * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and not drive.from_rest:
         odd.append(
             f"the motion is off zero by {number(to_length * mean_motion, 3)} {length}, "
             f"{number(100 * mean_motion / half_motion, 2)} % of its amplitude: the loop counts from its own middle"
@@ -81,6 +83,50 @@ def _crawling(drive: Drive) -> Iterator[str]:
         mistakes = [mistake for mistake in MISTAKES.values() if mistake.time < 1.0]
         unless = ", or ".join(mistake.sentence.format(files=shown(drive.loop)) for mistake in mistakes)
         yield f"one cycle takes {number(1.0 / drive.frequency / 60.0, 2)} min, as hardly any test does, unless {unless}"
+
+
+def look_at_programme(record: Loop, loops: Sequence[Loop], file: Path) -> Looked:
+    """Facts and oddities of a record that holds several loops.
+
+    Args:
+        record: the whole record.
+        loops: its parts, in order.
+        file: where it was read.
+
+    Raises:
+        FitError: a part that has no whole cycle, or runs the wrong way round.
+    """
+    drives = [drive_of(loop) for loop in loops]
+    unit, factor = record.direction.display.displacement
+    amplitudes, frequencies = [drive.amplitude for drive in drives], [drive.frequency for drive in drives]
+    cycles = sorted(drive.cycles for drive in drives)
+    used = sum(drive.loop.displacement.size for drive in drives)
+    facts = {
+        "programme": f"{len(loops)} loops in one record: {_in_turn([factor * size for size in amplitudes])} {unit} "
+        f"at {_in_turn(frequencies)} Hz, {_span(cycles)} cycles used of each; "
+        f"{100 * (1 - used / record.displacement.size):.2g} % of the rows left out",
+    }
+    odd = [*wrong_labels(file, record.direction, amplitudes, frequencies), *odd_channels(record)]
+    for place, (loop, drive) in enumerate(zip(loops, drives, strict=True), start=1):
+        left_out = loop.part.left_out if loop.part else None
+        motion = (
+            f"{number(factor * drive.amplitude, 4)} {unit} at {drive.frequency:.4g} Hz, {waveform(drive.coefficients)}"
+        )
+        noise = f"noise {number(100 * drive.noise / drive.half_range, 2)} % of half the range, a row"
+        facts[f"loop {place}"] = "; ".join(filter(None, (motion, noise, left_out)))
+        odd += [f"loop {place}: {note}" for note in (*drive.notes, *_changing(drive)) if note != left_out]
+    facts["sampling"] = clock(record) if record.timed else "no time in the file"
+    return Looked(facts, tuple(odd))
+
+
+def _in_turn(values: Sequence[float]) -> str:
+    """Values in their order, each told once: "0.2, 0.5, 1"."""
+    return ", ".join(dict.fromkeys(f"{value:.3g}" for value in values))
+
+
+def _span(rising: Sequence[float]) -> str:
+    """The first and the last of some numbers: "4 to 5", or the one that they are."""
+    return " to ".join(dict.fromkeys(f"{value:.3g}" for value in (rising[0], rising[-1])))
 
 
 class _EndCycles(NamedTuple):

@@ -16,7 +16,7 @@ from bushfit.campaign.schema import LoopFile, SweepFile
 from bushfit.errors import BushfitError, MeasurementError, NoColumnError
 from bushfit.geometry import Direction, Place
 from bushfit.inspection.histories import look_at_history
-from bushfit.inspection.loops import look_at_loop
+from bushfit.inspection.loops import look_at_loop, look_at_programme
 from bushfit.inspection.recognition import direction_of, open_table, recognised
 from bushfit.inspection.record import ColumnSeen, Inspected, Kind, Looked
 from bushfit.inspection.sweeps import look_at_sweep
@@ -26,13 +26,12 @@ from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.sweeps import STIFFNESS_PAIRS, read_sweep
 from bushfit.reading.table import Table
+from bushfit.reduction.programme import clock_stated, programme
 from bushfit.reduction.steps import sines
 from bushfit.validation import check_tables
 
 #: [Hz] Frequency above which a motion in steps is a stepped sine; chosen: quasi-static loops are slower.
 _QUASI_STATIC = 1.0
-#: Ratio of two frequencies above which a motion in steps is a stepped sine; chosen: a loop keeps to one.
-_OTHER_FREQUENCY = 1.2
 #: The key of a loop whose load cell counts the other way.
 _TURNED = {"force_sign": -1}
 #: Names of delimiters as they are told.
@@ -93,7 +92,7 @@ def inspect(file: Path, stated: Mapping[str, Any]) -> Inspected:
         kind, looked = "sweep", look_at_sweep(measured, file)
     else:
         measured, entry, odd = _read_loop(file, read_as, entry, table)
-        kind, looked = _look(measured, file)
+        kind, looked = _look(measured, file, clock_stated(_keywords(file, read_as, entry, LoopFile)))
     columns = _columns(table, is_sweep=is_sweep)
     named = named_direction([file.stem])
     if direction and named and named is not direction:
@@ -170,16 +169,19 @@ def _read_loop(
     return turned, {**entry, **_TURNED}, [odd]
 
 
-def _look(measured: Loop, file: Path) -> tuple[Kind, Looked]:
-    """The kind of a recorded test, a loop or a history, with its facts and oddities."""
+def _look(measured: Loop, file: Path, clock: Mapping[str, Any]) -> tuple[Kind, Looked]:
+    """The kind of a recorded test, a loop, a programme of loops or a history, with its facts and oddities."""
     found = sines(measured)
     points = {(round(np.log(frequency), 2), round(np.log(amplitude), 1)) for frequency, amplitude, _ in found}
     frequencies = [frequency for frequency, *_ in found] or [0.0]
     fast = max(frequencies) > _QUASI_STATIC
-    if len(points) > 1 and (fast or max(frequencies) > _OTHER_FREQUENCY * min(frequencies)):
+    if len(points) > 1 and fast:
         with suppress(MeasurementError):  # no steady sine after all
             return "history", look_at_history(measured, file)
-    looked = look_at_loop(measured, file)
+    loops = programme(measured, **clock)
+    if len(loops) > 1:
+        return "loop", look_at_programme(measured, loops, file)
+    looked = look_at_loop(loops[0], file)
     if fast or len(points) > 1:
         what = f"at {max(frequencies):.3g} Hz" if fast else "of several amplitudes"
         either = f"a motion {what} is taken for a loop; should it be a stepped sine, bushfit reduce makes points of it"

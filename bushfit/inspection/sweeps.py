@@ -9,7 +9,8 @@ import numpy as np
 from scipy.stats import linregress, poisson
 
 from bushfit.effects.contract import Array
-from bushfit.effects.mistakes import MISTAKES, shown
+from bushfit.effects.mistake import shown
+from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.record import Looked
@@ -84,7 +85,7 @@ def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
         _, start, count = np.unique(points, axis=1, return_index=True, return_counts=True)
         copies += int((count - 1).sum())
         first = min([first, *rows[start[count > 1]].tolist()])
-        scatter = noise.random[sweep.name, float(sweep.amplitude[rows[0]])][0] * magnitude[rows[0]]
+        scatter = noise.random[sweep.name, float(sweep.held[rows[0]])][0] * magnitude[rows[0]]
         same = min(float(finest[rows[0]] / scatter), 1.0)  # two draws fall on the same last digit
         expected += rows.size * (rows.size - 1) / 2.0 * same * max(same, _SAME_PHASE_P)
     if copies and poisson.sf(copies - 1, expected) < _COPIED_P:
@@ -129,7 +130,7 @@ def _outliers(sweep: Sweep, noise: SweepNoise, unit: str, factor: float) -> Iter
     off = np.nan_to_num(_from_repeats(sweep))
     for rows in _blocks(sweep):
         off[rows] -= _median(off[rows])
-    random = np.array([noise.random[sweep.name, float(x)] for x in sweep.amplitude])
+    random = np.array([noise.random[sweep.name, float(held)] for held in sweep.held])
     parts = np.stack((off.real, off.imag), axis=1)
     far = np.any((np.abs(parts) > _OUTLIER_DEVIATIONS * random) & (np.abs(parts) > _LEAST_OUTLIER), axis=1)
     for row in np.flatnonzero(far)[:_MOST_LISTED]:

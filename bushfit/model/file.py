@@ -18,7 +18,7 @@ import numpy as np
 from bushfit import __version__
 from bushfit.effects.stiffness_factor import EFFECT as FACTOR
 from bushfit.errors import ModelError, naming
-from bushfit.geometry import Bushing, Specimen
+from bushfit.geometry import Bushing, Shape, Specimen
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import End, Outlier, Quality, Range, Result
@@ -43,12 +43,13 @@ Matrix = tuple[tuple[Number, ...], ...]
 
 @dataclass(frozen=True)
 class BushingTable:
-    """bushing: name and geometry."""
+    """bushing: name, geometry, and the radial formulas it goes by, which older files do not say."""
 
     name: Name
     inner_radius_m: Number
     outer_radius_m: Number
     length_m: Number
+    shape: Shape = "paper"
 
 
 @dataclass(frozen=True)
@@ -194,9 +195,9 @@ def _result(tables: ModelFile) -> Result:
     Raises:
         ModelError: values that are no model, or a covariance of other parameters.
     """
-    shape, entries, fit = tables.bushing, tables.parameters, tables.fit
+    tube, entries, fit = tables.bushing, tables.parameters, tables.fit
     model = Model(
-        Bushing(shape.name, shape.inner_radius_m, shape.outer_radius_m, shape.length_m) if shape else None,
+        Bushing(tube.name, tube.inner_radius_m, tube.outer_radius_m, tube.length_m, tube.shape) if tube else None,
         tables.effects,
         {name: entry.value for name, entry in entries.items()},
     )
@@ -265,6 +266,7 @@ def model_document(model: Model) -> dict[str, Any]:
             "inner_radius_m": bushing.inner_radius,
             "outer_radius_m": bushing.outer_radius,
             "length_m": bushing.length,
+            **({"shape": bushing.shape} if bushing.shape != "paper" else {}),
         },
         "effects": [effect.name for effect in model.records],
         "parameters": {

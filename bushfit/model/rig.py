@@ -64,13 +64,29 @@ def record(
     Notes:
         The springpot is a Gruenwald-Letnikov sum, which is first order in the time step.
     """
-    step = 1.0 / (frequency * steps_per_cycle)
     index = np.arange((run_in + cycles) * steps_per_cycle + 1)
     motion = amplitude * wave(waveform, index / steps_per_cycle)
+    whole = imposed(model, direction, motion, 1.0 / (frequency * steps_per_cycle), frequency, kind=kind)
+    kept = slice(run_in * steps_per_cycle, None)
+    return Record(whole.time[kept] - whole.time[kept][0], whole.displacement[kept], whole.force[kept])
+
+
+def imposed(
+    model: Model, direction: Place, motion: Array, step: float, frequency: float, *, kind: Kind = "loop"
+) -> Record:
+    """Impose any motion from rest.
+
+    Args:
+        model: what is on the rig.
+        direction: direction of the test.
+        motion: displacement in even steps of time [m or rad], (n,).
+        step: of time [s].
+        frequency: of its cycles [Hz], for effects that count them.
+        kind: as of `record`.
+    """
     history = History(motion, step, periodic=False, frequency=frequency)
     force = model.force(direction, history, kind=kind)
-    kept = slice(run_in * steps_per_cycle, None)
-    return Record((index * step)[kept] - index[kept][0] * step, motion[kept], force[kept])
+    return Record(np.arange(motion.size) * step, motion, force)
 
 
 def first_harmonic(time: Array, signal: Array, frequency: float) -> complex:

@@ -14,12 +14,14 @@ from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
+from bushfit.geometry import Display, Place, Specimen, Unit
 from bushfit.reading.measurement import loss_factor
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from bushfit.reading.measurement import Loop, Sweep
+    from bushfit.reading.resonance import ResonanceTest
 
 #: The start of a text that a spreadsheet takes for a formula, in ASCII or full width, even after blanks.
 _FORMULA = re.compile("[\\s\"']*[=+\\-@\uff1d\uff0b\uff0d\uff20|%]|\\t")
@@ -69,10 +71,10 @@ def defused(text: str) -> str:
 
 
 def raw_loop_table(loop: Loop) -> pd.DataFrame:
-    """A loop as a rig writes it: time, displacement and force in the units of engineers."""
+    """A loop as a rig writes it: time, displacement and force in the units of engineers, or strain and stress."""
     import pandas as pd
 
-    (length, length_factor), (force, force_factor), _ = loop.direction.display
+    (length, length_factor), (force, force_factor), _ = _as_stated(loop.direction)
     return pd.DataFrame(
         {
             "time [s]": loop.time,
@@ -83,16 +85,44 @@ def raw_loop_table(loop: Loop) -> pd.DataFrame:
 
 
 def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
-    """A sweep as a rig writes it: frequency, amplitude, repeat, stiffness and loss factor in the units of engineers."""
+    """A sweep as a rig writes it: frequency, amplitude, repeat, stiffness and loss factor in the units of engineers.
+
+    Where the amplitude is stepped, it is written as reached, without its level.
+    """
     import pandas as pd
 
-    (length, length_factor), _, (stiffness, factor) = sweep.direction.display
+    (length, length_factor), _, (stiffness, factor) = _as_stated(sweep.direction)
+    level, reached = sweep.amplitude, sweep.reached
+    if sweep.stepped == "amplitude" and reached is not None:
+        level, reached = reached, None
     return pd.DataFrame(
         {
             "frequency [Hz]": sweep.frequency,
-            f"amplitude [{length}]": sweep.amplitude * length_factor,
+            f"amplitude [{length}]": level * length_factor,
+            **({} if reached is None else {f"amplitude reached [{length}]": reached * length_factor}),
             "repeat": sweep.repeat,
             f"stiffness [{stiffness}]": np.abs(sweep.stiffness) * factor,
             "loss factor [-]": loss_factor(sweep.stiffness),
         }
     )
+
+
+def raw_resonance_table(test: ResonanceTest) -> pd.DataFrame:
+    """A resonance test as a shaker's controller writes it: accelerations of base and mass, and their phase."""
+    import pandas as pd
+
+    return pd.DataFrame(
+        {
+            "frequency [Hz]": test.frequency,
+            "base acceleration [m/s^2]": test.base_acceleration,
+            "mass acceleration [m/s^2]": test.base_acceleration * np.abs(test.transmissibility),
+            "phase [deg]": np.degrees(np.angle(test.transmissibility)),
+        }
+    )
+
+
+def _as_stated(place: Place) -> Display:
+    """The units in which files of a place have displacement, force and stiffness; tensor strain is half of gamma."""
+    (unit, factor), force, stiffness = place.display
+    stated = place.stated_strain if isinstance(place, Specimen) else 1.0
+    return Display(Unit(unit, factor / stated), force, stiffness)

@@ -81,6 +81,59 @@ SWEEP_COLUMNS = {
         *("repeat", "repetition", "Wiederholung", "Wdh", "Messung", "répétition", "repetición", "重复"),
     ),
 }  # fmt: skip
+
+
+def _said(bodies: str, words: str) -> tuple[str, ...]:
+    """Every word, such as "acceleration", before and after every body, such as "base"; words and bodies part at |."""
+    return tuple(
+        way for body in bodies.split("|") for word in words.split("|") for way in (f"{body} {word}", word + body)
+    )
+
+
+#: Names of the base of a mount on a shaker.
+_BASE = (
+    "base|input|table|shaker|drive|excitation|control|Basis|Fußpunkt|Tisch|Anregung|Eingang|Anregungs|Fußpunkts"
+    "|de la base|d'entrée|entrée|de la table|d'excitation|excitation"
+)
+#: Names of the mass on it.
+_MASS = "mass|output|response|top|Masse|Massen|Antwort|Ausgang|de la masse|masse|de réponse|réponse|de sortie|sortie"
+_ACCELERATION = "acceleration|accel|acc|Beschleunigung|Beschl|accélération"
+_PHASE = "phase|phase angle|Phasenwinkel|déphasage"
+#: For each column of a resonance test (a mass on a mount on a shaker), the headers it goes by.
+RESONANCE_COLUMNS = {
+    "frequency": SWEEP_COLUMNS["frequency"],
+    "base_acceleration": _said(_BASE, _ACCELERATION),
+    "mass_acceleration": _said(_MASS, _ACCELERATION),
+    "base_phase": _said(_BASE, _PHASE),
+    "mass_phase": _said(_MASS, _PHASE),
+    "phase": (
+        *("phase", "phase angle", "phase difference", "relative phase", "transmissibility phase", "phase of T", "phi"),
+        *("Phasenwinkel", "Phasendifferenz", "Phasenverschiebung", "Phase Transmissibilität", "Phase Übertragung"),
+        *("déphasage", "angle de phase", "phase transmissibilité", "phase de la transmissibilité"),
+    ),
+    "transmissibility": (
+        *("transmissibility", "transmissibility magnitude", "transmissibility amplitude", "|T|", "transmission ratio"),
+        *("Transmissibilität", "Übertragungsfaktor", "Vergrößerungsfaktor", "Betrag Transmissibilität"),
+        *("transmissibilité", "module de la transmissibilité", "facteur de transmission"),
+    ),
+    "transmissibility_real": (
+        *("transmissibility real", "real transmissibility", "Re T", "real part of T", "Realteil T"),
+        *("Realteil Transmissibilität", "partie réelle transmissibilité"),
+    ),
+    "transmissibility_imaginary": (
+        *("transmissibility imaginary", "transmissibility imag", "imaginary transmissibility", "Im T"),
+        *("imaginary part of T", "Imaginärteil T", "Imaginärteil Transmissibilität"),
+        *("partie imaginaire transmissibilité",),
+    ),
+    **{
+        f"{role}_{part}": tuple(f"{name} {word}" for name in _said(bodies, _ACCELERATION) for word in words)
+        for role, bodies in (("base", _BASE), ("mass", _MASS))
+        for part, words in (
+            ("real", ("real", "re", "Realteil", "réel", "partie réelle")),
+            ("imaginary", ("imaginary", "imag", "im", "Imaginärteil", "imaginaire", "partie imaginaire")),
+        )
+    },
+}  # fmt: skip
 #: Words that tell where or how a channel was recorded, but not what it is.
 _ASIDES = re.compile(r"\b(?:axial|radial|torsional|measured|actual|gemessen|mesure|medido|ist)\b")
 #: For the roles that the symbol f may stand for, units by which it stands for the other one.

@@ -52,6 +52,19 @@ def source_of(
     return Source(listed_as or Path(file.name), sha256, {**(conditions or {}), **degrees})
 
 
+@dataclass(frozen=True)
+class Part:
+    """Where a loop stands in a record that holds several, one after the other.
+
+    Args:
+        first_row: row of the record that it begins with, from 0.
+        left_out: a sentence on what of the record around it belongs to no loop; None where all does.
+    """
+
+    first_row: int
+    left_out: str | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Loop:
     """A hysteresis loop, or any other record of time, displacement and force.
@@ -66,6 +79,9 @@ class Loop:
         source: the file it came from; None where it came from none.
         timed: whether time was recorded; else it was rebuilt from the displacement.
         weight: of the test in a fit, relative to that of others.
+        part: where it stands in a record of several loops; None where the record is one loop.
+        softening: by how much its first cycle is stiffer than its last, relative to the last; None where no more than
+            noise and the memory of rubber make.
 
     Raises:
         MeasurementError: arrays of different length.
@@ -80,6 +96,8 @@ class Loop:
     source: Source | None = None
     timed: bool = True
     weight: float = 1.0
+    part: Part | None = None
+    softening: float | None = None
 
     def __post_init__(self) -> None:
         _check_lengths(self.name, self.time, self.displacement, self.force)
@@ -136,9 +154,9 @@ class Sweep:
 
     @property
     def held(self) -> Floats:
-        """What every point of a run has in common, (n,): amplitude [m or rad] or frequency [Hz]; 0 where neither."""
+        """What every point of a run has in common, (n,): amplitude [m or rad] or frequency [Hz], or else its number."""
         if self.stepped is None:
-            return np.zeros_like(self.frequency)
+            return self.repeat.astype(float)
         return self.amplitude if self.stepped == "frequency" else self.frequency
 
     @property

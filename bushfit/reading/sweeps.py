@@ -12,6 +12,7 @@ from bushfit.geometry import Place
 from bushfit.reading.headers import SWEEP_COLUMNS, AmplitudeConvention, Column
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Complex, Floats, Sweep, source_of
+from bushfit.reading.runs import runs_of
 from bushfit.reading.table import Table
 
 #: The pairs of columns that each make a complex stiffness, in order of preference.
@@ -82,10 +83,22 @@ def read_sweep(
     _check_agreement(table, pair, values, stiffness)
     frequency, level = values["frequency"], to_peak * values["amplitude"]
     reached = to_peak * values["amplitude_reached"] if "amplitude_reached" in values else None
-    repeat = _repeats(table, wanted, values)
+    runs = runs_of(frequency, level, _repeats(table, wanted, values))
+    if reached is None and not np.array_equal(runs.amplitude, level):
+        reached = level
     source = source_of(file, listed_as, table.sha256, temperature, conditions)
     return Sweep(
-        name or file.stem, direction, frequency, level, stiffness, repeat, noise, source, reached, weight=weight
+        name or file.stem,
+        direction,
+        frequency,
+        runs.amplitude,
+        stiffness,
+        runs.repeat,
+        noise,
+        source,
+        reached,
+        runs.stepped,
+        weight=weight,
     )
 
 
@@ -206,14 +219,11 @@ def _complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> t
             return first + 1j * second, second / first
 
 
-def _repeats(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> NDArray[np.int64]:
-    """Number of each row's repeat, (n,): as its column has it, or else its count at this frequency and amplitude."""
-    if "repeat" in values:
-        repeat = values["repeat"]
-        is_count = (repeat == np.round(repeat)) & (repeat >= 0) & (repeat < _MOST_REPEATS)
-        table.refuse(~is_count, wanted["repeat"], "this is no repeat number", "a whole number")
-        return repeat.astype(np.int64)
-    import pandas as pd
-
-    points = pd.DataFrame({role: values[role] for role in ("frequency", "amplitude")})
-    return np.asarray(points.groupby(["frequency", "amplitude"]).cumcount(), dtype=np.int64) + 1
+def _repeats(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> NDArray[np.int64] | None:
+    """Number of each row's repeat as its column has it, (n,); None where there is none."""
+    if "repeat" not in values:
+        return None
+    repeat = values["repeat"]
+    is_count = (repeat == np.round(repeat)) & (repeat >= 0) & (repeat < _MOST_REPEATS)
+    table.refuse(~is_count, wanted["repeat"], "this is no repeat number", "a whole number")
+    return repeat.astype(np.int64)

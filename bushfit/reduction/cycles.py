@@ -96,7 +96,7 @@ class Cycles:
         if middle.size > 4:  # the record cuts the first and the last stroke short
             middle[[0, -1]] = 2.0 * middle[[1, -2]] - middle[[2, -3]]
         upward = np.flatnonzero((height[:-1] < middle) & (middle < height[1:]))
-        edges = _crossings(time, motion, turns, middle)[upward]
+        edges = middle_crossings(time, motion, turns, middle)[upward]
         peak, trough = height[upward[:-1] + 1], height[upward[:-1] + 2]
         return cls(time, edges, np.searchsorted(time, edges).astype(np.intp), peak - trough)
 
@@ -146,7 +146,7 @@ class Cycles:
         return np.where(sound, fundamental, rough)
 
 
-def _crossings(time: Floats, motion: Floats, turns: Integers, middle: Floats) -> Floats:
+def middle_crossings(time: Floats, motion: Floats, turns: Integers, middle: Floats) -> Floats:
     """Time at which each stroke from one turning point to the next crosses its middle [s], (strokes,)."""
     sense, length = np.sign(np.diff(motion[turns])), np.diff(turns)
     strokes = motion[turns[0] : turns[-1]]

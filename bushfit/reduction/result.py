@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.geometry import Place
-from bushfit.units import number
+from bushfit.units import for_people, number
 
 #: Relative distance of an amplitude from its level that is told; chosen: |K| may then be 1 % off.
 _MISSED_LEVEL = 0.03
@@ -18,6 +18,8 @@ _MISSED_LEVEL = 0.03
 _FEW_ROWS_PER_CYCLE = 12
 #: Harmonic distortion of the displacement from which a warning is due; chosen: rigs in order have less.
 _DISTORTED = 0.02
+#: Mean over the largest amplitude from which on it is told as a preload; chosen: sensors are off zero by less.
+_PRELOADED = 0.5
 #: Stretches without a point that are told one by one; chosen: about as many lines as a screen has room for.
 _MOST_TOLD = 5
 
@@ -40,6 +42,7 @@ class Step:
         displacement_distortion, force_distortion: total harmonic distortion, relative to the fundamental.
         nominal_frequency, level: frequency [Hz] and amplitude [m or rad] of the group of steps that it belongs to.
         repeat: number of this step among those at the same nominal frequency and level, from 1.
+        mean_displacement, mean_force: that the step was recorded about [m or rad, N or N m].
     """
 
     name: str
@@ -58,6 +61,8 @@ class Step:
     nominal_frequency: float = 0.0
     level: float = 0.0
     repeat: int = 1
+    mean_displacement: float = 0.0
+    mean_force: float = 0.0
 
     @property
     def loss_factor(self) -> float:
@@ -115,6 +120,7 @@ def _warnings(reduction: Reduction) -> Iterator[str]:
     steps = reduction.steps
     if reduction.outliers:
         yield f"{reduction.outliers} row{'s' * (reduction.outliers > 1)} far off the rows around left out"
+    yield from _preload(reduction)
     slope = _amplitude_slope(steps)
     for level in sorted({step.level for step in steps}):
         off = np.array([step.amplitude / level - 1.0 for step in steps if step.level == level])
@@ -146,6 +152,22 @@ def _warnings(reduction: Reduction) -> Iterator[str]:
         yield f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s makes no point: {skip.why}"
     if len(rejected) > _MOST_TOLD:
         yield f"{len(rejected) - _MOST_TOLD} more stretches make no point"
+
+
+def _preload(reduction: Reduction) -> Iterator[str]:
+    """A sentence on the means that the steps were recorded about, where they are no sensor's zero."""
+    (motion, force, _), units = reduction.direction.motion.words, reduction.direction.display
+    steps, means = reduction.steps, []
+    for word, unit, found, largest in (
+        (motion, units.displacement, [s.mean_displacement for s in steps], max(s.amplitude for s in steps)),
+        (force, units.force, [s.mean_force for s in steps], max(abs(s.stiffness) * s.amplitude for s in steps)),
+    ):
+        if abs(np.median(found)) > _PRELOADED * largest:
+            written, factor = for_people(*unit, max(found, key=abs))
+            ends = dict.fromkeys(number(factor * end, 3) for end in sorted((min(found), max(found)), key=abs))
+            means.append(f"a mean {word} of {' to '.join(ends)} {written}")
+    if means:
+        yield f"recorded about {' and '.join(means)}; the model knows no preload: the points are those about it"
 
 
 def _amplitude_slope(steps: Sequence[Step]) -> float:

@@ -184,6 +184,7 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
     rows = slice(cycles.first_rows[used.start], cycles.first_rows[used.stop])
     fit = HarmonicFit.of(history.time[rows], history.displacement[rows], history.force[rows], edges)
     x, f = fit.coefficients[:, 1]
+    errors, distortion = fit.errors().tolist(), fit.distortion().tolist()
     return Step(
         history.name,
         float(edges[0]),
@@ -194,8 +195,12 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
         fit.frequency,
         float(abs(x)),
         complex(f / x),
-        *fit.errors().tolist(),
-        *fit.distortion().tolist(),
+        gain_error=errors[0],
+        phase_error=errors[1],
+        displacement_distortion=distortion[0],
+        force_distortion=distortion[1],
+        mean_displacement=float(fit.solution[0, 0]),
+        mean_force=float(fit.solution[0, 1]),
     )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bushfit.effects.mistakes import candidate_named
+from bushfit.geometry import TRANSLATION
 from bushfit.reading.measurement import loss_factor
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
     from bushfit.model.model import Model
     from bushfit.prediction import Prediction
+    from bushfit.reduction.resonance import Resonance
     from bushfit.reduction.result import Reduction
 
 
@@ -167,6 +169,24 @@ def reduced_table(reduction: Reduction) -> pd.DataFrame:
     )
     order = [f"amplitude [{length}]", "repeat", "frequency [Hz]"]
     return frame.sort_values(order, ignore_index=True, kind="stable")
+
+
+def resonance_table(found: Resonance) -> pd.DataFrame:
+    """A resonance test reduced to a sweep: what the sweep reader takes, then what tells how each point came about."""
+    import pandas as pd
+
+    (length, length_factor), _, (stiffness, factor) = TRANSLATION.display
+    return pd.DataFrame(
+        {
+            "frequency [Hz]": found.frequency,
+            f"amplitude [{length}]": found.amplitude * length_factor,
+            f"stiffness [{stiffness}]": np.abs(found.stiffness) * factor,
+            "loss factor [-]": loss_factor(found.stiffness),
+            "relative error [-]": found.relative_error,
+            "transmissibility [-]": np.abs(found.transmissibility),
+            "rows averaged": found.rows,
+        }
+    )
 
 
 def spread(count: int, most: int) -> Array:

@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.random import Generator
 
-from bushfit.effects.mistakes import MISTAKES, Mistake, labelled
+from bushfit.effects.mistake import Mistake
+from bushfit.effects.mistakes import MISTAKES, labelled
 from bushfit.geometry import ROTATION, Direction
 from bushfit.reading.measurement import Complex, Floats, Loop, Sweep
 from bushfit.scorecard.hidden import Sealed, hidden_campaign

@@ -9,7 +9,17 @@ from itertools import cycle
 from typing import Any
 
 import numpy as np
-from spoiled_rows import IN_CAMPAIGN, IN_LOOP, IN_MODEL, IN_MORE, IN_SWEEP, USAGE, WHOLE_CAMPAIGNS, WHOLE_MODELS
+from spoiled_rows import (
+    IN_CAMPAIGN,
+    IN_LOOP,
+    IN_MODEL,
+    IN_MORE,
+    IN_RESONANCE,
+    IN_SWEEP,
+    USAGE,
+    WHOLE_CAMPAIGNS,
+    WHOLE_MODELS,
+)
 
 CAMPAIGN = """\
 [bushing]
@@ -44,6 +54,10 @@ amplitudes = ["0.1 mm"]
 torsion_amplitudes = ["0.5 deg"]
 directions = ["axial"]
 
+[[specimens]]
+name = "DMA"
+kind = "modulus"
+
 [simulate]
 seed = 1
 repeats = 3
@@ -69,6 +83,19 @@ frequency = "0.1 Hz"
 direction = "axial"
 amplitudes = ["0.1 mm"]
 frequencies = ["5 Hz", "15 Hz"]
+
+[[simulate.sweeps]]
+specimen = "DMA"
+amplitudes = ["0.1 %", "1 %", "5 %"]
+frequencies = ["10 Hz"]
+stepped = "amplitude"
+reached = "2 %"
+
+[[simulate.resonances]]
+direction = "radial"
+mass = "0.25 kg"
+base_acceleration = "0.1 g"
+frequencies = { start = "50 Hz", stop = "500 Hz", step = "10 Hz" }
 """
 MODEL: dict[str, Any] = {
     "schema": "bushfit/model/1",
@@ -103,12 +130,22 @@ def sweep() -> list[str]:
     return ["frequency [Hz],amplitude [mm],stiffness [N/mm],loss factor [-]", *rows]
 
 
+def shaker() -> list[str]:
+    """A mass of 0.5 kg on a mount of 1 kN/mm on a shaker."""
+    frequency = np.linspace(50.0, 400.0, 36)
+    ratio = 1.0 / (1.0 - 0.5 * (2.0 * np.pi * frequency) ** 2 / (1e6 * (1.0 + 0.1j)))
+    phase = np.degrees(np.angle(ratio))
+    rows = [f"{f:g},0.1000,{abs(0.1 * t):.4f},{p:.2f}" for f, t, p in zip(frequency, ratio, phase, strict=True)]
+    return ["frequency [Hz],base acceleration [g],mass acceleration [g],phase [deg]", *rows]
+
+
 FILES = {
     "campaign.toml": CAMPAIGN,
     "more.toml": CAMPAIGN + MORE,
     "model.json": json.dumps(MODEL, indent=1),
     "loop.csv": "\n".join(loop()) + "\n",
     "sweep.csv": "\n".join(sweep()) + "\n",
+    "shaker.csv": "\n".join(shaker()) + "\n",
 }
 READING = ("fit-static", "fit-dynamic", "fit", "diagnose", "run")
 TAKING_MODELS = (
@@ -174,6 +211,9 @@ def tables() -> Iterator[Spoiled]:
         yield Spoiled(f"loop: {name}", (next(commands), "campaign.toml"), tuple(says), {"loop.csv": change(loop())})
     for name, change, *says in IN_SWEEP:
         yield Spoiled(f"sweep: {name}", (next(commands), "campaign.toml"), tuple(says), {"sweep.csv": change(sweep())})
+    for name, change, *says in IN_RESONANCE:
+        command = ("reduce", "shaker.csv", "--mass", "0.5 kg", "--direction", "axial")
+        yield Spoiled(f"resonance: {name}", command, tuple(says), {"shaker.csv": change(shaker())})
 
 
 ROWS = [*campaigns(), *models(), *usage(), *tables()]

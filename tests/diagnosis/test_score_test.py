@@ -15,6 +15,7 @@ from bushfit.diagnosis.propose import proposals
 from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.search import critical_gain
 from bushfit.effects.contract import Array
+from bushfit.fitting.data_sets import parted
 
 LEVEL = 0.95
 SEEDS = 300
@@ -30,10 +31,12 @@ def with_residual(evidence: Evidence, residual: Array) -> Evidence:
 
 
 def with_freedom(evidence: Evidence, freedom: int) -> Evidence:
-    """The same fit, the shared variance of its sweeps known from so many degrees of freedom (0: exactly)."""
+    """The same fit, the shared variance of its sweeps known from so many degrees of freedom (0: exactly), and the
+    scatter exactly."""
+    _, sweeps = parted(evidence.data_sets)
+    noise = replace(sweeps[0].noise, freedom=freedom, scatter_freedom=0)
     data_sets = [
-        replace(data_set, noise=replace(data_set.noise, freedom=freedom)) if data_set.kind == "sweep" else data_set
-        for data_set in evidence.data_sets
+        replace(data_set, noise=noise) if data_set.kind == "sweep" else data_set for data_set in evidence.data_sets
     ]
     return replace(evidence, data_sets=tuple(data_sets))
 
@@ -88,10 +91,16 @@ def test_clean_campaigns_pass_the_thresholds_at_the_stated_rates(
     assert np.mean(candidates) < 0.02
 
 
+def blocks(evidence: Evidence) -> list[Array]:
+    """Indices of the residuals of each run."""
+    return [block for _, _, own in evidence.rigs for block in own]
+
+
 def blockwise(evidence: Evidence) -> tuple[Array, list[Array]]:
     """ScoreTest about every block: one column each, its mean."""
-    columns = np.zeros((len(evidence.blocks), evidence.residual.size))
-    for row, block in zip(columns, evidence.blocks, strict=True):
+    every = blocks(evidence)
+    columns = np.zeros((len(every), evidence.residual.size))
+    for row, block in zip(columns, every, strict=True):
         row[block] = 1.0
     return columns, [np.array([i]) for i in range(len(columns))]
 
@@ -103,10 +112,10 @@ def test_drawn_noise_passes_the_threshold_at_the_stated_rate(clean: Evidence, fr
     noise = random.standard_normal((count, clean.residual.size))
     if freedom:
         scale = np.sqrt(freedom / random.chisquare(freedom, count))[:, None]
-        for block in clean.blocks:
+        for block in blocks(clean):
             noise[:, block] += (scale - 1.0) * noise[:, block].mean(axis=1)[:, None]
     evidence = with_freedom(clean, freedom)
-    assert evidence.shared_freedom == freedom
+    assert max(freedoms.shared for freedoms, _, _ in evidence.rigs) == freedom
     threshold = ScoreTest(evidence, *blockwise(clean), PATTERN_LEFT).largest_by_chance(LEVEL)
     drawn = (ScoreTest(with_residual(evidence, row), *blockwise(clean), PATTERN_LEFT) for row in noise)
     share = float(np.mean([max(one.gains()) > threshold for one in drawn]))

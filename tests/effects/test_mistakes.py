@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from bushfit.effects import LIBRARY
 from bushfit.effects.contract import Level
-from bushfit.effects.mistakes import MISTAKES, candidate_named, mistake_named, shown
+from bushfit.effects.mistake import shown
+from bushfit.effects.mistakes import MISTAKES, candidate_named, mistake_named
 from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Direction
 from bushfit.reading.measurement import Loop, Source, Sweep

@@ -79,7 +79,7 @@ def test_repeats_without_a_common_frequency() -> None:
     sweep = Sweep("x", Direction.AXIAL, frequency, np.full(8, 1e-4), stiffness, np.array([1, 2] * 4))
     noise = sweep_noise([sweep])
     assert noise.origin == "assumed"
-    assert "no repeats of three frequencies or more" in noise.describe()
+    assert "no repeats of three points or more" in noise.describe()
 
 
 def test_missing_points_do_not_matter(noisy_sweep: Callable[..., Sweep]) -> None:

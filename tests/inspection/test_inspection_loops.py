@@ -90,8 +90,16 @@ LOOP_FAULTS: dict[str, tuple[Callable[[Loop], Loop], str]] = {
         "before its steady cycles are left out",
     ),
     "off zero": (
+        lambda x: replace(x, displacement=x.displacement + 3e-5),
+        "the motion is off zero by 0.03 mm, 3 % of its amplitude",
+    ),
+    "mean displacement": (
         lambda x: replace(x, displacement=x.displacement + 1e-4),
-        "the motion is off zero by 0.1 mm, 10 % of its amplitude",
+        "recorded about a mean displacement of 0.1 mm; the model knows no preload",
+    ),
+    "mean force": (
+        lambda x: replace(x, force=x.force + 820.0),
+        "recorded about a mean force of 820 N; the model knows no preload",
     ),
     "turned force": (lambda x: replace(x, force=-x.force), "the campaign needs force_sign = -1"),
 }

@@ -10,13 +10,15 @@ import pandas as pd
 import pytest
 from looking import NOISE, SEEDS, look, plan
 
+from bushfit.campaign.schema import SimulatedLoop, SimulateSettings
 from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
 from bushfit.inspection.draft import file_text
 from bushfit.inspection.opening import inspect
+from bushfit.model.model import Model
 from bushfit.reading.csvfile import raw_loop_table, raw_sweep_table
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.simulation import Undisturbed, measure
+from bushfit.simulation import Undisturbed, measure, simulate
 
 
 @pytest.mark.parametrize("rig", NOISE)
@@ -78,7 +80,7 @@ def test_a_history_points_to_reduce(root: Path) -> None:
     [
         (1.0, (1.0,), None),
         (5.0, (1.0,), "a motion at 5 Hz is taken for a loop"),
-        (0.1, (0.2, 0.6, 1.0), "a motion of several amplitudes is taken for a loop"),
+        (0.1, (0.2, 0.6, 1.0), None),
     ],
 )
 def test_one_sine_is_a_loop_however_fast(
@@ -96,6 +98,30 @@ def test_one_sine_is_a_loop_however_fast(
     told = [sentence for sentence in seen.looked.odd if "taken for a loop" in sentence]
     assert [sentence.startswith(said or "") for sentence in told] == [True] * bool(said)
     assert all("bushfit reduce" in sentence for sentence in told)
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_a_programme_of_loops_is_described(paper_model: Model, tmp_path: Path, *, timed: bool) -> None:
+    planned = SimulatedLoop(Direction.AXIAL, cycles=5, amplitudes=(2e-4, 5e-4, 1e-3), frequency=0.1, pause=12.0)
+    (record,) = simulate(paper_model, SimulateSettings(seed=1, force_noise=3e-3, loops=(planned,))).loops
+    table = raw_loop_table(record)
+    (table if timed else table.iloc[:, 1:]).to_csv(tmp_path / "axial.csv", index=False)
+    seen = inspect(tmp_path / "axial.csv", {} if timed else {"frequency": "0.1 Hz", "waveform": "sine"})
+    print(seen.looked.facts)
+    said = "3 loops in one record: 0.2, 0.5, 1 mm at 0.1 Hz, 4 to 5 cycles used of each; 25 % of the rows left out"
+    assert seen.kind == "loop"
+    assert seen.looked.facts["programme"] == said
+    assert seen.looked.facts["loop 2"].startswith("0.5 mm at 0.1 Hz, a sine; ")
+    assert seen.looked.facts["loop 2"].endswith("before its steady cycles are left out; 4 cycles are used")
+    assert tomllib.loads(file_text(seen, tmp_path))["loops"][0]["file"] == "axial.csv"
+
+
+def test_slow_loops_at_several_rates_are_no_stepped_sine(paper_model: Model, tmp_path: Path) -> None:
+    planned = SimulatedLoop(Direction.AXIAL, 5e-4, cycles=4, frequencies=(0.1, 0.3))
+    (record,) = simulate(paper_model, SimulateSettings(loops=(planned,))).loops
+    seen = look(tmp_path, record)
+    assert seen.kind == "loop"
+    assert seen.looked.facts["programme"].startswith("2 loops in one record: 0.5 mm at 0.1, 0.3 Hz")
 
 
 def damaged(values: np.ndarray, kind: int, random: np.random.Generator) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -232,6 +233,17 @@ def test_too_few_cycles_and_a_still_record_make_no_points() -> None:
     still = Loop("x", Direction.AXIAL, time, np.zeros_like(time), np.zeros_like(time))
     with pytest.raises(MeasurementError, match="does not go up and down"):
         reduce([still])
+
+
+def test_a_preload_is_told(clean: Stepped) -> None:
+    history = clean.measured(np.random.default_rng(4), 1e-4)
+    loaded = replace(history, displacement=history.displacement + 1.5e-3, force=history.force + 820.0)
+    plain, told = reduce([history]), reduce([loaded])
+    (sentence,) = (line for line in told.warnings if "preload" in line)
+    print(sentence)
+    assert sentence.startswith("recorded about a mean displacement of 1.5 mm and a mean force of 82")
+    assert not any("preload" in line for line in plain.warnings)
+    np.testing.assert_allclose(told.array("stiffness"), plain.array("stiffness"), rtol=1e-6)
 
 
 #: How data/cmp_15961_raw was made.

@@ -10,6 +10,7 @@ from bushfit.report.plots.gap import gap_figure
 from bushfit.report.plots.inspection import inspection_figure
 from bushfit.report.plots.prediction import fine_grid, prediction_figure
 from bushfit.report.plots.reduction import reduction_figure
+from bushfit.report.plots.resonance import resonance_figure
 from bushfit.report.plots.style import to_png
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "loops_figure",
     "prediction_figure",
     "reduction_figure",
+    "resonance_figure",
     "sweeps_figure",
     "to_png",
 ]

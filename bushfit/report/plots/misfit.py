@@ -101,9 +101,7 @@ def _map(model: Model, data_sets: Sequence[SweepData]) -> Map:
     points = Repeats.at(frequency, row)
     merged = max(np.unique(amplitude[row == level]).size for level in np.unique(row))
     deviation = -np.concatenate([data_set.deviation(model) for data_set in data_sets])
-    noise = np.array(
-        [data_set.noise.random[data_set.name, float(x)] for data_set in data_sets for x in data_set.amplitude]
-    )
+    noise = np.array([data_set.noise.random[data_set.name, float(x)] for data_set in data_sets for x in data_set.held])
     shared = np.array([data_set.noise.shared for data_set in data_sets for _ in data_set.amplitude])
     variance = np.square(noise) + np.square(shared)
     storage, loss = (

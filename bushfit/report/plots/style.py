@@ -6,7 +6,7 @@ import io
 import textwrap
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
@@ -119,12 +119,13 @@ def readable(axes: Axes, values: Array) -> None:
         logarithmic(axes, values)
 
 
-def logarithmic(axes: Axes, values: Array) -> None:
-    """Make the x axis logarithmic, with plain numbers."""
-    axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1, 3) if values.max() < _LOG_RATIO**2 * values.min() else (1,)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+def logarithmic(axes: Axes, values: Array, along: Literal["x", "y"] = "x") -> None:
+    """Make an axis logarithmic, with plain numbers."""
+    axis = {"x": axes.xaxis, "y": axes.yaxis}[along]
+    axes.set(**{f"{along}scale": "log"})
+    axis.set_major_locator(LogLocator(subs=(1, 3) if values.max() < _LOG_RATIO**2 * values.min() else (1,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def least_span(axes: Axes, least: float) -> None:

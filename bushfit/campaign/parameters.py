@@ -1,0 +1,79 @@
+"""Values of model parameters in a campaign file, by the names that they go by in files."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from bushfit.errors import CampaignError, naming
+from bushfit.units import quantity
+from bushfit.validation import unknown_key
+
+#: Size of a plain number at most: no parameter comes near it, and its square is still finite.
+_LARGEST_NUMBER = 1e100
+#: The second to the power of alpha, at the end of the unit of m.
+_S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
+
+
+def known_parameters() -> tuple[str, ...]:
+    """Names of all parameters of the library; a stiffness factor may have other places than are listed."""
+    from bushfit.effects import parameter_names
+
+    return parameter_names()
+
+
+def is_parameter(name: str) -> bool:
+    """Whether a key is the name of a parameter."""
+    from bushfit.effects import is_parameter
+
+    return is_parameter(name)
+
+
+def parameter_value(place: str, name: str, raw: Any) -> float:
+    """The SI value of a model parameter by its name in files; an error names the place.
+
+    Ratios, and parameters of added effects, may be plain numbers.
+    """
+    from bushfit.effects import parameter_named
+
+    with naming(place=place):
+        if not is_parameter(name):
+            raise unknown_key(name, known_parameters())
+        unit = _S_TO_ALPHA.sub("", parameter_named(name).unit)
+        is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
+        if is_number and (unit == "1" or "." in name) and abs(raw) <= _LARGEST_NUMBER:
+            return float(raw)
+        return quantity(_S_TO_ALPHA.sub("", raw) if name == "m" and isinstance(raw, str) else raw, unit)
+
+
+def parameter_values(raw: dict[str, Any]) -> dict[str, float]:
+    """Values by parameter, in SI."""
+    return {name: parameter_value(name, name, value) for name, value in raw.items()}
+
+
+def effect_values(raw: dict[str, Any]) -> dict[str, Any]:
+    """Values by effect and parameter, in SI."""
+    return {
+        effect: {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in table.items()}
+        if isinstance(table, dict)
+        else table
+        for effect, table in raw.items()
+    }
+
+
+def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
+    """Tables of value, min, max and vary by parameter, with the first three in SI."""
+    settings = {}
+    for name, table in raw.items():
+        if isinstance(table, dict):
+            given = [key for key in ("min", "value", "max") if key in table]
+            numbers = {key: parameter_value(f"{name}.{key}", name, table[key]) for key in given}
+            ordered = list(numbers.values())
+            if ordered != sorted(ordered) or numbers.get("min", -np.inf) == numbers.get("max", np.inf):
+                expected = "min below max, and value between them"
+                raise CampaignError("these limits hold no value", place=name, found=str(table), expected=expected)
+            table = {**table, **numbers}
+        settings[name] = table
+    return settings

@@ -1,0 +1,119 @@
+"""Runs of a sweep: what is stepped in it and what is held, and the levels that amplitudes as reached belong to.
+
+A run is what was recorded in one go: either the frequency is stepped and the amplitude held, or the reverse, or, where
+a mass swings on a mount, neither is held. Rigs miss what they are asked for: 0.0987 mm and 0.1004 mm are one level.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bushfit.reading.measurement import Floats, Stepped
+
+#: Span of a level in ln X at most; chosen: rigs in order miss a level by less than 4 % either way.
+_WIDEST_LEVEL = 0.08
+#: Distance in ln X from a level to the next over the span of a level, at least; chosen: below, they may be one.
+_LEAST_GAP = 3.0
+#: Span of the amplitudes of a pass over the frequencies in ln X, up to which it counts as held; chosen: a weak rig
+#: falls short by a third, and a mass on a mount moves through more.
+_WIDEST_PASS = 0.4
+#: Share of the rows, at least, with the frequency or the level of the row before, where one of them is held.
+_LEAST_HELD = 0.1
+#: Points of a run at least for its levels to be told by their place in it.
+_FEWEST_POINTS = 3
+
+
+class Runs(NamedTuple):
+    """What is stepped in a sweep, and its points as they were meant.
+
+    Args:
+        stepped: what changes within a run; None where neither is held.
+        amplitude: of the level of each point, (n,).
+        repeat: number of the repeat of each point, (n,); of the run where neither is held.
+    """
+
+    stepped: Stepped | None
+    amplitude: Floats
+    repeat: NDArray[np.int64]
+
+
+def runs_of(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | None) -> Runs:
+    """The runs of a sweep, from its points in the order of the file.
+
+    Args:
+        frequency: [Hz], (n,).
+        amplitude: as the file has it, nominal or as reached, (n,).
+        repeat: number of the repeat as the file has it, (n,); None where it has none: then what occurs again at a
+            frequency and level is a repeat.
+    """
+    levels = nominal(amplitude)
+    if (levels == amplitude).all():
+        levels = _by_rank(frequency, amplitude, repeat)
+    if np.mean((np.diff(frequency) == 0.0) | (np.diff(levels) == 0.0)) < _LEAST_HELD:
+        passes = repeat if repeat is not None else np.cumsum(np.append(False, np.diff(frequency) < 0.0)) + 1
+        if (of_passes := _of_passes(amplitude, _number(passes))) is None:
+            return Runs(None, amplitude, passes)
+        levels = of_passes
+    of_frequency, of_level = (np.unique(values).size for values in (frequency, levels))
+    counted = repeat if repeat is not None else _occurrence(frequency, levels)
+    return Runs("amplitude" if of_level > of_frequency else "frequency", levels, counted)
+
+
+def nominal(amplitude: Floats) -> Floats:
+    """The level of each amplitude, (n,): the median of those that lie together and far from all others.
+
+    Amplitudes that no gaps part into narrow levels of several points keep their own values.
+    """
+    distinct, place = np.unique(amplitude, return_inverse=True)
+    gaps = np.diff(np.log(distinct))
+    for gap in np.unique(gaps[gaps <= _WIDEST_LEVEL])[::-1]:
+        group = np.append(0, np.cumsum(gaps > gap))
+        span = max(float(np.ptp(np.log(distinct[group == one]))) for one in np.unique(group))
+        between = float(np.min(gaps, where=gaps > gap, initial=np.inf))
+        if span <= _WIDEST_LEVEL and between >= _LEAST_GAP * span and np.median(np.bincount(group)) > 1:
+            return _middle(amplitude, group[place])
+    return amplitude
+
+
+def _by_rank(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | None) -> Floats:
+    """The level of each amplitude by its place in its run, (n,), where all runs at all frequencies have as many.
+
+    Amplitudes keep their own values where there is one run alone, or where a level reaches into the next.
+    """
+    falls = np.append(False, (np.diff(amplitude) < 0.0) | (np.diff(frequency) != 0.0))
+    run = np.cumsum(falls) if repeat is None else _number(frequency, repeat)
+    counts = np.bincount(run)
+    if counts.size < 2 or np.ptp(counts[counts > 0]) > 0 or counts.max() < _FEWEST_POINTS:
+        return amplitude
+    order = np.lexsort((amplitude, run))
+    rank = np.empty(order.size, dtype=np.intp)
+    rank[order] = np.tile(np.arange(counts.max()), order.size // counts.max())
+    table = np.sort(amplitude[order].reshape(-1, counts.max()), axis=0)
+    return _middle(amplitude, rank) if (table[-1, :-1] < table[0, 1:]).all() else amplitude
+
+
+def _of_passes(amplitude: Floats, passes: NDArray[np.intp]) -> Floats | None:
+    """The level of each amplitude where every pass over the frequencies nearly keeps to one, (n,); else None."""
+    spans = [float(np.ptp(np.log(amplitude[passes == one]))) for one in np.unique(passes)]
+    return nominal(_middle(amplitude, passes)) if max(spans) < _WIDEST_PASS else None
+
+
+def _middle(values: Floats, group: NDArray[np.intp]) -> Floats:
+    """The median of the group of each value, (n,)."""
+    medians = np.array([np.median(values[group == one]) for one in range(group.max() + 1)])
+    return medians[group]
+
+
+def _number(*keys: Floats | NDArray[np.int64]) -> NDArray[np.intp]:
+    """A number from 0 for each combination of keys, (n,)."""
+    return np.unique(np.stack(keys), axis=1, return_inverse=True)[1].ravel()
+
+
+def _occurrence(*keys: Floats) -> NDArray[np.int64]:
+    """How often the keys of each row have occurred up to it, from 1, (n,)."""
+    import pandas as pd
+
+    return np.asarray(pd.DataFrame(dict(enumerate(keys))).groupby([*range(len(keys))]).cumcount(), dtype=np.int64) + 1

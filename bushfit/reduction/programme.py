@@ -1,0 +1,318 @@
+"""Loop programmes: a record of several amplitudes or rates, one after the other, parted into loops.
+
+The strokes of the motion, from one turning point to the next, are told apart by their range and by the time between
+the crossings of their middles. A run of alike ones is a part; ramps, pauses and single cycles between are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bushfit.errors import MeasurementError
+from bushfit.reading.loops import read_loop
+from bushfit.reading.measurement import Floats, Loop, Part, rebuild_time
+from bushfit.reduction.cycles import least_prominence, lone_outliers, middle_crossings, turning_points
+
+#: Rows that are enough to find the parts.
+_ENOUGH_ROWS = 200_000
+#: Relative difference of the ranges of two strokes up to which they are alike; chosen: rigs keep theirs better, and
+#: steps of a programme are larger.
+_SAME_RANGE = 0.03
+#: The same beyond noise, as a share of what a turning point stands out by, which is ten standard deviations.
+_NOISE_OF_RANGE = 0.3
+#: Relative difference of two half cycles up to which they are alike; chosen: rigs keep theirs better, and rates differ
+#: by more.
+_SAME_RATE = 0.08
+#: Strokes over which range and rate of a part are constant: two cycles.
+_STEADY_STROKES = 4
+#: Change over so many strokes, in units of what two that are alike may differ by, from which on a motion creeps.
+_MOST_CREEP = 1.5
+#: The same for a stroke up and the stroke down after it, which a drift of the mean parts.
+_MOST_DRIFT = 3.0
+#: Half cycles between crossings, fewer than which make no part: a whole cycle.
+_FEWEST_HALVES = 2
+#: Strokes from which on a record without a part is refused; chosen: two cycles show what changes.
+_FEWEST_CHANGING = 4
+#: [ln of a range] Difference between their ranges from which on it is; chosen: no rig misses its amplitude by a third.
+_CHANGING = 0.3
+#: Relative difference of the ranges of two parts up to which they have one amplitude; chosen: rigs step by more.
+_SAME_AMPLITUDE = 0.08
+#: Cycles between two parts alike up to which they are one that was disturbed; chosen: an outlier disturbs no more.
+_DISTURBED = 3.1
+#: Distance from its phase [cycles] up to which a motion goes on.
+_SAME_PHASE = 0.05
+#: Difference from the motion a period on up to which a part goes on at its ends, relative to its range.
+_SAME_MOTION = 0.05
+#: Share of a cycle from either end of the record up to which a part reaches to it.
+_AT_END = 0.1
+#: Cycles from which on the first one, which remembers what came before, goes: three, for what noise may take off them.
+_THREE = 2.95
+#: Cycles from which on first and last are held against each other.
+_TWO = 1.95
+#: Softening from which on it is told; chosen: less does not matter to a fit.
+_LEAST_SOFTENING = 0.02
+#: The same relative to the loss factor, for a part that begins from rest; chosen: the memory of a springpot and of
+#: friction makes up to 0.6 of it.
+_MEMORY_FROM_REST = 0.75
+#: The same for a part after other cycles; chosen: there they make up to 0.15 of it.
+_MEMORY = 0.25
+#: Standard errors beyond which a softening is none of noise.
+_CERTAIN = 6.0
+#: Harmonics that are fitted to a cycle of force; chosen: a loop of rubber has next to nothing beyond.
+_HARMONICS = 5
+#: Rows of a cycle that are enough for them.
+_ROWS_OF_CYCLE = 10_000
+#: Unknowns of such a fit: mean, slope, and two for each harmonic.
+_UNKNOWNS = 2 + 2 * _HARMONICS
+#: Keys of a loop in a campaign that settle its time where the file has none.
+_CLOCK = ("rate", "frequency", "waveform")
+
+
+@dataclass(frozen=True)
+class _Span:
+    """A part of a record: crossings of the middle it lies between, and what they settle.
+
+    Args:
+        begin, end: of its cycles, on the clock of the record.
+        period: of its cycles, on that clock.
+        range: peak to peak [m or rad].
+    """
+
+    begin: float
+    end: float
+    period: float
+    range: float
+
+    @property
+    def cycles(self) -> float:
+        """Number of its cycles."""
+        return (self.end - self.begin) / self.period
+
+    def like(self, other: _Span) -> bool:
+        """Whether two parts have one amplitude and one rate."""
+        ranges, periods = np.log(self.range / other.range), np.log(self.period / other.period)
+        return bool(abs(ranges) < _SAME_AMPLITUDE and abs(periods) < _SAME_RATE)
+
+
+def read_programme(**keywords: Any) -> tuple[Loop, ...]:
+    """The loops of a file, most often one: `read_loop` with these keywords, then `programme`."""
+    return programme(read_loop(**keywords), **clock_stated(keywords))
+
+
+def clock_stated(keywords: Mapping[str, Any]) -> dict[str, Any]:
+    """The keywords of `read_loop` that settle the time of a record without it."""
+    return {key: keywords[key] for key in _CLOCK if key in keywords}
+
+
+def programme(loop: Loop, **clock: Any) -> tuple[Loop, ...]:
+    """The loops of a record in their order: one for each part of constant amplitude and rate.
+
+    Args:
+        loop: the whole record.
+        clock: rate, frequency and waveform as `rebuild_time` takes them, for a record without time.
+
+    Returns:
+        The record itself where it has but one amplitude and rate, whatever comes before and after; else its parts,
+        which keep the time of the record. A softening is told of each.
+
+    Raises:
+        MeasurementError: amplitude or rate change all the time, so that no two cycles are alike.
+
+    Notes:
+        The first part of a record that begins with it keeps all its cycles; of any other the first cycle, which still
+        remembers what came before, is left out where two more are left.
+    """
+    time, motion = _thinned(loop)
+    spans = _spans(loop, time, motion)
+    if not spans:
+        return (loop,)
+    if all(span.like(spans[0]) for span in spans[1:]):
+        return (replace(loop, softening=_softening(loop, spans[0], from_rest=True)),)
+    return tuple(_loops(loop, time, spans, clock))
+
+
+def _thinned(loop: Loop) -> tuple[Floats, Floats]:
+    """Time [s], or number of the row where none was recorded, and displacement of rows enough to find the parts."""
+    every = slice(None, None, -(-loop.displacement.size // _ENOUGH_ROWS))
+    time, motion = _clock(loop)[every], loop.displacement[every]
+    sound = ~lone_outliers(time, motion)
+    return time[sound], motion[sound]
+
+
+def _clock(loop: Loop) -> Floats:
+    """Time of each row [s], or its number where no time was recorded, (n,)."""
+    return loop.time if loop.timed else np.arange(loop.displacement.size, dtype=float)
+
+
+def _spans(loop: Loop, time: Floats, motion: Floats) -> list[_Span]:
+    """The parts of a motion.
+
+    Raises:
+        MeasurementError: there are cycles, but no two alike.
+    """
+    least = least_prominence(motion)
+    turns = turning_points(motion, least)
+    if turns.size < 2 + _FEWEST_HALVES:
+        return []
+    height = motion[turns]
+    size = np.abs(np.diff(height))
+    across = middle_crossings(time, motion, turns, (height[1:] + height[:-1]) / 2.0)
+    found: list[_Span] = []
+    for strokes in _alike(size, _SAME_RANGE * size + _NOISE_OF_RANGE * least):
+        halves = np.diff(across[strokes])
+        for run in _alike(halves, _SAME_RATE * halves):
+            if run.stop - run.start >= _FEWEST_HALVES:
+                first, last = strokes.start + run.start, strokes.start + run.stop
+                period = 2.0 * float(across[last] - across[first]) / (last - first)
+                part = float(np.median(size[first : last + 1]))
+                found.append(_Span(float(across[first]), float(across[last]), period, part))
+    if not found:
+        _check_not_changing(loop, size[1:-1])
+    joined: list[_Span] = []
+    for span in found:
+        goes_on = bool(joined) and _goes_on(joined[-1], span)
+        joined[-1:] = [replace(joined[-1], end=span.end)] if goes_on else [*joined[-1:], span]
+    limits = [time[0], *(span.end for span in joined)], [*(span.begin for span in joined), time[-1]]
+    return [
+        _to_its_ends(span, time, motion, float(before), float(after))
+        for span, before, after in zip(joined, limits[0][:-1], limits[1][1:], strict=True)
+    ]
+
+
+def _check_not_changing(loop: Loop, size: Floats) -> None:
+    """Refuse a record without a part whose strokes, of these ranges [m or rad], go up and down by ever other amounts.
+
+    Raises:
+        MeasurementError: they do.
+    """
+    if size.size >= _FEWEST_CHANGING and np.ptp(np.log(size)) > _CHANGING:
+        unit, factor = loop.direction.display.displacement
+        raise MeasurementError(
+            "no part of the record is a loop",
+            file=loop.source.file if loop.source else loop.name,
+            found=f"{size.size / 2.0:.2g} cycles from {factor * size.min() / 2.0:.3g} to "
+            f"{factor * size.max() / 2.0:.3g} {unit}, no two in a row alike",
+            expected="at least two cycles of one amplitude and rate",
+            hint="record more cycles of each amplitude, best five",
+        )
+
+
+def _alike(values: Floats, reach: Floats) -> Iterator[slice]:
+    """Runs of two or more values, (n,), each within its `reach`, (n,), of its neighbours, and of what comes after.
+
+    Up and down may differ by more, which a drift makes, where each is like the next of its kind.
+    """
+    other = np.abs(np.diff(values)) > np.minimum(reach[1:], reach[:-1])
+    of_a_kind = np.concatenate(([False], np.abs(values[2:] - values[:-2]) <= reach[2:], [False]))
+    drifts = (of_a_kind[1:] | of_a_kind[:-1]) & (np.abs(np.diff(values)) <= _MOST_DRIFT * reach[1:])
+    for run in _runs(other & ~drifts):
+        own, ahead = values[run], _STEADY_STROKES
+        creeping = np.flatnonzero(np.abs(own[ahead:] - own[:-ahead]) > _MOST_CREEP * reach[run][ahead:])
+        changes = np.zeros(own.size - 1, dtype=bool)
+        for step in range(ahead):
+            changes[creeping + step] = True
+        for part in _runs(changes):
+            yield slice(run.start + part.start, run.start + part.stop)
+
+
+def _runs(changes: NDArray[np.bool_]) -> list[slice]:
+    """Slices of two or more entries between the changes, (n - 1,), of n entries."""
+    border = np.concatenate(([0], 1 + np.flatnonzero(changes), [changes.size + 1]))
+    return [slice(int(a), int(b)) for a, b in pairwise(border) if b - a > 1]
+
+
+def _goes_on(one: _Span, other: _Span) -> bool:
+    """Whether a part is the one before it, which a disturbance broke off."""
+    gap = (other.begin - one.end) / one.period
+    return one.like(other) and gap < _DISTURBED and abs(2.0 * gap - round(2.0 * gap)) < 2.0 * _SAME_PHASE
+
+
+def _to_its_ends(span: _Span, time: Floats, motion: Floats, before: float, after: float) -> _Span:
+    """A part with the half cycle that lies beyond its crossings on either side, where that is as a period on.
+
+    Args:
+        span: between its crossings.
+        time: of the rows, (n,).
+        motion: displacement of the rows [m or rad], (n,).
+        before: where the part before it ends, or the record begins.
+        after: where the part after it begins, or the record ends.
+    """
+    begin, end = max(span.begin - span.period / 2.0, before), min(span.end + span.period / 2.0, after)
+
+    def same(low: float, high: float, shift: float) -> bool:
+        rows = slice(*np.searchsorted(time, [low, high]))
+        off = np.abs(motion[rows] - np.interp(time[rows] + shift, time, motion))
+        return float(np.quantile(off, 0.9)) < _SAME_MOTION * span.range if off.size else True
+
+    begin = begin if same(begin, span.begin, span.period) else span.begin
+    end = end if same(span.end, end, -span.period) else span.end
+    near = _AT_END * span.period
+    return replace(
+        span,
+        begin=float(time[0]) if begin - time[0] < near else begin,
+        end=float(time[-1]) if time[-1] - end < near else end,
+    )
+
+
+def _loops(loop: Loop, time: Floats, spans: Sequence[_Span], clock: dict[str, Any]) -> Iterator[Loop]:
+    """A loop for each part, with what was left out between them."""
+    whole, every = _clock(loop), ("time", "displacement", "force")
+    last_end = float(time[0])
+    for number, span in enumerate(spans, start=1):
+        begin = span.begin
+        if begin > time[0] and span.cycles > _THREE:
+            begin += span.period
+        ends = np.searchsorted(whole, [begin, span.end])
+        rows = slice(int(ends[0]), int(ends[1]) + (span.end == time[-1]))
+        left_out = [
+            f"{f'{gap:.3g} s' if loop.timed else f'{gap:.0f} rows'} {where} its steady cycles"
+            for gap, where in ((begin - last_end, "before"), (time[-1] - span.end, "after"))
+            if gap > _AT_END * span.period and (where == "before" or number == len(spans))
+        ]
+        cycles = (span.end - begin) / span.period
+        said = f"{' and '.join(left_out)} are left out; {cycles:.3g} cycles are used" if left_out else None
+        part = replace(
+            loop,
+            **{name: getattr(loop, name)[rows] for name in every},
+            name=f"{loop.name}_part_{number}",
+            part=Part(rows.start, said),
+            softening=_softening(loop, span, from_rest=number == 1),
+        )
+        yield part if loop.timed else replace(part, time=rebuild_time(part.displacement, **clock))
+        last_end = span.end
+
+
+def _softening(loop: Loop, span: _Span, *, from_rest: bool) -> float | None:
+    """By how much the first cycle of a part is stiffer than its last; None where that is chance or what rubber keeps
+    in memory of what came before, which any model has."""
+    if span.cycles < _TWO:
+        return None
+    first, first_error = _stiffness(loop, span.begin, span.period)
+    last, last_error = _stiffness(loop, span.end - span.period, span.period)
+    softening = abs(first / last) - 1.0
+    remembered = (_MEMORY_FROM_REST if from_rest else _MEMORY) * abs(last.imag / last.real)
+    least = max(_LEAST_SOFTENING, remembered, _CERTAIN * float(np.hypot(first_error, last_error)))
+    return softening if softening > least else None
+
+
+def _stiffness(loop: Loop, begin: float, period: float) -> tuple[complex, float]:
+    """Complex stiffness of the cycle that begins then [N/m or N m/rad], and its relative error."""
+    clock = _clock(loop)
+    first, last = np.searchsorted(clock, [begin, begin + period])
+    rows = slice(first, last, max(1, (last - first) // _ROWS_OF_CYCLE))
+    phase = (clock[rows] - begin) / period
+    if phase.size <= _UNKNOWNS:
+        return 1.0, np.inf
+    turn = np.exp(2j * np.pi * np.outer(phase, np.arange(1, _HARMONICS + 1)))
+    columns = np.column_stack((np.ones_like(phase), phase, turn.real, -turn.imag))
+    values = np.column_stack((loop.displacement[rows], loop.force[rows]))
+    solution = np.linalg.lstsq(columns, values, rcond=None)[0]
+    x, force = solution[2] + 1j * solution[2 + _HARMONICS]
+    scatter = float(np.std(values[:, 1] - columns @ solution[:, 1]))
+    return complex(force / x), scatter * np.sqrt(2.0 / (phase.size - _UNKNOWNS)) / float(abs(force))

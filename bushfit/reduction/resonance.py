@@ -1,0 +1,266 @@
+"""Stiffness from resonance tests: a mass M on a mount whose base is shaken with a sine (base excitation).
+
+With the complex transmissibility T, acceleration of the mass over that of the base, the mount's stiffness is
+K = M omega^2 T/(T - 1), and its deformation |T - 1| times the base's displacement. An error dT makes the relative error
+dK/K = dT/(T (T - 1)): K is known well where |T - 1| is large, from somewhat below the resonance on, and badly below.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bushfit.errors import MeasurementError
+from bushfit.reading.measurement import Complex, Floats, Sweep
+from bushfit.reading.resonance import ResonanceTest
+
+#: Points that a test is thinned to; chosen: some twenty lie within the resonance, and a fit has no use for more.
+MOST_POINTS = 100
+#: Relative standard error of K beyond which a point is left out; chosen: it tells no fit anything.
+LARGEST_ERROR = 0.2
+#: Share of the information in a test that has to lie on one side of zero loss, for the sign of the phases to show.
+_CLEAR_SHARE = 0.8
+#: [-] Mean loss factor below which the phases show no loss; chosen: a tenth of what little-damping rubber has.
+_LEAST_LOSS_FACTOR = 0.005
+#: Points about which a smooth curve is laid, at least; chosen: twice the four terms that it has.
+_FEWEST_POINTS = 8
+#: Neighbours whose scatter gives the error of a point; chosen: enough for a median, few enough to be local.
+_NEIGHBOURS = 15
+#: Median of the magnitude of complex scatter over the standard deviation of its parts, sqrt(2 ln 2).
+_MEDIAN_TO_SIGMA = 1.1774100225154747
+#: Standard deviations from which a point pulls less on the smooth curve (Huber's).
+_PULLS_LESS = 2.0
+#: Rounds in which the weights of the smooth curve settle; chosen: they change by per cents after five.
+_ROUNDS = 10
+#: Halvings of the interval of a response; its width of up to 20 in ln X then is 2e-14.
+_HALVINGS = 50
+
+
+@dataclass(frozen=True, eq=False)
+class Resonance:
+    """What a resonance test was reduced to: points with the amplitude that each reached and its standard error.
+
+    Args:
+        test: as measured.
+        mass: that moves on the mount [kg].
+        turned: whether the test counts phases the other way (loss is positive here).
+        frequency: [Hz], (k,).
+        amplitude: of the mount's deformation, zero-to-peak [m], (k,).
+        stiffness: complex [N/m], (k,).
+        relative_error: standard deviation of the real and of the imaginary part of K, relative to |K|, (k,).
+        rows: number of rows that each point is the mean of, (k,).
+        left_out: frequencies of points whose error is beyond LARGEST_ERROR [Hz], (j,).
+    """
+
+    test: ResonanceTest
+    mass: float
+    turned: bool
+    frequency: Floats
+    amplitude: Floats
+    stiffness: Complex
+    relative_error: Floats
+    rows: NDArray[np.intp]
+    left_out: Floats
+
+    @property
+    def peak(self) -> tuple[float, float]:
+        """Frequency of the largest transmissibility [Hz], and this |T|."""
+        place = int(np.argmax(np.abs(self.test.transmissibility)))
+        return float(self.test.frequency[place]), float(abs(self.test.transmissibility[place]))
+
+    @property
+    def transmissibility(self) -> Complex:
+        """Complex T of each point [-], (k,), with loss that lags behind."""
+        return transmissibility(self.stiffness, self.mass, self.frequency)
+
+    @property
+    def sweep(self) -> Sweep:
+        """The points as a sweep in which neither frequency nor amplitude is held."""
+        test, error = self.test, self.relative_error
+        points = self.frequency, self.amplitude, self.stiffness
+        return Sweep(test.name, test.direction, *points, source=test.source, stepped=None, relative_error=error)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on points left out, the sign of the phases, and a resonance that was not reached."""
+        return tuple(_warnings(self))
+
+
+def _warnings(found: Resonance) -> Iterator[str]:
+    """Sentences on points left out, the sign of the phases, and a resonance that was not reached."""
+    left, total = found.left_out, found.left_out.size + found.frequency.size
+    if left.size:
+        yield (
+            f"{left.size} of {total} points left out, {left.min():.4g} to {left.max():.4g} Hz: the standard error of K "
+            f"is beyond {100 * LARGEST_ERROR:g} % there, because the mass moves almost as the base does"
+        )
+    if found.turned:
+        yield "the phases of this file count the other way: taken with the sign that makes the loss positive"
+    frequency, largest = found.peak
+    if frequency in (found.test.frequency[0], found.test.frequency[-1]):
+        yield f"no resonance: |T| is largest, {largest:.3g}, at the end of the sweep ({frequency:.4g} Hz)"
+
+
+def _refused(test: ResonanceTest, problem: str, expected: str, hint: str, found: str) -> MeasurementError:
+    """The error for a test that cannot be used."""
+    return MeasurementError(problem, file=test.source.file, found=found, expected=expected, hint=hint)
+
+
+def transmissibility(stiffness: Complex, mass: float, frequency: Floats) -> Complex:
+    """Complex transmissibility T = K/(K - M omega^2) of a mass on a mount whose base moves [-], (n,).
+
+    Args:
+        stiffness: complex K [N/m], (n,).
+        mass: M [kg].
+        frequency: [Hz], (n,).
+    """
+    return stiffness / (stiffness - mass * (2.0 * np.pi * frequency) ** 2)
+
+
+def response(
+    stiffness: Callable[[Floats], Complex], mass: float, frequency: Floats, base_amplitude: Floats
+) -> tuple[Floats, Complex]:
+    """Amplitude X of a mount [m] and its transmissibility [-], (n,) each, where the stiffness depends on X itself.
+
+    Args:
+        stiffness: complex K [N/m], (n,), at the frequencies for zero-to-peak amplitudes of the mount [m], (n,).
+        mass: that moves on the mount [kg].
+        frequency: [Hz], (n,).
+        base_amplitude: displacement of the base, zero-to-peak [m], (n,).
+
+    Notes:
+        Solves X = |T(K(X)) - 1| X_base by halving an interval of ln X. Should a mount be so soft that several X do, as
+        with a jump between two branches of a resonance, this is one of them.
+    """
+    inertia = mass * (2.0 * np.pi * frequency) ** 2
+
+    def excess(amplitude: Floats) -> Floats:
+        return amplitude * np.abs(stiffness(amplitude) - inertia) - inertia * base_amplitude
+
+    low = high = np.asarray(base_amplitude, dtype=float)
+    while (above := excess(low) > 0.0).any():
+        low = np.where(above, low / 2.0, low)
+    while (below := excess(high) < 0.0).any():
+        high = np.where(below, high * 2.0, high)
+    for _ in range(_HALVINGS):
+        middle = np.sqrt(low * high)
+        above = excess(middle) > 0.0
+        low, high = np.where(above, low, middle), np.where(above, middle, high)
+    amplitude = np.sqrt(low * high)
+    return amplitude, transmissibility(stiffness(amplitude), mass, frequency)
+
+
+def reduce_resonance(test: ResonanceTest, mass: float) -> Resonance:
+    """Stiffness over frequency and amplitude reached, from a resonance test.
+
+    Args:
+        test: at least a dozen rows.
+        mass: that moves on the mount [kg].
+
+    Raises:
+        MeasurementError: phases that show no loss whichever way they count, a storage stiffness below zero, or no point
+            of which the error is within LARGEST_ERROR.
+
+    Notes:
+        Rows next to each other are averaged to MOST_POINTS points: their flexibility 1/K = (1 - 1/T)/(M omega^2), in
+        which an error of T counts as it is however small |T - 1|. The relative standard error of T is the scatter of
+        these points about a smooth curve (see `_scatter`), so errors that neighbouring rows of a slow sweep share count
+        in full; what all points share, such as the gain of an accelerometer, shows only as far as no smooth stiffness
+        takes it up, and a wrong mass not at all: it is in no error here.
+    """
+    turned = _is_turned(test)
+    ratio = np.conj(test.transmissibility) if turned else test.transmissibility
+    count = min(test.frequency.size, MOST_POINTS)
+    starts = np.arange(count) * test.frequency.size // count
+    rows = np.diff(np.append(starts, test.frequency.size))
+
+    def mean(values: NDArray[Any]) -> NDArray[Any]:
+        return np.add.reduceat(values, starts) / rows
+
+    omega = 2.0 * np.pi * test.frequency
+    frequency = mean(test.frequency)
+    flexibility: Complex = mean((1.0 - 1.0 / ratio) / (mass * omega**2))
+    amplitude = mean(np.abs(ratio - 1.0) * test.base_acceleration / omega**2)
+    moving = flexibility != 0.0
+    stiffness = np.where(moving, flexibility, 1.0 + 0j) ** -1
+    thinned = transmissibility(stiffness, mass, frequency)
+    error = np.full(count, np.inf)
+    if np.count_nonzero(moving) >= _FEWEST_POINTS:
+        around = _scatter(frequency[moving], amplitude[moving], thinned[moving])
+        error[moving] = around / np.abs(thinned[moving] - 1.0)
+    kept = (error <= LARGEST_ERROR) & (stiffness.real > 0.0)
+    if not kept.any():
+        raise _refused(
+            test,
+            "no point of this test tells the stiffness",
+            f"a standard error of K of at most {100 * LARGEST_ERROR:g} % somewhere",
+            "sweep through the resonance, or look at the accelerations: they scatter",
+            found=f"{100 * error.min():.3g} % at best",
+        )
+    return Resonance(
+        test, mass, turned, frequency[kept], amplitude[kept], stiffness[kept], error[kept], rows[kept], frequency[~kept]
+    )
+
+
+def _is_turned(test: ResonanceTest) -> bool:
+    """Whether the phases count the other way: with them, the loss is below zero.
+
+    Rows count by (ln |T|)^2: most at the resonance and far above it, where they tell K well, and the same should base
+    and mass be swapped, which then shows as a stiffness below zero.
+    """
+    ratio = test.transmissibility
+    flexibility = (1.0 - 1.0 / ratio) / test.frequency**2
+    weight = np.log(np.abs(ratio)) ** 2
+    weight /= max(float(weight.sum()), np.finfo(float).tiny)
+    share = float(np.sum(weight[flexibility.imag < 0.0]))
+    loss = -float(np.sum(weight * np.sin(np.angle(flexibility))))
+    if max(share, 1.0 - share) < _CLEAR_SHARE or abs(loss) < _LEAST_LOSS_FACTOR:
+        raise _refused(
+            test,
+            "the phases show no loss, whichever way they count",
+            "a mass that lags behind the base through the whole resonance",
+            "check the unit of the phases, deg or rad, and that they are those of base and mass",
+            found=f"a mean loss factor of {loss:.2g}, above zero in {100 * share:.0f} % of what the test tells",
+        )
+    positive = float(np.sum(weight[flexibility.real > 0.0]))
+    if positive < _CLEAR_SHARE:
+        raise _refused(
+            test,
+            "the stiffness comes out below zero",
+            "a mass that moves with the base at low frequency, and more around the resonance",
+            "check that base and mass are not swapped, and that no phase is off by 180 deg",
+            found=f"a stiffness above zero in {100 * positive:.0f} % of what the test tells",
+        )
+    return loss < 0.0
+
+
+def _scatter(frequency: Floats, amplitude: Floats, ratio: Complex) -> Floats:
+    """Standard deviation of the real and of the imaginary part of dT/T at each point, (k,), by what lies around it.
+
+    Args:
+        frequency: [Hz], (k,).
+        amplitude: [m], (k,).
+        ratio: transmissibility, complex [-], (k,).
+
+    Notes:
+        1/T = 1 - M omega^2/K is linear in the flexibility 1/K. That is fitted over all points by a function linear in
+        ln f and quadratic in ln X, by least squares of dT/T with Huber's weights; the scatter is the median of |dT/T|
+        about it over the nearest _NEIGHBOURS points. Where the true stiffness bends more, this counts as scatter too.
+    """
+    logs = [np.log(values) - np.mean(np.log(values)) for values in (frequency, amplitude)]
+    terms = np.stack([np.ones_like(frequency), *logs, logs[1] ** 2], axis=1)
+    design = terms * (np.abs(ratio) * frequency**2)[:, None]
+    measured = (1.0 - 1.0 / ratio) * np.abs(ratio)
+    weight = np.ones_like(frequency)
+    for _ in range(_ROUNDS):
+        root = np.sqrt(weight)
+        left = np.abs(measured - design @ np.linalg.lstsq(root[:, None] * design, root * measured, rcond=None)[0])
+        sigma = np.median(left) / _MEDIAN_TO_SIGMA
+        weight = np.minimum(1.0, _PULLS_LESS * sigma / np.maximum(left, np.finfo(float).tiny))
+    nearest = np.argsort(np.abs(np.log(frequency)[:, None] - np.log(frequency)), axis=1, kind="stable")[:, :_NEIGHBOURS]
+    freedom = frequency.size / (frequency.size - terms.shape[1])
+    return np.median(left[nearest], axis=1) / _MEDIAN_TO_SIGMA * np.sqrt(freedom)

@@ -1,0 +1,288 @@
+"""Records of several amplitudes or rates: the parts that are found, their order, and fits to them. All is simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bushfit.campaign.schema import SimulatedLoop, SimulateSettings
+from bushfit.diagnosis.workflow import diagnose
+from bushfit.effects.contract import Array
+from bushfit.errors import MeasurementError
+from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import LoopData
+from bushfit.fitting.drive import drive_of
+from bushfit.fitting.procedures import fit_joint
+from bushfit.geometry import Direction
+from bushfit.model import rig
+from bushfit.model.model import Model
+from bushfit.reading.measurement import Loop
+from bushfit.reduction.programme import programme
+from bushfit.simulation import simulate
+
+STEP = 0.01
+NOISE = SimulateSettings(seed=2, force_noise=3e-3, displacement_noise=2e-4)
+
+
+def cycles(count: float, size: float, frequency: float = 0.1, start: float = 0.0, shape: str = "sine") -> Array:
+    """A motion of so many cycles and mm."""
+    return 1e-3 * size * rig.wave(shape, start + np.arange(0.0, count, STEP * frequency))
+
+
+def ramp(first: float, last: float, seconds: float) -> Array:
+    return 1e-3 * np.linspace(first, last, int(seconds / STEP), endpoint=False)
+
+
+def hold(seconds: float) -> Array:
+    return np.zeros(int(seconds / STEP))
+
+
+def recorded(model: Model, *motions: Array, seed: int = 0, noise: float = 3e-3) -> Loop:
+    """Motions one after the other from rest, with noise relative to the largest force."""
+    motion, random = np.concatenate(motions), np.random.default_rng(seed)
+    clean = rig.imposed(model, Direction.AXIAL, motion, STEP, 0.1)
+    jitter = 2e-4 * np.abs(motion).max() * random.standard_normal(motion.size)
+    scatter = noise * np.abs(clean.force).max() * random.standard_normal(motion.size)
+    return Loop("loop", Direction.AXIAL, clean.time, motion + jitter, clean.force + scatter)
+
+
+#: Motions, and amplitude [mm] and frequency [Hz] of each part that is to be found in them.
+PROGRAMMES: dict[str, tuple[Sequence[Array], Sequence[tuple[float, float]]]] = {
+    "three amplitudes": ([cycles(5, x) for x in (0.2, 0.5, 1)], [(0.2, 0.1), (0.5, 0.1), (1, 0.1)]),
+    "three cycles": ([cycles(3, x) for x in (0.2, 0.5, 1)], [(0.2, 0.1), (0.5, 0.1), (1, 0.1)]),
+    "two cycles": ([cycles(2, x) for x in (0.2, 0.5, 1)], [(0.2, 0.1), (0.5, 0.1), (1, 0.1)]),
+    "triangles": (
+        [cycles(4, x, shape="triangle") for x in (0.2, 0.5, 1)],
+        [(0.2, 0.1), (0.5, 0.1), (1, 0.1)],
+    ),
+    "up and down": (
+        [cycles(3, x) for x in (0.2, 0.5, 1, 0.5, 0.2)],
+        [(x, 0.1) for x in (0.2, 0.5, 1, 0.5, 0.2)],
+    ),
+    "pauses": (
+        [hold(5), cycles(5, 0.2), hold(10), cycles(5, 0.5), hold(20), cycles(5, 1), hold(5)],
+        [(0.2, 0.1), (0.5, 0.1), (1, 0.1)],
+    ),
+    "ramps between peaks": (
+        [cycles(4, 0.2, start=0.25), ramp(0.2, 1, 3), cycles(4, 1, start=0.25), ramp(1, 0, 9)],
+        [(0.2, 0.1), (1, 0.1)],
+    ),
+    "rates": ([cycles(5, 0.5, f) for f in (0.1, 0.2, 0.05)], [(0.5, 0.1), (0.5, 0.2), (0.5, 0.05)]),
+    "rates changed at the peak": (
+        [cycles(5, 0.5, f, start=0.25, shape="triangle") for f in (0.1, 0.2, 0.05)],
+        [(0.5, 0.1), (0.5, 0.2), (0.5, 0.05)],
+    ),
+    "amplitudes at two rates": (
+        [cycles(4, x, f) for f in (0.1, 0.3) for x in (0.2, 0.5, 1)],
+        [(x, f) for f in (0.1, 0.3) for x in (0.2, 0.5, 1)],
+    ),
+    "one speed": (
+        [cycles(3, x, 0.04 / x, shape="triangle") for x in (0.2, 0.5, 1)],
+        [(x, 0.04 / x) for x in (0.2, 0.5, 1)],
+    ),
+    "growing between": (
+        [*(cycles(n, x) for n, x in ((4, 0.2), (1, 0.3), (1, 0.4), (4, 0.5), (1, 0.7), (4, 1)))],
+        [(0.2, 0.1), (0.5, 0.1), (1, 0.1)],
+    ),
+    "very unlike": ([cycles(4, 0.02), cycles(4, 2)], [(0.02, 0.1), (2, 0.1)]),
+    "close": ([cycles(5, x) for x in (0.8, 0.9, 1)], [(0.8, 0.1), (0.9, 0.1), (1, 0.1)]),
+    "one comes again": ([cycles(4, x) for x in (1, 0.3, 1)], [(1, 0.1), (0.3, 0.1), (1, 0.1)]),
+    "about a mean": (
+        [ramp(0, 1.5, 20), 1.5e-3 + cycles(4, 0.2), 1.5e-3 + cycles(4, 0.5)],
+        [(0.2, 0.1), (0.5, 0.1)],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", PROGRAMMES)
+def test_each_steady_part_is_a_loop_in_its_order(paper_model: Model, case: str) -> None:
+    motions, expected = PROGRAMMES[case]
+    record = recorded(paper_model, *motions)
+    loops = programme(record)
+    drives = [drive_of(loop) for loop in loops]
+    for drive in drives:
+        print(f"{drive.loop.name}: {1e3 * drive.amplitude:.4f} mm, {drive.frequency:.4f} Hz, {drive.notes}")
+    assert [loop.name for loop in loops] == [f"loop_part_{number}" for number in range(1, len(expected) + 1)]
+    assert [1e3 * drive.amplitude for drive in drives] == pytest.approx([x for x, _ in expected], rel=5e-3)
+    assert [drive.frequency for drive in drives] == pytest.approx([f for _, f in expected], rel=2e-3)
+    for loop in loops:
+        assert loop.part is not None
+        rows = slice(loop.part.first_row, loop.part.first_row + loop.force.size)
+        np.testing.assert_array_equal(loop.force, record.force[rows])
+
+
+@pytest.mark.parametrize("case", ["three cycles", "pauses", "amplitudes at two rates", "one comes again"])
+def test_the_true_model_leaves_little_but_noise_of_each_part(paper_model: Model, case: str) -> None:
+    largest = 0.0
+    for loop in programme(recorded(paper_model, *PROGRAMMES[case][0], noise=1e-4)):
+        drive = drive_of(loop)
+        gap = float(np.sqrt(np.mean(np.square(LoopData(drive).relative(paper_model)))))
+        print(f"{case}, {loop.name}: true model within {100 * gap:.2f} % of half the force range")
+        assert gap < (5e-3 if drive.amplitude > 0.99 * largest else 2e-2)  # rubber remembers larger parts before
+        largest = max(largest, drive.amplitude)
+
+
+@pytest.mark.parametrize("case", ["three amplitudes", "up and down", "pauses", "rates", "one speed"])
+def test_without_time_parts_are_the_same(paper_model: Model, case: str) -> None:
+    motions, expected = PROGRAMMES[case]
+    loops = programme(replace(recorded(paper_model, *motions), timed=False), rate=1e-4)
+    sizes = [drive_of(loop).amplitude for loop in loops]
+    assert [1e3 * size for size in sizes] == pytest.approx([x for x, _ in expected], rel=1e-2)
+    for loop, size in zip(loops, sizes, strict=True):
+        assert drive_of(loop).frequency == pytest.approx(1e-4 / (4.0 * size), rel=2e-2)
+
+
+ALONE: dict[str, Sequence[Array]] = {
+    "from rest": [cycles(4, 1)],
+    "one cycle": [cycles(1, 1, start=0.25)],
+    "smaller cycles before": [cycles(1, 0.3), cycles(1, 0.6), cycles(4, 1)],
+    "broken by a hold": [cycles(4, 1), hold(30), cycles(4, 1)],
+    "a hole": [cycles(4, 1)],
+    "a ramp and a hold": [ramp(0, 1, 3), np.full(2000, 1e-3), cycles(4, 1, start=0.25)],
+}
+
+
+@pytest.mark.parametrize("case", ALONE)
+def test_one_amplitude_and_rate_is_the_record_itself(paper_model: Model, case: str) -> None:
+    record = recorded(paper_model, *ALONE[case])
+    if case == "a hole":
+        kept = np.r_[0:1500, 2600 : record.time.size]
+        record = replace(record, **{name: getattr(record, name)[kept] for name in ("time", "displacement", "force")})
+    (loop,) = programme(record)
+    assert (loop.name, loop.part, loop.softening) == ("loop", None, None)
+    assert (loop.time, loop.displacement, loop.force) == (record.time, record.displacement, record.force)
+
+
+def test_a_drift_of_the_mean_parts_nothing(paper_model: Model) -> None:
+    record = recorded(paper_model, *PROGRAMMES["three amplitudes"][0])
+    drifting = replace(record, displacement=record.displacement + np.linspace(0.0, 2e-5, record.time.size))
+    assert len(programme(drifting)) == 3
+    one = recorded(paper_model, cycles(15, 0.3))
+    (same,) = programme(replace(one, displacement=one.displacement + np.linspace(0.0, 3e-4, one.time.size)))
+    assert same.part is None
+
+
+@pytest.mark.parametrize("scatter", [0.005, 0.01, 0.02])
+def test_a_rig_that_misses_its_amplitude_makes_no_parts(scatter: float) -> None:
+    counts = []
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        for sizes in ((1.0,), (0.2, 0.5, 1.0)):
+            reached = [x * (1.0 + scatter * random.standard_normal()) for x in sizes for _ in range(8)]
+            motion = np.concatenate([cycles(1, x) for x in reached])
+            loop = Loop("loop", Direction.AXIAL, STEP * np.arange(motion.size), motion, 5e5 * motion)
+            counts.append(len(programme(loop)) == len(sizes))
+    print(f"cycles that scatter by {100 * scatter:g} %: parted rightly {sum(counts)} times of {len(counts)}")
+    assert sum(counts) >= 39
+
+
+def test_amplitudes_that_change_all_the_time_are_refused(paper_model: Model) -> None:
+    record = recorded(paper_model, *(cycles(1, x) for x in (0.2, 0.4, 0.6, 0.8, 1)))
+    with pytest.raises(MeasurementError, match="no part of the record is a loop"):
+        programme(record)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.lists(st.floats(0.1, 2.0), min_size=2, max_size=5),
+    st.integers(3, 6),
+    st.floats(0.0, 1.0),
+    st.sampled_from(["sine", "triangle"]),
+    st.booleans(),
+)
+def test_any_programme(sizes: list[float], count: int, start: float, shape: str, rests: bool) -> None:
+    """Of any amplitudes, phase and waveform; a sensor's force stands for the rubber's, which is not looked at."""
+    if any(abs(np.log(one / other)) < 0.15 for one, other in pairwise(sizes)):
+        return
+    motions = [part for x in sizes for part in (hold(7.0 * rests), cycles(count, x, start=start, shape=shape))]
+    motion = np.concatenate(motions)
+    loop = Loop("loop", Direction.AXIAL, STEP * np.arange(motion.size), motion, 5e5 * motion)
+    found = [float(np.ptp(part.displacement)) * 500.0 for part in programme(loop)]
+    assert found == pytest.approx(sizes, rel=5e-3)
+
+
+def virgin(loop: Loop, share: float) -> Loop:
+    """The first cycle of each of three parts of five cycles stiffer by a share, as rubber is that never went so far."""
+    at = loop.time / 10.0 % 5.0
+    return replace(loop, force=loop.force * np.where(at < 1.0, 1.0 + share, 1.0))
+
+
+def test_a_softening_is_told_of_each_part(paper_model: Model) -> None:
+    loops = programme(virgin(recorded(paper_model, *PROGRAMMES["three amplitudes"][0]), 0.12))
+    found = [100.0 * (loop.softening or 0.0) for loop in loops]
+    print("first cycle stiffer by", ", ".join(f"{value:.1f} %" for value in found), "of 12 %")
+    assert found == pytest.approx([12.0] * 3, abs=4.0)  # with what a springpot and friction make from rest
+    assert any("stiffer than the last (Mullins)" in note for note in drive_of(loops[1]).notes)
+    (one,) = programme(virgin(recorded(paper_model, cycles(5, 1)), 0.12))
+    assert one.softening == pytest.approx(0.12, abs=0.03)
+
+
+def test_a_softening_in_the_virgin_cycles_of_a_programme_is_diagnosed(paper_model: Model) -> None:
+    """Later parts of the record are past it, though each is a loop of its own."""
+    values = {"mullins_softening.share": 0.2, "mullins_softening.cycles": 1.0}
+    softening = paper_model.with_effect("mullins_softening", values)
+    loop = SimulatedLoop(Direction.AXIAL, cycles=5, amplitudes=(2e-4, 5e-4, 1e-3), frequency=0.1, pause=12.0)
+    data = Data.of(simulate(softening, replace(NOISE, loops=(loop,))).campaign())
+    found = diagnose(data)
+    share = found.result.model.values["mullins_softening.share"]
+    print(f"{found.verdict}: {[effect.name for effect in found.effects]}, share {share:.3f} of 0.2")
+    assert [effect.name for effect in found.effects] == ["mullins_softening"]
+    assert share == pytest.approx(0.2, abs=0.02)
+
+
+@pytest.mark.parametrize("case", ["three amplitudes", "pauses", "up and down"])
+def test_what_rubber_remembers_is_no_softening(paper_model: Model, other_models: dict[str, Model], case: str) -> None:
+    for model in (paper_model, *other_models.values()):
+        assert {loop.softening for loop in programme(recorded(model, *PROGRAMMES[case][0]))} == {None}
+
+
+@pytest.mark.parametrize(
+    ("motion", "force", "said"),
+    [
+        (1.5e-3, 820.0, "recorded about a mean displacement of 1.5 mm and a mean force of 820 N; the model knows no"),
+        (0.0, 820.0, "recorded about a mean force of 820 N; the model knows no preload"),
+        (-1.5e-3, 0.0, "recorded about a mean displacement of -1.5 mm; the model knows no preload"),
+    ],
+)
+def test_a_preloaded_loop_is_fitted_about_its_mean(paper_model: Model, motion: float, force: float, said: str) -> None:
+    plan = replace(NOISE, loops=tuple(SimulatedLoop(Direction.AXIAL, x, 0.1) for x in (2e-4, 5e-4, 1e-3)))
+    campaign = simulate(paper_model, plan).campaign()
+    loaded = [replace(x, displacement=x.displacement + motion, force=x.force + force) for x in campaign.loops]
+    plain, preloaded = (fit_joint(Data.of(replace(campaign, loops=loops))) for loops in (campaign.loops, loaded))
+    told = [line for line in preloaded.warnings if said in line]
+    print(told[0])
+    assert [line.partition(":")[0] for line in told] == [loop.name for loop in loaded]
+    assert not any("preload" in line for line in plain.warnings)
+    for name in ("mu", "sigma_fmax", "eps_half"):
+        assert preloaded.model.values[name] == pytest.approx(plain.model.values[name], rel=5e-3)
+
+
+def test_a_stiffness_other_to_either_side_is_no_preload(paper_model: Model) -> None:
+    """It makes a mean force as large as its second harmonic, which the diagnosis looks for."""
+    loop = recorded(paper_model, cycles(4, 1, start=0.25))
+    uneven = replace(loop, force=loop.force + 0.7 * np.ptp(loop.force) * np.square(loop.displacement / 1e-3))
+    assert np.mean(uneven.force) > 0.25 * np.ptp(uneven.force) / 2.0
+    assert drive_of(uneven).datum is None
+
+
+def test_a_programme_fits_as_its_loops_in_files_of_their_own(paper_model: Model) -> None:
+    sizes, rates = (2e-4, 5e-4, 1e-3), (0.02, 0.5)
+    whole = SimulatedLoop(Direction.AXIAL, cycles=4, amplitudes=sizes, frequencies=rates)
+    single = tuple(SimulatedLoop(Direction.AXIAL, x, f, cycles=3) for f in rates for x in sizes)
+    results = []
+    for loops in ((whole,), single):
+        simulated = simulate(paper_model, replace(NOISE, loops=loops))
+        data = Data.of(simulated.campaign())
+        assert len(data.loops) == 6
+        results.append(fit_joint(data))
+        assert [outlier for outlier in results[-1].outliers if outlier.distance > 6.0] == []
+    for name in ("mu", "sigma_fmax", "eps_half"):
+        one, other = (result.model.values[name] for result in results)
+        print(f"{name}: {one:.4g} of the programme, {other:.4g} of single loops, {paper_model.values[name]:.4g} true")
+        assert one == pytest.approx(other, rel=0.02)

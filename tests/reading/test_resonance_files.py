@@ -1,0 +1,129 @@
+"""Resonance tests as shakers and laboratories write them: one test, simulated, in many files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bushfit.errors import BushfitError
+from bushfit.geometry import Direction
+from bushfit.reading.headers import RESONANCE_COLUMNS
+from bushfit.reading.resonance import ResonanceTest, is_resonance, read_resonance
+from bushfit.reading.table import Table
+from bushfit.reduction.resonance import transmissibility
+
+#: [m/s^2] Standard gravity.
+G = 9.80665
+FREQUENCY = np.linspace(50.0, 400.0, 60)
+RATIO = transmissibility(np.full(60, 1e6 * (1 + 0.1j)), 0.5, FREQUENCY)
+BASE = 2.0 + 0.01 * FREQUENCY
+PHASE = 0.3
+
+
+def written(folder: Path, header: str, *columns: np.ndarray, mark: str = ",", decimal: str = ".") -> Path:
+    rows = [
+        mark.join(f"{value:.9g}".replace(".", decimal) for value in row)
+        for row in zip(FREQUENCY, *columns, strict=True)
+    ]
+    file = folder / "shaker.csv"
+    file.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    return file
+
+
+def read(file: Path, base_acceleration: float | None = None) -> ResonanceTest:
+    table = Table.open(file, RESONANCE_COLUMNS)
+    assert is_resonance(table)
+    return read_resonance(table, Direction.AXIAL, base_acceleration)
+
+
+MASS = BASE * np.abs(RATIO)
+ANGLE = np.angle(RATIO)
+
+
+@pytest.mark.parametrize(
+    ("header", "columns"),
+    [
+        (
+            "freq_hz,base_accel_ms2,base_phase_rad,mass_accel_ms2,mass_phase_rad",
+            (BASE, PHASE + 0 * BASE, MASS, PHASE + ANGLE),
+        ),
+        (
+            "Frequency [Hz],Base acceleration [g],Mass acceleration [g],Phase [deg]",
+            (BASE / G, MASS / G, np.degrees(ANGLE)),
+        ),
+        ("Frequency (Hz),Input Acc. (G),Output Acc. (G),Phase Angle (deg)", (BASE / G, MASS / G, np.degrees(ANGLE))),
+        ("f [Hz],|T| [-],phase [rad],base acceleration [m/s²]", (np.abs(RATIO), ANGLE, BASE)),
+        ("f [Hz],Re T,Im T,base acceleration [mm/s^2]", (RATIO.real, RATIO.imag, 1e3 * BASE)),
+        (
+            "f [Hz],base accel real [g],base accel imag [g],mass accel real [g],mass accel imag [g]",
+            (BASE / G, 0 * BASE, MASS / G * np.cos(ANGLE), MASS / G * np.sin(ANGLE)),
+        ),
+        (
+            "f [Hz],base acceleration pk-pk [g],mass acceleration pk-pk [g],phase [rad]",
+            (2 * BASE / G, 2 * MASS / G, ANGLE),
+        ),
+        (
+            "fréquence [Hz],accélération de la base [m/s2],accélération de la masse [m/s2],déphasage [deg]",
+            (BASE, MASS, np.degrees(ANGLE)),
+        ),
+    ],
+)
+def test_one_test_in_many_files(tmp_path: Path, header: str, columns: tuple) -> None:
+    test = read(written(tmp_path, header, *columns))
+    assert np.allclose(test.frequency, FREQUENCY)
+    assert np.allclose(test.transmissibility, RATIO, rtol=1e-6)
+    assert np.allclose(test.base_acceleration, BASE, rtol=1e-6)
+
+
+def test_a_german_file(tmp_path: Path) -> None:
+    header = "Frequenz [Hz];Fußpunktbeschleunigung [g];Massenbeschleunigung [g];Phasenwinkel [Grad]"
+    test = read(written(tmp_path, header, BASE / G, MASS / G, np.degrees(ANGLE), mark=";", decimal=","))
+    assert np.allclose(test.transmissibility, RATIO, rtol=1e-6)
+    assert np.allclose(test.base_acceleration, BASE, rtol=1e-6)
+
+
+def test_rows_are_sorted_by_frequency(tmp_path: Path) -> None:
+    file = written(tmp_path, "f [Hz],|T|,phase [rad]", np.abs(RATIO), ANGLE)
+    lines = file.read_text().splitlines()
+    file.write_text("\n".join([lines[0], *lines[:0:-1]]) + "\n")
+    test = read(file, 1.5)
+    assert np.allclose(test.frequency, FREQUENCY)
+    assert np.allclose(test.transmissibility, RATIO, rtol=1e-6)
+    assert set(test.base_acceleration) == {1.5}
+
+
+@pytest.mark.parametrize(
+    ("header", "base", "said"),
+    [
+        ("f [Hz],|T|,phase [rad]", None, "how strongly the base was shaken"),
+        ("f [Hz],|T|,phase", 1.0, "the phase has no unit"),
+        ("f [Hz],base acceleration,phase [rad]", None, "no complex transmissibility"),
+        ("f [Hz],base acceleration [N],mass acceleration [g]", None, "no complex transmissibility"),
+    ],
+)
+def test_what_a_file_does_not_say_is_asked_for(tmp_path: Path, header: str, base: float | None, said: str) -> None:
+    with pytest.raises(BushfitError, match=said):
+        read(written(tmp_path, header, np.abs(RATIO), ANGLE), base)
+
+
+def test_an_acceleration_without_unit_is_refused(tmp_path: Path) -> None:
+    header = "f [Hz],base acceleration,mass acceleration,phase [rad]"
+    with pytest.raises(BushfitError, match="the base acceleration has no unit") as refused:
+        read(written(tmp_path, header, BASE, MASS, ANGLE))
+    assert "an acceleration, such as m/s^2" in str(refused.value)
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0])
+def test_values_that_cannot_be_are_refused(tmp_path: Path, value: float) -> None:
+    mass = MASS.copy()
+    mass[7] = value
+    header = "f [Hz],mass acceleration [g],phase [rad],base acceleration [g]"
+    with pytest.raises(BushfitError, match=r"line 9.*: the mass acceleration is not positive"):
+        read(written(tmp_path, header, mass, ANGLE, BASE))
+
+
+def test_other_tests_are_no_resonance_tests(root: Path) -> None:
+    for name in ("sweep_axial.csv", "loop_axial_1.csv"):
+        assert not is_resonance(Table.open(root / "data/cmp_15961" / name, RESONANCE_COLUMNS))

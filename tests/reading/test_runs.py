@@ -1,0 +1,73 @@
+"""What is stepped in a sweep, and the levels of amplitudes as they were reached."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bushfit.reading.runs import nominal, runs_of
+
+AMPLITUDES = np.geomspace(1e-5, 1e-3, 15)
+FREQUENCIES = np.array([5.0, 20.0, 80.0])
+
+
+def swept(amplitudes: np.ndarray, frequencies: np.ndarray, repeats: int, scatter: float, seed: int) -> list[np.ndarray]:
+    """Frequency, amplitude reached, amplitude meant and repeat of amplitude sweeps, in the order they were recorded."""
+    random = np.random.default_rng(seed)
+    frequency, repeat, meant = (
+        axis.ravel() for axis in np.meshgrid(frequencies, np.arange(1, repeats + 1), amplitudes, indexing="ij")
+    )
+    return [frequency, meant * (1.0 + scatter * random.uniform(-1.0, 1.0, meant.size)), meant, repeat]
+
+
+@settings(deadline=None)
+@given(st.integers(1, 3), st.sampled_from([0.0, 1e-3, 0.01, 0.03, 0.08]), st.integers(0, 10_000), st.booleans())
+def test_amplitude_sweeps_as_reached_have_their_levels_back(
+    repeats: int, scatter: float, seed: int, numbered: bool
+) -> None:
+    frequency, reached, meant, repeat = swept(AMPLITUDES, FREQUENCIES, repeats, scatter, seed)
+    runs = runs_of(frequency, reached, repeat if numbered else None)
+    assert runs.stepped == "amplitude"
+    assert np.array_equal(runs.repeat, repeat)
+    assert np.unique(runs.amplitude).size == AMPLITUDES.size
+    assert np.allclose(runs.amplitude, meant, rtol=scatter + 1e-12)
+
+
+def test_a_frequency_sweep_that_misses_its_levels_holds_them_all_the_same() -> None:
+    random = np.random.default_rng(1)
+    amplitude, frequency = (x.ravel() for x in np.meshgrid([1e-4, 2e-4, 5e-4], np.arange(5.0, 156.0, 10.0)[::1]))
+    runs = runs_of(frequency, amplitude * (1.0 + 0.02 * random.uniform(-1.0, 1.0, amplitude.size)), None)
+    assert runs.stepped == "frequency"
+    assert np.unique(runs.amplitude).size == 3
+    assert (runs.repeat == 1).all()
+
+
+def test_a_mass_on_a_mount_holds_neither_and_each_pass_is_a_run() -> None:
+    frequency = np.tile(np.linspace(100.0, 300.0, 50), 2)
+    amplitude = 1e-5 / (1.0 + ((frequency - 200.0) / 20.0) ** 2) * np.repeat([1.0, 3.0], 50)
+    runs = runs_of(frequency, amplitude, None)
+    assert runs.stepped is None
+    assert np.array_equal(runs.repeat, np.repeat([1, 2], 50))
+    assert np.array_equal(runs.amplitude, amplitude)
+
+
+@pytest.mark.parametrize(
+    "amplitude",
+    [
+        pytest.param(np.geomspace(1e-5, 1e-3, 40), id="dense"),
+        pytest.param(np.array([1e-4, 1.1e-4, 1.48e-4, 1.63e-4]), id="uneven"),
+        pytest.param(np.array([1e-4, 2e-4, 5e-4]), id="nominal"),
+        pytest.param(np.array([1e-4]), id="one"),
+    ],
+)
+def test_amplitudes_that_nothing_groups_are_their_own_levels(amplitude: np.ndarray) -> None:
+    assert np.array_equal(nominal(amplitude), amplitude)
+
+
+def test_a_frequency_sweep_that_falls_short_by_a_quarter_is_one_run() -> None:
+    frequency = np.geomspace(0.01, 100.0, 28)
+    runs = runs_of(frequency, 0.15 * frequency**-0.03, None)
+    assert runs.stepped == "frequency"
+    assert np.unique(runs.amplitude).size == 1

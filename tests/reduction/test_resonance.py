@@ -1,0 +1,218 @@
+"""Resonance tests, simulated with a known stiffness and reduced again; and the measured ones in data/measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bushfit.effects.contract import Array
+from bushfit.errors import MeasurementError
+from bushfit.geometry import Direction
+from bushfit.model.model import Model
+from bushfit.reading.headers import RESONANCE_COLUMNS
+from bushfit.reading.measurement import Source
+from bushfit.reading.resonance import ResonanceTest, read_resonance
+from bushfit.reading.table import Table
+from bushfit.reduction.resonance import (
+    LARGEST_ERROR,
+    MOST_POINTS,
+    Resonance,
+    reduce_resonance,
+    response,
+    transmissibility,
+)
+
+#: [kg] and [m/s^2]: the paper's bushing then has its resonance near 165 Hz, at some 0.1 mm.
+MASS, BASE = 0.6, 20.0
+#: Masses of the measured tests [g], and of the discs that move with each.
+MEASURED, DISCS = (118, 253, 573, 1196), 14.8
+
+
+def shaken(model: Model, rows: int, noise: Callable[[int], Array] | None = None) -> ResonanceTest:
+    """A test of the paper's bushing from 60 to 500 Hz, simulated; `noise` of T is relative."""
+    frequency = np.geomspace(60.0, 500.0, rows)
+    base = BASE / (2.0 * np.pi * frequency) ** 2
+    _, ratio = response(lambda x: model.stiffness(Direction.AXIAL, frequency, x), MASS, frequency, base)
+    if noise:
+        ratio = ratio * (1.0 + noise(rows) + 1j * noise(rows))
+    return ResonanceTest("t", Direction.AXIAL, frequency, ratio, np.full(rows, BASE), Source(Path("t.csv"), ""))
+
+
+def misses(found: Resonance, model: Model) -> Array:
+    """What the points miss the stiffness by at their frequency and amplitude, relative to |K|, complex, (k,)."""
+    truth = model.stiffness(Direction.AXIAL, found.frequency, found.amplitude)
+    return found.stiffness / truth - 1.0
+
+
+@given(st.floats(1e4, 1e7), st.floats(0.01, 1.0), st.floats(0.0, 0.9), st.floats(1e-3, 1.0), st.floats(1e-7, 1e-3))
+def test_a_response_solves_its_equation(stiffness: float, loss: float, softer: float, half: float, base: float) -> None:
+    """X = |T(K(X)) - 1| X_base, for a stiffness that falls with X from K to (1 - softer) K."""
+    resonance = np.sqrt(stiffness / 0.5) / (2.0 * np.pi)
+    frequency = resonance * np.array([0.1, 0.5, 0.9, 1.0, 1.1, 2.0, 10.0])
+
+    def of_amplitude(x: Array) -> Array:
+        return stiffness * (1.0 - softer * x / (x + half)) * (1.0 + 1j * loss)
+
+    amplitude, ratio = response(of_amplitude, 0.5, frequency, np.full(7, base))
+    assert np.allclose(ratio, transmissibility(of_amplitude(amplitude), 0.5, frequency), rtol=1e-12)
+    assert np.allclose(amplitude, np.abs(ratio - 1.0) * base, rtol=1e-9)
+
+
+@pytest.mark.parametrize("rows", [40, 2000])
+def test_a_clean_test_gives_the_stiffness_back(paper_model: Model, rows: int) -> None:
+    found = reduce_resonance(shaken(paper_model, rows), MASS)
+    off = np.abs(misses(found, paper_model))
+    print(f"{rows} rows without noise: |K| and phase of {off.size} points within {off.max():.1e} of K")
+    assert off.size == min(rows, MOST_POINTS)
+    assert off.max() < (1e-12 if rows < MOST_POINTS else 1e-3)
+    assert found.rows.sum() == rows
+    assert not found.turned
+    assert found.warnings == ()
+
+
+def wandering(random: np.random.Generator, sigma: float) -> Callable[[int], Array]:
+    """Noise that neighbouring rows share: white noise averaged over a thirtieth of the rows."""
+
+    def noise(rows: int) -> Array:
+        width = rows // 30
+        return (
+            sigma
+            * np.sqrt(width)
+            * np.convolve(random.standard_normal(rows + width - 1), np.ones(width) / width, "valid")
+        )
+
+    return noise
+
+
+@pytest.mark.parametrize(
+    ("rows", "sigma", "shared", "least", "most"),
+    [
+        (40, 0.01, False, 0.92, 0.98),
+        (100, 0.02, False, 0.93, 0.98),
+        (2000, 0.05, False, 0.93, 0.99),
+        (2000, 0.01, True, 0.9, 0.98),
+    ],
+)
+def test_standard_errors_cover_what_points_miss(
+    paper_model: Model, rows: int, sigma: float, shared: bool, least: float, most: float
+) -> None:
+    """Also where neighbouring rows share their errors, as those of a slow sweep do."""
+    off, of_size = [], []
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        noise = wandering(random, sigma) if shared else lambda n, r=random: sigma * r.standard_normal(n)
+        found = reduce_resonance(shaken(paper_model, rows, noise), MASS)
+        missed = misses(found, paper_model) / found.relative_error
+        off += [missed.real, missed.imag]
+        of_size.append(float(np.median(found.relative_error)))
+    covered = float(np.mean(np.abs(np.concatenate(off)) < 1.96))
+    kind = "shared by neighbours" if shared else "of each row by itself"
+    print(
+        f"{rows} rows, {100 * sigma:g} % noise {kind}: 95 % intervals cover {100 * covered:.1f} % over 40 seeds, "
+        f"median standard error {100 * np.median(of_size):.2f} % of K"
+    )
+    assert least < covered < most
+
+
+def test_phases_that_count_the_other_way_are_told(paper_model: Model) -> None:
+    test = shaken(paper_model, 60)
+    found = reduce_resonance(test, MASS)
+    turned = reduce_resonance(replace(test, transmissibility=np.conj(test.transmissibility)), MASS)
+    assert np.allclose(turned.stiffness, found.stiffness)
+    assert turned.turned
+    assert ["count the other way" in sentence for sentence in turned.warnings] == [True]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (np.abs, "the phases show no loss"),
+        (lambda ratio: np.abs(ratio) * np.exp(1j * np.degrees(np.angle(ratio))), "the phases show no loss|below zero"),
+        (lambda ratio: 1.0 / ratio, "below zero"),
+        (lambda ratio: ratio * np.exp(2j * np.pi * np.random.default_rng(1).uniform(size=ratio.size)), "show no loss"),
+    ],
+    ids=["no phase", "degrees as radians", "swapped", "random phases"],
+)
+def test_what_shows_no_loss_is_refused(paper_model: Model, spoil: Callable[[Array], Array], said: str) -> None:
+    test = shaken(paper_model, 60)
+    with pytest.raises(MeasurementError, match=said):
+        reduce_resonance(replace(test, transmissibility=spoil(test.transmissibility)), MASS)
+
+
+def test_points_that_tell_little_are_left_out_and_counted(paper_model: Model) -> None:
+    """Far below the resonance, 5 % noise of T is many times T - 1."""
+    frequency = np.geomspace(5.0, 300.0, 80)
+    base = np.full(80, 1e-6)
+    _, ratio = response(lambda x: paper_model.stiffness(Direction.AXIAL, frequency, x), MASS, frequency, base)
+    random = np.random.default_rng(2)
+    ratio = ratio * (1.0 + 0.05 * (random.standard_normal(80) + 1j * random.standard_normal(80)))
+    acceleration = base * (2.0 * np.pi * frequency) ** 2
+    test = replace(shaken(paper_model, 80), frequency=frequency, transmissibility=ratio, base_acceleration=acceleration)
+    found = reduce_resonance(test, MASS)
+    print(f"{found.left_out.size} of 80 points left out, up to {found.left_out.max():.0f} Hz")
+    assert found.relative_error.max() <= LARGEST_ERROR
+    assert found.left_out.size + found.frequency.size == 80
+    assert found.left_out.max() < 100.0 < found.frequency.max()
+    assert f"{found.left_out.size} of 80 points left out" in found.warnings[0]
+
+
+def test_a_sweep_without_its_resonance_says_so(paper_model: Model) -> None:
+    test = shaken(paper_model, 80)
+    above = test.frequency > 250.0
+    cut = {name: getattr(test, name)[above] for name in ("frequency", "transmissibility", "base_acceleration")}
+    assert any("no resonance" in sentence for sentence in reduce_resonance(replace(test, **cut), MASS).warnings)
+
+
+@pytest.fixture(scope="module")
+def epdm(root: Path) -> dict[tuple[str, int], Resonance]:
+    """The eight measured tests, reduced, by level and mass [g]."""
+    found = {}
+    for level in ("01g", "1g"):
+        for mass in MEASURED:
+            table = Table.open(root / f"data/measured/epdm_70/shaker_{level}_{mass}g.csv", RESONANCE_COLUMNS)
+            found[level, mass] = reduce_resonance(read_resonance(table, Direction.AXIAL), 1e-3 * (mass + DISCS))
+    return found
+
+
+def test_the_measured_mount_softens_with_amplitude(epdm: dict[tuple[str, int], Resonance]) -> None:
+    """Its resonances at 0.1 and 1 g; a hand calculation has -7.4 % for the largest mass."""
+    changes = []
+    for mass in MEASURED:
+        (low, _), (high, _) = epdm["01g", mass].peak, epdm["1g", mass].peak
+        changes.append(high / low - 1.0)
+        print(f"{mass} g: resonance at {low:.1f} Hz (0.1 g) and {high:.1f} Hz (1 g), {100 * changes[-1]:+.1f} %")
+    assert changes == sorted(changes, reverse=True)
+    assert changes[-1] == pytest.approx(-0.074, abs=0.001)
+
+
+def test_the_masses_agree_on_the_measured_mount(epdm: dict[tuple[str, int], Resonance]) -> None:
+    """At 0.1 g and 450 Hz, where three of them tell it, at amplitudes below 0.0005 mm."""
+    told = []
+    for mass in (118, 253, 573):
+        found = epdm["01g", mass]
+        near = int(np.argmin(np.abs(found.frequency - 450.0)))
+        told.append(found.stiffness[near])
+        print(
+            f"{mass} g: {abs(told[-1]) / 1e3:.0f} N/mm, loss factor {told[-1].imag / told[-1].real:.3f} "
+            f"(+-{100 * found.relative_error[near]:.1f} %), {1e6 * found.amplitude[near]:.2f} um"
+        )
+    assert np.ptp(np.abs(told)) < 0.03 * np.mean(np.abs(told))
+    assert np.ptp(np.angle(told)) < 0.03
+
+
+def test_where_the_measured_tests_tell_the_stiffness(epdm: dict[tuple[str, int], Resonance]) -> None:
+    for (level, mass), found in epdm.items():
+        known = found.frequency[found.relative_error < 0.02]
+        print(
+            f"{level}, {mass} g: {found.frequency.size} points, {found.left_out.size} left out; "
+            f"K within 2 % from {known.min():.0f} to {known.max():.0f} Hz"
+        )
+        assert not found.turned
+        assert known.min() < 0.8 * found.peak[0] < 1.2 * found.peak[0] < known.max()
+        assert 0.05 < np.median(found.stiffness.imag / found.stiffness.real) < 0.2

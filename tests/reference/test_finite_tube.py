@@ -1,0 +1,147 @@
+"""The finite elements against another's, against closed forms and finer meshes; the shipped correction against both."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from agreement import Agree, digits
+from finite_tube import Solution, corrections, solve_tube
+
+from bushfit.geometry import Bushing, Direction
+from bushfit.shape import INCOMPRESSIBLE, RADIUS_RATIO_RANGE, SLENDERNESS_RANGE
+
+#: Angles of a quarter circle, and radii, at which the closed form is taken.
+_ANGLES, _RADII = 64, 200
+
+
+def kept_shapes(seed: int, count: int) -> list[tuple[float, float]]:
+    """Random shapes, none of which the correction was fitted to."""
+    random = np.random.default_rng(seed)
+    low, high = np.log(SLENDERNESS_RANGE)
+    slenderness = np.exp(random.uniform(low, high, count))
+    return list(zip(random.uniform(*RADIUS_RATIO_RANGE, count).tolist(), slenderness.tolist(), strict=True))
+
+
+def shipped(shapes: list[tuple[float, float]]) -> np.ndarray:
+    """Stiffness, strain and softening of the shipped correction, (n, 3)."""
+    return np.array([Bushing("tube", inner, 1.0, length).correction for inner, length in shapes])
+
+
+def long_tube(inner: float, n: int) -> Solution:
+    """An endless tube in closed form, per length: U = f/r and V = f' with f = A r + B r^3 + C/r + D r ln r, W = 0."""
+    nodes, weights = np.polynomial.legendre.leggauss(_RADII)
+    r, dr = inner + (1.0 - inner) * (nodes + 1.0) / 2.0, weights * (1.0 - inner) / 2.0
+    if n == 0:
+        squared = (0.5 / (r * np.log(1.0 / inner))) ** 2
+    else:
+
+        def at(x: float) -> list[list[float]]:
+            return [[1.0, x**2, x**-2, np.log(x)], [1.0, 3.0 * x**2, -(x**-2), np.log(x) + 1.0]]
+
+        _, B, C, D = np.linalg.solve(at(inner) + at(1.0), [1.0, 1.0, 0.0, 0.0])
+        stretch, shear = 2.0 * B * r - 2.0 * C / r**3 + D / r, 2.0 * (B * r + C / r**3)
+        angle = (np.arange(_ANGLES) + 0.5) * np.pi / (2.0 * _ANGLES)
+        squared = np.outer(np.cos(angle) ** 2, stretch**2) + np.outer(np.sin(angle) ** 2, shear**2)
+    energy = np.broadcast_to(squared * r * dr, np.shape(squared)).ravel()
+    even = 2.0 * np.pi * energy.sum() / (1.0 if n == 0 else _ANGLES)
+    return Solution(4.0 * even, np.pi * (1.0 - inner**2), np.sqrt(squared).ravel(), energy / energy.sum(), 0)
+
+
+def test_against_finite_elements_of_others(agree: Agree, root: Path) -> None:
+    with (root / "data/reference/radial_fe.csv").open(newline="") as stream:
+        rows = [[float(value) * 1e-3 for value in row[:3]] + [float(row[3])] for row in list(csv.reader(stream))[1:]]
+    solved = [b * solve_tube(a / b, length / b, fineness=0.5).stiffness for a, b, length, _ in rows]
+    calibrated = [
+        Bushing("row", a, b, length, "calibrated").stiffness_per_modulus(Direction.RADIAL) for a, b, length, _ in rows
+    ]
+    exact = [row[3] for row in rows]
+    for name, found in (("finite elements", solved), ("calibrated", calibrated)):
+        off = 100.0 * (np.array(found) / exact - 1.0)
+        print(f"{name} against the table: {off.min():+.2f} to {off.max():+.2f} %")
+        assert np.abs(off).max() < 1.0
+    agree("finite elements of the tube, radial, 14 shapes", [digits(solved, exact)])
+    agree('radial stiffness with `shape = "calibrated"`, 14 shapes', [digits(calibrated, exact)])
+
+
+@pytest.mark.parametrize("inner", [0.15, 10 / 18, 0.9])
+def test_the_middle_of_a_long_tube(inner: float) -> None:
+    """Between two lengths the stiffness grows by what the closed form says, Eqs. 8 and 7 being its strain."""
+    tube = Bushing("tube", inner, 1.0, 1.0)
+    for n, direction in ((1, Direction.RADIAL), (0, Direction.AXIAL)):
+        exact = long_tube(inner, n)
+        longer, shorter = (solve_tube(inner, length, n=n, bulk=1e7, fineness=0.7).stiffness for length in (24.0, 20.0))
+        growth = (longer - shorter) / 4.0 / exact.stiffness
+        even, friction = (
+            strain / tube.unit_strain(direction) for strain in (exact.energy_strain, exact.friction_strain)
+        )
+        print(
+            f"a/b {inner:.3f}, {direction}: stiffness grows by {growth:.5f} of the closed form's; over the formula's,"
+        )
+        print(f"the strain of equal energy is {even:.6f}, that for friction {friction:.3f}")
+        assert even == pytest.approx(1.0, rel=1e-9)
+        assert growth == pytest.approx(1.0, rel=2e-3)
+        assert 1.0 < friction < 1.5
+
+
+@pytest.mark.parametrize("shape", [(0.15, 0.1), (0.9, 0.1), (10 / 18, 34 / 18)])
+def test_finer_meshes_change_nothing(shape: tuple[float, float]) -> None:
+    coarse, fine, finer = (solve_tube(*shape, fineness=fineness) for fineness in (0.7, 1.0, 1.7))
+    for each in (coarse, fine, finer):
+        print(f"{each.unknowns} unknowns: stiffness {each.stiffness:.6g}, strain {each.friction_strain:.6g}")
+    for quantity in ("stiffness", "energy_strain", "friction_strain"):
+        assert getattr(fine, quantity) == pytest.approx(getattr(finer, quantity), rel=2e-4)
+        assert getattr(coarse, quantity) == pytest.approx(getattr(finer, quantity), rel=1e-3)
+
+
+def test_the_papers_bushing() -> None:
+    """What no correction ships: the axial formula supposes pure shear, and free ends are softer."""
+    bushing = Bushing("CMP 15 961", 10.0 / 18.0, 1.0, 34.0 / 18.0)
+    for n, direction in ((1, Direction.RADIAL), (0, Direction.AXIAL)):
+        solved = solve_tube(bushing.inner_radius, bushing.length, n=n)
+        strains = [
+            strain / 0.018 for strain in (bushing.unit_strain(direction), solved.energy_strain, solved.friction_strain)
+        ]
+        off = 100.0 * (bushing.stiffness_per_modulus(direction) / solved.stiffness - 1.0)
+        print(
+            f"{direction}: formula {off:+.1f} % in stiffness; strain per metre {strains[0]:.1f} by the formula, ",
+            end="",
+        )
+        print(f"{strains[1]:.1f} of equal energy, {strains[2]:.1f} for friction, whose modulus", end=" ")
+        print(f"is then within {100 * solved.friction_misfit:.1f} % from 0.3 to 3 eps_half")
+        assert solved.friction_misfit < 0.04
+        assert strains[1] < strains[2]
+    assert 4.0 < off < 7.0
+
+
+def test_the_correction_on_kept_shapes() -> None:
+    judge(kept_shapes(11, 3))
+
+
+@pytest.mark.slow
+def test_the_correction_on_many_kept_shapes() -> None:
+    judge(kept_shapes(12, 120))
+
+
+def judge(kept: list[tuple[float, float]]) -> None:
+    solved, found = corrections(kept), shipped(kept)
+    stiffness, strain = 100.0 * np.abs(found / solved - 1.0).max(axis=0)[:2]
+    print(f"{len(kept)} kept shapes: largest error in stiffness {stiffness:.2f} %, in strain {strain:.2f} %")
+    assert stiffness < 1.0
+    assert strain < 3.0
+
+
+@pytest.mark.parametrize(("mu", "error"), [(1e6, 0.005), (1e7, 0.02)])
+def test_a_bulk_modulus_of_2_gpa(mu: float, error: float) -> None:
+    """Thick and thin, flat and long tubes: how much less stiff they are than incompressible ones."""
+    worst = 0.0
+    for inner, length in ((0.2, 0.5), (0.6, 4.0), (0.85, 2.0), (0.9, 0.4), (0.9, 9.0)):
+        hard, soft = (solve_tube(inner, length, bulk=bulk, fineness=0.7) for bulk in (1.0 / INCOMPRESSIBLE, 2e9 / mu))
+        correction = Bushing("tube", inner, 1.0, length).correction
+        assert correction is not None
+        said, found = correction.lowering(mu), 1.0 - soft.stiffness / hard.stiffness
+        worst = max(worst, abs(said - found))
+        print(f"a/b {inner}, L/b {length}, mu {mu / 1e6:g} MPa: {100 * said:.1f} % lower, solved {100 * found:.1f} %")
+    assert worst < error
