@@ -6,7 +6,7 @@ Eqs. 7, 8, 10, 11, 12. Source: Garcia Tarrago, Kari, Vinolas, Gil-Negrete, Polym
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property, lru_cache
@@ -268,6 +268,18 @@ class Specimen:
 Place = Direction | Specimen
 
 
+def place_named(name: str, specimens: Iterable[Specimen]) -> Place:
+    """The specimen of this name, or else the direction.
+
+    Raises:
+        ModelError: it is neither.
+    """
+    known: dict[str, Place] = {str(place): place for place in (*Direction, *specimens)}
+    if name not in known:
+        raise ModelError("no such direction or specimen", found=name, expected="one of " + ", ".join(known))
+    return known[name]
+
+
 def unit_strain(bushing: Bushing | None, place: Place) -> float:
     """Equivalent strain per unit displacement [1/m], rotation [1/rad] or strain [1] at a place.
 
@@ -286,6 +298,11 @@ def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
     if isinstance(place, Specimen):
         return place.stiffness_per_modulus
     return _present(bushing, place).stiffness_per_modulus(place)
+
+
+def stated_strain(place: Place) -> float:
+    """What one unit of displacement or strain in a test's file is as it is counted: 2 of the tensor's shear, else 1."""
+    return place.stated_strain if isinstance(place, Specimen) else 1.0
 
 
 def _present(bushing: Bushing | None, place: Direction) -> Bushing:

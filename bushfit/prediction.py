@@ -6,14 +6,16 @@ Material and component effects are kept, instrument effects are left out: the ca
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from bushfit.effects import Level, effect_named
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
-from bushfit.geometry import Bushing, Direction, Place
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Bushing, Direction, Place, Specimen
+from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_jacobian
 from bushfit.reading.measurement import Sweep
@@ -23,8 +25,13 @@ from bushfit.units import number
 PAPER_FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
 #: Amplitudes of the paper's tables [m].
 PAPER_AMPLITUDES = (1e-4, 2e-4, 5e-4)
-#: Amplitudes for torsion, which the paper did not measure [rad]: chosen, strains like those of the other directions.
-_TORSION_AMPLITUDES = tuple(float(np.radians(x)) for x in (0.5, 1.0, 2.0))
+#: Amplitudes of each kind of motion where none were measured: those of torsion [rad], which the paper did not measure,
+#: and of the material's strain [1] are chosen so that strains are like the paper's.
+_AMPLITUDES_OF = {
+    TRANSLATION: PAPER_AMPLITUDES,
+    ROTATION: tuple(float(np.radians(x)) for x in (0.5, 1.0, 2.0)),
+    STRAINING: (0.01, 0.02, 0.05),
+}
 #: Beyond the fitted range by more than this, relative to its end, a prediction is an extrapolation: rigs miss their
 #: set points by less.
 _MARGIN = 0.01
@@ -34,6 +41,8 @@ _NOTED_LOWERING = 0.01
 _FREQUENCIES = 9
 #: Amplitudes of a grid where the paper's were not measured.
 _AMPLITUDES = 3
+#: Values of a grid at most of what was stepped through as it came: tables stay readable, and lines smooth.
+_MOST_STEPS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,17 +82,14 @@ class Prediction:
 def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ()) -> tuple[Array, Array]:
     """Frequencies [Hz] and amplitudes [m or rad] to predict at where none are asked for, rising.
 
-    They are those of the sweeps in this direction, so that prediction and measurement stand side by side. Without any
-    sweep they are the paper's as far as they lie in the measured range, or an even grid over that range where fewer
-    than two do.
+    They are those of the sweeps at this place, so that prediction and measurement stand side by side; of amplitudes
+    that were stepped, and of what swings free, at most ten over their range. Without any sweep they are the paper's as
+    far as they lie in the measured range, or an even grid over that range where fewer than two do.
     """
     mine = [sweep for sweep in sweeps if sweep.direction == direction]
     if mine:
-        frequency, amplitude = (
-            _distinct(np.concatenate([getattr(sweep, name) for sweep in mine])) for name in ("frequency", "amplitude")
-        )
-        return frequency, amplitude
-    amplitudes = np.array(_TORSION_AMPLITUDES if direction.is_rotation else PAPER_AMPLITUDES)
+        return _measured(mine, "frequency"), _measured(mine, "amplitude")
+    amplitudes = np.array(_AMPLITUDES_OF[direction.motion])
     frequencies = np.array(PAPER_FREQUENCIES)
     if result.measured is None:
         return frequencies, amplitudes
@@ -93,12 +99,28 @@ def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ())
         inside = _distinct(np.geomspace(low, high, _FREQUENCIES))
     if direction.is_rotation:
         return inside, amplitudes
-    per_displacement = result.model.unit_strain(Direction.AXIAL)
+    per_displacement = result.model.unit_strain(direction if isinstance(direction, Specimen) else Direction.AXIAL)
     least, most = (strain / per_displacement for strain in result.measured.strain)
     reached = amplitudes[(amplitudes >= least * (1 - _MARGIN)) & (amplitudes <= most * (1 + _MARGIN))]
     if reached.size < 2:
-        reached = _distinct(np.array([float(f"{x:.3g}") for x in np.geomspace(least, most, _AMPLITUDES)]))
+        reached = _even(least, most, _AMPLITUDES)
     return inside, reached
+
+
+def _measured(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitude"]) -> Array:
+    """The values of some sweeps, rising; in place of many that were taken as they came, some that span them."""
+    parts: tuple[list[Array], list[Array]] = [], []
+    for sweep in sweeps:
+        as_it_came = sweep.stepped is None or sweep.stepped == axis == "amplitude"
+        parts[as_it_came].append(getattr(sweep, axis))
+    planned, came = (_distinct(np.concatenate([np.empty(0), *part])) for part in parts)
+    spanned = came if came.size <= _MOST_STEPS else _even(came[0], came[-1], _MOST_STEPS)
+    return _distinct(np.concatenate([planned, spanned]))
+
+
+def _even(least: float, most: float, count: int) -> Array:
+    """So many values of three digits, in equal ratios from the least to the most."""
+    return _distinct(np.array([float(f"{x:.3g}") for x in np.geomspace(least, most, count)]))
 
 
 def _distinct(values: Array) -> Array:
@@ -162,6 +184,27 @@ def predict(
     )
 
 
+def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
+    """The compound of a fitted model in another bushing, and a sentence on what stayed behind.
+
+    What belongs to the material is kept, and the factors of specimens of it.
+    """
+    names = [specimen.name for specimen in result.specimens]
+    records = result.model.records
+    kept = [effect.name for effect in records if effect.level is Level.MATERIAL or effect.corrects in names]
+    model = Model.started(bushing, kept, result.model.values)
+    left = ", ".join(effect.name for effect in records if effect.name not in kept)
+    said = f"{bushing.name}: the compound of {result.name}, of which no bushing of this shape was tested"
+    said += f"; left out, because they belong to {result.name} or its rig: {left}" if left else ""
+    measured = result.measured
+    if measured:
+        measured = replace(measured, directions=tuple(name for name in measured.directions if name in names))
+    there = [name for name in result.covariance.names if name in model.values]
+    fitted = tuple(name for name in result.fitted if name in model.values)
+    covariance = result.covariance.restricted(there)
+    return Result(model, fitted, covariance, None, measured, inputs=result.inputs, specimens=result.specimens), said
+
+
 def caveats(result: Result) -> list[str]:
     """Sentences on what holds of a model's prediction in every direction."""
     lines = []
@@ -184,7 +227,16 @@ def rig_effects(result: Result) -> list[str]:
 def _unfitted(result: Result, direction: Place) -> Iterator[str]:
     """Warnings where a direction was not fitted: its band lacks the error of the formula that leads there."""
     fitted = result.measured.directions if result.measured else ()
-    if not fitted or direction in fitted:
+    if not fitted or str(direction) in fitted:
+        return
+    of_bushing = direction is Direction.AXIAL and not set(Direction).isdisjoint(fitted)
+    if not (of_bushing or direction in (Direction.RADIAL, Direction.TORSION)):
+        if not any(effect_named(name).corrects == str(direction) for name in result.model.effects):
+            tests = " and ".join(fitted)
+            yield (
+                f"{direction}: not fitted; its band holds the scatter of the {tests} tests, not by how much two bodies "
+                "of one compound differ, nor the error of their dimensions"
+            )
         return
     radially = direction is Direction.RADIAL or (Direction.AXIAL not in fitted and Direction.RADIAL in fitted)
     formula, compared = Direction.TORSION, "which was not compared with finite elements"

@@ -33,6 +33,7 @@ _KINDS = {
     "Pa": ("a stress", "MPa"),
     "kg": ("a mass", "kg"),
     "m/s^2": ("an acceleration", "m/s^2"),
+    "K": ("a temperature", "degC"),
     "1": ("a ratio", "%"),
 }
 #: By SI unit: the unit in which people write it, and the factor from SI to it; MPa*s^alpha is the paper's.
@@ -66,7 +67,7 @@ _MOST_DIGITS = 15
 #: A decimal number with a decimal point, and perhaps a power of ten.
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 #: One unit and perhaps its power, such as kN, mm^2, s**-1 or m⁻¹.
-_FACTOR = r"(?:[^\W\d_]+|%|°|1)(?:(?:\^|\*\*)-?[1-9]|⁻?[¹²³])?"
+_FACTOR = r"(?:[^\W\d_]+|[%‰°1])(?:(?:\^|\*\*)-?[1-9]|⁻?[¹²³])?"
 #: The products and quotients of units that are handed on to pint, which would otherwise evaluate any arithmetic.
 _UNIT = re.compile(rf"{_FACTOR}(?:(?:\s*[*/·⋅]\s*|\s+){_FACTOR})*")
 #: Characters of a unit at most: longer texts are no units, and pint takes its time with them.
@@ -118,7 +119,10 @@ _EXACT = {
         "s": "SEC Sec",
         "rpm": "RPM",
         "inch": "Inch INCH",
-        "MPa": "Mpa MPA",
+        "Pa": "pa PA",
+        "kPa": "kpa KPA KPa",
+        "MPa": "Mpa MPA mpa",
+        "GPa": "gpa GPA Gpa",
         "lbf": "LBF Lbf",
     }.items()
     for spelling in spellings.split()
@@ -147,7 +151,7 @@ def split_header(text: str) -> tuple[str, str | None]:
 
 
 def factor(text: str, expected: str) -> float:
-    """The number that turns values in the unit `text` into SI.
+    """The number that turns values in the unit `text` into SI; of a temperature, differences of values.
 
     Args:
         text: a unit such as "kN" or "N/mm"; "-" and "" stand for a ratio.
@@ -156,6 +160,8 @@ def factor(text: str, expected: str) -> float:
     Raises:
         UnitError: an unknown unit, or a unit of another dimension.
     """
+    if expected == "K" and (degree := kelvin(text)):
+        return degree[0]
     if expected == "m/s^2":
         text = _OF_ACCELERATION.get(text.strip(), text)
     scale, base = _resolve(text)
@@ -343,6 +349,11 @@ def _registry() -> pint.UnitRegistry[Any]:
     return pint.UnitRegistry(str(Path(__file__).with_name("units.txt")), cache_folder=None)
 
 
+def kelvin(unit: str) -> tuple[float, float] | None:
+    """Kelvin per unit of temperature such as "°C", and kelvin at its zero; None for any other text."""
+    return _TEMPERATURES.get(unit.replace("℃", "°C").replace("°", "deg").replace(" ", "").lower())
+
+
 def temperature(raw: object) -> float:
     """The temperature [K] that a text such as "22 degC", "295 K" or "72 degF" states.
 
@@ -350,8 +361,8 @@ def temperature(raw: object) -> float:
         UnitError: no text of a number and one of these units, or one below absolute zero.
     """
     found = re.fullmatch(r"\s*([+-]?\d+(?:[.,]\d+)?)\s*(.*?)\s*", raw) if isinstance(raw, str) else None
-    scale = _TEMPERATURES.get(found[2].replace("°", "deg").replace(" ", "").lower()) if found else None
-    kelvin = scale[0] * float(found[1].replace(",", ".")) + scale[1] if found and scale else -1.0
-    if kelvin < 0.0:
+    scale = kelvin(found[2]) if found else None
+    value = scale[0] * float(found[1].replace(",", ".")) + scale[1] if found and scale else -1.0
+    if value < 0.0:
         raise UnitError("this is no temperature", found=repr(raw), expected='such as "22 degC" or "295 K"')
-    return kelvin
+    return value

@@ -1,9 +1,9 @@
-"""One loop and one sweep, written in the dialects of test machines, spreadsheets and scripts."""
+"""One loop, one sweep, and one sweep of a coupon, in the dialects of test machines, spreadsheets and scripts."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import Literal
 
@@ -11,10 +11,11 @@ import numpy as np
 
 from bushfit.reading.measurement import Floats
 
-Kind = Literal["loop", "sweep"]
+Kind = Literal["loop", "sweep", "coupon"]
 
 _PHASE = np.linspace(0.0, 4.0 * np.pi, 60)
-#: time [s], displacement [mm], force [N]; frequency [Hz], amplitude [mm], stiffness [N/mm], loss factor [-].
+#: time [s], displacement [mm], force [N]; frequency [Hz], amplitude [mm], stiffness [N/mm], loss factor [-]; frequency
+#: [Hz], strain [%], storage modulus [MPa], loss modulus [MPa].
 NUMBERS: dict[Kind, list[list[Decimal]]] = {
     "loop": [
         [Decimal(f"{20.0 + 100.0 * p:.3f}"), Decimal(f"{2 * np.sin(p):.4f}"), Decimal(f"{12000 * np.sin(p + 0.1):.2f}")]
@@ -24,6 +25,11 @@ NUMBERS: dict[Kind, list[list[Decimal]]] = {
         [Decimal(f), Decimal(a), Decimal(f"{2345.125 + 7 * f - 900 * float(a):.3f}"), Decimal(f"{0.1 + f / 5e3:.4f}")]
         for a in ("0.1", "0.2", "0.5")
         for f in (5, 15, 25, 35, 45, 55)
+    ],
+    "coupon": [
+        [Decimal(f), Decimal(e), Decimal(f"{5.125 + f / 50 - float(e):.3f}"), Decimal(f"{0.4 + f / 500:.4f}")]
+        for e in ("0.05", "0.15", "1.25")
+        for f in (1, 2, 5, 10, 20, 50)
     ],
 }
 
@@ -37,6 +43,7 @@ HEADERS: dict[str, dict[Kind, str]] = {
     "english": {
         "loop": "time, displacement, force",
         "sweep": "frequency, amplitude, stiffness, loss factor",
+        "coupon": "frequency, strain amplitude, storage modulus, loss modulus",
     },
     "camel": {
         "loop": "Time, Axial Displacement, Axial Force",
@@ -45,6 +52,7 @@ HEADERS: dict[str, dict[Kind, str]] = {
     "german": {
         "loop": "Zeit, Weg, Kraft",
         "sweep": "Frequenz, Amplitude, Dynamische Steifigkeit, Verlustfaktor",
+        "coupon": "Frequenz, Scherdehnung, Speichermodul G', Verlustmodul G''",
     },
     "umlaut": {
         "loop": "Prüfzeit, Prüfweg, Prüfkraft",
@@ -57,6 +65,7 @@ HEADERS: dict[str, dict[Kind, str]] = {
     "french": {
         "loop": "Temps, Déplacement, Effort",
         "sweep": "Fréquence, Amplitude, Raideur, Facteur de pertes",
+        "coupon": "Fréquence, Déformation dynamique, Module de conservation, Module de perte",
     },
     "french ascii": {
         "loop": "TEMPS, DEPLACEMENT, FORCE",
@@ -65,6 +74,7 @@ HEADERS: dict[str, dict[Kind, str]] = {
     "spanish": {
         "loop": "Tiempo, Desplazamiento, Fuerza",
         "sweep": "Frecuencia, Amplitud, Rigidez dinámica, Factor de pérdida",
+        "coupon": "Frecuencia, Amplitud de deformación, Módulo de almacenamiento, Módulo de pérdida",
     },
     "spanish ascii": {
         "loop": "tiempo, desplazamiento, carga",
@@ -73,15 +83,52 @@ HEADERS: dict[str, dict[Kind, str]] = {
     "chinese": {
         "loop": "时间, 位移, 力",
         "sweep": "频率, 振幅, 刚度, 损耗因子",
+        "coupon": "频率, 剪切应变, 储能模量, 损耗模量",
     },
+    "bluehill": {"loop": "Time, Extension, Load"},
+    "test suite": {"loop": "Running Time, Axial Displacement, Axial Force"},
+    "daq": {"loop": "Time , Crosshead , Load "},
+    "wave matrix": {"loop": "Total Time, Position(Linear:Position), Load(Linear:Load)"},
+    "win test": {"loop": "Elapsed Time, Disp, Load"},
+    "trapezium": {"loop": "Time, Stroke, Force"},
+    "test xpert": {
+        "loop": "Prüfzeit, Standardweg, Standardkraft",
+        "sweep": "Prüffrequenz, Wegamplitude, Dyn. Steifigkeit, Verlustfaktor tan d",
+    },
+    "test xpert french": {"loop": "Temps, Course standard, Force standard"},
+    "mts": {"sweep": "Frequency, Dynamic Displacement p-p, K*, Tan Delta"},
+    "symbols": {
+        "sweep": "f, A, c dyn, tan δ",
+        "coupon": "f, Strain dyn, G', G''",
+    },
+    "amplitude SS": {"sweep": "Frequenz, Amplitude SS, Dyn. Federrate, tan delta"},
+    "metravib": {"sweep": "Fréquence, Amplitude crête, Raideur dynamique K*, tan(δ)"},
+    "snake": {"coupon": "freq, strain_dyn, G_storage, G_loss"},
+    "trios": {"coupon": "Frequency, Oscillation strain, Storage modulus, Loss modulus"},
+    "trios omega": {"coupon": "Angular frequency, Oscillation strain, Storage modulus, Loss modulus"},
+    "rheo compass": {"coupon": "Frequency, Shear Strain, Storage Modulus, Loss Modulus"},
+    "rheo compass omega": {"coupon": "Angular Frequency, Shear Strain, G', G''"},
+    "rspace": {
+        "coupon": "Frequency, Complex shear strain, "
+        "Shear modulus (elastic component), Shear modulus (viscous component)"
+    },
+    "osc": {"coupon": "Freq, Strain, G', G\""},
 }
-UNITS: dict[Kind, list[str]] = {"loop": ["s", "mm", "N"], "sweep": ["Hz", "mm", "N/mm", "-"]}
+UNITS: dict[Kind, list[str]] = {
+    "loop": ["s", "mm", "N"],
+    "sweep": ["Hz", "mm", "N/mm", "-"],
+    "coupon": ["Hz", "%", "MPa", "MPa"],
+}
 MACHINE = ["Instrument: EL-7 Nº 3", "Operator{0}A. B.", "Date{0}2026-01-01", "Speed{0}10{0}mm/min", ""]
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """A way to write a table. `unit` is how a header carries its unit; None puts it into a row below."""
+    """A way to write a table.
+
+    `unit` is how a header carries its unit; None puts it into a row below. `others` are columns that are not needed, in
+    ascending order: place, header, unit and cell. `double` says that amplitudes count peak-to-peak.
+    """
 
     kind: Kind = "loop"
     delimiter: str = ","
@@ -102,6 +149,37 @@ class Dialect:
     commented_header: bool = False
     units_row: str = "{0}"
     last_line_ends: bool = True
+    others: Sequence[tuple[int, str, str, str]] = ()
+    quoted_header: bool = False
+    double: bool = False
+
+    @property
+    def headers(self) -> list[str]:
+        """The headers of the kind's columns."""
+        return HEADERS[self.language][self.kind].split(", ")
+
+    def unit_of(self, index: int) -> str:
+        """The unit of a column of the kind, as the table has it."""
+        unit = UNITS[self.kind][index]
+        return self.units.get(unit, unit)
+
+    def place(self, index: int) -> int:
+        """Where a column of the kind stands in a row."""
+        place = list(self.columns).index(index)
+        for other, *_ in self.others:
+            place += other <= place
+        return place
+
+    def cells(self, own: Sequence[str], which: int) -> list[str]:
+        """A row with the columns that are not needed: their headers (1), units (2) or cells (3)."""
+        cells = list(own)
+        for other in self.others:
+            cells.insert(other[0], str(other[which]))
+        return cells + ["", self.extra, "", "ok"][which : which + 1] * bool(self.extra)
+
+    def row(self, row: Sequence[Decimal]) -> list[str]:
+        """The cells of a row of numbers."""
+        return self.cells([self.number(row[i]) for i in self.columns], 3)
 
     @property
     def columns(self) -> Sequence[int]:
@@ -112,24 +190,30 @@ class Dialect:
         signs = {",": self.thousands, ".": self.decimal}
         return "".join(signs.get(sign, sign) for sign in text).rjust(self.pad)
 
-    def line(self, cells: Sequence[str]) -> str:
-        if self.quotes:
+    def line(self, cells: Sequence[str], *, is_header: bool = False) -> str:
+        if self.quotes or (is_header and self.quoted_header):
             cells = [f'"{cell}"' for cell in cells]
         return self.delimiter.join(cells) + self.delimiter * self.trailing
 
     def text(self) -> str:
         """The table as text."""
-        names = HEADERS[self.language][self.kind].split(", ")
-        units = [self.units.get(unit, unit) for unit in UNITS[self.kind]]
-        headers = [self.unit.format(names[i], units[i]) if self.unit else names[i] for i in self.columns]
-        extra = [self.extra] if self.extra else []
+        units = [self.unit_of(i) for i in self.columns]
+        names = [self.headers[i] for i in self.columns]
+        others = [
+            (place, self.unit.format(header, unit) if self.unit and unit else header, unit, cell)
+            for place, header, unit, cell in self.others
+        ]
+        named = replace(self, others=others)
+        if self.unit:
+            names = [self.unit.format(name, unit) for name, unit in zip(names, units, strict=True)]
         lines = [line.format(self.delimiter) for line in self.before]
-        lines.append("# " * self.commented_header + self.line(headers + extra))
+        lines.append("# " * self.commented_header + self.line(named.cells(names, 1), is_header=True))
         if self.unit is None:
-            lines.append(self.line([self.units_row.format(units[i]) for i in self.columns] + [""] * len(extra)))
+            row = [self.units_row.format(unit) if unit else "" for unit in named.cells(units, 2)]
+            lines.append(self.line(row, is_header=True))
         for number, row in enumerate(NUMBERS[self.kind]):
             lines += [self.between[number]] if number in self.between else []
-            lines.append(self.line([self.number(row[i]) for i in self.columns] + ["ok"] * len(extra)))
+            lines.append(self.line(self.row(row)))
         return self.end.join(lines) + self.end * self.last_line_ends
 
     def bytes(self) -> bytes:

@@ -13,11 +13,11 @@ from bushfit.campaign.schema import SimulatedSweep, SimulateSettings
 from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
-from bushfit.geometry import Bushing, Direction, Shape
+from bushfit.geometry import Bushing, Direction, Shape, Specimen
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Range, Result
-from bushfit.prediction import PAPER_AMPLITUDES, PAPER_FREQUENCIES, caveats, default_grid, predict
+from bushfit.prediction import PAPER_AMPLITUDES, PAPER_FREQUENCIES, carried, caveats, default_grid, predict
 from bushfit.reading.measurement import Sweep
 from bushfit.report.tables import prediction_table
 from bushfit.simulation import measure, undisturbed
@@ -249,6 +249,70 @@ def test_default_grid_is_that_of_the_sweeps_in_the_direction_where_there_are_any
     assert frequencies.tolist() == [1.0, 20.0, 80.0], "two that miss the same set point are one"
     assert amplitudes.tolist() == [2e-4, 4e-4, 1e-3]
     assert tuple(default_grid(result, Direction.AXIAL, [sweep])[1]) == PAPER_AMPLITUDES
+
+
+def test_default_grid_of_what_was_taken_as_it_came(result: Result) -> None:
+    """Amplitudes that were stepped, and all of a resonance test, at ten values at most; what was held as it is."""
+    frequency, amplitude = (axis.ravel() for axis in np.meshgrid([10.0, 40.0], np.geomspace(2e-5, 1e-3, 15)))
+    strain = Sweep("a", Direction.AXIAL, frequency, amplitude, np.full(30, 1e6 + 1e5j), stepped="amplitude")
+    frequencies, amplitudes = default_grid(result, Direction.AXIAL, [strain])
+    assert frequencies.tolist() == [10.0, 40.0]
+    assert (amplitudes.size, amplitudes[0], amplitudes[-1]) == (10, 2e-5, 1e-3)
+    free = Sweep(
+        "r",
+        Direction.AXIAL,
+        np.geomspace(50, 500, 200),
+        np.geomspace(1e-4, 1e-6, 200),
+        np.full(200, 1e6 + 1e5j),
+        stepped=None,
+    )
+    assert [axis.size for axis in default_grid(result, Direction.AXIAL, [free])] == [10, 10]
+    planned = Sweep("f", Direction.AXIAL, np.arange(5.0, 156.0, 5.0), np.full(31, 3e-4), np.full(31, 1e6 + 1e5j))
+    frequencies, amplitudes = default_grid(result, Direction.AXIAL, [planned, strain])
+    assert set(planned.frequency) <= set(frequencies)
+    assert 3e-4 in amplitudes
+
+
+def test_the_compound_is_carried_to_another_bushing(result: Result) -> None:
+    """Same material, other shape: stiffness goes as the shape does; what belongs to the old bushing stays there."""
+    model = result.model.with_effect("stiffness_factor.radial", {"stiffness_factor.radial": 1.1})
+    model = model.with_effect("inertia").with_effect("clearance").with_effect("viscous")
+    wide = Bushing("wide", 0.010, 0.018, 0.068)
+    other, said = carried(replace(result, model=model), wide)
+    print(said)
+    assert other.model.effects == ("elastic", "springpot", "friction", "viscous")
+    assert "clearance, stiffness_factor.radial, inertia" in said
+    here, there = (predict(each, Direction.AXIAL, [10.0, 50.0], [1e-4]) for each in (result, other))
+    np.testing.assert_allclose(there.stiffness.value, 2.0 * here.stiffness.value)
+    np.testing.assert_allclose(
+        np.subtract(there.stiffness.high, there.stiffness.low),
+        2.0 * np.subtract(here.stiffness.high, here.stiffness.low),
+    )
+    assert any("extrapolated" in line for line in predict(other, Direction.RADIAL, [10.0], [5e-3]).warnings)
+
+
+def test_a_coupon_predicts_a_bushing_and_says_what_it_does_not_know(result: Result) -> None:
+    coupon = Specimen("DMA", "modulus")
+    assert result.measured is not None
+    alone = replace(
+        result,
+        model=replace(result.model, bushing=None),
+        specimens=(coupon,),
+        measured=replace(result.measured, directions=("DMA",)),
+    )
+    table = prediction_table(predict(alone, coupon, [10.0], default_grid(alone, coupon)[1]))
+    assert list(table.columns[:6]) == [
+        *("frequency [Hz]", "strain amplitude [%]", "modulus [MPa]", "loss factor [-]"),
+        *("storage modulus [MPa]", "loss modulus [MPa]"),
+    ]
+    assert 1.0 < table["modulus [MPa]"].iloc[0] < 3.0
+    with pytest.raises(ModelError, match=r"axial: there is no bushing[\s\S]*--bushing other.toml"):
+        predict(alone, Direction.AXIAL, [10.0], [1e-4])
+    bushing, _ = carried(alone, result.model.bushing)  # type: ignore[arg-type]
+    found = predict(bushing, Direction.AXIAL, [10.0], [1e-4])
+    np.testing.assert_allclose(found.stiffness.value, predict(result, Direction.AXIAL, [10.0], [1e-4]).stiffness.value)
+    (line,) = found.warnings
+    assert line.startswith("axial: not fitted; its band holds the scatter of the DMA tests, not by how much two bodies")
 
 
 @pytest.mark.parametrize(

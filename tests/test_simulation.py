@@ -177,6 +177,7 @@ def written(simulated: Simulated, folder: Path) -> Campaign:
 TOLERANCE = {"mu": 0.04, "m": 0.15, "alpha": 0.08, "sigma_fmax": 0.12, "eps_half": 0.12}
 AXIAL_SWEEP = SimulatedSweep(Direction.AXIAL, (1e-4, 2e-4, 5e-4), tuple(np.arange(5.0, 156.0, 15.0).tolist()))
 TENSION = Specimen("bar, tension", "modulus", strain="tension")
+TENSOR = Specimen("half strains", "modulus", strain="tensor")
 
 
 @pytest.mark.parametrize(
@@ -188,6 +189,7 @@ TENSION = Specimen("bar, tension", "modulus", strain="tension")
             (
                 replace(STRAIN_SWEEP, direction=MOUNT, amplitudes=tuple(6e-3 * strain for strain in STRAINS)),
                 replace(STRAIN_SWEEP, direction=TENSION),
+                replace(STRAIN_SWEEP, direction=TENSOR),
             ),
             (SimulatedLoop(MOUNT, 5e-4, 0.1), SimulatedLoop(COUPON, 0.05, 0.1)),
             id="specimens of each kind",
@@ -228,8 +230,8 @@ def test_strains_are_written_as_files_of_the_specimen_state_them(coupon: Undistu
     """Tensor strain is half the engineering strain; the modulus is the same."""
     (sweep,) = measure(coupon, SimulateSettings()).sweeps
     tensor = raw_sweep_table(replace(sweep, direction=replace(COUPON, strain="tensor")))
-    np.testing.assert_allclose(tensor["amplitude [%]"], 50.0 * sweep.amplitude_reached)
-    np.testing.assert_allclose(tensor["stiffness [MPa]"], 1e-6 * np.abs(sweep.stiffness))
+    np.testing.assert_allclose(tensor["strain amplitude [%]"], 50.0 * sweep.amplitude_reached)
+    np.testing.assert_allclose(tensor["modulus [MPa]"], 1e-6 * np.abs(sweep.stiffness))
 
 
 def test_names_of_specimens_are_names_of_files(paper_model: Model, tmp_path: Path) -> None:

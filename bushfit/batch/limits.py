@@ -120,7 +120,7 @@ def _parameters(raw: object, _: ValidationInfo) -> object:
 
 def _stiffness(raw: object, info: ValidationInfo) -> object:
     point = info.data.get("at")
-    return quantity(raw, point.direction.motion.stiffness_unit) if isinstance(point, Point) else 0.0
+    return quantity(raw, point.motion.stiffness_unit) if isinstance(point, Point) else 0.0
 
 
 def _ratio(raw: object, _: ValidationInfo) -> object:

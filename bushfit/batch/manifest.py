@@ -24,12 +24,13 @@ from bushfit.campaign.toml import read_toml
 from bushfit.effects import effect_named
 from bushfit.effects.mistakes import candidate_named
 from bushfit.errors import CampaignError
-from bushfit.geometry import Direction
 from bushfit.reading.files import read_utf8
 from bushfit.validation import Text, check_tables, converted, unknown_key
 
 Command = Literal["run", "fit", "diagnose", "predict"]
 
+#: The way on from test files.
+_OF_TESTS = "bushfit init FILE... makes a campaign of test files"
 #: What is done to a campaign where nothing is said.
 _DEFAULT: tuple[Command, ...] = ("fit",)
 #: Which commands look at a setting.
@@ -80,7 +81,7 @@ class Settings:
     """
 
     commands: Annotated[tuple[Command, ...], Words, Field(min_length=1)] | None = None
-    directions: Annotated[tuple[Direction, ...], Words] | None = None
+    directions: Annotated[tuple[Text, ...], Words] | None = None
     effects: Effects | None = None
     adopt: Candidates | None = None
     without: Candidates | None = None
@@ -152,7 +153,10 @@ def read_manifest(source: str, given: Settings, *more: str) -> Manifest:
         listed = (source, *more)
         if strange := [name for name in listed if Path(name).suffix.lower() != ".toml"]:
             raise CampaignError(
-                "this is no campaign", file=strange[0], expected="one manifest, or campaign files alone"
+                "this is no campaign",
+                file=strange[0],
+                expected="one manifest, or campaign files alone",
+                hint=_OF_TESTS,
             )
         stem, base, entries = "batch", Path(), iter([Entry(campaign=name) for name in listed])
     elif _PATTERN.search(source) and not path.exists():
@@ -169,7 +173,7 @@ def read_manifest(source: str, given: Settings, *more: str) -> Manifest:
             "this is no manifest",
             file=path,
             expected='a .toml or .csv file, or a pattern in quotes such as "bushings/*/campaign.toml"',
-            hint=f'"{path}/*/campaign.toml" in quotes' if path.is_dir() else None,
+            hint=f'"{path}/*/campaign.toml" in quotes' if path.is_dir() else _OF_TESTS,
         )
     return Manifest(stem, _rows(list(entries), base, given, source), points)
 

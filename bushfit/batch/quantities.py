@@ -44,7 +44,7 @@ LOSS_FACTOR = "loss factor"
 
 def at_point(point: Point, what: str) -> Quantity:
     """Stiffness or loss factor at an operating point."""
-    unit, factor = point.direction.display.stiffness if what == STIFFNESS else ("-", 1.0)
+    unit, factor = point.motion.display.stiffness if what == STIFFNESS else ("-", 1.0)
     return Quantity(f"{what} {point}", unit, factor)
 
 

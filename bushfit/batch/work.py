@@ -192,7 +192,10 @@ def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> R
             at_bound[name] = result.at_bound[name]
     warnings, at = [*notes, *result.warnings], {}
     for point in points:
-        prediction = predict(result, point.direction, [point.frequency], [point.amplitude])
+        if (place := result.place(point.place)).motion != point.motion:
+            expected = f"an amplitude in {place.display.displacement.name}"
+            raise BatchError("this amplitude is none of the place", found=str(point), expected=expected)
+        prediction = predict(result, place, [point.frequency], [point.amplitude])
         at[str(point)] = {"stiffness": _band(prediction.stiffness), "loss factor": _band(prediction.loss_factor)}
         warnings += [line for line in prediction.warnings if line not in warnings]
     quality = result.quality

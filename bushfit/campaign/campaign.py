@@ -13,7 +13,7 @@ from bushfit.campaign.places import place_tested
 from bushfit.campaign.schema import CampaignFile, FitSettings, LoopFile, PredictSettings, SimulateSettings, SweepFile
 from bushfit.campaign.toml import read_toml
 from bushfit.errors import CampaignError, naming, typed
-from bushfit.geometry import Bushing, Specimen
+from bushfit.geometry import Bushing, Specimen, place_named
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.sweeps import read_sweep
@@ -67,7 +67,7 @@ def load_campaign(path: str | Path) -> Campaign:
         MeasurementError: a measurement that cannot be used.
     """
     path = Path(path)
-    _refuse_tests(path)
+    refuse_tests([path])
     content = read_toml(path, CampaignFile)
     if not (content.loops or content.sweeps or content.simulate):
         raise CampaignError(
@@ -80,6 +80,9 @@ def load_campaign(path: str | Path) -> Campaign:
         bushing = Bushing(**vars(content.bushing)) if content.bushing else None
         specimens = tuple(Specimen(**vars(table)) for table in content.specimens)
         _check_bodies(bushing, specimens)
+        with naming(place="predict.directions"):
+            for name in content.predict.directions or ():
+                place_named(name, specimens)
     return Campaign(
         content.name or (bushing or specimens[0]).name,
         path,
@@ -95,6 +98,21 @@ def load_campaign(path: str | Path) -> Campaign:
     )
 
 
+def load_bushing(path: Path) -> Bushing:
+    """The bushing of a campaign file, or of a file with a [bushing] table alone; its tests are not read.
+
+    Raises:
+        CampaignError: the file is missing, no TOML, or has no [bushing].
+        ModelError: an impossible bushing.
+    """
+    table = read_toml(path, CampaignFile).bushing
+    if table is None:
+        expected = "a [bushing] table with name, inner_radius, outer_radius and length"
+        raise CampaignError("there is no bushing in it", file=path, expected=expected)
+    with naming(path):
+        return Bushing(**vars(table))
+
+
 def _check_bodies(bushing: Bushing | None, specimens: Sequence[Specimen]) -> None:
     """Raise a CampaignError where there is no body, or two have one name."""
     names = [specimen.name for specimen in specimens]
@@ -105,21 +123,20 @@ def _check_bodies(bushing: Bushing | None, specimens: Sequence[Specimen]) -> Non
         raise CampaignError("two specimens have one name", place="[[specimens]]", found=", ".join(sorted(doubles)))
 
 
-def _refuse_tests(path: Path) -> None:
-    """Raise a CampaignError where a test file, a folder or a model was given in place of a campaign."""
-    ending, is_folder = path.suffix.lower(), path.is_dir()
-    if not (is_folder or (ending in (*TEST_FILES, ".json") and path.exists())):
+def refuse_tests(paths: Sequence[Path]) -> None:
+    """Raise a CampaignError where test files, a folder or a model were given in place of a campaign."""
+    first = paths[0]
+    tests = [path for path in paths if path.is_dir() or (path.suffix.lower() in TEST_FILES and path.exists())]
+    if not tests and not (first.suffix.lower() == ".json" and first.exists()):
         return
-    files = f"{typed(path)}/*.csv" if is_folder else typed(path)
-    found = "a folder" if is_folder else "a test file"
-    hint = (
-        f'bushfit init {files} --inner-radius "10 mm" --outer-radius "18 mm" --length "34 mm" makes one, with '
-        "the sizes of your rubber"
-    )
-    if ending == ".json" and not is_folder:
-        found, hint = "a model", f"bushfit predict {files} predicts from a model"
     expected = "a .toml file that names the bushing and its tests"
-    raise CampaignError("a campaign is needed", file=path, found=found, expected=expected, hint=hint)
+    if tests:
+        found = "a folder" if tests[0].is_dir() else "a test file" if len(tests) == 1 else "test files"
+        sizes = '--inner-radius "10 mm" --outer-radius "18 mm" --length "34 mm"'
+        hint = f"bushfit init {' '.join(map(typed, tests))} {sizes} makes one, with the sizes of your rubber"
+    else:
+        found, hint = "a model", f"bushfit predict {typed(first)} predicts from a model"
+    raise CampaignError("a campaign is needed", file=(tests or paths)[0], found=found, expected=expected, hint=hint)
 
 
 def reader_keywords(

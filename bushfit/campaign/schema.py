@@ -19,10 +19,11 @@ from bushfit.campaign.parameters import (
 from bushfit.campaign.places import KEYS, with_places
 from bushfit.errors import CampaignError
 from bushfit.geometry import TRANSLATION, Direction, Place, Shape, Specimen
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
+from bushfit.reading.headers import AmplitudeConvention
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Stepped, Waveform
 from bushfit.reading.resonance import FEWEST_ROWS
+from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.units import quantity, temperature
 from bushfit.validation import Flag, Name, Text, converted, known_keys, standing_in_table, unknown_key
 
@@ -108,6 +109,7 @@ _SIMULATED_PLACES = converted(
 Temperature = Annotated[float, converted(lambda raw, _: temperature(raw))]
 Length = Annotated[float, _si("m"), Field(gt=0)]
 Angle = Annotated[float, _si("rad"), Field(gt=0)]
+Strain = Annotated[float, _si("1"), Field(gt=0)]
 Frequency = Annotated[float, _si("Hz"), Field(gt=0)]
 Frequencies = Annotated[tuple[Frequency, ...], _FIRST_ERROR, _table(_frequencies), Field(min_length=1)]
 Displacement = Annotated[float, _motion(), Field(gt=0)]
@@ -139,7 +141,7 @@ class SpecimenTable:
     elements: Count = 1
 
     def __post_init__(self) -> None:
-        if self.name in (*Direction, "loops", "sweeps", "gap", "candidates", "shear"):
+        if self.name in (*Direction, "loops", "sweeps", "gap", "candidates", "measured", "shear"):
             expected = "a name of its own: its tables are named after it"
             raise ValueError(CampaignError("this name is taken", place="name", found=self.name, expected=expected))
 
@@ -243,12 +245,19 @@ class FitSettings:
 
 @dataclass(frozen=True)
 class PredictSettings:
-    """[predict]: frequencies [Hz], amplitudes [m], rotation amplitudes [rad] and directions; None for the default."""
+    """[predict]: what to predict, and where; None for the default.
+
+    Args:
+        frequencies: [Hz].
+        amplitudes, torsion_amplitudes, strain_amplitudes: zero-to-peak [m], [rad] and, of a modulus, [1].
+        directions: of the bushing, or specimens by name.
+    """
 
     frequencies: Frequencies | None = None
     amplitudes: Annotated[tuple[Length, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
     torsion_amplitudes: Annotated[tuple[Angle, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
-    directions: Annotated[tuple[Direction, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
+    directions: Annotated[tuple[Name, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
+    strain_amplitudes: Annotated[tuple[Strain, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
 
 
 @dataclass(frozen=True)

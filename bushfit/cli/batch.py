@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, direction_option, example, naming_option, shared_options
+from bushfit.cli.common import Options, example, naming_option, place_option, shared_options
 from bushfit.cli.show import new_table, warn
 from bushfit.units import alike, for_people
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from bushfit.batch.points import Point
     from bushfit.batch.pool import Pool
     from bushfit.batch.run import Plan, Summary
-    from bushfit.geometry import Direction
 
 #: Bushings of a kind (failed, out of limits, on the edge) that the terminal names; batch.csv has all.
 _MOST_SHOWN = 10
@@ -39,7 +38,7 @@ _SECONDS_A_LINE = 10.0
     multiple=True,
     help="What to do with each campaign: fit, diagnose, predict, may be given again; or run, the whole chain [fit].",
 )
-@direction_option(
+@place_option(
     "directions",
     multiple=True,
     help="Tests to fit, as in bushfit fit.",
@@ -125,7 +124,7 @@ def command(
         click.get_current_context().exit(1)
 
 
-def _settings(commands: tuple[Command, ...], directions: tuple[Direction, ...], effects: tuple[str, ...]) -> Settings:
+def _settings(commands: tuple[Command, ...], directions: tuple[str, ...], effects: tuple[str, ...]) -> Settings:
     """What the options ask of every row that does not say otherwise."""
     from bushfit.batch.manifest import Settings
     from bushfit.effects import effect_named

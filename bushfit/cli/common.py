@@ -40,6 +40,15 @@ class _Direction(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows 
         return Direction(click.Choice([str(direction) for direction in Direction]).convert(value, param, ctx))
 
 
+class _Place(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows none
+    """A direction, or a specimen of a campaign, which only the campaign knows."""
+
+    name = "place"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        return str(value) if str(value).strip() else self.fail("this is no direction: an empty text", param, ctx)
+
+
 class _DirectionOption(click.Option):
     """An option that takes directions; they stand in its help in place of "{directions}"."""
 
@@ -72,6 +81,8 @@ class _Share(click.FloatRange):
 
 #: Decorator of a command that takes a direction, or several.
 direction_option = partial(click.option, "--direction", cls=_DirectionOption, type=_Direction())
+#: The same of a command that takes specimens by their names, too.
+place_option = partial(click.option, "--direction", cls=_DirectionOption, type=_Place())
 
 
 @contextmanager
@@ -205,7 +216,7 @@ def campaign_options(function: F, soft_l1: str = "points far off pull less, outl
         soft_l1: what the robust loss does in this command, for its help.
     """
 
-    @click.argument("campaign", type=click.Path(path_type=Path))
+    @click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=click.Path(path_type=Path))
     @click.option(
         "--loss",
         type=click.Choice(["linear", "soft_l1"]),
@@ -220,10 +231,26 @@ def campaign_options(function: F, soft_l1: str = "points far off pull less, outl
     @shared_options
     @wraps(function)
     def wrapped(*args: Any, options: Options, **kwargs: Any) -> Any:
-        task = Task(kwargs.pop("campaign"), kwargs.pop("loss"), kwargs.pop("max_nrmse"), options)
+        campaign = _only(kwargs.pop("campaigns"))
+        task = Task(campaign, kwargs.pop("loss"), kwargs.pop("max_nrmse"), options)
         return function(*args, task=task, **kwargs)
 
     return wrapped  # type: ignore[return-value]
+
+
+def _only(campaigns: Sequence[Path]) -> Path:
+    """The one campaign of a command line; several test files in its place are told what makes one of them."""
+    from bushfit.campaign.campaign import refuse_tests
+
+    first, *others = campaigns
+    if others:
+        refuse_tests(campaigns)
+        extra = "argument" if len(others) == 1 else "arguments"
+        raise click.UsageError(
+            f"Got unexpected extra {extra} ({' '.join(map(str, others))}). bushfit batch takes several campaigns.",
+            click.get_current_context(),
+        )
+    return first
 
 
 def open_model(file: Path) -> Result:

@@ -4,36 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
-from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, Task, campaign_options, direction_option, example
+from bushfit.cli.common import Options, Task, campaign_options, example, place_option
 from bushfit.cli.show import tell_fit
-
-if TYPE_CHECKING:
-    from bushfit.geometry import Direction
 
 
 @click.command(
     "fit", epilog=example("bushfit fit configs/arm_bushing.toml --direction axial --direction radial --profile")
 )
-@direction_option(
+@place_option(
     "directions",
     multiple=True,
-    help="Tests to fit: {directions}; may be given again [axial, as in the paper; of loops, or of sweeps, "
-    "all where none is axial].",
+    help="Tests to fit: {directions}, or a specimen's name; may be given again [axial, as in the paper, and all "
+    "specimens; of loops, or of sweeps, all where none is axial].",
 )
 @click.option(
     "--effect",
     "effects",
     multiple=True,
     metavar="NAME",
-    help="Add an effect to the paper's three, such as inertia; may be given again. A wrong NAME lists them all.",
+    help="Add an effect to the paper's three and to those of [fit] effects, such as inertia; may be given again. A "
+    "wrong NAME lists them all.",
 )
 @click.option("--profile", is_flag=True, help="Add 95 % intervals by profile likelihood (some seconds).")
 @campaign_options
-def command(directions: tuple[Direction, ...], effects: tuple[str, ...], profile: bool, task: Task) -> None:
+def command(directions: tuple[str, ...], effects: tuple[str, ...], profile: bool, task: Task) -> None:
     """Fit all five parameters to the loops and sweeps of CAMPAIGN together.
 
     Writes model.json, and the tables and plots of both: loops.csv, loops.png, sweeps.csv, sweeps.png. Tests in

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, direction_option, example, open_model, shared_options
-from bushfit.cli.show import new_table, warn
+from bushfit.cli.common import Options, example, open_model, place_option, shared_options
+from bushfit.cli.show import new_table, tell_tests, warn
 
 if TYPE_CHECKING:
-    from bushfit.geometry import Direction
     from bushfit.jobs.predict import Predicted
 
 #: Amplitudes of a direction that the terminal shows at most, spread from first to last; the CSV has all.
@@ -28,39 +27,58 @@ _MOST_AMPLITUDES = 8
 @click.option(
     "--campaign",
     type=click.Path(path_type=Path),
-    help="Lay this campaign's sweeps over the plots, and use its [predict] grid.",
+    help="Lay this campaign's sweeps over the plots, set them beside the prediction, and use its [predict] grid.",
 )
-@direction_option(
+@click.option(
+    "--bushing",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Predict another bushing of the same compound: the [bushing] table of this TOML file.",
+)
+@place_option(
     "directions",
     multiple=True,
-    help="{directions}; may be given again [axial and radial].",
+    help="{directions}, or a specimen's name; may be given again [axial and radial of a bushing, and all specimens].",
 )
 @click.option("--frequencies", help='Such as "5:155:10 Hz" or "20, 50, 100 Hz" [the campaign\'s].')
 @click.option("--amplitudes", help='Zero-to-peak, such as "0.1, 0.2, 0.5 mm" [the campaign\'s].')
 @click.option("--torsion-amplitudes", help='Zero-to-peak rotation, for --direction torsion ["0.5, 1, 2 deg"].')
+@click.option("--strain-amplitudes", help='Zero-to-peak strain, for specimens that give a modulus ["1, 2, 5 %"].')
 @shared_options
 def command(
     model: Path,
     campaign: Path | None,
-    directions: tuple[Direction, ...],
+    bushing: Path | None,
+    directions: tuple[str, ...],
     frequencies: str | None,
     amplitudes: str | None,
     torsion_amplitudes: str | None,
+    strain_amplitudes: str | None,
     options: Options,
 ) -> None:
     """Dynamic stiffness and loss factor of MODEL (the model.json of run, fit or diagnose, or dynamic.json) over a grid.
 
-    Writes axial.csv and radial.csv (torsion.csv on request) with 95 % bands, and a plot of each. Effects of the rig
-    are left out. Without a grid in the options or the campaign it is that of the campaign's sweeps in each direction,
-    or the paper's as far as it was measured. A warning names what leaves the fitted directions, strains or frequencies.
+    Writes axial.csv and radial.csv (torsion.csv on request), and a table of each specimen, with 95 % bands, and a plot
+    of each; with --campaign measured.csv, its sweeps beside the model. Effects of the rig are left out. Without a grid
+    in the options or the campaign it is that of the campaign's sweeps at each place, or the paper's as far as it was
+    measured. A warning names what leaves the fitted directions, strains or frequencies.
+
+    --bushing carries the compound to another shape: effects of the material are kept, those of the old bushing and its
+    rig are left out, and it is said which.
     """
-    from bushfit.campaign.campaign import load_campaign
+    from bushfit.campaign.campaign import load_bushing, load_campaign
     from bushfit.campaign.naming import folder_name
     from bushfit.campaign.schema import PredictSettings
     from bushfit.cli.grids import parse_grid
     from bushfit.jobs.predict import Predict
+    from bushfit.prediction import carried
 
-    result = open_model(model)
+    result, notes = open_model(model), list[str]()
+    of_fit = [f"of the fit: {line}" for line in result.warnings]
+    if bushing:
+        result, note = carried(result, load_bushing(bushing))
+        notes.append(note)
+        directions = directions or ("axial", "radial")
     loaded = load_campaign(campaign) if campaign else None
     job = Predict(
         PredictSettings(
@@ -68,14 +86,17 @@ def command(
             parse_grid(amplitudes, "--amplitudes", "m"),
             parse_grid(torsion_amplitudes, "--torsion-amplitudes", "rad"),
             directions or None,
+            parse_grid(strain_amplitudes, "--strain-amplitudes", "1"),
         )
     )
     folder = options.folder(loaded.slug if loaded else folder_name(result.name))
-    options.require_free(folder, job.names(loaded, options.formats))
-    outcome = job.run(result, loaded)
+    measured = ["measured.csv"] if loaded and loaded.sweeps else []
+    options.require_free(folder, [*job.names(result, loaded, options.formats), *measured])
+    outcome = job.run(result, loaded, tuple(notes))
     tell_predictions(options, outcome)
-    warn(options, [f"of the fit: {line}" for line in result.warnings])
-    options.write(folder, outcome.files(options.formats))
+    tell_tests(options, outcome.tests, outcome.usable)
+    warn(options, of_fit)
+    options.write(folder, outcome.files_beside(options.formats))
     options.tell(outcome.document)
 
 
@@ -88,7 +109,9 @@ def tell_predictions(options: Options, outcome: Predicted) -> None:
         table = prediction_table(prediction)
         amplitudes = table.iloc[:, 1].unique()
         chosen = amplitudes[spread(amplitudes.size, _MOST_AMPLITUDES)]
-        shown = new_table(f"{outcome.result.name}: {prediction.direction}, corners", *table.columns[:4])
+        place = str(prediction.direction)
+        whose = "" if prediction.direction in outcome.result.specimens else f"{outcome.result.name}: "
+        shown = new_table(f"{whose}{place}, corners", *table.columns[:4])
         low, high = table.iloc[:, 0].min(), table.iloc[:, 0].max()
         for row in table[table.iloc[:, 0].isin([low, high]) & table.iloc[:, 1].isin(chosen)].itertuples(index=False):
             shown.add_row(*(number(value, 6) for value in row[:2]), *(alike([value], 4)[0] for value in row[2:4]))

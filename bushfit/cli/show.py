@@ -13,12 +13,14 @@ if TYPE_CHECKING:
 
     from bushfit.cli.common import Options
     from bushfit.jobs.fits import Fitted
-    from bushfit.model.result import Result
+    from bushfit.model.result import Misfit, Result, Usable
 
 #: Correlation between two parameters from which on it is shown without -v: they trade off against each other.
 _CLOSE = 0.9
 #: A value below its least possible value times this is shown as resting there: logarithms tell no more apart.
 _AT_LEAST = 1.01
+#: Tests that the terminal shows at most without -v, those that are met worst.
+_MOST_TESTS = 8
 #: Digits of a value whose standard error is not known.
 _PLAIN_DIGITS = 4
 #: Fewest and most digits of a value, however small or large its standard error.
@@ -49,9 +51,40 @@ def tell_result(options: Options, title: str, result: Result) -> None:
             f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)} "
             f"over {quality.points} points, noise {number(100 * quality.noise, 2)} % a point"
         )
+    tell_tests(options, result.tests, result.usable)
     shown = [pair for pair in result.covariance.correlations() if options.verbose or abs(pair[2]) > _CLOSE]
     if shown:
         console.print("correlation: " + ", ".join(f"{one}/{other} {value:+.2f}" for one, other, value in shown))
+
+
+def tell_tests(options: Options, tested: Sequence[Misfit], usable: Sequence[Usable]) -> None:
+    """How well each test is met, with -v each run of it, and within what the model is usable."""
+    tests = [test for test in tested if options.verbose or test.held is None]
+    worst = sorted(tests, key=lambda test: -test.reduced_chi_square)[: len(tests) if options.verbose else _MOST_TESTS]
+    if len(tests) > 1:
+        table = new_table("test by test", "test", "place", "points", "NRMSE [%]", "chi-square", "gain off [%]", "")
+        for test in tests:
+            if test in worst:
+                name = test.test if test.held is None else f"  {_held(test)}"
+                figures = (number(100 * test.nrmse, 2), number(test.reduced_chi_square, 2), f"{100 * test.gain:+.2f}")
+                table.add_row(name, test.place, str(test.points), *figures, "" if test.fitted else "not fitted")
+        options.console.print(table)
+    if left := len(tests) - len(worst):
+        options.console.print(f"and {left} tests more, which are met better; -v shows them", markup=False)
+    for place in usable:
+        how = "each predicted from other runs" if place.held_out else "as fitted"
+        words = f"{number(100 * place.stiffness, 2)} % of stiffness and {number(place.loss_factor, 2)} of loss factor"
+        line = f"{place.place}: usable within {words} (95 % of {place.points} points, {how})"
+        options.console.print(line, markup=False)
+
+
+def _held(test: Misfit) -> str:
+    """What a run held, as people read it."""
+    from bushfit.geometry import ROTATION, STRAINING, TRANSLATION
+
+    motions = {motion.displacement_unit: motion.display.displacement for motion in (TRANSLATION, ROTATION, STRAINING)}
+    unit, factor = motions.get(test.unit or "", (test.unit, 1.0))
+    return f"{number(factor * (test.value or 0.0), 3)} {unit}"
 
 
 def tell_sources(options: Options, result: Result) -> None:

@@ -18,14 +18,10 @@ import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.effects.contract import Array
+from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.reading.measurement import Stepped
 
-#: A part without which some parameter's variance would grow by more than this factor is not held out: what is left does
-#: not determine that parameter, so a prediction would say nothing.
-_MOST_GROWTH = 100.0
-#: Condition number of the remaining information beyond which its inverse is rounding.
-_SINGULAR = 1e14
 #: Held-out gap, in units of noise, that counts as closed: noise and its own estimate make 1.1.
 _CLOSED = 1.2
 #: Share of the held-out gap before, below which the gap after counts as closed too.
@@ -71,7 +67,8 @@ class HoldOut:
 def hold_out(before: Evidence, after: Evidence) -> HoldOut:
     """Compare two models of the same tests on every part that both can predict from the rest."""
     models = (before, after)
-    gaps = {name: [_predicted(evidence, chosen) for evidence in models] for name, chosen in _parts(after)}
+    whole = [LeaveOut.of(evidence.solution.jacobian, evidence.residual) for evidence in models]
+    gaps = {name: list(map(_predicted, models, whole, [chosen] * 2)) for name, chosen in _parts(after)}
     told = {name: pair for name, pair in gaps.items() if all(gap.size for gap in pair)}
     parts = tuple(HeldOut(name, *map(_rms, pair)) for name, pair in told.items())
     together = zip(*told.values(), strict=True) if told else [[evidence.residual] for evidence in models]
@@ -82,19 +79,10 @@ def _rms(gap: Array) -> float:
     return float(np.sqrt(np.mean(np.square(gap))))
 
 
-def _predicted(evidence: Evidence, chosen: Array) -> Array:
+def _predicted(evidence: Evidence, whole: LeaveOut, chosen: Array) -> Array:
     """Residuals of the chosen rows with the model fitted to the others; none where those leave it open."""
-    jacobian, residual = evidence.solution.jacobian, evidence.residual
-    rest, full = jacobian[:, ~chosen] @ jacobian[:, ~chosen].T, jacobian @ jacobian.T
-    moving = np.diag(full) > 0.0
-    rest, full = rest[np.ix_(moving, moving)], full[np.ix_(moving, moving)]
-    if np.linalg.cond(rest) > _SINGULAR:
-        return np.empty(0)
-    inverse = np.linalg.inv(rest)
-    if np.any(np.diag(inverse) > _MOST_GROWTH * np.diag(np.linalg.inv(full))):
-        return np.empty(0)
-    step = -inverse @ (jacobian[moving][:, ~chosen] @ residual[~chosen])
-    return residual[chosen] + step @ jacobian[moving][:, chosen]
+    step = whole.step(chosen)
+    return np.empty(0) if step is None else evidence.residual[chosen] + step @ evidence.solution.jacobian[:, chosen]
 
 
 def _parts(evidence: Evidence) -> Iterator[tuple[str, Array]]:

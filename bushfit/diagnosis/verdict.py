@@ -18,6 +18,7 @@ from bushfit.diagnosis.refit import Candidate
 from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.search import SAME, Search, Step
 from bushfit.effects import effect_of
+from bushfit.fitting.agreement import misfits, usable
 from bushfit.fitting.assess import Stage, covariance, measured_range, quality
 from bushfit.fitting.data_sets import parted, sources
 from bushfit.fitting.procedures import cautions
@@ -217,6 +218,8 @@ def _result(evidence: Evidence, bounds: Bounds) -> Result:
         tuple(cautions(model, evidence.solution, evidence.data_sets, bounds, cov)),
         sources(evidence.data_sets),
         at_bound=evidence.solution.at_bound,
+        tests=misfits(model, evidence.data_sets),
+        usable=usable(evidence.solution, evidence.data_sets),
     )
 
 

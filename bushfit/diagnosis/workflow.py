@@ -14,11 +14,10 @@ from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.refit import can_reach
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import judge
-from bushfit.effects import BASE, effect_named, qualified
+from bushfit.effects import effect_named, qualified
 from bushfit.effects.mistakes import candidate_named, mistake_named
 from bushfit.fitting.data import Data
 from bushfit.fitting.robust import estimate, outliers_at, told
-from bushfit.fitting.starts import start_values
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 
@@ -28,7 +27,8 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
 
     Args:
         data: the campaign; all directions are used.
-        model: where to start; the paper's three branches unless told. Its effects are kept, its values refitted.
+        model: where to start; the paper's three branches, and what [fit] adds, unless told. Its effects are kept, its
+            values refitted.
         settings: limits, and effects, or mistakes in the record, to adopt or to leave out.
 
     Raises:
@@ -49,7 +49,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     outliers = begun.outliers if data.robust else outliers_at(found.result.model, search.base.data_sets)
     notes = (*said, *found.notes, *told(outliers, robust=data.robust))
     warnings = (*said, *found.result.warnings)
-    result = replace(found.result, outliers=outliers, warnings=warnings)
+    result = replace(found.result, outliers=outliers, warnings=warnings, specimens=data.campaign.specimens)
     return replace(found, notes=notes, result=result)
 
 
@@ -75,8 +75,8 @@ def _begin(data: Data, model: Model | None, settings: Settings, goal: float = np
     hint = "add measured tests to the campaign"
     data_sets = data.some([*data.loops, *data.sweeps], "there is nothing to diagnose", hint)
     held = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
-    start = {**start_values(data.campaign.bushing, data_sets, {}), **data.given}
-    model = model or Model.started(data.campaign.bushing, BASE, start)
+    start = data.start(data_sets, {})
+    model = model or Model.started(data.campaign.bushing, data.effects, start)
     start = {name: value for name, value in start.items() if name in model.values and name not in held}
     for name in settings.adopt:
         if mistake_named(name) is None and name not in model.effects:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
@@ -10,10 +10,14 @@ from typing import TypeVar
 import numpy as np
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.errors import FitError
+from bushfit.effects import BASE
+from bushfit.effects.contract import Array
+from bushfit.errors import FitError, naming
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data, sweep_data
 from bushfit.fitting.solve import Bounds
-from bushfit.geometry import Direction, Place
+from bushfit.fitting.starts import start_values
+from bushfit.geometry import Direction, Specimen, place_named
+from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 
 #: Difference of two amplitudes relative to their size up to which they are the same level.
@@ -44,7 +48,10 @@ class Data:
 
         Raises:
             FitError: a loop is not one whole cycle or more, rows of it are missing, or it gives energy.
+            ModelError: [fit] effects has an unknown effect, or one twice.
         """
+        with naming(campaign.path, place="[fit] effects"):
+            Model.started(None, (*BASE, *campaign.fit.effects), {})
         return cls(
             campaign,
             tuple(loop_data(campaign.loops, without_outliers=campaign.fit.loss != "linear")),
@@ -86,55 +93,76 @@ class Data:
         settings = self.campaign.fit.parameters
         return {name: setting.value for name, setting in settings.items() if setting.value is not None}
 
+    def start(self, data_sets: Sequence[DataSet], held: Mapping[str, float]) -> dict[str, float]:
+        """Values of the paper's parameters, and of all that the campaign gives, to start a fit of some tests from.
+
+        Raises:
+            FitError: see `start_values`.
+        """
+        with naming(self.campaign.path):
+            return start_values(self.campaign.bushing, data_sets, {**self.given, **held})
+
     def free(self, names: Sequence[str]) -> tuple[str, ...]:
         """Those names that the campaign does not hold."""
         settings = self.campaign.fit.parameters
         return tuple(name for name in names if name not in settings or settings[name].vary)
 
-    def chosen(self, directions: Sequence[Place] | None) -> list[DataSet]:
-        """Data sets of the given directions; by default the axial loops and sweeps, as in the paper.
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The model that [fit] asks for: the paper's three branches and the effects that it adds."""
+        return (*BASE, *self.campaign.fit.effects)
 
-        Where no loop is axial, all loops are taken by default, and so with sweeps.
+    def chosen(self, places: Sequence[str] | None) -> list[DataSet]:
+        """Data sets of the places of these names; by default the axial ones, as in the paper, and the specimens'.
+
+        Where no loop of the bushing is axial, all loops are taken by default, and so with sweeps.
 
         Raises:
             FitError: there is none.
+            ModelError: a name that is neither a direction nor a specimen of the campaign.
         """
         hint = "add measured tests, or make some with bushfit simulate"
         data_sets = self.some([*self.loops, *self.sweeps], "there is nothing to fit", hint)
-        if directions is None:
-            return [*_axial(self.loops), *_axial(self.sweeps)]
-        chosen = [data_set for data_set in data_sets if data_set.direction in directions]
+        if places is None:
+            return [*_compound(self.loops), *_compound(self.sweeps)]
+        with naming(self.campaign.path):
+            wanted = [place_named(str(place), self.campaign.specimens) for place in places]
+        chosen = [data_set for data_set in data_sets if data_set.direction in wanted]
         if not chosen:
             raise FitError(
                 "no test in the directions asked for",
                 file=self.campaign.path,
                 found=", ".join(sorted({str(data_set.direction) for data_set in data_sets})) or "no tests",
-                expected=", ".join(str(direction) for direction in directions),
+                expected=", ".join(places),
             )
         return chosen
 
     def static_loops(self) -> list[DataSet]:
-        """The loops `fit-static` uses: the axial ones, or all where none is axial.
+        """The loops `fit-static` uses: the axial ones, else those of the bushing, else all.
 
         Raises:
             FitError: there is no loop.
         """
         hint = "add a quasi-static loop, or run bushfit fit for the sweeps alone"
-        return [*_axial(self.some(self.loops, "fit-static needs a loop", hint, "no [[loops]]"))]
+        return [*_first(self.some(self.loops, "fit-static needs a loop", hint, "no [[loops]]"))]
 
     @cached_property
     def smallest_sweep(self) -> SweepData:
         """The sweep levels `fit-dynamic` uses: those the campaign names, else the smallest axial one.
 
+        Sweeps of the frequency go first, then those of the bushing. Of a sweep of the amplitude it takes the smallest
+        at each frequency, and of one that holds neither all points.
+
         Raises:
             FitError: no sweep, or none at the amplitudes named.
         """
         hint = "add a stepped-sine file, or run bushfit fit-static for the loops alone"
-        sweeps = _axial(self.some(self.sweeps, "fit-dynamic needs a sweep", hint, "no [[sweeps]]"))
+        every = self.some(self.sweeps, "fit-dynamic needs a sweep", hint, "no [[sweeps]]")
+        sweeps = _first([data_set for data_set in every if data_set.test.stepped == "frequency"] or every)
         wanted = self.campaign.fit.dynamic_amplitudes
         if not wanted:
             sweep = min(sweeps, key=lambda data_set: float(data_set.amplitude.min()))
-            return sweep.at_amplitudes((float(sweep.amplitude.min()),))
+            return sweep.at_amplitudes(_smallest(sweep))
         for sweep in sweeps:
             there = np.isclose(sweep.amplitude[:, None], wanted, rtol=_SAME_LEVEL).any(axis=1)
             if there.any():
@@ -149,6 +177,23 @@ class Data:
         )
 
 
-def _axial(data_sets: Sequence[_Kind]) -> Sequence[_Kind]:
-    """The axial ones, or all where none is."""
-    return [data_set for data_set in data_sets if data_set.direction is Direction.AXIAL] or data_sets
+def _compound(data_sets: Sequence[_Kind]) -> Sequence[_Kind]:
+    """The axial ones and those of specimens; all where the bushing has others only."""
+    if not any(data_set.direction is Direction.AXIAL for data_set in data_sets):
+        return data_sets
+    return [each for each in data_sets if each.direction is Direction.AXIAL or isinstance(each.direction, Specimen)]
+
+
+def _first(data_sets: Sequence[_Kind]) -> Sequence[_Kind]:
+    """The axial ones, else those of the bushing, else all."""
+    axial = [data_set for data_set in data_sets if data_set.direction is Direction.AXIAL]
+    return axial or [each for each in data_sets if not isinstance(each.direction, Specimen)] or data_sets
+
+
+def _smallest(sweep: SweepData) -> Array:
+    """Amplitudes of a sweep's smallest level, or the smallest at each frequency, or all, by what is stepped, (k,)."""
+    if sweep.test.stepped == "frequency":
+        return sweep.amplitude.min(keepdims=True)
+    if sweep.test.stepped is None:
+        return sweep.amplitude
+    return np.array([sweep.amplitude[sweep.frequency == at].min() for at in np.unique(sweep.frequency)])

@@ -18,7 +18,7 @@ _SOFTEST = 5e4
 _HARDEST = 1e8
 #: Modulus of the fastest and smallest test over that of the slowest and largest, at most, for any rubber.
 _MOST_STIFFENING = 20.0
-_CHECK = "check the units of displacement and force, and the dimensions of the bushing"
+_CHECK = "check the units of displacement and force, and the dimensions of what was tested"
 
 
 def implausible(bushing: Bushing | None, data_sets: Sequence[DataSet]) -> list[str]:

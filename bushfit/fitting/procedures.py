@@ -9,7 +9,8 @@ import numpy as np
 
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
-from bushfit.errors import FitError, ModelError
+from bushfit.errors import FitError
+from bushfit.fitting.agreement import misfits, usable
 from bushfit.fitting.assess import Stage, covariance, lack_of_fit, measured_range, misfit, quality
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, parted, sources
@@ -18,8 +19,6 @@ from bushfit.fitting.plausible import implausible, unfitted
 from bushfit.fitting.profile import profile95
 from bushfit.fitting.robust import Estimate, estimate, told
 from bushfit.fitting.solve import Bounds, Coordinates, Solution
-from bushfit.fitting.starts import start_values
-from bushfit.geometry import Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import End, Result
@@ -53,16 +52,16 @@ class TwoStep:
 def fit_joint(
     data: Data,
     *,
-    effects: Sequence[str] = BASE,
-    directions: Sequence[Direction] | None = None,
+    effects: Sequence[str] | None = None,
+    directions: Sequence[str] | None = None,
     profile: Callable[[str, int], None] | None = None,
 ) -> Result:
     """All parameters of a model together, from loops and sweeps.
 
     Args:
         data: the campaign.
-        effects: the model; the paper's three branches unless told.
-        directions: tests to use; the axial ones by default, as in the paper.
+        effects: the model; the paper's three branches, and what [fit] adds to them, unless told.
+        directions: and specimens whose tests to use; see `Data.chosen`.
         profile: called with the name of each parameter when its profile likelihood is done, and how many are left;
             None asks for none.
 
@@ -70,9 +69,11 @@ def fit_joint(
         FitError: no test in those directions, or data that cannot support the fit.
     """
     data_sets = data.chosen(directions)
-    found = _solve(data, data_sets, effects, {})
+    found = _solve(data, data_sets, data.effects if effects is None else effects, {})
     left: list[DataSet] = [data_set for data_set in (*data.loops, *data.sweeps) if data_set not in data_sets]
     result = _result(data, [found], notes=unfitted(found.solution.model, left, _NEXT))
+    tests = misfits(found.solution.model, found.data_sets, left)
+    result = replace(result, tests=tests, usable=usable(found.solution, found.minimised, left))
     if profile is None:
         return result
     intervals = profile95(found.solution, found.minimised, result.covariance, data.bounds, profile)
@@ -193,20 +194,7 @@ def _without_springpot(data: Data, solution: Solution, data_sets: Sequence[DataS
 
 def _solve(data: Data, data_sets: Sequence[DataSet], effects: Sequence[str], held: Mapping[str, float]) -> Estimate:
     """Fit what the campaign leaves free of a model, from start values taken from the data."""
-    bushing = data.campaign.bushing
-    start = {**start_values(bushing, data_sets, held), **data.given, **held}
-    try:
-        model = Model.started(bushing, effects, start)
-    except ModelError as error:
-        if error.place is None or error.place in data.given:
-            raise
-        raise FitError(
-            "the tests are of a size that no bushing shows",
-            file=data.campaign.path,
-            found=f"{error.place} = {error.found}",
-            expected=error.expected,
-            hint="check the units of displacement and force, and the dimensions of the bushing",
-        ) from error
+    model = Model.started(data.campaign.bushing, effects, data.start(data_sets, held))
     names = [name for name in data.free(tuple(model.parameters)) if name not in held]
     return estimate(model, data_sets, names, data.bounds, robust=data.robust)
 
@@ -238,6 +226,8 @@ def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = Non
         sources(data_sets),
         outliers,
         at_bound={name: end for step in steps for name, end in step.solution.at_bound.items()},
+        specimens=data.campaign.specimens,
+        tests=misfits(model, data_sets),
     )
 
 

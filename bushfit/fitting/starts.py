@@ -9,9 +9,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from bushfit.effects import parameter_named
 from bushfit.effects.contract import Array
 from bushfit.effects.friction import harmonic_shape
+from bushfit.errors import FitError
 from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.plausible import implausible
 from bushfit.geometry import Bushing, stiffness_per_modulus, unit_strain
 
 #: Strain amplitude of the largest test over eps_half, before anything is known; chosen: the fit finds the rest.
@@ -26,8 +29,9 @@ _LEAST_GROWTH = 1e-3
 _ABOVE_ZERO = 1e-9
 #: Frequency over the slowest up to which a test counts as slow.
 _SLOW = 1.5
-#: Strain over the smallest of the sweeps up to which a point counts as of their smallest level.
-_SMALLEST = 1.01
+#: Strain over the smallest of the sweeps up to which a point counts as of their smallest level: amplitudes that were
+#: stepped are reached within some per cent.
+_SMALLEST = 1.2
 #: Range of ln omega from which on it tells a slope.
 _LEAST_RANGE = 0.1
 #: Start of alpha where the data tell no slope: that of a usual filled rubber.
@@ -40,6 +44,11 @@ _ALPHA_RANGE = (0.1, 0.6)
 
 def start_values(bushing: Bushing | None, data_sets: Sequence[DataSet], known: Mapping[str, float]) -> dict[str, float]:
     """Values of mu, m, alpha, sigma_fmax, eps_half to start from; `known` ones are kept and allowed for.
+
+    What lies beyond the bounds of its parameter is moved to them.
+
+    Raises:
+        FitError: it lies there, and the moduli of the tests are those of no rubber.
 
     Notes:
         - eps_half from the largest strain reached;
@@ -63,7 +72,16 @@ def start_values(bushing: Bushing | None, data_sets: Sequence[DataSet], known: M
         least = _LEAST_SHARE * modulus.imag.clip(min=0.0) + _ABOVE_ZERO * mu
         viscous_loss = np.maximum(modulus.imag - friction.imag, least)
         m, alpha = _springpot(log_omega, modulus.real[smallest], viscous_loss[smallest], _LEAST_GROWTH * mu)
-    return {"mu": mu, "m": m, "alpha": alpha, "sigma_fmax": sigma_fmax, "eps_half": eps_half, **known}
+    found = {"mu": mu, "m": m, "alpha": alpha, "sigma_fmax": sigma_fmax, "eps_half": eps_half}
+    found = {name: value for name, value in found.items() if name not in known}
+    inside = {name: float(np.clip(value, *parameter_named(name).bounds)) for name, value in found.items()}
+    if inside != found and (reasons := implausible(bushing, data_sets)):
+        raise FitError(
+            "the tests are of a size that no rubber shows",
+            found=reasons[0],
+            hint="if these are the units and the dimensions, give start values in [fit] of the campaign",
+        )
+    return {**inside, **known}
 
 
 def _springpot(log_omega: Array, storage: Array, loss: Array, least_growth: float) -> tuple[float, float]:

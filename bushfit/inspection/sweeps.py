@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 from scipy.stats import linregress, poisson
@@ -15,6 +14,7 @@ from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.record import Looked
 from bushfit.reading.measurement import Sweep, loss_factor
+from bushfit.reading.names import Said
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 from bushfit.units import number
 
@@ -46,8 +46,8 @@ _MOST_LISTED = 4
 _MOST_LEVELS = 8
 
 
-def look_at_sweep(sweep: Sweep, file: Path) -> Looked:
-    """Facts and oddities of a sweep; `file` is where it was read."""
+def look_at_sweep(sweep: Sweep, named: Said) -> Looked:
+    """Facts and oddities of a sweep; `named` is what the names of its file and sheet say."""
     unit, factor = sweep.direction.display.displacement
     frequencies, levels = np.unique(sweep.frequency), np.unique(sweep.amplitude)
     repeats = np.unique(sweep.repeat)
@@ -60,7 +60,7 @@ def look_at_sweep(sweep: Sweep, file: Path) -> Looked:
         "noise": noise.describe(),
     }
     odd = [
-        *wrong_labels(file, sweep.direction, [float(x) for x in levels], [float(x) for x in frequencies]),
+        *wrong_labels(named, sweep.direction, [float(x) for x in levels], [float(x) for x in frequencies]),
         *_copies(sweep, noise),
         *_missing(sweep, unit, factor),
         *_outliers(sweep, noise, unit, factor),

@@ -11,7 +11,7 @@ from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.errors import FitError
 from bushfit.model.file import to_document
-from bushfit.model.model import FIVE, Model
+from bushfit.model.model import Model
 from bushfit.report.artifacts import artifact_names, diagnosis_files
 from bushfit.report.folder import to_json
 
@@ -60,7 +60,8 @@ class Diagnose:
         ]
 
     def run(self, data: Data) -> Diagnosed:
-        parameters = tuple(self.model.parameters) if self.model else FIVE
+        model = self.model or Model.started(data.campaign.bushing, data.effects, {})
+        parameters = tuple(model.parameters)
         if not (self.settings.adopt or data.free(parameters)):
             raise FitError(
                 "there is nothing to fit, and so nothing to diagnose",

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from bushfit.effects import BASE
 from bushfit.errors import FitError
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, given_static
 from bushfit.model.file import to_document
@@ -17,7 +16,6 @@ from bushfit.report.folder import to_json
 if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
     from bushfit.fitting.data import Data
-    from bushfit.geometry import Direction
     from bushfit.model.result import Result
 
 
@@ -99,7 +97,7 @@ class Fit:
     how many are left.
     """
 
-    directions: tuple[Direction, ...] = ()
+    directions: tuple[str, ...] = ()
     effects: tuple[str, ...] = ()
     profile: Callable[[str, int], None] | None = None
 
@@ -107,7 +105,7 @@ class Fit:
         return ["model.json", *artifact_names(tests_of(campaign), formats)]
 
     def run(self, data: Data) -> Fitted:
-        effects = (*BASE, *self.effects)
+        effects = (*data.effects, *(name for name in self.effects if name not in data.campaign.fit.effects))
         result = fit_joint(data, effects=effects, directions=self.directions or None, profile=self.profile)
         return Fitted("model", tests_of(data.campaign), data, (("joint fit", result),))
 
@@ -119,6 +117,6 @@ def tests_of(campaign: Campaign) -> tuple[str, ...]:
 
 def files_of_tests(data: Data, result: Result, kinds: Collection[str], formats: Collection[str]) -> dict[str, bytes]:
     """Tables and plots of tests of some kinds beside a model, with the outliers that its fit left out marked."""
-    marked = data.without(result.outliers)
-    loops = fit_files("loops", result.model, marked.loops if "loops" in kinds else (), formats)
-    return loops | fit_files("sweeps", result.model, marked.sweeps if "sweeps" in kinds else (), formats)
+    marked, title = data.without(result.outliers), result.model.name if result.model.bushing else data.campaign.name
+    loops = fit_files("loops", result, title, marked.loops if "loops" in kinds else (), formats)
+    return loops | fit_files("sweeps", result, title, marked.sweeps if "sweeps" in kinds else (), formats)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from bushfit.campaign.schema import PredictSettings
+from bushfit.fitting.agreement import met_within, misfits
 from bushfit.fitting.data_sets import SweepData, sweep_data
-from bushfit.geometry import Direction
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Specimen, place_named
 from bushfit.prediction import Prediction, caveats, default_grid, predict
-from bushfit.report.artifacts import artifact_names, prediction_files
+from bushfit.report.artifacts import artifact_names, measured_file, place_files, prediction_files
 from bushfit.report.tables import prediction_table
 
 if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
-    from bushfit.model.result import Result
+    from bushfit.geometry import Place
+    from bushfit.model.result import Misfit, Result, Usable
 
 #: Directions that are predicted where none is asked for: those of the paper.
 _DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
@@ -23,11 +26,19 @@ _DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """The outcome of a prediction: one table a direction; `measured` is laid over the plots."""
+    """The outcome of a prediction: one table a place; `measured` is laid over the plots.
+
+    Args:
+        result: the model.
+        predictions: of each place.
+        measured: sweeps of places that the model can predict.
+        notes: what else a user must know.
+    """
 
     result: Result
     predictions: Sequence[Prediction]
     measured: Sequence[SweepData]
+    notes: tuple[str, ...] = ()
 
     @property
     def document(self) -> Mapping[str, Any]:
@@ -36,11 +47,35 @@ class Predicted:
 
     @property
     def warnings(self) -> list[str]:
-        """Of each direction, then of all."""
-        return [*(line for p in self.predictions for line in p.warnings), *caveats(self.result)]
+        """Of the carried model, of each place, then of all."""
+        return [*self.notes, *(line for p in self.predictions for line in p.warnings), *caveats(self.result)]
+
+    @cached_property
+    def tests(self) -> tuple[Misfit, ...]:
+        """How well the model meets each of the sweeps."""
+        return misfits(self.result.model, *self._parted)
+
+    @cached_property
+    def usable(self) -> tuple[Usable, ...]:
+        """Within what it meets them, by place."""
+        return met_within(self.result.model, *self._parted)
+
+    @property
+    def _parted(self) -> tuple[list[SweepData], list[SweepData]]:
+        """The sweeps whose files the model was fitted to, and the others."""
+        files = {source.sha256 for source in self.result.inputs}
+        known = [bool(sweep.source and sweep.source.sha256 in files) for sweep in self.measured]
+        fitted, left = (
+            [s for s, old in zip(self.measured, known, strict=True) if old is part] for part in (True, False)
+        )
+        return fitted, left
 
     def files(self, formats: Collection[str]) -> dict[str, bytes]:
-        return prediction_files(self.result, self.predictions, self.measured, formats)
+        return prediction_files(self.result, self.predictions, self.measured, formats, self.notes)
+
+    def files_beside(self, formats: Collection[str]) -> dict[str, bytes]:
+        """The same, and the measured points beside the model's as a table."""
+        return self.files(formats) | measured_file(self.result, *self._parted, formats)
 
 
 @dataclass(frozen=True)
@@ -49,23 +84,45 @@ class Predict:
 
     asked: PredictSettings = field(default_factory=PredictSettings)
 
-    def names(self, campaign: Campaign | None, formats: Collection[str]) -> list[str]:
-        directions = self._settings(campaign).directions or _DIRECTIONS
-        return artifact_names([str(direction) for direction in directions], formats)
+    def places(self, result: Result | None, campaign: Campaign | None) -> list[Place]:
+        """Those asked for, else the paper's directions where there is a bushing, and all specimens.
 
-    def run(self, result: Result, campaign: Campaign | None) -> Predicted:
-        """One prediction a direction.
+        Args:
+            result: the model; None where it is still to be fitted to the campaign.
+            campaign: its tests; None for a model alone.
 
         Raises:
-            ModelError: a frequency or amplitude that is not positive.
+            ModelError: a name that is neither a direction nor a specimen.
+        """
+        bodies = [(result.model.bushing, result.specimens)] if result else []
+        bodies += [(campaign.bushing, campaign.specimens)] if campaign else []
+        specimens = {specimen.name: specimen for _, some in bodies for specimen in some}
+        if names := self._settings(campaign).directions:
+            return [place_named(name, specimens.values()) for name in names]
+        return [*(_DIRECTIONS if bodies[0][0] or not specimens else ()), *specimens.values()]
+
+    def names(self, result: Result | None, campaign: Campaign | None, formats: Collection[str]) -> list[str]:
+        """The files of each place."""
+        return artifact_names(place_files(self.places(result, campaign)), formats)
+
+    def run(self, result: Result, campaign: Campaign | None, notes: tuple[str, ...] = ()) -> Predicted:
+        """One prediction a place.
+
+        Raises:
+            ModelError: a frequency or amplitude that is not positive, or a direction where there is no bushing.
         """
         settings, sweeps = self._settings(campaign), campaign.sweeps if campaign else ()
         predictions = []
-        for direction in settings.directions or _DIRECTIONS:
-            frequencies, amplitudes = default_grid(result, direction, sweeps)
-            asked = settings.torsion_amplitudes if direction.is_rotation else settings.amplitudes
-            predictions.append(predict(result, direction, settings.frequencies or frequencies, asked or amplitudes))
-        return Predicted(result, predictions, sweep_data(sweeps))
+        for place in self.places(result, campaign):
+            frequencies, amplitudes = default_grid(result, place, sweeps)
+            asked = {
+                TRANSLATION: settings.amplitudes,
+                ROTATION: settings.torsion_amplitudes,
+                STRAINING: settings.strain_amplitudes,
+            }[place.motion]
+            predictions.append(predict(result, place, settings.frequencies or frequencies, asked or amplitudes))
+        known = [each for each in sweep_data(sweeps) if result.model.bushing or isinstance(each.direction, Specimen)]
+        return Predicted(result, predictions, known, notes)
 
     def _settings(self, campaign: Campaign | None) -> PredictSettings:
         given = {key: value for key, value in vars(self.asked).items() if value is not None}

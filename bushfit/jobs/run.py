@@ -83,7 +83,7 @@ class Run:
             "joint.json",
             *Diagnose().names(campaign, formats),
             *artifact_names(tests_of(campaign), formats),
-            *Predict().names(campaign, formats),
+            *Predict().names(None, campaign, formats),
         ]
 
     def run(self, data: Data) -> Ran:

@@ -21,7 +21,7 @@ from bushfit.errors import ModelError, naming
 from bushfit.geometry import Bushing, Shape, Specimen
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
-from bushfit.model.result import End, Outlier, Quality, Range, Result
+from bushfit.model.result import End, Misfit, Outlier, Quality, Range, Result, Usable
 from bushfit.reading.files import read_utf8
 from bushfit.reading.measurement import Source
 from bushfit.validation import Flag, Name, Number, WholeNumber, check_tables
@@ -111,6 +111,8 @@ class FitTable:
     frequency_Hz: tuple[Number, Number] | None = None  # noqa: N815
     strain: tuple[Number, Number] | None = None
     directions: tuple[Name, ...] = ()
+    tests: tuple[Misfit, ...] = ()
+    usable: tuple[Usable, ...] = ()
 
     def __post_init__(self) -> None:
         if self.strain and not self.frequency_Hz:
@@ -213,6 +215,8 @@ def _result(tables: ModelFile) -> Result:
         profile={name: entry.profile95 for name, entry in entries.items() if entry.profile95},
         at_bound={name: entry.at_bound for name, entry in entries.items() if entry.at_bound},
         specimens=tuple(table.specimen for table in tables.specimens),
+        tests=fit.tests if fit else (),
+        usable=fit.usable if fit else (),
     )
     with naming(place="fit, directions"):
         for name in result.measured.directions if result.measured else ():
@@ -241,7 +245,7 @@ def to_document(result: Result) -> dict[str, Any]:
             "matrix": covariance.matrix.tolist(),
             "spread": [part.tolist() for part in covariance.spread],
         },
-        "fit": _fit(result.quality, result.measured) if result.quality and result.measured else None,
+        "fit": _fit(result, result.quality, result.measured) if result.quality and result.measured else None,
         "warnings": list(result.warnings),
         "outliers": [asdict(outlier) for outlier in result.outliers],
         "provenance": {
@@ -310,12 +314,14 @@ def _uncertainty(result: Result, name: str) -> dict[str, Any]:
     return entry | {"vary": name in result.fitted}
 
 
-def _fit(quality: Quality, measured: Range) -> dict[str, Any]:
+def _fit(result: Result, quality: Quality, measured: Range) -> dict[str, Any]:
     return {
         **asdict(quality),
         "frequency_Hz": list(measured.frequency),
         "strain": list(measured.strain),
         "directions": list(measured.directions),
+        "tests": [asdict(test) for test in result.tests],
+        "usable": [asdict(place) for place in result.usable],
     }
 
 

@@ -8,12 +8,11 @@ from typing import Literal
 
 import numpy as np
 
-from bushfit.errors import ModelError
-from bushfit.geometry import Direction, Place, Specimen
+from bushfit.geometry import Place, Specimen, place_named
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Source
-from bushfit.validation import Number, WholeNumber
+from bushfit.validation import Flag, Number, WholeNumber
 
 #: Largest half width, in units of the value, of which the exponential is taken: exp(300) is far beyond every bound of
 #: a parameter, and still a finite number.
@@ -56,6 +55,54 @@ class Range:
 
 
 @dataclass(frozen=True)
+class Misfit:
+    """How well a model meets one test, or one run of it.
+
+    Args:
+        test: its name.
+        place: direction, or specimen by its name.
+        fitted: whether the model was fitted to it.
+        held: what the run holds; None of the whole test.
+        value: at which it is held.
+        unit: of the value, SI: "m", "rad" or "1" of an amplitude, "Hz".
+        points: that carry weight: operating points of a sweep, rows of a loop.
+        nrmse: root mean square difference, relative to |K| or to half the loop's force range.
+        reduced_chi_square: mean square residual in units of noise.
+        gain: |K| of the model over the measured one, less 1, mean of the points.
+    """
+
+    test: str
+    place: str
+    fitted: Flag
+    held: Literal["amplitude", "frequency"] | None
+    value: Number | None
+    unit: str | None
+    points: WholeNumber
+    nrmse: Number
+    reduced_chi_square: Number
+    gain: Number
+
+
+@dataclass(frozen=True)
+class Usable:
+    """Within what a model meets the measurement at a place: 95 % of the points lie nearer.
+
+    Args:
+        place: direction, or specimen by its name.
+        stiffness: relative difference of |K|.
+        loss_factor: difference of the loss factor.
+        points: operating points that were compared; a loop is one.
+        held_out: whether each was predicted from the fit without its run; else from the fit to all.
+    """
+
+    place: str
+    stiffness: Number
+    loss_factor: Number
+    points: WholeNumber
+    held_out: Flag
+
+
+@dataclass(frozen=True)
 class Outlier:
     """A point that lies farther off than noise explains, beside neighbours that do not.
 
@@ -95,6 +142,8 @@ class Result:
         profile: 95 % intervals by profile likelihood, where they were asked for; None is an open end.
         at_bound: parameters that came to rest on the least or largest value they may have, and on which.
         specimens: that were tested beside the bushing, or instead of it.
+        tests: how well the model meets each test, and each run of it.
+        usable: within what it meets the measurement, by place.
     """
 
     model: Model
@@ -108,6 +157,8 @@ class Result:
     profile: Mapping[str, tuple[float | None, float | None]] = field(default_factory=dict)
     at_bound: Mapping[str, End] = field(default_factory=dict)
     specimens: tuple[Specimen, ...] = ()
+    tests: tuple[Misfit, ...] = ()
+    usable: tuple[Usable, ...] = ()
 
     @property
     def name(self) -> str:
@@ -120,10 +171,7 @@ class Result:
         Raises:
             ModelError: it is neither.
         """
-        known: dict[str, Place] = {str(place): place for place in (*Direction, *self.specimens)}
-        if name not in known:
-            raise ModelError("no such direction or specimen", found=name, expected="one of " + ", ".join(known))
-        return known[name]
+        return place_named(name, self.specimens)
 
     def interval(self, name: str) -> tuple[float, float] | None:
         """95 % interval of a parameter [its SI unit], cut at its bounds; None where it was held at an exact value.

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
-from bushfit.geometry import Display, Place, Specimen, Unit
+from bushfit.geometry import STRAINING, Display, Place, Specimen, Unit
 from bushfit.reading.measurement import loss_factor
 
 if TYPE_CHECKING:
@@ -74,12 +74,13 @@ def raw_loop_table(loop: Loop) -> pd.DataFrame:
     """A loop as a rig writes it: time, displacement and force in the units of engineers, or strain and stress."""
     import pandas as pd
 
+    moves, resists, _ = loop.direction.motion.words
     (length, length_factor), (force, force_factor), _ = _as_stated(loop.direction)
     return pd.DataFrame(
         {
             "time [s]": loop.time,
-            f"displacement [{length}]": loop.displacement * length_factor,
-            f"force [{force}]": loop.force * force_factor,
+            f"{moves} [{length}]": loop.displacement * length_factor,
+            f"{resists} [{force}]": loop.force * force_factor,
         }
     )
 
@@ -91,6 +92,8 @@ def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
     """
     import pandas as pd
 
+    motion = sweep.direction.motion
+    amplitude, relates = "strain amplitude" if motion is STRAINING else "amplitude", motion.words[2]
     (length, length_factor), _, (stiffness, factor) = _as_stated(sweep.direction)
     level, reached = sweep.amplitude, sweep.reached
     if sweep.stepped == "amplitude" and reached is not None:
@@ -98,10 +101,10 @@ def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
     return pd.DataFrame(
         {
             "frequency [Hz]": sweep.frequency,
-            f"amplitude [{length}]": level * length_factor,
+            f"{amplitude} [{length}]": level * length_factor,
             **({} if reached is None else {f"amplitude reached [{length}]": reached * length_factor}),
             "repeat": sweep.repeat,
-            f"stiffness [{stiffness}]": np.abs(sweep.stiffness) * factor,
+            f"{relates} [{stiffness}]": np.abs(sweep.stiffness) * factor,
             "loss factor [-]": loss_factor(sweep.stiffness),
         }
     )

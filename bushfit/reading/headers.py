@@ -1,7 +1,4 @@
-"""The headers that columns go by in test files: English, German, French, Spanish and Chinese words, and symbols.
-
-Case, accents, blanks, hyphens and underscores do not count, and an umlaut is the same as its vowel with or without e.
-"""
+"""What the header of a column says in a test file: its role, its unit, and how it counts amplitudes."""
 
 from __future__ import annotations
 
@@ -17,127 +14,20 @@ from bushfit import units
 #: How an amplitude is counted.
 AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak"]
 
-#: For each column of a loop, the headers it goes by.
-LOOP_COLUMNS = {
-    "time": ("time", "t", "zeit", "temps", "tiempo", "时间", "elapsed time", "running time", "test time", "Prüfzeit"),
-    "displacement": (
-        *("displacement", "disp", "deflection", "stroke", "travel", "position", "extension"),
-        *("rotation", "angle", "twist", "phi"),
-        *("Weg", "Verschiebung", "Auslenkung", "Hub", "Federweg", "Prüfweg", "Kolbenweg", "Winkel", "Drehwinkel"),
-        *("Verdrehung", "Verdrehwinkel", "Standardweg", "Traversenweg", "Axialweg", "Radialweg", "Verformung"),
-        *("déplacement", "course", "flèche", "enfoncement", "rotation", "angle de torsion", "rotación"),
-        *("desplazamiento", "recorrido", "carrera", "deformación", "ángulo", "giro", "ángulo de giro"),
-        *("位移", "行程", "角度", "转角"),
-    ),
-    "force": (
-        *("force", "load", "torque", "moment", "F"),
-        *("Kraft", "Prüfkraft", "Standardkraft", "Axialkraft", "Radialkraft", "Last", "Drehmoment", "Torsionsmoment"),
-        *("effort", "charge", "couple", "moment de torsion"),
-        *("fuerza", "carga", "par", "momento", "par de torsión"),
-        *("力", "载荷", "负荷", "扭矩"),
-    ),
-}
-#: For each column of a sweep, the headers it goes by.
-SWEEP_COLUMNS = {
-    "frequency": ("frequency", "freq", "f", "Frequenz", "Prüffrequenz", "fréquence", "frecuencia", "频率"),
-    "amplitude": (
-        *("amplitude", "ampl", "amp", "displacement amplitude", "rotation amplitude", "angle amplitude"),
-        *("dynamic amplitude", "Wegamplitude", "Winkelamplitude", "amplitude de déplacement", "amplitude dynamique"),
-        *("amplitud", "amplitud de desplazamiento", "amplitud dinámica", "振幅", "幅值"),
-    ),
-    "amplitude_reached": ("amplitude reached", "erreichte Amplitude", "amplitude atteinte", "amplitud alcanzada"),
-    "stiffness": (
-        *("stiffness", "dynamic stiffness", "stiffness magnitude", "complex stiffness", "kdyn", "cdyn", "|k|", "K*"),
-        *("Steifigkeit", "dynamische Steifigkeit", "Federsteifigkeit", "Drehsteifigkeit", "dyn Steifigkeit"),
-        *("Federrate", "dynamische Federrate", "dyn Federrate", "dyn. Federrate", "Federkonstante", "|K*|", "c*"),
-        *("Steifigkeit dyn", "Steifigkeit dynamisch", "dyn Federsteifigkeit", "dynamische Federsteifigkeit"),
-        *("dyn stiffness", "stiffness dyn"),
-        *("raideur", "rigidité", "raideur dynamique", "rigidité dynamique"),
-        *("rigidez", "rigidez dinámica", "刚度", "动刚度"),
-    ),
-    "loss_factor": (
-        *("loss factor", "tan delta", "tandelta", "tan d", "eta", "η", "tan δ"),
-        *("Verlustfaktor", "Dämpfung tan d", "Dämpfung tan delta"),
-        *("facteur de perte", "facteur de pertes", "facteur d'amortissement"),
-        *("factor de pérdida", "factor de pérdidas", "损耗因子"),
-    ),
-    "phase": (
-        *("phase", "phase angle", "loss angle", "delta", "δ", "phi"),
-        *("Phasenwinkel", "Verlustwinkel", "Phasenverschiebung", "Dämpfungswinkel", "Verlustwinkel δ"),
-        *("déphasage", "angle de phase", "angle de perte", "angle de pertes"),
-        *("fase", "ángulo de fase", "ángulo de pérdida", "ángulo de pérdidas", "desfase", "相位", "相位角", "损耗角"),
-    ),
-    "storage_stiffness": (
-        *("storage stiffness", "k'", "elastic stiffness"),
-        *("Speichersteifigkeit", "raideur de stockage", "raideur élastique", "raideur conservative"),
-        *("rigidité de stockage", "rigidez de almacenamiento", "rigidez elástica", "储能刚度"),
-    ),
-    "loss_stiffness": (
-        *("loss stiffness", "k''", "Verluststeifigkeit", "raideur de perte", "raideur de pertes"),
-        *("raideur dissipative", "rigidité de perte", "rigidité de pertes"),
-        *("rigidez de pérdida", "rigidez de pérdidas", "损耗刚度"),
-    ),
-    "repeat": (
-        *("repeat", "repetition", "Wiederholung", "Wdh", "Messung", "répétition", "repetición", "重复"),
-    ),
-}  # fmt: skip
-
-
-def _said(bodies: str, words: str) -> tuple[str, ...]:
-    """Every word, such as "acceleration", before and after every body, such as "base"; words and bodies part at |."""
-    return tuple(
-        way for body in bodies.split("|") for word in words.split("|") for way in (f"{body} {word}", word + body)
-    )
-
-
-#: Names of the base of a mount on a shaker.
-_BASE = (
-    "base|input|table|shaker|drive|excitation|control|Basis|Fußpunkt|Tisch|Anregung|Eingang|Anregungs|Fußpunkts"
-    "|de la base|d'entrée|entrée|de la table|d'excitation|excitation"
-)
-#: Names of the mass on it.
-_MASS = "mass|output|response|top|Masse|Massen|Antwort|Ausgang|de la masse|masse|de réponse|réponse|de sortie|sortie"
-_ACCELERATION = "acceleration|accel|acc|Beschleunigung|Beschl|accélération"
-_PHASE = "phase|phase angle|Phasenwinkel|déphasage"
-#: For each column of a resonance test (a mass on a mount on a shaker), the headers it goes by.
-RESONANCE_COLUMNS = {
-    "frequency": SWEEP_COLUMNS["frequency"],
-    "base_acceleration": _said(_BASE, _ACCELERATION),
-    "mass_acceleration": _said(_MASS, _ACCELERATION),
-    "base_phase": _said(_BASE, _PHASE),
-    "mass_phase": _said(_MASS, _PHASE),
-    "phase": (
-        *("phase", "phase angle", "phase difference", "relative phase", "transmissibility phase", "phase of T", "phi"),
-        *("Phasenwinkel", "Phasendifferenz", "Phasenverschiebung", "Phase Transmissibilität", "Phase Übertragung"),
-        *("déphasage", "angle de phase", "phase transmissibilité", "phase de la transmissibilité"),
-    ),
-    "transmissibility": (
-        *("transmissibility", "transmissibility magnitude", "transmissibility amplitude", "|T|", "transmission ratio"),
-        *("Transmissibilität", "Übertragungsfaktor", "Vergrößerungsfaktor", "Betrag Transmissibilität"),
-        *("transmissibilité", "module de la transmissibilité", "facteur de transmission"),
-    ),
-    "transmissibility_real": (
-        *("transmissibility real", "real transmissibility", "Re T", "real part of T", "Realteil T"),
-        *("Realteil Transmissibilität", "partie réelle transmissibilité"),
-    ),
-    "transmissibility_imaginary": (
-        *("transmissibility imaginary", "transmissibility imag", "imaginary transmissibility", "Im T"),
-        *("imaginary part of T", "Imaginärteil T", "Imaginärteil Transmissibilität"),
-        *("partie imaginaire transmissibilité",),
-    ),
-    **{
-        f"{role}_{part}": tuple(f"{name} {word}" for name in _said(bodies, _ACCELERATION) for word in words)
-        for role, bodies in (("base", _BASE), ("mass", _MASS))
-        for part, words in (
-            ("real", ("real", "re", "Realteil", "réel", "partie réelle")),
-            ("imaginary", ("imaginary", "imag", "im", "Imaginärteil", "imaginaire", "partie imaginaire")),
-        )
-    },
-}  # fmt: skip
+#: How the headers of a frequency in radians begin.
+_ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsation", "角频率")
+#: What a rig writes of a channel in brackets: "Load(Linear:Load) (kN)".
+_CHANNEL = re.compile(r"\([^()]*[:|][^()]*\)")
+#: The loss factor as a function, of which the brackets hold no unit.
+_TAN = re.compile(r"(?i)\btan\s*\(\s*(delta|d|δ)\s*\)")
+#: A quotation mark that stands for two primes: G".
+_TWO_PRIMES = re.compile(r"(?<![^\W_])([A-Za-z])\"")
 #: Words that tell where or how a channel was recorded, but not what it is.
 _ASIDES = re.compile(r"\b(?:axial|radial|torsional|measured|actual|gemessen|mesure|medido|ist)\b")
 #: For the roles that the symbol f may stand for, units by which it stands for the other one.
 _UNITS_NOT_F = {"force": ("Hz",), "frequency": ("N", "N m")}
+#: Units by which the symbol A stands for an amplitude, and not for an area.
+_UNITS_OF_A = ("m", "rad")
 #: Names of an amplitude that count it peak-to-peak by themselves. "range" alone and "Schwingungsweite" are not among
 #: them, because some call the amplitude so.
 _PEAK_TO_PEAK_NAMES = {
@@ -237,7 +127,8 @@ class Vocabulary:
         return {heading.role for cell in cells if (heading := self.heading(cell))}
 
     def _read(self, header: str) -> Heading | None:
-        whole = header.translate(_SPELLINGS)
+        marked = _TWO_PRIMES.sub(r"\1''", _TAN.sub("tan delta", _CHANNEL.sub("", header)))
+        whole = marked.translate(_SPELLINGS)
         text, convention = split_convention(whole)
         if plain(header) in self._roles:  # a campaign may name a header with its unit
             name, unit = units.split_header(text)
@@ -253,13 +144,32 @@ class Vocabulary:
                 without_asides,
                 *([bare + "amplitude"] if counted else []),
                 *(["amplitude"] if double else []),
+                *self._said_twice(name),
             ):
                 role = self._roles.get(candidate)
-                if role is None or not (certain or units.is_unit(unit or "")):
+                is_unit = units.is_unit if role != "temperature" else units.kelvin
+                if role is None or not (certain or is_unit(unit or "")):
+                    continue
+                if candidate == "a" and not any(units.agrees(unit or "", si) for si in _UNITS_OF_A):
                     continue
                 if not (candidate == "f" and unit and any(units.agrees(unit, si) for si in _UNITS_NOT_F[role])):
                     return Heading(role, unit, counted)
         return None
+
+    def _said_twice(self, name: str) -> Iterator[str]:
+        """The word of a header that says one thing in two ways, such as "Storage modulus G'" or "Weg s"."""
+        for blank in re.finditer(r"[\s,(]+", name):
+            word, symbol = plain(name[: blank.start()]), plain(name[blank.end() :])
+            if word in self._roles and self._roles[word] == self._roles.get(symbol):
+                yield word
+
+
+def is_angular(header: str, unit: str) -> bool:
+    """Whether a frequency counts radians: its unit does, or its header says so and the unit counts nothing (1/s)."""
+    name = plain(header)
+    return units.agrees(unit, "rad/s") or (
+        "hz" not in unit.lower() and any(name.startswith(plain(word)) for word in _ANGULAR) and units.agrees(unit, "Hz")
+    )
 
 
 @lru_cache(maxsize=4096)
@@ -285,7 +195,7 @@ def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
     name, unit = units.split_header(text)
     yield name, unit, True
     if unit is None:
-        for cut in _NAME_END.finditer(name):
+        for cut in reversed(list(_NAME_END.finditer(name))):  # strain_dyn_pct is no strain in dyn %
             yield name[: cut.start()], name[cut.end() :].replace("_", " "), False
 
 

@@ -9,12 +9,13 @@ from typing import Literal
 
 import numpy as np
 
-from bushfit.geometry import Place
-from bushfit.reading.headers import LOOP_COLUMNS, Column
+from bushfit.geometry import Place, stated_strain
+from bushfit.reading.headers import Column
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Floats, Loop, Waveform, rebuild_time, source_of
 from bushfit.reading.parallel import by_chunks
 from bushfit.reading.table import Table
+from bushfit.reading.words import LOOP_COLUMNS
 
 #: Rows of the shortest loop; chosen: fewer do not show a shape.
 _FEWEST_LOOP_ROWS = 10
@@ -59,7 +60,7 @@ def read_loop(
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
     """
-    table = Table.open(file, LOOP_COLUMNS, columns, units, written)
+    table = Table.open(file, LOOP_COLUMNS, columns, units, written, direction.motion)
     _check_not_swapped(table, direction)
     wanted = _loop_columns(table, direction, force_sign, has_clock=rate is not None or frequency is not None)
     values = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
@@ -94,6 +95,7 @@ def _check_not_swapped(table: Table, direction: Place) -> None:
 def _loop_columns(table: Table, direction: Place, force_sign: int, *, has_clock: bool) -> dict[str, Column]:
     """The columns of a loop with their units; only one `has_clock`, a rate or frequency that is stated, lacks time."""
     displacement = table.column("displacement", direction.motion.displacement_unit)
+    displacement = replace(displacement, scale=stated_strain(direction) * displacement.scale)
     force = table.column("force", direction.motion.force_unit)
     wanted = {"displacement": displacement, "force": replace(force, scale=force_sign * force.scale)}
     if "time" in table.roles:

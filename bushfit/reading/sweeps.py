@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bushfit.geometry import Place
-from bushfit.reading.headers import SWEEP_COLUMNS, AmplitudeConvention, Column
+from bushfit import units as si
+from bushfit.geometry import Place, stated_strain
+from bushfit.reading.headers import AmplitudeConvention, Column
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Complex, Floats, Sweep, source_of
 from bushfit.reading.runs import runs_of
 from bushfit.reading.table import Table
+from bushfit.reading.words import OF_MOTION, SWEEP_COLUMNS
 
 #: The pairs of columns that each make a complex stiffness, in order of preference.
 STIFFNESS_PAIRS = (("stiffness", "loss_factor"), ("stiffness", "phase"), ("storage_stiffness", "loss_stiffness"))
 #: Columns of which every value is above zero.
-_POSITIVE = ("frequency", "amplitude", "amplitude_reached", "stiffness", "storage_stiffness")
+_POSITIVE = ("frequency", "amplitude", "amplitude_reached", "stiffness", "storage_stiffness", "relative_error")
 #: Rows of the shortest sweep; chosen: fewer show no dependence on frequency or amplitude.
 _FEWEST_SWEEP_ROWS = 3
 #: Above every number of a repeat; chosen: a larger one is another quantity.
@@ -29,8 +32,22 @@ _LOWEST_LOSS_FACTOR = -0.5
 _HIGHEST_LOSS_FACTOR = 5.0
 #: [-] Loss factor that every rubber exceeds somewhere; chosen: a tenth of what little-damping rubber has.
 _LEAST_LOSS_FACTOR = 0.005
+#: Share of the points that are clearly below zero where a loss counts the other way; chosen: noise may lift some, and a
+#: channel that is late leaves the loss of low frequencies above zero.
+_THROUGHOUT = 0.95
+#: Share within which an amplitude or frequency that is stated agrees with a column for it; chosen: rigs miss by less.
+_STATED_AGREEMENT = 0.1
+#: [K] Distance from the stated temperature within which a row was tested at it; chosen: chambers keep to less.
+_SAME_TEMPERATURE = 2.0
+#: [K] Range of temperatures that one test may have; chosen: a rubber warms up by as much while it is tested.
+ONE_TEST = 5.0
 #: Share of |K| within which columns that say the same agree; chosen: some are rounded to few digits.
 _AGREEMENT = 0.02
+#: What else may be done about a column that is not there.
+_HINTS = {
+    "amplitude": 'or state at_amplitude = "0.1 mm" if all rows have it',
+    "frequency": 'or state at_frequency = "10 Hz" if all rows have it',
+}
 #: Factors from an amplitude as it is counted to zero-to-peak.
 _ZERO_TO_PEAK: dict[AmplitudeConvention, float] = {"zero-to-peak": 1.0, "peak-to-peak": 0.5}
 
@@ -45,45 +62,57 @@ def read_sweep(
     units: Mapping[str, str] | None = None,
     written: FileFormat | None = None,
     amplitude: AmplitudeConvention | None = None,
+    at_amplitude: float | None = None,
+    at_frequency: float | None = None,
     noise: float | None = None,
     weight: float = 1.0,
     temperature: float | None = None,
     conditions: Mapping[str, str | float] | None = None,
 ) -> Sweep:
-    """Read a stepped-sine sweep.
+    """Read a sweep.
 
     Args:
-        file: a table with columns frequency, amplitude and one of STIFFNESS_PAIRS. Two more are optional: repeat
-            (without it, an operating point that occurs again is a repeat) and amplitude reached (where the rig missed
-            the amplitude of the level).
-        direction: direction of the test, which settles the units that fit.
+        file: a table with columns frequency, amplitude and one of STIFFNESS_PAIRS, long or wide (see `wide`). More are
+            optional: repeat (without it, an operating point that occurs again is a repeat), amplitude reached (where
+            the rig missed the amplitude of the level), temperature, and relative error.
+        direction: direction of the test, or its specimen, which settles the headers and units that fit.
         name: of the sweep; default the stem of the file.
         listed_as: the file as the campaign names it, for provenance; default its name.
         columns: header of a role (a key of SWEEP_COLUMNS), where it is not a usual one.
         units: unit of a role, where the file does not tell it.
         written: how the file is written, where it does not tell.
-        amplitude: how the file counts amplitudes, where its header does not say so: zero-to-peak unless stated.
+        amplitude: how file and campaign count amplitudes, where its header does not say so: zero-to-peak unless stated.
             The sweep has them zero-to-peak.
+        at_amplitude: of a file without a column for it [m or rad, or strain], counted as `amplitude` has it.
+        at_frequency: of a file without a column for it [Hz].
         noise, weight: of the sweep, see `Sweep`.
-        temperature: at which it was tested [K], where it is stated.
+        temperature: at which it was tested [K], where it is stated; of a file with a column for it, the rows near it.
         conditions: what else is stated of the test, for provenance.
 
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
     """
-    table = Table.open(file, SWEEP_COLUMNS, columns, units, written)
+    table = Table.open(file, SWEEP_COLUMNS, columns, units, written, direction.motion)
     pair = _stiffness_pair(table)
-    wanted = _sweep_columns(table, direction, pair)
-    to_peak = _ZERO_TO_PEAK[_convention(table, wanted["amplitude"], amplitude)]
+    stated = {"frequency": at_frequency, "amplitude": at_amplitude}
+    at = {role: value for role, value in stated.items() if value is not None}
+    wanted = _sweep_columns(table, direction, pair, at)
+    to_peak = _ZERO_TO_PEAK[_convention(table, wanted.get("amplitude"), amplitude)]
+    if at_amplitude is not None:  # as the file counts
+        at["amplitude"] = at_amplitude * stated_strain(direction) * _ZERO_TO_PEAK[amplitude or "zero-to-peak"] / to_peak
     values = table.read(wanted, fewest_rows=_FEWEST_SWEEP_ROWS)
     _check_positive(table, wanted, values)
+    for role, value in at.items():
+        values[role] = _stated(table, wanted.get(role), values, value)
     with np.errstate(over="ignore"):
         stiffness, loss_factor = _complex_stiffness(pair, values)
     _check_loss(table, wanted[pair[1]], loss_factor)
     _check_agreement(table, pair, values, stiffness)
-    frequency, level = values["frequency"], to_peak * values["amplitude"]
-    reached = to_peak * values["amplitude_reached"] if "amplitude_reached" in values else None
-    runs = runs_of(frequency, level, _repeats(table, wanted, values))
+    repeat = _repeats(table, wanted, values)
+    rows, temperature = _of_temperature(table, values, temperature)
+    frequency, level = values["frequency"][rows], to_peak * values["amplitude"][rows]
+    reached = to_peak * values["amplitude_reached"][rows] if "amplitude_reached" in values else None
+    runs = runs_of(frequency, level, None if repeat is None else repeat[rows])
     if reached is None and not np.array_equal(runs.amplitude, level):
         reached = level
     source = source_of(file, listed_as, table.sha256, temperature, conditions)
@@ -92,12 +121,13 @@ def read_sweep(
         direction,
         frequency,
         runs.amplitude,
-        stiffness,
+        stiffness[rows],
         runs.repeat,
         noise,
         source,
         reached,
         runs.stepped,
+        values["relative_error"][rows] if "relative_error" in values else None,
         weight=weight,
     )
 
@@ -107,6 +137,8 @@ def _stiffness_pair(table: Table) -> tuple[str, str]:
     for pair in STIFFNESS_PAIRS:
         if set(pair) <= set(table.roles):
             return pair
+    for role in {role: None for pair in STIFFNESS_PAIRS for role in pair if role in OF_MOTION}:
+        table.refuse_other_motion(role)
     raise table.error(
         "no pair of columns gives a complex stiffness",
         line=table.layout.header_line,
@@ -116,10 +148,11 @@ def _stiffness_pair(table: Table) -> tuple[str, str]:
     )
 
 
-def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str]) -> dict[str, Column]:
+def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str], at: Mapping[str, float]) -> dict[str, Column]:
     """The columns of a sweep with their units, in the order in which they are checked.
 
-    Beside those that are needed, the pairs that say the same are read, if their units fit.
+    Beside those that are needed, which a role that is stated (`at`) is not, the pairs that say the same are read, if
+    their units fit. Of a temperature, the zero is still that of its unit.
     """
     length, stiffness = direction.motion.displacement_unit, direction.motion.stiffness_unit
     units = dict.fromkeys(SWEEP_COLUMNS, stiffness) | {
@@ -129,11 +162,20 @@ def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str]) -> dic
         "phase": "rad",
         "loss_factor": "1",
         "repeat": "1",
+        "relative_error": "1",
+        "temperature": "K",
     }
-    optional = [role for role in ("amplitude_reached", "repeat") if role in table.roles]
+    needed = [role for role in ("frequency", "amplitude") if role in table.roles or role not in at]
+    optional = [role for role in ("amplitude_reached", "repeat", "relative_error") if role in table.roles]
+    degrees = table.roles.get("temperature")
+    optional += ["temperature"] * (degrees is not None and degrees.unit is not None)
     again = [role for other in STIFFNESS_PAIRS if set(other) <= set(table.roles) for role in other]
     again = [role for role in again if units[role] == "1" or table.agrees(role, units[role])]
-    return {role: table.column(role, units[role]) for role in ("frequency", "amplitude", *pair, *optional, *again)}
+    found = {role: table.column(role, units[role], _HINTS.get(role)) for role in (*needed, *pair, *optional, *again)}
+    for role in ("amplitude", "amplitude_reached"):
+        if role in found:
+            found[role] = replace(found[role], scale=stated_strain(direction) * found[role].scale)
+    return found if degrees is None else {"temperature": degrees, **found}
 
 
 def _check_positive(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> None:
@@ -149,8 +191,8 @@ def _check_positive(table: Table, wanted: Mapping[str, Column], values: Mapping[
 
 
 def _check_loss(table: Table, column: Column, loss_factor: Floats) -> None:
-    """Refuse a loss that counts the other way, ratios that are stated in %, and a loss that no bushing has."""
-    if np.median(loss_factor) < -_LEAST_LOSS_FACTOR:
+    """Refuse a loss that counts the other way throughout, ratios stated in %, and a loss that no bushing has."""
+    if np.mean(loss_factor < -_LEAST_LOSS_FACTOR) > _THROUGHOUT:
         raise table.error(
             "the loss counts the other way",
             column=column,
@@ -193,8 +235,64 @@ def _check_agreement(table: Table, pair: tuple[str, str], values: Mapping[str, F
         )
 
 
-def _convention(table: Table, column: Column, stated: AmplitudeConvention | None) -> AmplitudeConvention:
+def _stated(table: Table, column: Column | None, values: Mapping[str, Floats], stated: float) -> Floats:
+    """The amplitude or frequency of each row [SI], (n,): as stated, or as its column has it, which must agree."""
+    if column is None:
+        return np.full(next(iter(values.values())).size, stated)
+    found = values[column.role]
+    table.refuse(
+        np.abs(found - stated) > _STATED_AGREEMENT * stated,
+        column,
+        f"the {column.role} is not the one that is stated",
+        f"at_{column.role} as the campaign states it, {stated / column.scale:.6g} {column.unit}, within 10 %",
+        f"take at_{column.role} out of the campaign: the file has a column for it",
+    )
+    return found
+
+
+def _of_temperature(
+    table: Table, values: Mapping[str, Floats], stated: float | None
+) -> tuple[NDArray[np.intp], float | None]:
+    """The rows of a test, by index, and its temperature [K]: as stated, or else the mean of its column if it has one.
+
+    Raises:
+        MeasurementError: several temperatures of which none is stated, or too few rows near the one that is.
+        UnitError: a column without its unit where it matters.
+    """
+    rows = np.arange(values["frequency"].size)
+    if "temperature" not in values:
+        return rows, stated
+    found, unit = values["temperature"], table.roles["temperature"].unit
+    if unit is None and stated is None and np.ptp(found) <= ONE_TEST:
+        return rows, None
+    column = table.column("temperature", "K")
+    celsius = found + (si.kelvin(unit or "") or (1.0, 0.0))[1] - si.CELSIUS
+    if stated is None:
+        if np.ptp(celsius) <= ONE_TEST:
+            return rows, round(float(celsius.mean()), 2) + si.CELSIUS
+        problem, expected = "this file holds tests at several temperatures", "one temperature"
+    else:
+        rows = np.flatnonzero(np.abs(celsius + si.CELSIUS - stated) <= _SAME_TEMPERATURE)
+        if rows.size >= _FEWEST_SWEEP_ROWS:
+            return rows, stated
+        problem = "too few rows are near the temperature that is stated"
+        expected = f"{_FEWEST_SWEEP_ROWS} rows or more within {_SAME_TEMPERATURE:g} K of {stated - si.CELSIUS:.4g} degC"
+    ordered = np.sort(celsius)
+    means = [part.mean() for part in np.split(ordered, np.flatnonzero(np.diff(ordered) > _SAME_TEMPERATURE) + 1)]
+    nearest = min(means, key=lambda mean: abs(mean + si.CELSIUS - (stated or 0.0)))
+    raise table.error(
+        problem,
+        column=column,
+        found=", ".join(f"{mean:.1f}" for mean in means) + " degC",
+        expected=expected,
+        hint=f'state temperature = "{nearest:.1f} degC" in the campaign; several tests may name one file',
+    )
+
+
+def _convention(table: Table, column: Column | None, stated: AmplitudeConvention | None) -> AmplitudeConvention:
     """How amplitudes are counted: as their header says, or else the campaign; zero-to-peak where neither says."""
+    if column is None:
+        return stated or "zero-to-peak"
     if column.convention and stated and column.convention != stated:
         raise table.error(
             "header and campaign count amplitudes differently",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
@@ -11,12 +12,15 @@ from pathlib import Path
 
 from bushfit import units
 from bushfit.errors import MeasurementError, NoColumnError, UnitError, naming
+from bushfit.geometry import STRAINING, TRANSLATION, Motion
 from bushfit.reading.columns import Columns
 from bushfit.reading.files import Bytes, sha256, view_bytes
-from bushfit.reading.headers import Column, Heading, Vocabulary, split_convention
+from bushfit.reading.headers import Column, Heading, Vocabulary, is_angular, plain, split_convention
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.source import RowSource, Text
+from bushfit.reading.wide import unfolded
+from bushfit.reading.words import OF_MOTION, of_motion
 from bushfit.reading.workbook import is_workbook, open_sheet
 
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
@@ -30,9 +34,13 @@ class Table(Columns):
 
     Args:
         checksum: SHA-256 of the file, perhaps still under way.
+        names: for each role the headers it usually goes by, whatever the motion.
+        motion: of what was tested.
     """
 
     checksum: Future[str]
+    names: Mapping[str, Sequence[str]]
+    motion: Motion
 
     @classmethod
     def open(
@@ -42,16 +50,18 @@ class Table(Columns):
         columns: Mapping[str, str] | None = None,
         stated_units: Mapping[str, str] | None = None,
         stated: FileFormat | None = None,
+        motion: Motion = TRANSLATION,
     ) -> Table:
         """Read a file and understand its header.
 
         Args:
             file: a text in any dialect, or a workbook. Lines of other content may stand above the header, and a row of
-                units below it.
-            names: for each role the headers it usually goes by.
+                units below it. A sweep's may be a wide table.
+            names: for each role the headers it usually goes by, LOOP_COLUMNS or SWEEP_COLUMNS.
             columns: for each role that goes by another header, this header.
             stated_units: for each role of which the file does not tell the unit, this unit.
             stated: what the file does not tell of its format.
+            motion: of what was tested, by which a test of strain and modulus goes by other headers.
 
         Raises:
             MeasurementError: no such file, no text, no header, or a header that does not settle which column is which.
@@ -60,40 +70,50 @@ class Table(Columns):
         stated = stated or FileFormat()
         data = view_bytes(file, MeasurementError)
         checksum = sha256(data)
-        vocabulary = Vocabulary(names, columns or {})
+        vocabulary = Vocabulary(of_motion(names, motion), columns or {})
 
-        def lay_out(source: RowSource) -> Layout:
+        def lay_out(source: RowSource) -> tuple[RowSource, Layout, Vocabulary]:
             delimiter = "" if source.sheet else DELIMITERS[stated.delimiter] if stated.delimiter else None
-            return find_layout(source.head(), vocabulary, delimiter=delimiter, header_line=stated.header_line)
+            layout = find_layout(source.head(), vocabulary, delimiter=delimiter, header_line=stated.header_line)
+            if (
+                "amplitude" in names
+                and stated.header_line is None
+                and (wide := unfolded(source, file, vocabulary, layout, delimiter))
+            ):
+                return *wide, Vocabulary({role: (role,) for role in names}, {})
+            return source, layout, vocabulary
 
         try:
-            source = _source(data, file, stated, lambda sheet: len(vocabulary.roles(lay_out(sheet).headers)) > 1)
-            layout = lay_out(source)
+            source = _source(data, file, stated, lambda sheet: len(vocabulary.roles(lay_out(sheet)[1].headers)) > 1)
+            source, layout, understood = lay_out(source)
         except csv.Error as error:
             raise MeasurementError("the table cannot be read", file=file, found=str(error)) from error
         if stated.header_line not in (None, layout.header_line):
             found = f"header_line = {stated.header_line}"
             raise MeasurementError("there is no header on this line", file=file, found=found, hint="lines count from 1")
-        table = cls(file, source, layout, stated, {}, checksum)
+        table = cls(file, source, layout, stated, {}, checksum, names, motion)
         table._check_header()
-        return replace(table, roles=table._recognise(vocabulary, columns or {}, stated_units or {}))
+        named = columns or {} if understood is vocabulary else {}
+        return replace(table, roles=table._recognise(understood, named, stated_units or {}))
 
     @property
     def sha256(self) -> str:
         """SHA-256 of the file."""
         return self.checksum.result()
 
-    def column(self, role: str, expected: str) -> Column:
+    def column(self, role: str, expected: str, hint: str | None = None) -> Column:
         """The column of a role, with the factor from its unit to the SI unit `expected`; a ratio needs no unit.
+
+        `hint` is what else may be done where there is no such column.
 
         Raises:
             MeasurementError: no such column.
             UnitError: no unit, an unknown one, or one of another dimension.
         """
         if role not in self.roles:
-            raise self.missing(role, expected)
+            raise self.missing(role, expected, hint)
         column = self.roles[role]
-        if column.unit is None and expected != "1":
+        if column.unit is None and (expected != "1" or role in OF_MOTION):
             example = units.example(expected)
             raise UnitError(
                 f"the {_label(role)} has no unit",
@@ -104,8 +124,15 @@ class Table(Columns):
                 hint=f'write "{column.header} [{example}]" in the header, '
                 f'or units = {{ {role} = "{example}" }} in the campaign',
             )
+        unit = column.unit or "1"
+        others = ("m", "rad", "N/m", "N*m/rad") if self.motion is STRAINING else ("1", "Pa")
+        if role in OF_MOTION and role != "force" and any(units.agrees(unit, other) for other in others):
+            self.refuse_other_motion(role, [column.header])
         with naming(self.file, self.place(self.layout.header_line, column)):
-            return replace(column, scale=units.factor(column.unit or "1", expected))
+            if expected == "Hz" and is_angular(column.header, unit):
+                per_second = "rad/s" if units.agrees(unit, "rad/s") else "Hz"
+                return replace(column, scale=units.factor(unit, per_second) / (2.0 * math.pi))
+            return replace(column, scale=units.factor(unit, expected))
 
     def agrees(self, role: str, expected: str) -> bool:
         """Whether a role has a column with a unit of the dimension of `expected`."""
@@ -114,6 +141,7 @@ class Table(Columns):
 
     def missing(self, role: str, expected: str, hint: str | None = None) -> MeasurementError:
         """The error for a role that has no column; `expected` is its SI unit."""
+        self.refuse_other_motion(role)
         return self.error(
             f"there is no column for the {_label(role)}",
             line=self.layout.header_line,
@@ -121,6 +149,35 @@ class Table(Columns):
             expected=f'a header such as "{_label(role)} [{units.example(expected)}]"',
             hint=f'name the column in the campaign: columns = {{ {role} = "..." }}' + (f", {hint}" if hint else ""),
         )
+
+    def refuse_other_motion(self, role: str, headers: Sequence[str] | None = None) -> None:
+        """Refuse headers that would name a role in a test of the other kind of motion: strain, or displacement.
+
+        Args:
+            role: for which there is no column.
+            headers: that are known to do so; else those of the table that do.
+
+        Raises:
+            MeasurementError: there is such a header.
+        """
+        kinds = ("displacement and force or stiffness", "strain and modulus")
+        if self.motion is STRAINING:
+            other, (found, expected) = TRANSLATION, kinds
+            hint = 'take specimen out of the campaign, or give it kind = "shear" with its area and thickness'
+        else:
+            other, (expected, found) = STRAINING, kinds
+            hint = (
+                'write [[specimens]] with a name and kind = "modulus" in the campaign, and specimen = "its name" here'
+            )
+        words = Vocabulary({role: of_motion(self.names, other)[role]} if role in OF_MOTION else {}, {})
+        for header in headers or filter(words.heading, self.headers):
+            raise self.error(
+                f"this is a test of {found}",
+                line=self.layout.header_line,
+                found=f'"{header}" for the {_label(role)}',
+                expected=expected,
+                hint=hint,
+            )
 
     def _check_header(self) -> None:
         """Refuse a header of one cell, or of numbers alone."""
@@ -149,6 +206,14 @@ class Table(Columns):
             if heading is None:
                 continue
             role = heading.role
+            column = self._column_of(heading, index, stated_units.get(role))
+            if plain(header) == "t" and role == "temperature" and not units.kelvin(column.unit or ""):
+                continue  # a time, or another quantity
+            if role == "frequency" and role in roles:  # in Hz and in rad/s
+                angular = [is_angular(one.header, one.unit or "") for one in (roles[role], column)]
+                if angular[0] != angular[1]:
+                    roles[role] = roles[role] if angular[1] else column
+                    continue
             if role in roles:
                 raise self.error(
                     f"more than one column could be the {_label(role)}",
@@ -157,7 +222,7 @@ class Table(Columns):
                     expected="one",
                     hint=f'choose it in the campaign: columns = {{ {role} = "{header}" }}',
                 )
-            roles[role] = self._column_of(heading, index, stated_units.get(role))
+            roles[role] = column
         for role in columns:
             if role not in roles:
                 raise self._no_column(role, columns[role])

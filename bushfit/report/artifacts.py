@@ -5,6 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
+from bushfit.campaign.naming import folder_name
+from bushfit.effects import Level
+from bushfit.geometry import Direction
 from bushfit.reading.csvfile import to_csv
 from bushfit.report import tables
 
@@ -14,6 +19,7 @@ if TYPE_CHECKING:
 
     from bushfit.diagnosis.record import Diagnosis
     from bushfit.fitting.data_sets import LoopData, SweepData
+    from bushfit.geometry import Place
     from bushfit.model.model import Model
     from bushfit.model.result import Result
     from bushfit.prediction import Prediction
@@ -28,39 +34,68 @@ _TABLES: Mapping[str, Callable[[Model, Any], pd.DataFrame]] = {
 
 def fit_files(
     kind: Literal["loops", "sweeps"],
-    model: Model,
+    result: Result,
+    title: str,
     data_sets: Sequence[LoopData] | Sequence[SweepData],
     formats: Collection[str],
 ) -> dict[str, bytes]:
     """`loops.csv` and `loops.png` of a fit, or `sweeps.csv` and `sweeps.png`; nothing where there are no such tests."""
     files: dict[str, bytes] = {}
     if data_sets and "csv" in formats:
-        files[f"{kind}.csv"] = to_csv(_TABLES[kind](model, data_sets))
+        files[f"{kind}.csv"] = to_csv(_TABLES[kind](result.model, data_sets))
     if data_sets and "png" in formats:
         from bushfit.report.plots import loops_figure, sweeps_figure, to_png
 
         draw: Mapping[str, Callable[[Model, Any, str], Figure]] = {"loops": loops_figure, "sweeps": sweeps_figure}
-        files[f"{kind}.png"] = to_png(draw[kind](model, data_sets, model.name))
+        files[f"{kind}.png"] = to_png(draw[kind](result.model, data_sets, title))
     return files
 
 
 def prediction_files(
-    result: Result, predictions: Sequence[Prediction], measured: Sequence[SweepData], formats: Collection[str]
+    result: Result,
+    predictions: Sequence[Prediction],
+    measured: Sequence[SweepData],
+    formats: Collection[str],
+    notes: Sequence[str] = (),
 ) -> dict[str, bytes]:
-    """`<direction>.csv` and `<direction>.png` of each prediction, the measured points over the model."""
-    files = {f"{p.direction}.csv": to_csv(tables.prediction_table(p)) for p in predictions if "csv" in formats}
+    """`<place>.csv` and `<place>.png` of each prediction, the measured points over the model."""
+    names = place_files([prediction.direction for prediction in predictions])
+    pairs = list(zip(names, predictions, strict=True))
+    files = {f"{name}.csv": to_csv(tables.prediction_table(p)) for name, p in pairs if "csv" in formats}
     if "png" not in formats:
         return files
     from bushfit.prediction import caveats, predict, rig_effects
     from bushfit.report.plots import fine_grid, prediction_figure, to_png
 
-    for prediction in predictions:
+    bare = result.model.without(Level.INSTRUMENT)
+    for name, prediction in pairs:
         curves = predict(result, prediction.direction, *fine_grid(prediction))
         rig = predict(result, prediction.direction, *fine_grid(prediction), rig=True) if rig_effects(result) else None
-        note = ". ".join(text[0].upper() + text[1:] for text in (*caveats(result), *prediction.warnings))
-        figure = prediction_figure(prediction, measured, result.model.name, curves=curves, rig=rig, note=note)
-        files[f"{prediction.direction}.png"] = to_png(figure)
+        note = ". ".join(text[0].upper() + text[1:] for text in (*notes, *caveats(result), *prediction.warnings))
+        title = result.name if isinstance(prediction.direction, Direction) else str(prediction.direction)
+        figure = prediction_figure(prediction, measured, title, curves=curves, rig=rig, model=bare, note=note)
+        files[f"{name}.png"] = to_png(figure)
     return files
+
+
+def measured_file(
+    result: Result, fitted: Sequence[SweepData], left: Sequence[SweepData], formats: Collection[str]
+) -> dict[str, bytes]:
+    """`measured.csv`: every measured sweep, fitted or not, beside the model; nothing where there is none."""
+    if not ((fitted or left) and "csv" in formats):
+        return {}
+    table = tables.sweeps_table(result.model, [*fitted, *left])
+    table["fitted"] = np.repeat(["yes", "no"], [sum(s.frequency.size for s in part) for part in (fitted, left)])
+    return {"measured.csv": to_csv(table)}
+
+
+def place_files(places: Sequence[Place]) -> list[str]:
+    """The names, without an ending, of the tables and plots of places: safe on every system, each once."""
+    names: list[str] = []
+    for place in places:
+        name = folder_name(str(place))
+        names.append(name if name not in names else f"{name}_{len(names) + 1}")
+    return names
 
 
 def diagnosis_files(diagnosis: Diagnosis, title: str, formats: Collection[str]) -> dict[str, bytes]:

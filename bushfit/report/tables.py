@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bushfit.effects.mistakes import candidate_named
-from bushfit.geometry import TRANSLATION
+from bushfit.geometry import STRAINING, TRANSLATION
 from bushfit.reading.measurement import loss_factor
 
 if TYPE_CHECKING:
@@ -17,10 +17,19 @@ if TYPE_CHECKING:
     from bushfit.diagnosis.record import Diagnosis
     from bushfit.effects.contract import Array
     from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
+    from bushfit.geometry import Place
     from bushfit.model.model import Model
     from bushfit.prediction import Prediction
     from bushfit.reduction.resonance import Resonance
     from bushfit.reduction.result import Reduction
+
+
+def words(place: Place) -> tuple[str, str, str]:
+    """What headers call amplitude, force and stiffness at a place; a modulus test has other words."""
+    if place.motion is not STRAINING:
+        return "amplitude", "force", "stiffness"
+    strain, stress, modulus = STRAINING.words
+    return f"{strain} amplitude", stress, modulus
 
 
 def prediction_table(prediction: Prediction) -> pd.DataFrame:
@@ -28,16 +37,17 @@ def prediction_table(prediction: Prediction) -> pd.DataFrame:
     import pandas as pd
 
     (length, length_factor), _, (stiffness, factor) = prediction.direction.display
+    moved, _, resisted = words(prediction.direction)
     bands = {
-        f"stiffness [{stiffness}]": (prediction.stiffness, factor),
+        f"{resisted} [{stiffness}]": (prediction.stiffness, factor),
         "loss factor [-]": (prediction.loss_factor, 1.0),
-        f"storage stiffness [{stiffness}]": (prediction.storage_stiffness, factor),
-        f"loss stiffness [{stiffness}]": (prediction.loss_stiffness, factor),
+        f"storage {resisted} [{stiffness}]": (prediction.storage_stiffness, factor),
+        f"loss {resisted} [{stiffness}]": (prediction.loss_stiffness, factor),
     }
     return pd.DataFrame(
         {
             "frequency [Hz]": prediction.frequency,
-            f"amplitude [{length}]": prediction.amplitude * length_factor,
+            f"{moved} [{length}]": prediction.amplitude * length_factor,
             **{name: band.value * scale for name, (band, scale) in bands.items()},
             **{
                 f"{name}, {end}": getattr(band, end) * scale
@@ -54,15 +64,16 @@ def loops_table(model: Model, data_sets: Sequence[LoopData]) -> pd.DataFrame:
 
     def rows(data_set: LoopData) -> pd.DataFrame:
         (length, length_factor), (force, force_factor), _ = data_set.direction.display
-        drive = data_set.drive
+        drive, (_, resisting, _) = data_set.drive, words(data_set.direction)
+        moved = "displacement" if resisting == "force" else "strain"
         return pd.DataFrame(
             {
                 "loop": data_set.name,
                 "direction": str(data_set.direction),
                 "time [s]": drive.phase / drive.frequency,
-                f"displacement [{length}]": drive.displacement(drive.phase) * length_factor,
-                f"force [{force}]": drive.force * force_factor,
-                f"model force [{force}]": data_set.force(model) * force_factor,
+                f"{moved} [{length}]": drive.displacement(drive.phase) * length_factor,
+                f"{resisting} [{force}]": drive.force * force_factor,
+                f"model {resisting} [{force}]": data_set.force(model) * force_factor,
                 "residual [noise]": data_set.shown(model),
             }
         )
@@ -76,6 +87,7 @@ def sweeps_table(model: Model, data_sets: Sequence[SweepData]) -> pd.DataFrame:
 
     def rows(data_set: SweepData) -> pd.DataFrame:
         (length, length_factor), _, (stiffness, factor) = data_set.direction.display
+        moved, _, resisted = words(data_set.direction)
         modelled = data_set.stiffness(model)
         gain, phase = np.split(data_set.shown(model), 2)
         return pd.DataFrame(
@@ -83,14 +95,16 @@ def sweeps_table(model: Model, data_sets: Sequence[SweepData]) -> pd.DataFrame:
                 "sweep": data_set.sweep.name,
                 "direction": str(data_set.direction),
                 "frequency [Hz]": data_set.frequency,
-                f"amplitude [{length}]": data_set.amplitude * length_factor,
+                f"{moved} [{length}]": data_set.amplitude * length_factor,
                 "repeat": data_set.repeat,
-                f"stiffness [{stiffness}]": np.abs(data_set.measured) * factor,
+                f"{resisted} [{stiffness}]": np.abs(data_set.measured) * factor,
                 "loss factor [-]": loss_factor(data_set.measured),
-                f"model stiffness [{stiffness}]": np.abs(modelled) * factor,
+                f"model {resisted} [{stiffness}]": np.abs(modelled) * factor,
                 "model loss factor [-]": loss_factor(modelled),
                 "stiffness residual [noise]": gain,
                 "loss residual [noise]": phase,
+                "model over measured [-]": np.abs(modelled / data_set.measured),
+                "loss factor difference [-]": loss_factor(modelled) - loss_factor(data_set.measured),
             }
         )
 

@@ -122,7 +122,7 @@ BAD: list[tuple[type[BushfitError], str, list[str]]] = [
         SIMULATE + '[predict]\nfrequencies = { start = "5 Hz", stop = "1 MHz", step = "1 mHz" }',
         ["predict.frequencies", "no range"],
     ),
-    (CampaignError, SIMULATE + '[predict]\ndirections = ["up"]', ["predict.directions #1", "up", "'torsion'"]),
+    (ModelError, SIMULATE + '[predict]\ndirections = ["up"]', ["predict.directions", "up", "torsion"]),
     (CampaignError, SIMULATE + "seed = -1", ["simulate.seed", "-1"]),
     (CampaignError, SIMULATE + "repeats = 1.5", ["simulate.repeats", "1.5", "whole number"]),
     (CampaignError, SIMULATE + "parameters = { nu = 1 }", ["simulate.parameters.nu", "unknown key", 'mean "mu"']),

@@ -40,6 +40,33 @@ def column(index: int, value: str) -> Lines:
     return change
 
 
+def added(header: str, *values: str) -> Lines:
+    """One column more, of values that take turns."""
+    return lambda lines: text(
+        [f"{lines[0]},{header}", *(f"{line},{values[index % len(values)]}" for index, line in enumerate(lines[1:]))]
+    )
+
+
+def wide(old: str, new: str) -> Lines:
+    """The sweep as a wide table, with a text replaced."""
+
+    def change(lines: list[str]) -> str:
+        cells = [line.split(",") for line in lines[1:]]
+        levels = list(dict.fromkeys(row[1] for row in cells))
+        blocks = []
+        for title, column in (("K* [N/mm]", 2), ("tan delta", 3)):
+            by_frequency: dict[str, list[str]] = {}
+            for row in cells:
+                by_frequency.setdefault(row[0], []).append(row[column])
+            rows = [",".join([frequency, *values]) for frequency, values in by_frequency.items()]
+            blocks += [title, ",".join(["f [Hz]", *(f"{level} mm" for level in levels)]), *rows]
+        content = text(blocks)
+        assert old in content, content
+        return content.replace(old, new, 1)
+
+    return change
+
+
 def entry(*path: str | int, value: Any) -> Callable[[dict[str, Any]], None]:
     """One entry of the model file set."""
 

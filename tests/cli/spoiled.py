@@ -9,17 +9,8 @@ from itertools import cycle
 from typing import Any
 
 import numpy as np
-from spoiled_rows import (
-    IN_CAMPAIGN,
-    IN_LOOP,
-    IN_MODEL,
-    IN_MORE,
-    IN_RESONANCE,
-    IN_SWEEP,
-    USAGE,
-    WHOLE_CAMPAIGNS,
-    WHOLE_MODELS,
-)
+from spoiled_rows import IN_CAMPAIGN, IN_MODEL, IN_MORE, IN_RESONANCE, USAGE, WHOLE_CAMPAIGNS, WHOLE_MODELS
+from spoiled_tables import IN_LOOP, IN_SWEEP
 
 CAMPAIGN = """\
 [bushing]

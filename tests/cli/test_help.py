@@ -13,7 +13,7 @@ import pytest
 from commandline import Done, call
 
 from bushfit.cli import cli
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
+from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 
 Run = Callable[..., Done]
 COMMANDS = cli.list_commands(click.Context(cli))

@@ -20,8 +20,13 @@ def test_predict_lays_measurements_over_and_takes_grids(bushfit: Run, tmp_path: 
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert {file.name for file in (tmp_path / "x").iterdir()} == {
-        f"{d}.{end}" for d in ("axial", "radial") for end in ("csv", "png")
-    }
+        *(f"{d}.{end}" for d in ("axial", "radial") for end in ("csv", "png")), "measured.csv",
+    }  # fmt: skip
+    measured = pd.read_csv(tmp_path / "x" / "measured.csv")
+    assert set(measured["sweep"]) == {"sweep_axial", "sweep_radial"}
+    assert dict(zip(measured["direction"], measured["fitted"], strict=True)) == {"axial": "yes", "radial": "no"}
+    assert measured["model over measured [-]"].between(0.95, 1.05).all()
+    assert "radial: usable within" in done.stderr
     table = pd.read_csv(tmp_path / "x" / "axial.csv")
     assert table["frequency [Hz]"].tolist() == [10, 20, 30] * 2
     assert table["amplitude [mm]"].tolist() == [0.1] * 3 + [0.3] * 3

@@ -84,7 +84,9 @@ def test_simulated_specimens_are_reduced_and_fitted_as_the_campaign_says(typed: 
     truth = json.loads((tmp_path / "sim/truth.json").read_text())
     assert [truth["schema"], truth["bushing"], truth["specimens"][1]["name"]] == ["bushfit/model/2", None, "mount"]
     assert (
-        (tmp_path / "sim/sweep_DMA.csv").read_text().startswith("frequency [Hz],amplitude [%],repeat,stiffness [MPa],")
+        (tmp_path / "sim/sweep_DMA.csv")
+        .read_text()
+        .startswith("frequency [Hz],strain amplitude [%],repeat,modulus [MPa],")
     )
     lines = (tmp_path / "sim/campaign.toml").read_text().splitlines()
     commands = [shlex.split(line)[2:] for line in lines if line.startswith("# bushfit reduce")]

@@ -70,7 +70,7 @@ def test_a_prediction_is_over_what_was_asked_for_before_what_the_campaign_says(
     assert prediction.direction is Direction.RADIAL
     assert prediction.frequency.tolist() == [7.0, 9.0]
     assert prediction.amplitude.tolist() == [1e-4, 1e-4]
-    assert Predict().names(said, ("csv",)) == ["radial.csv"]
+    assert Predict().names(None, said, ("csv",)) == ["radial.csv"]
     assert list(found.files(("csv",))) == ["radial.csv"]
 
 

@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dialects import DIALECTS, HEADERS, NUMBERS, Dialect, expected
+from dialects import DIALECTS, NUMBERS, UNITS, Dialect, expected
+from machines import MACHINES
 
+from bushfit import units
 from bushfit.errors import MeasurementError
-from bushfit.geometry import Direction
+from bushfit.geometry import Direction, Specimen
 from bushfit.reading.loops import read_loop
-from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.measurement import Floats, Loop, Sweep
 from bushfit.reading.sweeps import read_sweep
 
 
@@ -22,45 +24,65 @@ def written(dialect: Dialect, folder: Path) -> Path:
 
 
 def by_bushfit(file: Path) -> Loop | Sweep:
-    return read_loop(file, Direction.AXIAL) if file.stem == "loop" else read_sweep(file, Direction.AXIAL)
+    if file.stem == "loop":
+        return read_loop(file, Direction.AXIAL)
+    return read_sweep(file, Direction.AXIAL if file.stem == "sweep" else Specimen("DMA", "modulus"))
 
 
-@pytest.mark.parametrize("name", DIALECTS)
+ALL = {**DIALECTS, **MACHINES}
+
+
+def in_si(dialect: Dialect) -> list[Floats]:
+    """The columns of a dialect as its units have them."""
+    columns = []
+    for index, (column, unit) in enumerate(zip(expected(dialect.kind), UNITS[dialect.kind], strict=True)):
+        own = dialect.unit_of(index)
+        if own == "rad/s":
+            columns.append(column * (1.0 / (2.0 * np.pi)))
+        else:
+            si = {"mm": "m", "N/mm": "N/m", "MPa": "Pa", "%": "1", "-": "1"}.get(unit, unit)
+            columns.append(column * units.factor(own, si))
+    return columns
+
+
+@pytest.mark.parametrize("name", ALL)
 def test_every_dialect_reads_to_the_same_numbers(name: str, tmp_path: Path) -> None:
-    dialect = DIALECTS[name]
-    file = written(dialect, tmp_path)
-    if dialect.kind == "loop":
-        time, displacement, force = expected("loop")
-        loop = read_loop(file, Direction.AXIAL)
-        assert np.array_equal(loop.time, time)
-        assert np.array_equal(loop.displacement, displacement * 1e-3)
-        assert np.array_equal(loop.force, force)
+    dialect = ALL[name]
+    read = by_bushfit(written(dialect, tmp_path))
+    first, amplitude, third, *loss = in_si(dialect)
+    if isinstance(read, Loop):
+        assert np.array_equal(read.time, first)
+        assert np.array_equal(read.displacement, amplitude)
+        assert np.array_equal(read.force, third)
+        return
+    assert np.array_equal(read.frequency, first)
+    assert np.array_equal(read.amplitude, amplitude * (0.5 if dialect.double else 1.0))
+    if dialect.kind == "coupon":
+        assert np.array_equal(read.stiffness, third + 1j * loss[0])
     else:
-        frequency, amplitude, stiffness, loss_factor = expected("sweep")
-        sweep = read_sweep(file, Direction.AXIAL)
-        assert np.array_equal(sweep.frequency, frequency)
-        assert np.array_equal(sweep.amplitude, amplitude * 1e-3)
-        exact = stiffness * 1e3 / np.hypot(1.0, loss_factor) * (1.0 + 1j * loss_factor)
-        assert np.array_equal(sweep.stiffness, exact)
+        assert np.array_equal(read.stiffness, third / np.hypot(1.0, loss[0]) * (1.0 + 1j * loss[0]))
 
 
-@pytest.mark.parametrize("name", DIALECTS)
+@pytest.mark.parametrize("name", ALL)
 def test_errors_name_line_and_column_in_every_dialect(name: str, tmp_path: Path) -> None:
     """One cell in the middle is no number; the error has its line as an editor counts, its header, and the cell."""
-    dialect = DIALECTS[name]
-    row = NUMBERS[dialect.kind][12]
-    cells = [dialect.number(row[i]) for i in dialect.columns] + ["ok"] * bool(dialect.extra)
+    dialect = ALL[name]
+    cells = dialect.row(NUMBERS[dialect.kind][12])
     good = dialect.line(cells)
-    cells[list(dialect.columns).index(1)] = "bad"
+    cells[dialect.place(1)] = "bad"
     bad = dialect.line(cells)
     text = dialect.text()
     assert text.count(good) == 1
     file = tmp_path / f"{dialect.kind}.csv"
     file.write_bytes(dialect.encoded(text.replace(good, bad)))
     line = text.split(dialect.end).index(good) + 1
-    header = HEADERS[dialect.language][dialect.kind].split(", ")[1]
     with pytest.raises(MeasurementError) as caught:
         by_bushfit(file)
     message = str(caught.value)
-    assert f'line {line}, column "{header}' in message, message
+    assert f'line {line}, column "{dialect.headers[1].strip()}' in message, message
     assert 'found: "bad"' in message, message
+
+
+def test_machines_and_laboratories_are_many() -> None:
+    print(f"{len(ALL)} dialects, {len(MACHINES)} of them of machines and laboratories")
+    assert len(MACHINES) >= 25

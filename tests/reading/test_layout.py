@@ -6,8 +6,9 @@ import csv
 
 import pytest
 
-from bushfit.reading.headers import LOOP_COLUMNS, Vocabulary
+from bushfit.reading.headers import Vocabulary
 from bushfit.reading.layout import Layout, Line, find_layout, fits, is_comment, split
+from bushfit.reading.words import LOOP_COLUMNS
 
 LOOPS = Vocabulary(LOOP_COLUMNS, {})
 

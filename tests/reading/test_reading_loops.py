@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from texts import LOOP, LOOP_ROWS, TIME, loop_from, with_line
 
 from bushfit.errors import BushfitError, MeasurementError
-from bushfit.geometry import Direction
+from bushfit.geometry import Direction, Specimen
 from bushfit.reading.parallel import CHUNK
 
 
@@ -167,3 +167,17 @@ def test_any_bytes_are_a_loop_or_a_clear_error(tmp_path_factory: pytest.TempPath
     for content in (data, LOOP.encode() + data):
         with contextlib.suppress(BushfitError):
             loop_from(content, tmp_path_factory.getbasetemp())
+
+
+def test_a_loop_of_a_coupon_has_strain_and_stress(tmp_path: Path) -> None:
+    text = LOOP.replace("displacement [mm]", "shear strain [%]").replace("force [N]", "Schubspannung [kPa]")
+    loop = loop_from(text, tmp_path, direction=Specimen("DMA", "modulus"))
+    plain = loop_from(LOOP, tmp_path)
+    np.testing.assert_allclose(loop.displacement, 10.0 * plain.displacement)
+    np.testing.assert_allclose(loop.force, 1e3 * plain.force)
+    doubled = loop_from(text, tmp_path, direction=Specimen("DMA", "modulus", strain="tensor"))
+    np.testing.assert_allclose(doubled.displacement, 2.0 * loop.displacement)
+    with pytest.raises(BushfitError, match=r"test of strain and modulus[\s\S]*specimen = "):
+        loop_from(text, tmp_path)
+    with pytest.raises(BushfitError, match="test of displacement and force"):
+        loop_from(LOOP, tmp_path, direction=Specimen("DMA", "modulus"))

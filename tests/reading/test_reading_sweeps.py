@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from texts import SWEEP, SWEEP_HEADER, SWEEP_ROWS, sweep_from, with_line
 
 from bushfit.errors import BushfitError
+from bushfit.geometry import Specimen
 
 
 @pytest.mark.parametrize(
@@ -70,9 +72,197 @@ def test_noise_about_no_loss_is_no_loss_the_other_way(tmp_path: Path) -> None:
     assert np.median(sweep_from(SWEEP.replace("0.1\n", "-0.002\n"), tmp_path).stiffness.imag) < 0.0
 
 
+def test_a_late_channel_may_make_some_losses_negative_but_not_all(tmp_path: Path) -> None:
+    """A delay of 0.1 ms takes 0.1 rad at 155 Hz from a loss factor of 0.08; a wrong sign leaves nothing above zero."""
+    frequency = np.linspace(5.0, 155.0, 16)
+    for sign, delay in ((1.0, 1e-4), (-1.0, 0.0)):
+        eta = sign * np.tan(np.arctan(0.08) - 2.0 * np.pi * frequency * delay)
+        text = "\n".join([SWEEP_HEADER, *(f"{f},0.1,600,{e:.5f}" for f, e in zip(frequency, eta, strict=True))])
+        if sign > 0.0:
+            assert (sweep_from(text, tmp_path).stiffness.imag < 0.0).any()
+        else:
+            with pytest.raises(BushfitError, match="the loss counts the other way"):
+                sweep_from(text, tmp_path)
+
+
+ONE_LEVEL = "\n".join(["frequency [Hz],stiffness [N/mm],loss factor [-]", *(f"{f},{500 + f},0.1" for f in (5, 15, 25))])
+ONE_FREQUENCY = "\n".join(
+    ["amplitude [mm],stiffness [N/mm],loss factor [-]", *(f"0.{a},{500 + a},0.1" for a in (1, 2, 5))]
+)
+
+
+def test_what_a_file_has_no_column_for_is_stated(tmp_path: Path) -> None:
+    assert set(sweep_from(ONE_LEVEL, tmp_path, at_amplitude=2e-4).amplitude) == {2e-4}
+    assert set(sweep_from(ONE_LEVEL, tmp_path, at_amplitude=2e-4, amplitude="peak-to-peak").amplitude) == {1e-4}
+    assert set(sweep_from(ONE_FREQUENCY, tmp_path, at_frequency=10.0).frequency) == {10.0}
+    near = "\n".join([SWEEP_HEADER, "5,0.098,600,0.1", "15,0.104,610,0.1", "25,0.1,620,0.1"])
+    np.testing.assert_allclose(sweep_from(near, tmp_path, at_amplitude=1e-4).amplitude_reached, [9.8e-5, 1.04e-4, 1e-4])
+    doubled = near.replace("amplitude [mm]", "amplitude p-p [mm]")
+    assert sweep_from(doubled, tmp_path, at_amplitude=5e-5).amplitude_reached[0] == pytest.approx(4.9e-5)
+
+
+DMA = Specimen("DMA", "modulus")
+#: A simulated strain sweep, in the form of a DMA's export.
+COUPON = "\n".join(
+    [
+        "run,freq_hz,temperature_C,G_storage_pa,G_loss_pa,G_abs_pa,tan_delta,force_dyn_N,strain_dyn_pct",
+        *(
+            f"sd,10,{t},{g.real},{g.imag},{abs(g)},{g.imag / g.real},1.5,{e}"
+            for e, g, t in ((0.011, 5.2e6 + 4e5j, 22.1), (0.1, 4.5e6 + 5e5j, 22.3), (1.1, 3.1e6 + 6e5j, 22.2))
+        ),
+    ]
+)  # fmt: skip
+
+
+def test_a_coupon_gives_strain_and_modulus(tmp_path: Path) -> None:
+    sweep = sweep_from(COUPON, tmp_path, direction=DMA)
+    np.testing.assert_allclose(sweep.amplitude, [1.1e-4, 1e-3, 1.1e-2])
+    np.testing.assert_allclose(sweep.stiffness, [5.2e6 + 4e5j, 4.5e6 + 5e5j, 3.1e6 + 6e5j])
+    assert sweep.source is not None
+    assert sweep.source.conditions == {"temperature_degC": 22.2}
+    tensor = Specimen("DMA", "modulus", strain="tensor")
+    np.testing.assert_allclose(sweep_from(COUPON, tmp_path, direction=tensor).amplitude, [2.2e-4, 2e-3, 2.2e-2])
+    without = "\n".join(line.rpartition(",")[0] for line in COUPON.splitlines())
+    assert set(sweep_from(without, tmp_path, direction=tensor, at_amplitude=1e-3).amplitude) == {2e-3}
+
+
+@pytest.mark.parametrize(
+    ("unit", "scale"), [("%", 0.01), ("-", 1.0), ("mm/m", 1e-3), ("µε", 1e-6), ("microstrain", 1e-6)]
+)
+def test_strains_in_every_unit(unit: str, scale: float, tmp_path: Path) -> None:
+    text = COUPON.replace("strain_dyn_pct", f"Shear strain amplitude [{unit}]")
+    np.testing.assert_allclose(sweep_from(text, tmp_path, direction=DMA).amplitude, scale * np.array([0.011, 0.1, 1.1]))
+
+
+@pytest.mark.parametrize(
+    ("storage", "loss"),
+    [
+        ("Storage modulus G' [Pa]", "Loss modulus G'' [Pa]"),
+        ("Speichermodul (Pa)", "Verlustmodul (Pa)"),
+        ("E' (Pa)", 'E" (Pa)'),
+        ("module de conservation / Pa", "module de perte / Pa"),
+    ],
+)
+def test_moduli_by_many_names(storage: str, loss: str, tmp_path: Path) -> None:
+    text = COUPON.replace("G_storage_pa", storage).replace("G_loss_pa", loss).replace("G_abs_pa", "x")
+    assert sweep_from(text, tmp_path, direction=DMA).stiffness[0] == pytest.approx(5.2e6 + 4e5j)
+
+
+def at_temperatures(*temperatures: float, unit: str = "degC") -> str:
+    rows = [f"{f},0.1,{500 + f + t:.3f},0.1,{t}" for t in temperatures for f in (5, 15, 25)]
+    return "\n".join([f"{SWEEP_HEADER},Temperature [{unit}]", *rows])
+
+
+def test_the_rows_at_a_stated_temperature_are_taken(tmp_path: Path) -> None:
+    text = at_temperatures(-10.0, 18.4, 25.2)
+    for stated, offset in ((291.55, 18.4), (300.0, 25.2)):
+        sweep = sweep_from(text, tmp_path, temperature=stated)
+        np.testing.assert_allclose(np.abs(sweep.stiffness) * 1e-3, [505 + offset, 515 + offset, 525 + offset])
+    assert set(sweep.repeat) == {1}
+
+
+@pytest.mark.parametrize(("unit", "value"), [("degC", 22.0), ("°C", 22.0), ("K", 295.15), ("degF", 71.6), ("C", 22.0)])
+def test_the_temperature_of_a_file_is_its_condition(unit: str, value: float, tmp_path: Path) -> None:
+    source = sweep_from(at_temperatures(value, value, unit=unit), tmp_path).source
+    assert source is not None
+    assert source.conditions["temperature_degC"] == pytest.approx(22.0)
+
+
+def test_a_temperature_that_nothing_depends_on_needs_no_unit(tmp_path: Path) -> None:
+    source = sweep_from(at_temperatures(22.0, 23.0).replace(" [degC]", ""), tmp_path).source
+    assert source is not None
+    assert source.conditions == {}
+
+
+def test_errors_of_the_points_are_read(tmp_path: Path) -> None:
+    rows = "\n".join([SWEEP_HEADER + ",relative error [%]", *(f"{row},0.5" for row in SWEEP_ROWS)])
+    np.testing.assert_allclose(sweep_from(rows, tmp_path).relative_error, 0.005)
+    assert sweep_from(SWEEP, tmp_path).relative_error is None
+
+
+@pytest.mark.parametrize(
+    "header", ["angular frequency [rad/s]", "omega [1/s]", "Kreisfrequenz [1/s]", "frequency [rad/s]"]
+)
+def test_radians_per_second_become_hertz(header: str, tmp_path: Path) -> None:
+    found = sweep_from(SWEEP.replace("frequency [Hz]", header), tmp_path).frequency
+    np.testing.assert_allclose(found, np.tile([5.0, 15.0, 25.0, 35.0], 2) / (2.0 * np.pi))
+
+
+STATED = [
+    ("no amplitude", ONE_LEVEL, {}, ["line 1", "no column for the amplitude", 'at_amplitude = "0.1 mm"']),
+    ("no frequency", ONE_FREQUENCY, {}, ["line 1", "no column for the frequency", 'at_frequency = "10 Hz"']),
+    (
+        "another amplitude",
+        SWEEP,
+        {"at_amplitude": 1e-4},
+        ["line 6", '"amplitude [mm]"', '"0.2"', "0.1 mm, within 10 %", "take at_amplitude out"],
+    ),
+    ("another frequency", SWEEP, {"at_frequency": 5.0}, ["line 3", "frequency is not the one", "5 Hz", "at_frequency"]),
+    (
+        "several temperatures",
+        at_temperatures(-10.0, 18.4, 25.2),
+        {},
+        ['"Temperature [degC]"', "tests at several temperatures", "-10.0, 18.4, 25.2 degC", "state temperature ="],
+    ),
+    (
+        "no such temperature",
+        at_temperatures(-10.0, 18.4),
+        {"temperature": 313.15},
+        ["near the temperature", "-10.0, 18.4 degC", "2 K of 40 degC", 'temperature = "18.4 degC"'],
+    ),
+    ("unknown degrees", at_temperatures(20.0, unit="degX"), {}, ["line 1", '"Temperature [degX]"', "unknown unit"]),
+    (
+        "degrees without unit",
+        at_temperatures(20.0, 40.0).replace(" [degC]", ""),
+        {},
+        ["line 1", "the temperature has no unit", 'units = { temperature = "degC" }'],
+    ),
+    (
+        "a negative error",
+        "\n".join([SWEEP_HEADER + ",relative error [-]", *(f"{row},-0.5" for row in SWEEP_ROWS)]),
+        {},
+        ["line 2", '"relative error [-]"', "not positive"],
+    ),
+    (
+        "a coupon as a bushing",
+        COUPON,
+        {},
+        ["line 1", "test of strain and modulus", "[[specimens]]", 'kind = "modulus"'],
+    ),
+    (
+        "a strain as an amplitude",
+        SWEEP.replace("[mm]", "[%]"),
+        {},
+        ["line 1", "test of strain and modulus", "specimen ="],
+    ),
+    (
+        "a bushing as a coupon",
+        SWEEP,
+        {"direction": DMA},
+        ["line 1", "test of displacement and force or stiffness", 'kind = "shear"'],
+    ),
+    (
+        "a strain without unit",
+        COUPON.replace("strain_dyn_pct", "strain"),
+        {"direction": DMA},
+        ["line 1", "the amplitude has no unit", 'write "strain [%]"'],
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "stated", "words"), [case[1:] for case in STATED], ids=[case[0] for case in STATED])
+def test_what_is_stated_and_the_file_have_to_agree(
+    text: str, stated: dict[str, Any], words: list[str], tmp_path: Path
+) -> None:
+    with pytest.raises(BushfitError) as caught:
+        sweep_from(text, tmp_path, **stated)
+    message = str(caught.value)
+    assert all(word in message for word in ["sweep.csv", *words]), message
+
+
 BAD_SWEEPS = [
     ("no pair", SWEEP.replace("loss factor [-]", "x"), ["line 1", "no pair", "storage stiffness"]),
-    ("frequency unit", SWEEP.replace("[Hz]", "[rad/s]"), ["line 1", "does not fit", "a frequency"]),
+    ("frequency unit", SWEEP.replace("[Hz]", "[rad]"), ["line 1", "does not fit", "a frequency"]),
     ("phase unit", SWEEP.replace("loss factor [-]", "phase"), ["line 1", "the phase has no unit", "phase [deg]"]),
     ("decibel", SWEEP.replace("[-]", "[dB]"), ["line 1", "unknown unit", "dB"]),
     ("frequency", with_line(SWEEP, 3, "-15,0.1,600,0.1"), ["line 3", "frequency is not positive", '"-15"']),

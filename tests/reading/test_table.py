@@ -9,9 +9,9 @@ import pytest
 from texts import LOOP, LOOP_ROWS, loop_from
 
 from bushfit.errors import MeasurementError, NoColumnError, UnitError
-from bushfit.reading.headers import LOOP_COLUMNS
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.table import Table
+from bushfit.reading.words import LOOP_COLUMNS
 
 
 def opened(text: str, folder: Path, **stated: object) -> Table:

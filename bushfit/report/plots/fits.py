@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,25 +18,28 @@ from bushfit.prediction import Band
 from bushfit.report.plots.points import (
     SECTORS,
     Axis,
+    Kind,
     Points,
     by_direction,
+    by_kind,
     held_beside,
     means,
     outliers,
     over_sectors,
-    stepped_axis,
     turn,
 )
-from bushfit.report.plots.prediction import FINE, draw, points_note
+from bushfit.report.plots.prediction import FINE, draw, draw_as_it_came, points_note
 from bushfit.report.plots.style import (
     CM,
     DOT,
     INK,
     ROW,
+    Style,
     dress,
     explain,
     file_name,
     legend,
+    logarithmic,
     mark_outliers,
     new_figure,
     noise_band,
@@ -49,6 +52,8 @@ from bushfit.units import for_people
 _STRIP = 2.6 / CM
 #: Most rows of a loop that are drawn: a panel is some 400 pixels wide, and a loop crosses it several times.
 _MOST_ROWS = 1600
+#: Amplitudes that were stepped over more than this ratio lie on a logarithmic axis: chosen, half a decade.
+_DECADES = 3.0
 #: Height of the panels of loops over that of others: a hysteresis loop wants a square.
 _LOOPS_HEIGHT = 1.25
 
@@ -60,57 +65,68 @@ _MEANS = f"Lines there: means over {360 // SECTORS} deg."
 def sweeps_figure(model: Model, data_sets: Sequence[SweepData], title: str) -> Figure:
     """Magnitude and loss factor of sweeps over what they step through, measured and modelled; their residuals below.
 
-    A row of panels per direction; along x lies the frequency, or the amplitude where it is stepped through (see
-    `stepped_axis`). The model keeps the effects of the rig, since sweeps hold them.
+    A row of panels per place and kind of sweep; along x lies what is stepped, or the frequency where nothing was held.
+    The model keeps the effects of the rig, since sweeps hold them.
 
     Args:
         model: the fitted model.
         data_sets: at least one sweep.
         title: names the bushing.
     """
-    directions = by_direction(data_sets)
-    figure = new_figure(title, (ROW + _STRIP) * len(directions))
-    grid = figure.subplots(2 * len(directions), 2, squeeze=False, height_ratios=[ROW, _STRIP] * len(directions))
-    for (direction, mine), pair, strips in zip(directions.items(), grid[::2], grid[1::2], strict=True):
-        points = means(mine)
-        axis = stepped_axis(points.frequency, points.amplitude)
-        levels = np.unique(getattr(points, held_beside(axis)))
-        draw(pair, direction, _model_lines(model, direction, points, axis), points, axis, levels)
-        _draw_residuals(pair, strips, model, mine, points, axis)
+    kinds = by_kind(data_sets)
+    figure = new_figure(title, (ROW + _STRIP) * len(kinds))
+    grid = figure.subplots(2 * len(kinds), 2, squeeze=False, height_ratios=[ROW, _STRIP] * len(kinds))
+    for (kind, mine), pair, strips in zip(kinds.items(), grid[::2], grid[1::2], strict=True):
+        if kind.stepped is None:
+            draw_as_it_came(pair, kind.place, model, mine)
+        else:
+            points, held = means(mine), held_beside(kind.axis)
+            levels = np.unique(getattr(points, held))
+            draw(pair, kind.place, _model_lines(model, kind.place, points, kind.axis), points, kind.axis, levels)
+        _draw_residuals(pair, strips, model, mine, kind)
     outlying = any((data_set.weights == 0.0).any() for data_set in data_sets)
     explain(figure, "Lines: model.", points_note(data_sets), _RESIDUALS, _OUTLIERS * outlying)
     return figure
 
 
 def _draw_residuals(
-    pair: Sequence[Axes],
-    strips: Sequence[Axes],
-    model: Model,
-    data_sets: Sequence[SweepData],
-    points: Points,
-    axis: Axis,
+    pair: Sequence[Axes], strips: Sequence[Axes], model: Model, data_sets: Sequence[SweepData], kind: Kind
 ) -> None:
-    """The residuals of one direction's sweeps, of the gain left and of the phase right, below the panels `pair`."""
-    scale = data_sets[0].direction.display.displacement.factor if axis == "amplitude" else 1.0
-    held = held_beside(axis)
-    levels = np.unique(getattr(points, held))
+    """The residuals of one kind of sweeps, of the gain left and of the phase right, below the panels `pair`."""
+    scale = kind.place.display.displacement.factor if kind.axis == "amplitude" else 1.0
+    x = [scale * getattr(data_set, kind.axis) for data_set in data_sets]
     for part, (panel, strip, name) in enumerate(zip(pair, strips, ("gain", "phase"), strict=True)):
         residuals = [data_set.shown(model).reshape(2, -1)[part] for data_set in data_sets]
-        for data_set, residual in zip(data_sets, residuals, strict=True):
-            for style, level in zip(styles(levels.size, held), levels, strict=True):
-                at = (getattr(data_set, held) == level) & (data_set.weights > 0.0)
-                strip.plot(
-                    scale * getattr(data_set, axis)[at], residual[at], style.marker, color=style.color, alpha=0.8, **DOT
-                )
+        for look, place, at in _looks(data_sets, kind):
+            marker = DOT | {"color": look.color, "alpha": 0.8}
+            strip.plot(x[place][at], residuals[place][at], look.marker, **marker)
         strip.sharex(panel)
         dress(strip, panel.get_xlabel(), f"{name} residual\n/ noise")
-        readable(strip, scale * getattr(points, axis))
+        reach = np.concatenate(x)
+        if kind.axis == "amplitude" and reach.max() > _DECADES * reach.min():
+            logarithmic(strip, reach)
+        else:
+            readable(strip, reach)
         panel.tick_params(labelbottom=False)
         panel.set_xlabel("")
         noise_band(strip)
-        for data_set, residual in zip(data_sets, residuals, strict=True):
+        for place, data_set in enumerate(data_sets):
             outlying = data_set.weights == 0.0
-            mark_outliers(strip, scale * getattr(data_set, axis)[outlying], residual[outlying])
+            mark_outliers(strip, x[place][outlying], residuals[place][outlying])
+
+
+def _looks(data_sets: Sequence[SweepData], kind: Kind) -> Iterator[tuple[Style, int, Array]]:
+    """How the points of each level are drawn, or of each test where nothing was held: style, number of the test, which
+    of its points."""
+    if kind.stepped is None:
+        for place, style in enumerate(styles(len(data_sets), "loop")):
+            yield style._replace(marker="o"), place, data_sets[place].weights > 0.0
+        return
+    held = held_beside(kind.axis)
+    levels = np.unique(np.concatenate([getattr(data_set.standing(), held) for data_set in data_sets]))
+    for place, data_set in enumerate(data_sets):
+        for style, level in zip(styles(levels.size, held), levels, strict=True):
+            yield style, place, (getattr(data_set, held) == level) & (data_set.weights > 0.0)
 
 
 def loops_figure(model: Model, data_sets: Sequence[LoopData], title: str) -> Figure:

@@ -16,12 +16,13 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import DataSet, LoopData, parted
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, parted
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.report.plots.fits import loop_labels, loops_legend
 from bushfit.report.plots.misfit import Curve, Map, Side, columns, has_holes, replaced, side_of
-from bushfit.report.plots.points import SECTORS, Repeats, by_direction
+from bushfit.report.plots.points import SECTORS, Kind, by_direction, by_kind
+from bushfit.report.plots.prediction import axis_label
 from bushfit.report.plots.style import (
     CM,
     GREY,
@@ -31,6 +32,7 @@ from bushfit.report.plots.style import (
     TEXT,
     dress,
     explain,
+    file_name,
     fonts,
     logarithmic,
     new_figure,
@@ -80,8 +82,8 @@ _HOLE = 1.75
 _FAR = 40.0
 #: Up to where that scale is linear, in units of noise: a little more than a right model scatters.
 _NEAR = 5.0
-#: Colour of what was not measured.
-_ABSENT = "#c8c8c8"
+#: Shade of what is measured and within the noise: nothing that was measured is white.
+_WITHIN = 0.92
 #: Most labels of a map's rows.
 _MOST_LABELS = 10
 #: Letters in a line of the summary, as many as the width of a figure holds.
@@ -114,7 +116,7 @@ def gap_figure(
         mended: the tests that belong to the model after, where they are others; drawn where they were recorded.
     """
     every_loop, every_sweep = parted(data_sets)
-    loops, sweeps = by_direction(every_loop), by_direction(every_sweep)
+    loops, sweeps = by_direction(every_loop), by_kind(every_sweep)
     later = dict(zip(data_sets, mended or data_sets, strict=True))
     sides = [
         side_of(model, name, list(tests.values()), replaced(sweeps, tests), replaced(loops, tests))
@@ -122,8 +124,8 @@ def gap_figure(
             columns(before, after, later), ({test: test for test in later}, later), strict=False
         )
     ]
-    rows = [(direction, part) for direction in sweeps for part in ("storage", "loss")]
-    heights = [_map_height(sides[0].maps[direction]) for direction, _ in rows]
+    rows = [(kind, part) for kind in sweeps for part in ("storage", "loss")]
+    heights = [_map_height(sides[0].maps[kind]) for kind, _ in rows]
     heights += [_loops_height(mine, len(sides)) for mine in loops.values()]
     lines = textwrap.wrap(summary, _SUMMARY_LETTERS)
     figure = new_figure(title, sum(heights) + _SCALE * bool(rows) + _LINE * (len(lines) + 2))
@@ -132,10 +134,10 @@ def gap_figure(
     grid = body.subplots(len(heights), len(sides), squeeze=False, height_ratios=heights)
     if rows:
         edges, colors = _scale(sides)
-        for row, (direction, part) in zip(grid, rows, strict=False):
+        for row, (kind, part) in zip(grid, rows, strict=False):
             for axes, side in zip(row, sides, strict=True):
-                _draw_map(axes, side.maps[direction], part, colors)
-            _label_maps(row, direction, part, sides[0].maps[direction])
+                _draw_map(axes, kind, side.maps[kind], part, colors)
+            _label_maps(row, kind, part, sides[0].maps[kind], sweeps[kind])
         _draw_scale(body, [axes for row in grid[: len(rows)] for axes in row], edges, colors)
     for row, (direction, mine) in zip(grid[len(rows) :], loops.items(), strict=True):
         _draw_loops(row, direction, mine, [side.loops[direction] for side in sides])
@@ -146,7 +148,7 @@ def gap_figure(
 
 def _map_height(drawn: Map) -> float:
     """Height of a map [inch]."""
-    return float(np.clip(_LEVEL * np.unique(drawn.points.amplitude).size, _LEAST_MAP, _LARGEST_MAP))
+    return float(np.clip(_LEVEL * np.unique(drawn.points.held).size, _LEAST_MAP, _LARGEST_MAP))
 
 
 def _loops_height(data_sets: Sequence[LoopData], sides: int) -> float:
@@ -166,8 +168,8 @@ def _legend_columns(labels: Sequence[str], sides: int) -> int:
 def _scale(sides: Sequence[Side]) -> tuple[Array, ScalarMappable]:
     """The values at which the colour changes, in units of noise, and the colours.
 
-    Steps from white (within the noise) to dark, blue where the measurement is below the model and red above.
-    They end where 2 % of the points are left beyond.
+    Steps from a pale grey (within the noise) to dark, blue where the measurement is below the model and red above. They
+    end where 2 % of the points are left beyond.
     """
     values = np.abs(
         np.concatenate([part for side in sides for drawn in side.maps.values() for part in (drawn.storage, drawn.loss)])
@@ -176,21 +178,21 @@ def _scale(sides: Sequence[Side]) -> tuple[Array, ScalarMappable]:
     edges = np.array(_EDGES[: max(needed, _LEAST_EDGES)])
     shades = np.linspace(_FAINT, 1.0, edges.size) / 2.0
     colors = colormaps["RdBu_r"](0.5 + np.concatenate((-shades[::-1], [0.0], shades)))
-    colors[edges.size] = 1.0
+    colors[edges.size, :3] = _WITHIN
     both = np.concatenate((-edges[::-1], edges))
     return both, ScalarMappable(BoundaryNorm(both, len(colors), extend="both"), ListedColormap(colors))
 
 
-def _draw_map(axes: Axes, drawn: Map, part: str, colors: ScalarMappable) -> None:
-    """Draw a row of cells per amplitude, each as wide as the step of frequency; what was not measured stays grey."""
+def _draw_map(axes: Axes, kind: Kind, drawn: Map, part: str, colors: ScalarMappable) -> None:
+    """Draw a row of cells per held value, each as wide as the step; what was not measured stays white."""
     values: Array = getattr(drawn, part)
-    points = drawn.points
-    even = _evenly(points)
-    levels, row = np.unique(points.amplitude, return_inverse=True)
+    along = drawn.points.along * (kind.place.display.displacement.factor if kind.axis == "amplitude" else 1.0)
+    even = _evenly(along)
+    levels, row = np.unique(drawn.points.held, return_inverse=True)
     low, high = np.empty_like(values), np.empty_like(values)
     for level in range(levels.size):
         at = row == level
-        low[at], high[at] = _cells(points.frequency[at], logarithmic=even)
+        low[at], high[at] = _cells(along[at], logarithmic=even)
     cells = np.stack(
         [np.stack((x, row + y), axis=1) for x, y in ((low, -0.5), (high, -0.5), (high, 0.5), (low, 0.5))], axis=1
     )
@@ -201,31 +203,31 @@ def _draw_map(axes: Axes, drawn: Map, part: str, colors: ScalarMappable) -> None
     inset = _BAR_INSET * (high - low)[below]
     axes.hlines(row[below], low[below] + inset, high[below] - inset, color="white", lw=1.1)
     axes.hlines(np.arange(1, levels.size) - 0.5, low.min(), high.max(), color="white", lw=1.5)
-    axes.set(facecolor=_ABSENT, ylim=(-0.5, levels.size - 0.5))
+    axes.set(ylim=(-0.5, levels.size - 0.5))
     if even:
-        logarithmic(axes, points.frequency)
+        logarithmic(axes, along)
     axes.set_xlim(low.min(), high.max())
     axes.tick_params(labelsize=SMALL, colors=INK)
     axes.spines[:].set_color(GREY)
     axes.set_yticks(np.arange(0, levels.size, math.ceil(levels.size / _MOST_LABELS)))
 
 
-def _evenly(points: Repeats) -> bool:
-    """Whether the frequencies are spaced more evenly by ratio than by difference."""
-    frequency = np.unique(points.frequency)
-    if frequency.size < 3:
+def _evenly(along: Array) -> bool:
+    """Whether what is stepped is spaced more evenly by ratio than by difference."""
+    distinct = np.unique(along)
+    if distinct.size < 3:
         return False
-    ratios, steps = np.diff(np.log(frequency)), np.diff(frequency)
+    ratios, steps = np.diff(np.log(distinct)), np.diff(distinct)
     return bool(np.std(ratios) / np.mean(ratios) < np.std(steps) / np.mean(steps))
 
 
-def _cells(frequency: Array, *, logarithmic: bool) -> tuple[Array, Array]:
-    """Lower and upper edge of the cell of each frequency [Hz], (n,) each.
+def _cells(along: Array, *, logarithmic: bool) -> tuple[Array, Array]:
+    """Lower and upper edge of the cell of each frequency [Hz] or amplitude, (n,) each.
 
     They lie half way to the neighbours; where one of them is much further off than the other, as far off as on the
     other's side. The cell of a lone frequency is a fifth as wide as that.
     """
-    x = np.log(frequency) if logarithmic else frequency
+    x = np.log(along) if logarithmic else along
     steps = np.diff(x) if x.size > 1 else np.array([0.2 if logarithmic else 0.2 * x[0]])
     left, right = (np.concatenate(ends)[: x.size] for ends in ((steps[:1], steps), (steps, steps[-1:])))
     left, right = np.where(left > _HOLE * right, right, left), np.where(right > _HOLE * left, left, right)
@@ -233,15 +235,17 @@ def _cells(frequency: Array, *, logarithmic: bool) -> tuple[Array, Array]:
     return (np.exp(low), np.exp(high)) if logarithmic else (np.maximum(low, 0.0), high)
 
 
-def _label_maps(row: Sequence[Axes], direction: Place, part: str, drawn: Map) -> None:
-    unit, length = direction.display.displacement
-    levels = np.unique(drawn.points.amplitude)
+def _label_maps(row: Sequence[Axes], kind: Kind, part: str, drawn: Map, sweeps: Sequence[SweepData]) -> None:
+    unit, factor = ("Hz", 1.0) if kind.axis == "amplitude" else kind.place.display.displacement
+    names = [f"{factor * level:.3g} {unit}" for level in np.unique(drawn.points.held)]
+    if kind.stepped is None and drawn.merged == 1:
+        names = [file_name(sweep.name) for sweep in sweeps]
     for axes in row:
-        axes.set_yticklabels([f"{length * levels[round(tick)]:.3g} {unit}" for tick in axes.get_yticks()])
+        axes.set_yticklabels([names[round(tick)] for tick in axes.get_yticks()])
         axes.tick_params(labelleft=axes is row[0], labelbottom=part == "loss")
         if part == "loss":
-            axes.set_xlabel("frequency [Hz]", fontsize=TEXT, color=INK)
-    _name(row[0], f"{direction}\n{part}")
+            axes.set_xlabel(axis_label(kind.place, kind.axis), fontsize=TEXT, color=INK)
+    _name(row[0], f"{kind.place}\n{part}")
 
 
 def _name(axes: Axes, words: str) -> None:
@@ -315,12 +319,18 @@ def _words(side: Side) -> list[str]:
     repeated = any(drawn.repeated for drawn in side.maps.values())
     within = " and ".join(["within 2 (maps)"] * maps + ["in the grey (loops)"] * loops)
     merged = max((drawn.merged for drawn in side.maps.values()), default=1)
-    of = [*["its repeats"] * repeated, *[f"up to {merged} neighbouring amplitudes"] * (merged > 1)]
+    of = [*["its repeats"] * repeated, *[f"up to {merged} neighbouring rows"] * (merged > 1)]
+    usual = all(kind.stepped == "frequency" for kind in side.maps)
+    across = (
+        "frequency across, amplitude"
+        if usual
+        else "across what is stepped (or the frequency), what is held (or the test)"
+    )
     return [
-        "Maps: frequency across, amplitude upwards; white: model and measurement agree within the noise. A bar in a "
-        "cell: 3 and more below." * maps,
+        f"Maps: {across} upwards; pale grey: model and measurement agree within the noise. A bar in a cell: 3 and more "
+        "below." * maps,
         f"A cell is the mean of {' and of '.join(of)}, in units of the noise of that mean." * bool(of),
-        "Grey: not measured." * any(has_holes(drawn.points) for drawn in side.maps.values()),
+        "White: not measured." * any(has_holes(drawn.points) for drawn in side.maps.values()),
         f"Loops: measured less model over the cycle, means over {360 // SECTORS} deg, in units of the noise of that "
         "mean." * loops,
         f"Where the model is right, 95 % lie {within}.",

@@ -12,7 +12,8 @@ from matplotlib.gridspec import SubplotSpec
 from bushfit.effects.contract import Array
 from bushfit.inspection.record import Inspected
 from bushfit.reading.measurement import Floats, Loop, Sweep
-from bushfit.report.plots.points import BINS, held_beside, ranges, stepped_axis
+from bushfit.report.plots.points import BINS, Kind, held_beside, ranges
+from bushfit.report.plots.prediction import axis_label
 from bushfit.report.plots.style import (
     CM,
     GREY,
@@ -21,7 +22,7 @@ from bushfit.report.plots.style import (
     dress,
     explain,
     file_name,
-    legend,
+    name_levels,
     new_figure,
     readable,
     styles,
@@ -44,7 +45,7 @@ def inspection_figure(files: Sequence[Inspected]) -> Figure:
     grid = figure.add_gridspec(len(files), 1)
     for row, seen in enumerate(files):
         place = grid[row, 0]
-        name = file_name(seen.file.name, _NAME_LETTERS)
+        name = file_name(seen.label, _NAME_LETTERS)
         words = f"{seen.kind}, {seen.direction or 'direction unknown'}"
         words += ", force turned" * (seen.entry.get("force_sign") == -1)
         title = f"{name}: {words}" + (f", {len(seen.looked.odd)} odd" if seen.looked.odd else "")
@@ -97,11 +98,11 @@ def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
     units = sweep.direction.display
     stiffness, factor = for_people(*units.stiffness, float(np.abs(sweep.stiffness).max()))
     pair = place.subgridspec(1, 2).subplots(squeeze=False)[0]
-    axis = stepped_axis(sweep.frequency, sweep.amplitude)
+    axis = Kind(sweep.direction, sweep.stepped).axis
     held = held_beside(axis)
     scales = {"frequency": ("Hz", 1.0), "amplitude": units.displacement}
-    (x_unit, x_factor), (unit, length) = scales[axis], scales[held]
-    x, at_level = x_factor * getattr(sweep, axis), getattr(sweep, held)
+    (_, x_factor), (unit, length) = scales[axis], scales[held]
+    x, at_level = x_factor * getattr(sweep, axis), sweep.held
     levels = np.unique(at_level)
     drawn = styles(levels.size, held)
     kinds = (
@@ -113,10 +114,11 @@ def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
             at = at_level == level
             axes.plot(*_means(x[at], values[at]), color=style.color, ls=style.dashes, lw=0.8)
             axes.plot(x[at], values[at], style.marker, color=style.color, alpha=0.75, **POINT)
-        dress(axes, f"{axis} [{x_unit}]", label)
+        dress(axes, axis_label(sweep.direction, axis), label)
         readable(axes, x)
     labels = [f"{length * level:.3g} {unit}" for level in levels]
-    legend(pair[-1], [style.handle(True) for style in drawn], labels, held)
+    if sweep.stepped:
+        name_levels(pair[-1], labels, held, [True] * levels.size)
     return pair[0]
 
 

@@ -11,23 +11,25 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
 from bushfit.geometry import Place
 from bushfit.model.model import Model
-from bushfit.report.plots.points import Repeats, over_sectors
+from bushfit.report.plots.points import Kind, Repeats, held_beside, over_sectors
 
 _T = TypeVar("_T", SweepData, LoopData)
+_K = TypeVar("_K")
 
 #: Most rows of a map: each is then 1.7 mm high, and its bars and the lines between rows are still seen.
 _MOST_ROWS = 24
 
 
 class Map(NamedTuple):
-    """Measured less model at each operating point of a direction, over the noise of its mean.
+    """Measured less model at each operating point of a kind of sweeps, over the noise of its mean.
 
     Args:
-        points: the operating points; neighbouring amplitudes count as one where there are more than rows, (k,).
+        points: the operating points, by what is stepped (the frequency where nothing is held) and by row: what is held,
+            or the number of the test; neighbouring values count as one where there are more than rows, (k,).
         storage: the real part of what is left, (k,).
         loss: the imaginary part, (k,).
         repeated: whether an operating point was measured more than once.
-        merged: how many amplitudes a row stands for at most.
+        merged: how many held values a row stands for at most.
     """
 
     points: Repeats
@@ -49,7 +51,7 @@ class Side(NamedTuple):
 
     title: str
     gap: float
-    maps: Mapping[Place, Map]
+    maps: Mapping[Kind, Map]
     loops: Mapping[Place, Sequence[Curve]]
 
 
@@ -66,16 +68,16 @@ def columns(before: Model, after: Model, later: Mapping[DataSet, DataSet]) -> li
     return [(before, "before"), (after, f"after adding {' and '.join(added)}" if added else "after")]
 
 
-def replaced(tests: Mapping[Place, Sequence[_T]], later: Mapping[DataSet, DataSet]) -> dict[Place, list[_T]]:
+def replaced(tests: Mapping[_K, Sequence[_T]], later: Mapping[DataSet, DataSet]) -> dict[_K, list[_T]]:
     """The tests as mended, under the directions they were recorded as."""
-    return {direction: [cast(_T, later[test]) for test in mine] for direction, mine in tests.items()}
+    return {kind: [cast(_T, later[test]) for test in mine] for kind, mine in tests.items()}
 
 
 def side_of(
     model: Model,
     name: str,
     data_sets: Sequence[DataSet],
-    sweeps: Mapping[Place, Sequence[SweepData]],
+    sweeps: Mapping[Kind, Sequence[SweepData]],
     loops: Mapping[Place, Sequence[LoopData]],
 ) -> Side:
     """What is drawn of a model against all tests."""
@@ -83,23 +85,24 @@ def side_of(
     return Side(
         name,
         gap,
-        {direction: _map(model, mine) for direction, mine in sweeps.items()},
+        {kind: _map(model, kind, mine) for kind, mine in sweeps.items()},
         {direction: [_curve(model, data_set) for data_set in mine] for direction, mine in loops.items()},
     )
 
 
-def _map(model: Model, data_sets: Sequence[SweepData]) -> Map:
-    """Mean deviation of each cell over the noise of that mean, of sweeps of one direction.
+def _map(model: Model, kind: Kind, data_sets: Sequence[SweepData]) -> Map:
+    """Mean deviation of each cell over the noise of that mean, of sweeps of one kind.
 
     Repeats differ by what scatters from point to point and by what each block shares: both average out.
     """
     repeated = bool(Repeats.of(data_sets).count.max() > 1)
-    frequency, amplitude = (
-        np.concatenate([getattr(data_set, name) for data_set in data_sets]) for name in ("frequency", "amplitude")
-    )
-    row = map_rows(amplitude)
-    points = Repeats.at(frequency, row)
-    merged = max(np.unique(amplitude[row == level]).size for level in np.unique(row))
+    axes = kind.axis, held_beside(kind.axis)
+    along, held = (np.concatenate([getattr(data_set, name) for data_set in data_sets]) for name in axes)
+    if kind.stepped is None:
+        held = np.repeat(np.arange(1.0, len(data_sets) + 1.0), [data_set.frequency.size for data_set in data_sets])
+    row = map_rows(held)
+    points = Repeats.at(along, row)
+    merged = max(np.unique(held[row == level]).size for level in np.unique(row))
     deviation = -np.concatenate([data_set.deviation(model) for data_set in data_sets])
     noise = np.array([data_set.noise.random[data_set.name, float(x)] for data_set in data_sets for x in data_set.held])
     shared = np.array([data_set.noise.shared for data_set in data_sets for _ in data_set.amplitude])
@@ -111,15 +114,15 @@ def _map(model: Model, data_sets: Sequence[SweepData]) -> Map:
     return Map(points, storage, loss, repeated, merged)
 
 
-def map_rows(amplitude: Array) -> Array:
-    """The amplitude of each point's row in a map, (n,) -> (n,).
+def map_rows(held: Array) -> Array:
+    """The held value of each point's row in a map, (n,) -> (n,).
 
-    Its own, but where there are more amplitudes than rows: then the geometric mean of those in its row, one of as many
+    Its own, but where there are more values than rows: then the geometric mean of those in its row, one of as many
     equal steps of the logarithm as there are rows.
     """
-    levels, place = np.unique(amplitude, return_inverse=True)
+    levels, place = np.unique(held, return_inverse=True)
     if levels.size <= _MOST_ROWS:
-        return amplitude
+        return held
     size = np.log(levels)
     row = np.minimum((_MOST_ROWS * (size - size[0]) / (size[-1] - size[0])).astype(int), _MOST_ROWS - 1)
     _, row = np.unique(row, return_inverse=True)
@@ -134,5 +137,5 @@ def _curve(model: Model, data_set: LoopData) -> Curve:
 
 
 def has_holes(points: Repeats) -> bool:
-    """Whether a level lacks a frequency that another has."""
-    return points.frequency.size < np.unique(points.frequency).size * np.unique(points.amplitude).size
+    """Whether a row lacks a point that another has."""
+    return points.along.size < np.unique(points.along).size * np.unique(points.held).size

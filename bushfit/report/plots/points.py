@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeVar
+from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import LoopData, SweepData
 from bushfit.geometry import Place
 from bushfit.prediction import Band
-from bushfit.report.plots.style import MOST_NAMED
+from bushfit.reading.measurement import Stepped
 
 _T = TypeVar("_T", SweepData, LoopData)
 
@@ -33,14 +33,24 @@ def by_direction(data_sets: Sequence[_T]) -> dict[Place, list[_T]]:
     }
 
 
-def stepped_axis(frequency: Array, amplitude: Array) -> Axis:
-    """What sweeps step through, and so what lies along x: a line stands for each value that they hold meanwhile.
+class Kind(NamedTuple):
+    """What the sweeps of a row of panels have in common: where they were made, and what they step through."""
 
-    The frequency, except where there are more amplitudes than frequencies, and more than a legend can name: a sweep
-    of the amplitude, or one whose amplitudes are given as each point reached them.
-    """
-    amplitudes = np.unique(amplitude).size
-    return "amplitude" if amplitudes > max(MOST_NAMED, np.unique(frequency).size) else "frequency"
+    place: Place
+    stepped: Stepped | None
+
+    @property
+    def axis(self) -> Axis:
+        """What lies along x; the frequency, too, where nothing was held."""
+        return "amplitude" if self.stepped == "amplitude" else "frequency"
+
+
+def by_kind(data_sets: Sequence[SweepData]) -> dict[Kind, list[SweepData]]:
+    """The sweeps of each place that step through the same, in the order of the tests."""
+    kinds: dict[Kind, list[SweepData]] = {}
+    for data_set in data_sets:
+        kinds.setdefault(Kind(data_set.direction, data_set.sweep.stepped), []).append(data_set)
+    return kinds
 
 
 def held_beside(axis: Axis) -> Axis:
@@ -67,17 +77,17 @@ class Points:
 
 @dataclass(frozen=True, eq=False)
 class Repeats:
-    """Operating points of some sweeps, sorted by amplitude, then frequency, and which rows repeat each.
+    """Operating points of some sweeps, sorted by what is held, then by what is stepped, and which rows repeat each.
 
     Args:
-        frequency: [Hz], (k,).
-        amplitude: [m or rad], (k,).
+        along: what is stepped, such as the frequency [Hz], (k,).
+        held: what is held meanwhile, such as the amplitude [m or rad], (k,).
         count: rows at each point, (k,).
         rows: all rows of the sweeps, one after the other, in the order of the points, (n,).
     """
 
-    frequency: Array
-    amplitude: Array
+    along: Array
+    held: Array
     count: Array
     rows: Array
 
@@ -91,9 +101,9 @@ class Repeats:
         return cls.at(frequency, amplitude)
 
     @classmethod
-    def at(cls, frequency: Array, amplitude: Array) -> Repeats:
+    def at(cls, along: Array, held: Array) -> Repeats:
         """The points of some rows, each (n,)."""
-        spots, place = np.unique(np.stack((amplitude, frequency)), axis=1, return_inverse=True)
+        spots, place = np.unique(np.stack((held, along)), axis=1, return_inverse=True)
         place = place.ravel()
         return cls(spots[1], spots[0], np.bincount(place), np.argsort(place, kind="stable"))
 
@@ -116,7 +126,7 @@ def means(data_sets: Sequence[SweepData]) -> Points:
         values = quantity(stiffness)
         return Band(repeats.mean(values), *(repeats.summed(values, extreme) for extreme in (np.minimum, np.maximum)))
 
-    return Points(repeats.frequency, repeats.amplitude, band(np.abs), band(lambda k: k.imag / k.real))
+    return Points(repeats.along, repeats.held, band(np.abs), band(lambda k: k.imag / k.real))
 
 
 def outliers(data_set: LoopData) -> tuple[Array, Array]:

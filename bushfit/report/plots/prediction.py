@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,22 +12,27 @@ from matplotlib.lines import Line2D
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import SweepData
 from bushfit.geometry import Place
+from bushfit.model.model import Model
 from bushfit.prediction import Band, Prediction
+from bushfit.reading.measurement import loss_factor
 from bushfit.report.plots.points import Axis, Points, held_beside, means
 from bushfit.report.plots.style import (
+    DOT,
     INK,
     POINT,
     ROW,
     Style,
     dress,
     explain,
+    file_name,
     least_span,
     legend,
+    name_levels,
     new_figure,
     readable,
     styles,
 )
-from bushfit.report.tables import spread
+from bushfit.report.tables import spread, words
 from bushfit.units import for_people
 
 #: Points of a model's line: chosen, no corner is seen at the size of a panel.
@@ -69,9 +74,12 @@ def prediction_figure(
     *,
     curves: Prediction | None = None,
     rig: Prediction | None = None,
+    model: Model | None = None,
     note: str = "",
 ) -> Figure:
     """Magnitude and loss factor over frequency per amplitude, and over amplitude per frequency (Figs. 7 to 9).
+
+    Sweeps that held nothing have a row of their own, if there is a model to meet them.
 
     Args:
         prediction: its amplitudes (up to six) and frequencies (up to four) become the lines.
@@ -79,30 +87,48 @@ def prediction_figure(
         title: names the bushing.
         curves: the prediction on `fine_grid`, for smooth lines; without it they run straight from point to point.
         rig: the same as these lines, with the rig's effects: drawn thin where points are laid over, which it meets.
+        model: of the prediction.
         note: what else a reader must know, such as what the prediction leaves out.
     """
     lines = prediction if curves is None else curves
-    mine = [data_set for data_set in measured if data_set.direction == prediction.direction]
+    every = [data_set for data_set in measured if data_set.direction == prediction.direction]
+    mine = [data_set for data_set in every if data_set.sweep.stepped]
+    free = [data_set for data_set in every if model and not data_set.sweep.stepped]
     points = means(mine)
+
+    def held_by(axis: Axis) -> Array:
+        return np.concatenate([np.empty(0), *(each.sweep.held for each in mine if each.sweep.stepped == axis)])
+
     frequencies, amplitudes = np.unique(prediction.frequency), np.unique(prediction.amplitude)
     rows: list[tuple[Axis, Array]] = []
     if frequencies.size > 1 or amplitudes.size == 1:
-        rows.append(("frequency", amplitudes[spread(amplitudes.size, _MOST_AMPLITUDES)]))
+        rows.append(("frequency", _lines(amplitudes, held_by("frequency"), _MOST_AMPLITUDES)))
     if amplitudes.size > 1:
         known = frequencies[[np.isclose(points.frequency, f, _SAME, 0.0).any() for f in frequencies]]
         levels = known if known.size > 1 else frequencies
-        rows.append(("amplitude", levels[spread(levels.size, _MOST_FREQUENCIES)]))
-    figure = new_figure(title, len(rows) * ROW)
-    pairs = zip(figure.subplots(len(rows), 2, squeeze=False), rows, strict=True)
+        rows.append(("amplitude", _lines(levels, held_by("amplitude"), _MOST_FREQUENCIES)))
+    height = len(rows) + bool(free)
+    figure = new_figure(title, height * ROW)
+    grid = figure.subplots(height, 2, squeeze=False)
+    pairs = zip(grid, rows, strict=False)
     drawn = [draw(pair, prediction.direction, lines, points, *row, rig) for pair, row in pairs]
     laid = any(drawn)
+    if free and model:
+        draw_as_it_came(grid[-1], prediction.direction, model, free)
     banded = np.any(lines.stiffness.high > lines.stiffness.low)
     shade = "; shaded: its 95 % band, where that is wider than the line" if banded else ""
     through = " Thin lines: the same with what belongs to the rig, as the points were measured." if laid and rig else ""
     if amplitudes.size > _MOST_AMPLITUDES:
-        through += f" Over frequency {_MOST_AMPLITUDES} of the {amplitudes.size} amplitudes are drawn."
-    explain(figure, f"Lines: model{shade}.{through}", points_note(mine) if laid else "", note)
+        through += f" Over frequency some of the {amplitudes.size} amplitudes are drawn."
+    explain(figure, f"Lines: model{shade}.{through}", points_note(every) if laid or free else "", note)
     return figure
+
+
+def _lines(levels: Array, held: Array, most: int) -> Array:
+    """The levels that are drawn as lines: those that some test held, or else all; of more than fit some, evenly."""
+    met = levels[[np.isclose(held, level, _SAME, 0.0).any() for level in levels]]
+    chosen = met if met.size else levels
+    return chosen[spread(chosen.size, most)]
 
 
 def draw(
@@ -130,14 +156,14 @@ def draw(
     """
     held, units = held_beside(axis), direction.display
     scales = {"frequency": ("Hz", 1.0), "amplitude": units.displacement}
-    unit, scale = scales[axis]
+    _, scale = scales[axis]
     x, where = scale * getattr(lines, axis), scale * getattr(points, axis)
     marked = _spots(getattr(points, held), levels, (where >= x.min() * (1 - _SAME)) & (where <= x.max() * (1 + _SAME)))
     laid = any(spots.any() for spots in marked)
     looks = styles(levels.size, held)
     stiffness_unit, factor = for_people(*units.stiffness, float(lines.stiffness.value.max()))
     kinds = (
-        ("stiffness", factor, f"{direction} stiffness |K| [{stiffness_unit}]"),
+        ("stiffness", factor, stiffness_label(direction, stiffness_unit)),
         ("loss_factor", 1.0, f"{direction} loss factor [-]"),
     )
     for axes, (kind, factor, name) in zip(pair, kinds, strict=True):
@@ -149,10 +175,16 @@ def draw(
                 if rig is not None:
                     axes.plot(x[at], factor * getattr(rig, kind).value[at], color=look.color, lw=_THIN)
                 _draw_points(axes, look, where, point, spots)
-        dress(axes, f"{axis} [{unit}]", name)
+        dress(axes, axis_label(direction, axis), name)
         readable(axes, x)
         least_span(axes, _LEAST_STIFFNESS_SPAN * line.high.max() if kind == "stiffness" else _LEAST_LOSS_SPAN)
-    _name_levels(pair[-1], levels, held, scales[held], [bool(spots.any()) for spots in marked], rig=laid and bool(rig))
+    besides = {
+        "bushing": Line2D([], [], color=INK, lw=_LINE),
+        "with the rig": Line2D([], [], color=INK, lw=_THIN, marker="o", **POINT),
+    }
+    unit, scale = scales[held]
+    names = [f"{scale * level:.3g} {unit}" for level in levels]
+    name_levels(pair[-1], names, held, [bool(spots.any()) for spots in marked], besides if laid and rig else None)
     return laid
 
 
@@ -180,28 +212,43 @@ def _draw_points(axes: Axes, look: Style, x: Array, band: Band, at: Array) -> No
     axes.plot(x[at], band.value[at], look.marker, color=look.color, **POINT)
 
 
-def _name_levels(
-    axes: Axes, levels: Array, held: Axis, display: tuple[str, float], marked: Sequence[bool], *, rig: bool
-) -> None:
-    """The legend: levels as the lines lie, the stiffest on top; and what the lines are where the rig's are among them.
+def stiffness_label(place: Place, unit: str) -> str:
+    """The label of an axis with the stiffness, or the modulus, of a place."""
+    resisted = words(place)[2]
+    return f"{place} {resisted}{' |K|' if resisted == 'stiffness' else ''} [{unit}]"
+
+
+def axis_label(place: Place, axis: Axis) -> str:
+    """The label of an axis with what sweeps step through at a place."""
+    return "frequency [Hz]" if axis == "frequency" else f"{words(place)[0]} [{place.display.displacement.name}]"
+
+
+def draw_as_it_came(pair: Sequence[Axes], place: Place, model: Model, data_sets: Sequence[SweepData]) -> None:
+    """Draw sweeps that held nothing over the frequency: points as measured, and the model at the same points.
 
     Args:
-        axes: the panel.
-        levels: amplitudes or frequencies, (k,).
-        held: which of the two.
-        display: their unit and the factor from SI to it.
-        marked: whether each has points, (k,).
-        rig: whether there are lines of the rig.
+        pair: the panels of stiffness and loss factor.
+        place: of the sweeps.
+        model: its lines meet each point at the amplitude that it reached.
+        data_sets: the sweeps, a colour each.
     """
-    unit, factor = display
-    handles = [look.handle(points) for look, points in zip(styles(levels.size, held), marked, strict=True)]
-    labels = [f"{factor * level:.3g} {unit}" for level in levels]
-    order = 1 if held == "amplitude" else -1
-    besides = {
-        "bushing": Line2D([], [], color=INK, lw=_LINE),
-        "with the rig": Line2D([], [], color=INK, lw=_THIN, marker="o", **POINT),
-    }
-    legend(axes, handles[::order], labels[::order], held, besides=besides if rig else None)
+    largest = max(float(np.abs(data_set.measured).max()) for data_set in data_sets)
+    unit, factor = for_people(*place.display.stiffness, largest)
+    looks = styles(len(data_sets), "loop")
+    kinds: tuple[tuple[Callable[[Array], Array], float, str], ...] = (
+        (np.abs, factor, stiffness_label(place, unit)),
+        (loss_factor, 1.0, f"{place} loss factor [-]"),
+    )
+    for axes, (quantity, scale, name) in zip(pair, kinds, strict=True):
+        for data_set, look in zip(data_sets, looks, strict=True):
+            rising = np.argsort(data_set.frequency, kind="stable")
+            frequency, counted = data_set.frequency[rising], data_set.weights[rising] > 0.0
+            measured, modelled = (scale * quantity(k)[rising] for k in (data_set.measured, data_set.stiffness(model)))
+            axes.plot(frequency[counted], measured[counted], "o", color=look.color, alpha=0.5, **DOT)
+            axes.plot(frequency, modelled, color=look.color, lw=_LINE)
+        dress(axes, "frequency [Hz]", name)
+    handles = [Line2D([], [], color=look.color, lw=_LINE) for look in looks]
+    legend(pair[-1], handles, [file_name(data_set.name) for data_set in data_sets], "test")
 
 
 def points_note(data_sets: Sequence[SweepData]) -> str:

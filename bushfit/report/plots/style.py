@@ -11,6 +11,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
 from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -82,9 +84,11 @@ class Style(NamedTuple):
 
 
 def styles(count: int, what: str) -> list[Style]:
-    """A style for each of so many amplitudes, frequencies or loops."""
+    """A style for each of so many amplitudes, frequencies or loops; by colour alone where a colour bar names them."""
     name, first, last = _SCALES[what]
     colors = colormaps[name](np.linspace(first, last, count))
+    if count > MOST_NAMED and what != "loop":
+        return [Style(color, _DASHES[0], _MARKERS[0]) for color in colors]
     return [Style(c, _DASHES[i % len(_DASHES)], _MARKERS[i % len(_MARKERS)]) for i, c in enumerate(colors)]
 
 
@@ -174,6 +178,39 @@ def legend(
         lines, texts = [*lines, Line2D([], [], ls="")], [*texts, f"and {left} more"]
     lines, texts = [*lines, *(besides or {}).values()], [*texts, *(besides or {})]
     axes.legend(lines, texts, fontsize=SMALL, title_fontsize=SMALL, **(_LEGEND | {"title": title} | place))
+
+
+def name_levels(
+    axes: Axes,
+    levels: Sequence[str],
+    what: str,
+    marked: Sequence[bool],
+    besides: Mapping[str, Line2D] | None = None,
+) -> None:
+    """Say which line is which level: by a legend, the stiffest on top, or of more than eight by a colour bar.
+
+    Args:
+        axes: the panel.
+        levels: amplitudes or frequencies in words, rising, (k,).
+        what: "amplitude" or "frequency".
+        marked: whether each has points, (k,).
+        besides: what is named after the levels, by its label.
+    """
+    looks = styles(len(levels), what)
+    if len(levels) <= MOST_NAMED:
+        order = 1 if what == "amplitude" else -1
+        handles = [look.handle(points) for look, points in zip(looks, marked, strict=True)]
+        legend(axes, handles[::order], levels[::order], what, besides=besides)
+        return
+    edges = np.arange(len(levels) + 1) - 0.5
+    colors = ScalarMappable(BoundaryNorm(edges, len(levels)), ListedColormap([look.color for look in looks]))
+    bar = axes.figure.colorbar(colors, ax=axes, aspect=16, pad=0.04, drawedges=False)
+    ticks = spread(len(levels), MOST_NAMED)
+    bar.set_ticks(ticks.tolist(), labels=[levels[tick] for tick in ticks], fontsize=SMALL, color=INK)
+    bar.ax.tick_params(length=2, colors=INK, which="both")
+    bar.minorticks_off()
+    bar.ax.set_title(what, fontsize=SMALL, color=INK)
+    bar.outline.set(edgecolor=GREY, linewidth=0.6)
 
 
 def file_name(name: str, letters: int = _NAME_LETTERS) -> str:

@@ -16,7 +16,7 @@ from bushfit.geometry import Direction
 from bushfit.inspection.record import Inspected, Looked
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.prediction import predict
+from bushfit.prediction import default_grid, predict
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reduction.steps import Reduction, Step
 from bushfit.report.plots import (
@@ -79,46 +79,70 @@ def loops(paper_model: Model, looped: Looped) -> Callable[..., list[LoopData]]:
 
 @pytest.mark.parametrize("count", [2, 8, 40, 300])
 def test_sweeps_of_many_amplitudes(paper_model: Model, swept: Swept, count: int) -> None:
-    """Over the frequency as long as a legend can name the amplitudes, else over what there is more of."""
+    """A line an amplitude, named by a legend as long as that can, else by a colour bar."""
     data_sets = [swept(paper_model, amplitudes=np.geomspace(2e-5, 1e-3, count), repeats=1)]
     figure = checked(sweeps_figure(paper_model, data_sets, "mount"))
-    over_amplitude = count > 16
-    assert figure.axes[2].get_xlabel() == ("amplitude [mm]" if over_amplitude else "frequency [Hz]")
-    names = named(figure.axes[1])
-    if over_amplitude:
-        assert len(names) == 9
-        assert names[0] == "155 Hz"
-        assert names[-2:] == ["5 Hz", "and 8 more"]
+    assert figure.axes[2].get_xlabel() == "frequency [Hz]"
+    if count > 8:
+        names = [tick.get_text() for tick in figure.axes[-1].get_yticklabels()]
+        assert len(names) == 8
+        assert (names[0], names[-1], figure.axes[-1].get_title()) == ("0.02 mm", "1 mm", "amplitude")
     else:
-        assert len(names) == count
+        assert len(named(figure.axes[1])) == count
     checked(gap_figure(paper_model, paper_model, data_sets, "mount", ""))
     prediction = predict(Result(paper_model), Direction.AXIAL, [5.0, 50.0], np.geomspace(2e-5, 1e-3, count))
     curves = predict(Result(paper_model), Direction.AXIAL, *fine_grid(prediction))
     checked(prediction_figure(prediction, data_sets, "mount", curves=curves))
     seen = Inspected(Path(f"{LONG_NAME}.csv"), "sweep", Direction.AXIAL, {}, (), Looked({}), {}, data_sets[0].sweep)
-    (left, right) = checked(inspection_figure([seen])).axes
-    assert len([line for line in left.lines if line.get_linestyle() == "None"]) == (16 if over_amplitude else count)
-    assert len(named(right)) <= 9
+    (left, right, *bar) = checked(inspection_figure([seen])).axes
+    assert len([line for line in left.lines if line.get_linestyle() == "None"]) == count
+    assert len(bar) == (count > 8)
+    assert bar or len(named(right)) == count
 
 
 def test_amplitudes_as_each_point_reached_them(paper_model: Model) -> None:
-    """A level per point: lines stand for what was held, the frequency."""
+    """Nothing was held: a line for the whole test, which meets each point at the amplitude that it reached."""
     random = np.random.default_rng(1)
     frequency, level = (axis.ravel() for axis in np.meshgrid(np.geomspace(5.0, 155.0, 15), [1e-4, 2e-4, 5e-4]))
     amplitude = level * (1.0 + 0.02 * random.standard_normal(level.size))
     stiffness = paper_model.stiffness("axial", frequency, amplitude) * (1.0 + 0.01 * random.standard_normal(level.size))
-    data_sets = sweep_data([Sweep("reached.csv", Direction.AXIAL, frequency, amplitude, stiffness)])
+    data_sets = sweep_data([Sweep("reached.csv", Direction.AXIAL, frequency, amplitude, stiffness, stepped=None)])
     figure = checked(sweeps_figure(paper_model, data_sets, "reached"))
-    lines = [line for line in figure.axes[0].lines if line.get_linestyle() != "None"]
-    assert len(lines) == 15
+    (line,) = [line for line in figure.axes[0].lines if line.get_linestyle() != "None"]
+    rising = np.argsort(frequency, kind="stable")
+    expected = np.abs(paper_model.stiffness("axial", frequency[rising], amplitude[rising])) / 1e3
+    np.testing.assert_allclose(line.get_ydata(), expected)
+    assert named(figure.axes[1]) == ["reached.csv"]
     points = [line for line in figure.axes[0].lines if line.get_linestyle() == "None"]
     assert sum(len(line.get_xdata()) for line in points) == 45, "each point once, however near the levels are"
-    rows = map_rows(amplitude)
-    assert np.unique(rows).size <= 24
-    np.testing.assert_allclose(rows, amplitude, rtol=0.1)
-    assert "neighbouring amplitudes" in checked(
-        gap_figure(paper_model, paper_model, data_sets, "reached", "")
-    ).get_supxlabel().replace("\n", " ")
+    gap = checked(gap_figure(paper_model, paper_model, data_sets, "reached", ""))
+    assert [text.get_text() for text in gap.axes[0].get_yticklabels()] == ["reached.csv"]
+    prediction = predict(Result(paper_model), Direction.AXIAL, [5.0, 50.0], [1e-4, 5e-4])
+    figure = checked(prediction_figure(prediction, data_sets, "reached", model=paper_model))
+    assert len(figure.axes) == 6, "a row of panels more"
+
+
+@pytest.mark.parametrize("frequencies", [(40.0,), (10.0, 40.0, 100.0), tuple(np.geomspace(5.0, 150.0, 30))])
+def test_sweeps_of_the_amplitude(paper_model: Model, frequencies: tuple[float, ...]) -> None:
+    """Amplitudes across, logarithmic; a line and a row of the map for each frequency that was held."""
+    random = np.random.default_rng(1)
+    frequency, amplitude = (axis.ravel() for axis in np.meshgrid(frequencies, np.geomspace(2e-5, 1e-3, 15)))
+    amplitude = amplitude * (1.0 + 0.01 * random.standard_normal(amplitude.size))
+    stiffness = paper_model.stiffness("axial", frequency, amplitude) * (
+        1.0 + 0.01 * random.standard_normal(frequency.size)
+    )
+    data_sets = sweep_data([Sweep("strain", Direction.AXIAL, frequency, amplitude, stiffness, stepped="amplitude")])
+    figure = checked(sweeps_figure(paper_model, data_sets, "strain"))
+    assert figure.axes[2].get_xlabel() == "amplitude [mm]"
+    assert figure.axes[2].get_xscale() == "log"
+    assert len([line for line in figure.axes[0].lines if line.get_linestyle() != "None"]) == len(frequencies)
+    gap = checked(gap_figure(paper_model, paper_model, data_sets, "strain", ""))
+    assert gap.axes[1].get_xlabel() == "amplitude [mm]"
+    assert len(gap.axes[0].get_yticklabels()) == min(len(frequencies), 8), "each, or every third of 24 rows"
+    prediction = predict(
+        Result(paper_model), Direction.AXIAL, *default_grid(Result(paper_model), Direction.AXIAL, [data_sets[0].sweep])
+    )
+    checked(prediction_figure(prediction, data_sets, "strain", model=paper_model))
 
 
 def test_rows_of_a_map_are_the_amplitudes_as_long_as_they_fit() -> None:

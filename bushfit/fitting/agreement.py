@@ -1,0 +1,207 @@
+"""Prediction against measurement: how well a model meets each test and run, and within what it is usable.
+
+Where each test, and each level of it, has its own figures, thousands of rows of a loop do not hide a sweep that is off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.fitting.data_sets import DataSet, SweepData
+from bushfit.fitting.solve import Solution
+from bushfit.model.model import Model
+from bushfit.model.result import Misfit, Usable
+from bushfit.model.sensitivity import stiffness_jacobian
+from bushfit.reading.measurement import loss_factor
+
+#: A part without which some parameter's variance would grow by more than this factor is not held out: what is left does
+#: not determine that parameter, so a prediction would say nothing.
+_MOST_GROWTH = 100.0
+#: Condition number of the remaining information beyond which its inverse is rounding.
+_SINGULAR = 1e14
+#: Share of the points, those that lie nearest, that a model is usable within: chosen, as of all intervals.
+_SHARE = 0.95
+#: Share of the points of a place that have to be held out for these to speak for it.
+_ENOUGH = 0.5
+
+#: How far points are off in |K| and loss factor, (2, n), and whether they were predicted without their run.
+_Off = tuple[Array, bool]
+
+
+class _Run(NamedTuple):
+    """What of a test was recorded with one value held, in which unit, and which of its points it is, (n,) bool."""
+
+    held: Literal["amplitude", "frequency"] | None
+    value: float | None
+    unit: str | None
+    points: Array
+
+
+@dataclass(frozen=True, eq=False)
+class LeaveOut:
+    """A fit at its end, ready to be asked what it would be without some of its rows.
+
+    Args:
+        moving: which parameters the rows depend on, (k,) bool.
+        basis: orthonormal basis of what these can do to the whitened residuals, (n, m).
+        triangle: of the derivatives by coordinate, jacobian^T = basis triangle, (m, m).
+        along: the residuals along the basis, (m,).
+        residual: the whitened residuals, (n,).
+    """
+
+    moving: Array
+    basis: Array
+    triangle: Array
+    along: Array
+    residual: Array
+
+    @classmethod
+    def of(cls, jacobian: Array, residual: Array) -> LeaveOut:
+        """The same from the derivatives of the whitened residuals by coordinate, (k, n), and the residuals, (n,)."""
+        moving = np.any(jacobian != 0.0, axis=1)
+        basis, triangle = np.linalg.qr(jacobian[moving].T)
+        return cls(moving, basis, triangle, basis.T @ residual, residual)
+
+    def step(self, rows: Array) -> Array | None:
+        """How far the parameters move without these rows, in coordinates, (k,); None where the rest leaves one open.
+
+        It is one Gauss-Newton step, which is exact where the model is linear over that step.
+        """
+        step = np.zeros(self.moving.size)
+        if not self.basis.size:
+            return step
+        left_out = self.basis[rows]
+        rest = np.eye(len(self.triangle)) - left_out.T @ left_out
+        if max(np.linalg.cond(rest), np.linalg.cond(self.triangle) ** 2) > _SINGULAR:
+            return None
+        back, inverse = np.linalg.inv(self.triangle), np.linalg.inv(rest)
+        variance, without = (np.einsum("ij,jk,ik->i", back, inner, back) for inner in (np.eye(len(rest)), inverse))
+        if np.any(without > _MOST_GROWTH * variance):
+            return None
+        step[self.moving] = -back @ (inverse @ (self.along - left_out.T @ self.residual[rows]))
+        return step
+
+
+def misfits(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet] = ()) -> tuple[Misfit, ...]:
+    """How well a model meets each test, and each run of those that have several, one after the other.
+
+    Args:
+        model: as fitted.
+        fitted: the tests that it was fitted to.
+        left: other tests.
+    """
+    pairs = [(data_set, True) for data_set in fitted] + [(data_set, False) for data_set in left]
+    return tuple(found for data_set, was in pairs for found in _misfits(model, data_set.standing(), was_fitted=was))
+
+
+def _misfits(model: Model, data_set: DataSet, *, was_fitted: bool) -> Iterator[Misfit]:
+    """The figures of a test without points of no weight, and of its runs where there are several."""
+    relative, gain = data_set.relative(model), np.abs(_modelled(model, data_set) / data_set.measured) - 1.0
+    squares = np.square(data_set.residual(model)).reshape(data_set.parts, -1).sum(axis=0)
+    place, every = str(data_set.direction), np.ones(data_set.frequency.size, dtype=bool)
+
+    def figures(run: _Run, relative: Array, squares: Array, gain: Array) -> Misfit:
+        named = data_set.name, place, was_fitted, run.held, run.value, run.unit
+        reduced = float(squares.sum()) / (data_set.parts * relative.size)
+        return Misfit(*named, relative.size, float(np.sqrt(np.mean(relative**2))), reduced, float(gain.mean()))
+
+    yield figures(_Run(None, None, None, every), relative, squares, gain)
+    runs = list(_runs(data_set))
+    for run in runs if len(runs) > 1 else ():
+        yield figures(run, *(values[run.points] for values in (relative, squares, gain)))
+
+
+def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[DataSet] = ()) -> tuple[Usable, ...]:
+    """Within what a fitted model meets the measured stiffness and loss factor, 95 % of the points, place by place.
+
+    Each run is predicted from the fit without it where the rest tells all parameters; a test that was not fitted is
+    predicted anyway. Where fewer than half the points of a place are predicted so, all count as the fit has them.
+
+    Args:
+        solution: the fit.
+        data_sets: what it was fitted to, with the weights at which it is the least sum of squares.
+        left: other tests.
+    """
+    free = [i for i, name in enumerate(solution.coordinates.names) if name not in solution.at_bound]
+    whole, begin = LeaveOut.of(solution.jacobian[free], solution.residual), 0
+    found: dict[str, list[_Off]] = {}
+    for data_set in data_sets:
+        modelled, slopes = _modelled(solution.model, data_set), _slopes(solution, data_set)[free]
+        for run in _runs(data_set):
+            points = np.broadcast_to(run.points, (data_set.parts, data_set.size // data_set.parts))
+            step = whole.step(begin + np.flatnonzero(points))
+            moved = modelled if step is None else modelled * np.exp(step @ slopes)
+            counted = run.points & _counted(data_set)
+            off = _off(moved[counted], data_set.measured[counted])
+            found.setdefault(str(data_set.direction), []).append((off, step is not None))
+        begin += data_set.size
+    _add(found, solution.model, left, held_out=True)
+    return tuple(_usable(place, parts) for place, parts in found.items())
+
+
+def met_within(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet]) -> tuple[Usable, ...]:
+    """As `usable` of a model whose fit is not at hand: the tests that it was fitted to count as the fit has them."""
+    found: dict[str, list[_Off]] = {}
+    _add(found, model, fitted, held_out=False)
+    _add(found, model, left, held_out=True)
+    return tuple(_usable(place, parts) for place, parts in found.items())
+
+
+def _add(found: dict[str, list[_Off]], model: Model, data_sets: Sequence[DataSet], *, held_out: bool) -> None:
+    """Add to `found`, by place, how far the points of tests are off."""
+    for data_set in data_sets:
+        off = _off(_modelled(model, data_set), data_set.measured)
+        found.setdefault(str(data_set.direction), []).append((off, held_out))
+
+
+def _usable(place: str, parts: Sequence[_Off]) -> Usable:
+    """The figures of a place from how far its points are off, (2, n) a part, and whether each was predicted."""
+    every = np.concatenate([off for off, _ in parts], axis=1)
+    predicted = np.concatenate([np.empty((2, 0)), *(off for off, held_out in parts if held_out)], axis=1)
+    held_out = predicted.shape[1] >= _ENOUGH * every.shape[1]
+    off = predicted if held_out else every
+    stiffness, loss = np.quantile(off, _SHARE, axis=1, method="higher").tolist()
+    return Usable(place, stiffness, loss, off.shape[1], held_out)
+
+
+def _off(modelled: Array, measured: Array) -> Array:
+    """Relative difference of |K|, and difference of the loss factor, without sign, (2, n)."""
+    return np.abs([np.abs(modelled / measured) - 1.0, loss_factor(modelled) - loss_factor(measured)])
+
+
+def _modelled(model: Model, data_set: DataSet) -> Array:
+    """Complex stiffness of the model at the operating points of a test [N/m, N m/rad or Pa], (n,)."""
+    return data_set.noise_free(model).measured
+
+
+def _slopes(solution: Solution, data_set: DataSet) -> Array:
+    """Derivatives of ln K by coordinate at the operating points, (k, n)."""
+    model, names = solution.model, solution.coordinates.names
+    if not names:
+        return np.zeros((0, data_set.frequency.size))
+    test = data_set.direction, data_set.frequency, data_set.amplitude
+    slopes = stiffness_jacobian(model, *test, names, data_set.kind) / model.stiffness(*test, kind=data_set.kind)
+    return slopes * solution.coordinates.slopes(model.values)[:, None]
+
+
+def _runs(data_set: DataSet) -> Iterator[_Run]:
+    """What was recorded with each value held; a loop, and a sweep that holds nothing, is one run."""
+    stepped = data_set.sweep.stepped if isinstance(data_set, SweepData) else None
+    if not isinstance(data_set, SweepData) or stepped is None:
+        yield _Run(None, None, None, np.ones(data_set.frequency.size, dtype=bool))
+        return
+    what: Literal["amplitude", "frequency"] = "amplitude" if stepped == "frequency" else "frequency"
+    unit = data_set.direction.motion.displacement_unit if what == "amplitude" else "Hz"
+    held = data_set.sweep.held[data_set.order]
+    for value in np.unique(held):
+        yield _Run(what, float(value), unit, held == value)
+
+
+def _counted(data_set: DataSet) -> Array:
+    """Which operating points carry weight, (n,) bool."""
+    return data_set.weights > 0.0 if isinstance(data_set, SweepData) else np.ones(1, dtype=bool)

@@ -1,0 +1,292 @@
+"""Wide tables of a sweep, turned into long ones: frequencies down and amplitudes across, or the reverse.
+
+A wide table has one block or more, side by side or one below the other. The first column of a block holds the values of
+one of frequency and amplitude; above every other column stand the value of the other and what the column holds, in one
+cell ("K* 0.1 mm [N/mm]") or in several, of which those that are merged over columns are filled at the left only:
+
+    K* [N/mm];0.1 mm;0.2 mm            ;0.1 mm;       ;0.2 mm;              f [Hz];K*_0.1mm [N/mm];tan_d_0.1mm;...
+    5        ;1520  ;1390        f [Hz];K*    ;tan d  ;K*    ;tan d         5     ;1520           ;0.101      ;...
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import NamedTuple
+
+from bushfit import units
+from bushfit.errors import MeasurementError
+from bushfit.reading.headers import AmplitudeConvention, Vocabulary, split_convention
+from bushfit.reading.layout import DELIMITERS, Layout, Line, is_comment, split
+from bushfit.reading.numerals import is_like_number
+from bushfit.reading.source import RowSource, Sheet
+
+#: The two roles of which one runs down and the other across.
+_STEPPED = ("frequency", "amplitude")
+#: Rows above a block that may be its header; chosen: a title, levels, quantities, and units.
+_MOST_HEADER_ROWS = 4
+#: A number in a header, with what names it before ("A = 0.1") and what may be its unit after it.
+_LEVEL = re.compile(
+    r"(?:(?P<name>[^\W\d_]+)\s*=\s*)?(?<![\w.,*'|])±?(?P<number>\d+(?:[.,]\d+)?(?:e[+-]?\d+)?)(?![.,]?\d)"
+    r"(?:\s*[\[(]?\s*(?P<unit>[^\W\d_]+|%|°)[\])]?)?",
+    re.IGNORECASE,
+)
+#: What a symbol before a level stands for: "A = 0.1".
+_SYMBOLS = {"f": "frequency", "a": "amplitude", "x": "amplitude", "s": "amplitude", "\u03b3": "amplitude"}
+#: What joins a level to a quantity in a header, and says no more.
+_JOINTS = re.compile(r"[\[(]\s*(?:at|bei)?\s*[\])]|(?<!\w)(?:at|bei|für|for|à|a|@|:|,|;|=|-)(?!\w)")
+#: How amplitudes are counted, in the header of a long table.
+_COUNTED: dict[AmplitudeConvention | None, str] = {"peak-to-peak": " p-p", "zero-to-peak": " 0-p", None: ""}
+#: A level that may have thousands: 1,250.
+_OPEN = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
+#: What parts the two roles that a corner names: "f [Hz] \ A [mm]".
+_CORNER = re.compile(r"\s*[\\|]\s*|\s+/\s+")
+
+
+class _Said(NamedTuple):
+    """What header cells say: what a column holds, in which unit, and at which level of what; None where they do not."""
+
+    role: str | None = None
+    unit: str | None = None
+    level: str | None = None
+    stepped: str | None = None
+    level_unit: str | None = None
+    convention: AmplitudeConvention | None = None
+
+    def also(self, other: _Said) -> _Said:
+        """What this says, and where it does not, the other."""
+        return other._replace(**{name: said for name, said in self._asdict().items() if said is not None})
+
+
+class _Series(NamedTuple):
+    """A column of a wide table: what its header says of it and of the column down; line, value down and cell each."""
+
+    said: _Said
+    down: _Said
+    points: list[tuple[int, str | float, str | float]]
+
+
+#: A row of a wide table: its line and cells.
+_Row = tuple[int, list[str | float]]
+
+
+@dataclass(frozen=True, eq=False)
+class _Unfolded(Sheet):
+    """The rows of a wide table as those of a long one, each with the line of the wide one it comes from (`numbers`)."""
+
+    numbers: Sequence[int] = ()
+
+    def lines(self, _: int) -> Iterator[Line]:
+        """All rows below the header."""
+        return (Line(number, cells) for number, cells in zip(self.numbers, self.content, strict=True))
+
+
+def unfolded(
+    source: RowSource, file: Path, vocabulary: Vocabulary, layout: Layout, delimiter: str | None
+) -> tuple[RowSource, Layout] | None:
+    """A wide table as a long one, of which the headers are names of roles; None where a file holds no wide table.
+
+    Args:
+        source: the rows of the file.
+        file: which errors name.
+        vocabulary: what columns of a sweep are called.
+        layout: of the file, read as a long table.
+        delimiter: what parts the cells, where that is known.
+
+    Raises:
+        MeasurementError: blocks that do not belong together, or that do not say what they hold.
+    """
+    named = [heading.role for cell in layout.headers if (heading := vocabulary.heading(cell))]
+    if len(named) > 2 and len(set(named)) == len(named) and set(named) & set(_STEPPED):
+        return None
+    for mark in DELIMITERS.values() if delimiter is None else (delimiter,):
+        lines = (line for line in source.head() if not is_comment(line.content, mark))
+        rows: list[_Row] = [
+            (number, [*split(content, mark)] if isinstance(content, str) else [*content]) for number, content in lines
+        ]
+        if series := [one for block in _blocks(rows, vocabulary) for one in _series(*block, vocabulary)]:
+            return _joined(series, source, file, mark)
+    return None
+
+
+def _blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple[list[list[str]], list[_Row]]]:
+    """Header cells and rows of numbers of each block, without the columns before and after it."""
+    starts = [_first_number(cells) for _, cells in rows]
+    done = 0
+    for start, run in groupby(range(len(rows)), key=starts.__getitem__):
+        numbers = list(run)
+        if start is None or len(numbers) < 2:
+            continue
+        part = rows[max(done, numbers[0] - _MOST_HEADER_ROWS) : numbers[-1] + 1]
+        done = numbers[-1] + 1
+        width = max(len(cells) for _, cells in part)
+        padded = [(line, cells + [""] * (width - len(cells))) for line, cells in part]
+        headers = [[str(cell) for cell in cells] for _, cells in padded[: -len(numbers)]]
+        bottom = headers[-1] if headers else [""] * width
+        corners = [[one.stepped for one in _corner(cell, vocabulary)] for cell in bottom]
+        edges = [start, *(at for at in range(start + 1, width) if any(corners[at]) and corners[at] == corners[start])]
+        for first, last in zip(edges, [*edges[1:], width], strict=True):
+            data = [(line, cells[first:last]) for line, cells in padded[-len(numbers) :]]
+            yield [cells[first:last] for cells in headers], data
+
+
+def _first_number(cells: Sequence[str | float]) -> int | None:
+    """Index of the first filled cell, if it is a number and so is another, and half of the row or more."""
+    numbers = {index: is_like_number(str(cell)) for index, cell in enumerate(cells) if cell != ""}
+    first = next(iter(numbers), 0)
+    return first if sum(numbers.values()) > max(1, len(numbers) / 2 - 1) and numbers[first] else None
+
+
+def _series(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: Vocabulary) -> list[_Series]:
+    """The columns of a block; none where it is no block of a wide table."""
+    columns = [index for index in range(1, len(data[0][1])) if any(cells[index] != "" for _, cells in data)]
+    said = dict.fromkeys(columns, _Said())
+    down, across = _Said(), _Said()
+    for distance, cells in enumerate(reversed(headers)):
+        texts = _filled(cells) if distance else cells
+        row = {column: _said(texts[column], vocabulary) for column in columns}
+        if any(texts[column] and row[column] == _Said() for column in columns):
+            break
+        levels = {one.stepped for one in row.values() if one.level}
+        for corner in _corner(cells[0], vocabulary):
+            named = corner._replace(level_unit=corner.level_unit or corner.unit, role=None, unit=None)
+            if corner.role is not None:
+                continue
+            if corner.stepped in levels - {None} or (levels and down.stepped not in (None, corner.stepped)):
+                across = across.also(named)
+            else:
+                down = down.also(named)
+        said = {column: one.also(row[column]) for column, one in said.items()}
+    stepped = next((one.stepped for one in (*said.values(), across) if one.stepped), None)
+    stepped = stepped or next((role for role in _STEPPED if down.stepped and role != down.stepped), None)
+    said = {column: one.also(across)._replace(stepped=one.stepped or stepped) for column, one in said.items()}
+    if stepped is None or len(columns) < 2 or not all(one.level for one in said.values()):
+        return []
+    down = down._replace(stepped=_STEPPED[stepped == _STEPPED[0]])
+    return [_Series(one, down, [(line, cells[0], cells[c]) for line, cells in data]) for c, one in said.items()]
+
+
+def _filled(cells: Sequence[str]) -> list[str]:
+    """Cells of which an empty one is merged with the one before it."""
+    texts = [""]
+    for cell in cells:
+        texts.append(cell or texts[-1])
+    return texts[1:]
+
+
+def _corner(text: str, vocabulary: Vocabulary) -> list[_Said]:
+    """What the cells of a corner say that names one thing or two: "f [Hz]", "f [Hz] \\ A [mm]"; no level."""
+    return [one for part in _CORNER.split(text) if not (one := _said(part, vocabulary)).level]
+
+
+def _said(text: str, vocabulary: Vocabulary) -> _Said:
+    """What a header cell says; nothing where a part of it is not understood."""
+    whole, convention = split_convention(text.replace("_", " "))
+    if is_like_number(text):
+        return _Said(level=text)
+    heading = vocabulary.heading(text)
+    if heading and (heading.unit is None or units.is_unit(heading.unit)):
+        if heading.role in _STEPPED:
+            return _Said(stepped=heading.role, level_unit=heading.unit, convention=heading.convention)
+        return _Said(heading.role, heading.unit)
+    if text and units.is_unit(bare := whole.strip("[]() ")):
+        return _Said(unit=bare, convention=convention)
+    if not (found := _LEVEL.search(whole)):
+        return _Said()
+    unit, end = found["unit"], found.end()
+    stepped = _stepped_in(unit)
+    if unit and not stepped:
+        unit, end = None, found.end("number")
+    rest = _JOINTS.sub(" ", whole[: found.start()] + " " + whole[end:]).strip()
+    level = _Said(None, None, found["number"], stepped or _SYMBOLS.get((found["name"] or "").lower()), unit, convention)
+    if not rest:
+        return level
+    if heading := vocabulary.heading(rest):
+        if heading.role in _STEPPED:
+            return level.also(_Said(stepped=heading.role, level_unit=heading.unit))
+        return level.also(_Said(heading.role, heading.unit))
+    bare = rest.strip("[]() ")
+    return level._replace(level_unit=bare, stepped=_stepped_in(bare)) if not unit and _stepped_in(bare) else _Said()
+
+
+def _stepped_in(unit: str | None) -> str | None:
+    """What has a unit: a frequency, or an amplitude."""
+    if not unit:
+        return None
+    if units.agrees(unit, "Hz"):
+        return "frequency"
+    return "amplitude" if any(units.agrees(unit, si) for si in ("m", "rad", "1")) else None
+
+
+def _joined(series: Sequence[_Series], source: RowSource, file: Path, delimiter: str) -> tuple[RowSource, Layout]:
+    """The columns of all blocks as one long table: a row for each value down at each level."""
+
+    def error(problem: str, found: str, expected: str) -> MeasurementError:
+        place = f'sheet "{source.sheet}"' if source.sheet else f"line {series[0].points[0][0] - 1}"
+        hint = "correct the wide table, or write it as a long one: a row for each frequency and amplitude"
+        return MeasurementError(problem, file=file, place=place, found=found, expected=expected, hint=hint)
+
+    by_role: dict[str, list[_Series]] = {}
+    for one in series:
+        if one.said.role is None:
+            expected = "a quantity such as K* [N/mm] or tan delta above each block, or in each header"
+            raise error("a block of this wide table does not say what it holds", _told(series), expected)
+        by_role.setdefault(one.said.role, []).append(one)
+    for columns in by_role.values():
+        columns.sort(key=lambda one: _value(one.said.level))
+    first, *others = by_role.values()
+    for other in others:
+        if _points(first) != _points(other):
+            expected = "the same frequencies and amplitudes in all blocks"
+            raise error("the blocks of this wide table differ", _told(series), expected)
+    down, across = (
+        {(said.stepped, said.level_unit, said.convention) for said in sayings}
+        for sayings in ((one.down for one in series), (one.said for one in series))
+    )
+    quantities = {(one.said.role, one.said.unit, None): None for one in series}
+    if len(down) > 1 or len(across) > 1 or len(quantities) > len(by_role):
+        expected = "one unit for each quantity, and levels of one kind"
+        raise error("this wide table counts one thing in two ways", _told(series), expected)
+    headers = [
+        f"{role}{_COUNTED[convention]}{f' [{unit}]' if unit else ''}".replace("_", " ")
+        for role, unit, convention in (*down, *across, *quantities)
+    ]
+    rows = [
+        (
+            line,
+            [value, text if _OPEN.fullmatch(text) else _value(text), *(column.points[index][2] for column in columns)],
+        )
+        for columns in zip(*by_role.values(), strict=True)
+        if (text := columns[0].said.level or "")
+        for index, (line, value, _) in enumerate(columns[0].points)
+    ]
+    header_line = min(line for line, _ in rows) - 1
+    sheet = _Unfolded(source.sheet or "", [cells for _, cells in rows], numbers=[line for line, _ in rows])
+    return sheet, Layout(delimiter, tuple(headers), header_line, ("",) * len(headers), None)
+
+
+def _points(columns: Sequence[_Series]) -> list[tuple[float, list[float]]]:
+    """Level and values down of each column."""
+    return [(_value(one.said.level), [_value(text) for _, text, _ in one.points]) for one in columns]
+
+
+def _value(text: str | float | None) -> float:
+    """A number of a header, whichever its decimal mark; nan where it has separators between thousands."""
+    try:
+        return float(str(text).replace(",", "."))
+    except ValueError:
+        return math.nan
+
+
+def _told(series: Sequence[_Series]) -> str:
+    """The columns of a wide table in words: what each holds, at which level, over how many rows."""
+    counted = Counter((one.said.role, one.said.unit, one.said.stepped, len(one.points)) for one in series)
+    return "; ".join(
+        f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of {count} {stepped}s, {n} rows"
+        for (role, unit, stepped, n), count in counted.items()
+    )

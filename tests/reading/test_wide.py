@@ -1,0 +1,182 @@
+"""Wide tables: every form reads to the numbers of the long table; what does not fit together has one error."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import openpyxl
+import pytest
+from texts import sweep_from
+
+from bushfit.errors import BushfitError
+from bushfit.geometry import Direction
+from bushfit.reading.measurement import Sweep
+from bushfit.reading.sweeps import read_sweep
+
+FREQUENCIES = ("5", "15", "25", "35")
+AMPLITUDES = ("0,05", "0,1", "0,5")
+IN_MM = [f"{amplitude} mm" for amplitude in AMPLITUDES]
+
+
+def number(text: str) -> float:
+    return float(text.replace(",", "."))
+
+
+def stiffness(frequency: str, amplitude: str) -> str:
+    """[N/mm] A value that no other point has."""
+    return f"{1500.0 + number(frequency) - 300.0 * number(amplitude):.1f}".replace(".", ",")
+
+
+def loss(frequency: str, amplitude: str) -> str:
+    """[-] A value that no other point has."""
+    return f"{0.1 + number(frequency) / 1e3 + number(amplitude) / 1e2:.4f}".replace(".", ",")
+
+
+Cell = Callable[[str, str], str]
+
+
+def block(cell: Cell, heads: Sequence[str] = IN_MM, corner: str = "f [Hz]") -> list[str]:
+    """A block of one quantity with frequencies down."""
+    rows = [";".join([frequency, *(cell(frequency, a) for a in AMPLITUDES)]) for frequency in FREQUENCIES]
+    return [";".join([corner, *heads]), *rows]
+
+
+def turned(cell: Cell) -> list[str]:
+    """A block of one quantity with amplitudes down."""
+    rows = [";".join([amplitude, *(cell(f, amplitude) for f in FREQUENCIES)]) for amplitude in AMPLITUDES]
+    return [";".join(["Amplitude [mm]", *(f"{frequency} Hz" for frequency in FREQUENCIES)]), *rows]
+
+
+def pairs(*headers: str) -> list[str]:
+    """Frequencies down, and stiffness and loss factor beside each other for each amplitude."""
+    cells = [[f, *(cell(f, a) for a in AMPLITUDES for cell in (stiffness, loss))] for f in FREQUENCIES]
+    return [*headers, *(";".join(row) for row in cells)]
+
+
+def halves(*headers: str) -> list[str]:
+    """Frequencies down, all amplitudes of the stiffness, then all of the loss factor."""
+    cells = [[f, *(cell(f, a) for cell in (stiffness, loss) for a in AMPLITUDES)] for f in FREQUENCIES]
+    return [*headers, *(";".join(row) for row in cells)]
+
+
+def beside(left: Sequence[str], right: Sequence[str]) -> list[str]:
+    return [f"{one};;{other}" for one, other in zip(left, right, strict=True)]
+
+
+def each(form: str) -> str:
+    """A header cell for each amplitude."""
+    return ";".join(form.format(amplitude) for amplitude in AMPLITUDES)
+
+
+BOTH = beside(block(stiffness), block(loss))
+FORMS = {
+    "one below the other": ["Steifigkeit K* [N/mm]", *block(stiffness), "", "tan delta", *block(loss)],
+    "amplitudes down": ["K* [N/mm]", *turned(stiffness), "", "Verlustfaktor", *turned(loss)],
+    "side by side": ["K* [N/mm];;;;;tan delta;;;", *BOTH],
+    "side by side, a preamble": ["Rig;3", "Date;12.03.2026", "", "K* [N/mm];;;;;tan delta;;;", *BOTH],
+    "two things in a corner": [
+        "K* [N/mm];;;;;tan delta;;;",
+        *beside(*(block(cell, AMPLITUDES, "f [Hz] \\ A [mm]") for cell in (stiffness, loss))),
+    ],
+    "amplitudes in a row of their own": ["K* [N/mm]", "A [mm];" + each("{0}"), *block(stiffness, [""] * 3), "tan delta",
+                                         "A [mm];" + each("{0}"), *block(loss, [""] * 3)],
+    "all in one header": halves("f [Hz];" + each("K* {0} mm [N/mm]") + ";" + each("tan delta {0} mm")),
+    "underscores": halves("f_Hz;" + each("K*_{0}mm_N/mm") + ";" + each("tan_delta_{0}mm")),
+    "at": halves("Frequenz [Hz];" + each("K* bei {0} mm [N/mm]") + ";" + each("tan d (bei {0} mm)")),
+    "A = ": halves("f [Hz];" + each("K* [N/mm] A={0} mm") + ";" + each("tan delta A={0} mm")),
+    "amplitudes over quantities": pairs("Amplitude [mm];0,05;;0,1;;0,5;", "f [Hz]" + 3 * ";K* [N/mm];tan d"),
+    "quantities over amplitudes": halves(";K* [N/mm];;;Verlustfaktor;;", "Frequenz [Hz];" + ";".join(2 * IN_MM)),
+    "a units row": pairs("Amplitude [mm];0,05;;0,1;;0,5;", "Frequenz" + 3 * ";K*;tan d", "Hz" + 3 * ";N/mm;-"),
+}  # fmt: skip
+
+
+def check(sweep: Sweep, scale: float = 1.0) -> None:
+    """All points are there, each with its own stiffness."""
+    found = {
+        (f, round(a * 1e3, 9)): k for f, a, k in zip(sweep.frequency, sweep.amplitude, sweep.stiffness, strict=True)
+    }
+    assert len(found) == len(FREQUENCIES) * len(AMPLITUDES) == sweep.frequency.size
+    for frequency in FREQUENCIES:
+        for amplitude in AMPLITUDES:
+            eta = number(loss(frequency, amplitude))
+            expected = 1e3 * number(stiffness(frequency, amplitude)) / np.hypot(1.0, eta) * (1.0 + 1j * eta)
+            assert found[number(frequency), round(scale * number(amplitude), 9)] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_every_form_reads_to_the_same_points(form: str, tmp_path: Path) -> None:
+    check(sweep_from("\n".join(FORMS[form]) + "\n", tmp_path))
+    check(sweep_from("\n".join(FORMS[form]).replace(";", "\t") + "\n", tmp_path))
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_every_form_reads_from_a_workbook(form: str, tmp_path: Path) -> None:
+    book = openpyxl.Workbook()
+    book.active.title = "Info"
+    book.active.append(["Operator", "A. B."])
+    sheet = book.create_sheet("Axial")
+    for row in csv.reader(FORMS[form], delimiter=";"):
+        sheet.append([number(cell) if cell and cell.replace(",", "").isdecimal() else cell or None for cell in row])
+    book.save(tmp_path / "book.xlsx")
+    check(read_sweep(tmp_path / "book.xlsx", Direction.AXIAL))
+
+
+def test_amplitudes_peak_to_peak_are_halved(tmp_path: Path) -> None:
+    text = halves("f [Hz];" + each("K* {0} mm p-p [N/mm]") + ";" + each("tan delta {0} mm p-p"))
+    check(sweep_from("\n".join(text), tmp_path), scale=0.5)
+
+
+def test_a_unit_that_no_header_has_can_be_stated(tmp_path: Path) -> None:
+    text = halves("f [Hz];" + each("K* [N/mm] A={0}") + ";" + each("tan delta A={0}"))
+    with pytest.raises(BushfitError, match="the amplitude has no unit"):
+        sweep_from("\n".join(text), tmp_path)
+    check(sweep_from("\n".join(text), tmp_path, units={"amplitude": "mm"}))
+
+
+def test_repeats_are_columns_of_one_amplitude(tmp_path: Path) -> None:
+    again = [f"{a} mm" for a in ("0,1", "0,1", "0,5")]
+    sweep = sweep_from("\n".join(["K* [N/mm]", *block(stiffness, again), "tan d", *block(loss, again)]), tmp_path)
+    assert sorted(sweep.repeat) == [1] * 8 + [2] * 4
+
+
+SPOILED = {
+    "a hole": (
+        [line.replace(stiffness("15", "0,1"), "") for line in FORMS["one below the other"]],
+        ['line 4, column "stiffness [N/mm]"', "the cell is empty"],
+    ),
+    "a text": (
+        [line.replace(stiffness("15", "0,1"), "bad") for line in FORMS["one below the other"]],
+        ['line 4, column "stiffness [N/mm]"', '"bad"'],
+    ),
+    "a block that is shorter": (FORMS["one below the other"][:-1], ["the blocks of this wide table differ", "3 rows"]),
+    "a block that is narrower": (
+        ["K* [N/mm]", *block(stiffness), "", "tan d", *(line.rpartition(";")[0] for line in block(loss))],
+        ["the blocks of this wide table differ", "loss factor of 2 amplitudes"],
+    ),
+    "other amplitudes": (
+        ["K* [N/mm]", *block(stiffness), "", "tan d", *block(loss, ["0,05 mm", "0,1 mm", "0,6 mm"])],
+        ["the blocks of this wide table differ"],
+    ),
+    "two units": (
+        ["K* [N/mm]", *block(stiffness), "", "tan d", *block(loss, ["50 µm", "100 µm", "500 µm"])],
+        ["the blocks of this wide table differ"],
+    ),
+    "no quantity": (block(stiffness), ["does not say what it holds", "K* [N/mm] or tan delta above each block"]),
+    "no loss": (["K* [N/mm]", *block(stiffness)], ["no pair of columns", "frequency [Hz], amplitude [mm], stiffness"]),
+    "a negative frequency": (
+        [line.replace("15;", "-15;") for line in FORMS["one below the other"]],
+        ['line 4, column "frequency [Hz]"', "not positive"],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", SPOILED)
+def test_spoiled_wide_tables_have_one_clear_error(case: str, tmp_path: Path) -> None:
+    text, words = SPOILED[case]
+    with pytest.raises(BushfitError) as caught:
+        sweep_from("\n".join(text), tmp_path)
+    message = str(caught.value)
+    assert all(word in message for word in ["sweep.csv", *words]), message
