@@ -22,6 +22,7 @@ from bushfit.campaign.naming import folder_name
 from bushfit.campaign.schema import Share
 from bushfit.campaign.toml import read_toml
 from bushfit.effects import effect_named
+from bushfit.effects.mistakes import candidate_named
 from bushfit.errors import CampaignError
 from bushfit.reading.files import read_utf8
 from bushfit.validation import Text, check_tables, converted, unknown_key
@@ -51,6 +52,13 @@ def _effect(raw: object, _: object) -> object:
     return effect_named(raw).name if isinstance(raw, str) else raw
 
 
+def _candidate(raw: object, _: object) -> object:
+    """An effect, or a mistake in the record with its test behind a colon."""
+    if isinstance(raw, str):
+        candidate_named(raw)
+    return raw
+
+
 def _words(raw: object) -> object:
     """A list, from a cell as from TOML: "fit; predict"."""
     return tuple(word for word in re.split(r"[;,\s]+", raw) if word) if isinstance(raw, str) else raw
@@ -58,6 +66,7 @@ def _words(raw: object) -> object:
 
 Words = BeforeValidator(_words)
 Effects = Annotated[tuple[Annotated[str, converted(_effect)], ...], Words]
+Candidates = Annotated[tuple[Annotated[str, converted(_candidate)], ...], Words]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,8 +83,8 @@ class Settings:
     commands: Annotated[tuple[Command, ...], Words, Field(min_length=1)] | None = None
     directions: Annotated[tuple[Text, ...], Words] | None = None
     effects: Effects | None = None
-    adopt: Effects | None = None
-    without: Effects | None = None
+    adopt: Candidates | None = None
+    without: Candidates | None = None
     max_effects: Annotated[int, Field(ge=0, le=5)] | None = None
     tolerance: Share | None = None
     model: Text | None = None

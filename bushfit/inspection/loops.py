@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.effects.mistake import shown
+from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.drive import Drive, drive_of
 from bushfit.fitting.preload import TOLD_MEAN
 from bushfit.fitting.waveform import waveform
@@ -30,6 +32,8 @@ _OFF_ZERO = 0.02
 _MOST_END_CYCLES = 6
 #: Harmonics that are fitted to a cycle; chosen: a loop of rubber has next to nothing beyond.
 _HARMONICS = 7
+#: [s] A cycle that takes longer is in doubt; chosen: quasi-static tests take minutes.
+_LONGEST_CYCLE = 3000.0
 #: Rows of a cycle for each harmonic that is fitted; chosen: twice the unknowns and some.
 _ROWS_PER_HARMONIC = 5
 
@@ -63,6 +67,7 @@ def look_at_loop(loop: Loop, named: Said) -> Looked:
         *odd_channels(loop),
         *drive.notes,
         *_changing(drive),
+        *_crawling(drive),
     ]
     if _OFF_ZERO * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and not drive.from_rest:
         odd.append(
@@ -70,6 +75,14 @@ def look_at_loop(loop: Loop, named: Said) -> Looked:
             f"{number(100 * mean_motion / half_motion, 2)} % of its amplitude: the loop counts from its own middle"
         )
     return Looked(facts, tuple(odd))
+
+
+def _crawling(drive: Drive) -> Iterator[str]:
+    """A sentence on a loop that takes longer than any laboratory waits, and on what the file may say instead."""
+    if drive.frequency * _LONGEST_CYCLE < 1.0:
+        mistakes = [mistake for mistake in MISTAKES.values() if mistake.time < 1.0]
+        unless = ", or ".join(mistake.sentence.format(files=shown(drive.loop)) for mistake in mistakes)
+        yield f"one cycle takes {number(1.0 / drive.frequency / 60.0, 2)} min, as hardly any test does, unless {unless}"
 
 
 def look_at_programme(record: Loop, loops: Sequence[Loop], named: Said) -> Looked:
