@@ -92,6 +92,10 @@ class MeasurementError(BushfitError):
     """A measured table that cannot be used."""
 
 
+class NoTestError(MeasurementError):
+    """A table that holds no test."""
+
+
 class NoColumnError(MeasurementError):
     """A table without the header that a column was named by."""
 

@@ -19,6 +19,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_jacobian
 from bushfit.reading.measurement import Sweep
+from bushfit.reduction.resonance import response
 from bushfit.units import number
 
 #: Frequencies of the paper's tables [Hz].
@@ -37,6 +38,12 @@ _AMPLITUDES_OF = {
 _MARGIN = 0.01
 #: Share by which a finite bulk modulus lowers the radial stiffness, from which that is said: that of the other errors.
 _NOTED_LOWERING = 0.01
+#: Strain at which the resonance of a mass is looked for first; chosen: small for any rubber.
+_SMALL_STRAIN = 1e-4
+#: Lowest and highest frequency about a resonance over that of small strain.
+_DECADE = (0.2, 4.0)
+#: Frequencies there; chosen: 0.5 % apart, which is as near as tests tell a peak.
+_RESONANCE_POINTS = 600
 #: Frequencies of a grid where the paper's were not measured.
 _FREQUENCIES = 9
 #: Amplitudes of a grid where the paper's were not measured.
@@ -182,6 +189,64 @@ def predict(
         loss_stiffness=band(stiffness.imag, slopes.imag),
         warnings=(*_unfitted(result, direction), *_extrapolations(result, direction, frequency, amplitude)),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class PredictedResonance:
+    """A mass on a mount whose base is shaken with a sine of constant acceleration, as the model has it.
+
+    Args:
+        place: what the mass stands on.
+        mass: [kg].
+        base_acceleration: amplitude [m/s^2].
+        frequency: [Hz], (n,).
+        amplitude: of the mount's deformation, zero-to-peak [m], (n,).
+        transmissibility: complex, acceleration of the mass over that of the base [-], (n,).
+        stiffness: complex, of the mount at that frequency and amplitude [N/m], (n,).
+    """
+
+    place: Place
+    mass: float
+    base_acceleration: float
+    frequency: Array
+    amplitude: Array
+    transmissibility: Array
+    stiffness: Array
+
+    @property
+    def peak(self) -> tuple[float, float]:
+        """Frequency of the largest transmissibility [Hz], and this |T|."""
+        place = int(np.argmax(np.abs(self.transmissibility)))
+        return float(self.frequency[place]), float(abs(self.transmissibility[place]))
+
+
+def predict_resonance(
+    result: Result, place: Place, mass: float, base_acceleration: float, frequencies: Sequence[float] | Array | None
+) -> PredictedResonance:
+    """Transmissibility and amplitude of a mass on the bushing or specimen, where stiffness depends on amplitude itself.
+
+    Args:
+        result: fitted model; the rig's effects are left out.
+        place: of translation.
+        mass: that moves [kg].
+        base_acceleration: amplitude of the base [m/s^2].
+        frequencies: [Hz]; None for a decade about the resonance.
+
+    Raises:
+        ModelError: a place that does not count displacement and force.
+    """
+    if place.motion is not TRANSLATION:
+        raise ModelError("no mass stands on this", found=str(place), expected="a direction or mount with a stiffness")
+    model = result.model.without(Level.INSTRUMENT)
+    if frequencies is None:
+        small = model.stiffness(place, 1.0, _SMALL_STRAIN / model.unit_strain(place))
+        about = float(np.sqrt(np.abs(small) / mass)) / (2.0 * np.pi)
+        frequencies = about * np.geomspace(_DECADE[0], _DECADE[1], _RESONANCE_POINTS)
+    frequency = np.asarray(frequencies, dtype=float)
+    base = base_acceleration / (2.0 * np.pi * frequency) ** 2
+    amplitude, ratio = response(lambda reached: model.stiffness(place, frequency, reached), mass, frequency, base)
+    stiffness = model.stiffness(place, frequency, amplitude)
+    return PredictedResonance(place, mass, base_acceleration, frequency, amplitude, ratio, stiffness)
 
 
 def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:

@@ -22,12 +22,15 @@ from bushfit.campaign.naming import folder_name
 from bushfit.campaign.schema import Share
 from bushfit.campaign.toml import read_toml
 from bushfit.effects import effect_named
+from bushfit.effects.mistakes import candidate_named
 from bushfit.errors import CampaignError
 from bushfit.reading.files import read_utf8
 from bushfit.validation import Text, check_tables, converted, unknown_key
 
 Command = Literal["run", "fit", "diagnose", "predict"]
 
+#: The way on from test files.
+_OF_TESTS = "bushfit init FILE... makes a campaign of test files"
 #: What is done to a campaign where nothing is said.
 _DEFAULT: tuple[Command, ...] = ("fit",)
 #: Which commands look at a setting.
@@ -49,6 +52,13 @@ def _effect(raw: object, _: object) -> object:
     return effect_named(raw).name if isinstance(raw, str) else raw
 
 
+def _candidate(raw: object, _: object) -> object:
+    """An effect, or a mistake in the record with its test behind a colon."""
+    if isinstance(raw, str):
+        candidate_named(raw)
+    return raw
+
+
 def _words(raw: object) -> object:
     """A list, from a cell as from TOML: "fit; predict"."""
     return tuple(word for word in re.split(r"[;,\s]+", raw) if word) if isinstance(raw, str) else raw
@@ -56,6 +66,7 @@ def _words(raw: object) -> object:
 
 Words = BeforeValidator(_words)
 Effects = Annotated[tuple[Annotated[str, converted(_effect)], ...], Words]
+Candidates = Annotated[tuple[Annotated[str, converted(_candidate)], ...], Words]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,8 +83,8 @@ class Settings:
     commands: Annotated[tuple[Command, ...], Words, Field(min_length=1)] | None = None
     directions: Annotated[tuple[Text, ...], Words] | None = None
     effects: Effects | None = None
-    adopt: Effects | None = None
-    without: Effects | None = None
+    adopt: Candidates | None = None
+    without: Candidates | None = None
     max_effects: Annotated[int, Field(ge=0, le=5)] | None = None
     tolerance: Share | None = None
     model: Text | None = None
@@ -142,7 +153,10 @@ def read_manifest(source: str, given: Settings, *more: str) -> Manifest:
         listed = (source, *more)
         if strange := [name for name in listed if Path(name).suffix.lower() != ".toml"]:
             raise CampaignError(
-                "this is no campaign", file=strange[0], expected="one manifest, or campaign files alone"
+                "this is no campaign",
+                file=strange[0],
+                expected="one manifest, or campaign files alone",
+                hint=_OF_TESTS,
             )
         stem, base, entries = "batch", Path(), iter([Entry(campaign=name) for name in listed])
     elif _PATTERN.search(source) and not path.exists():
@@ -159,7 +173,7 @@ def read_manifest(source: str, given: Settings, *more: str) -> Manifest:
             "this is no manifest",
             file=path,
             expected='a .toml or .csv file, or a pattern in quotes such as "bushings/*/campaign.toml"',
-            hint=f'"{path}/*/campaign.toml" in quotes' if path.is_dir() else None,
+            hint=f'"{path}/*/campaign.toml" in quotes' if path.is_dir() else _OF_TESTS,
         )
     return Manifest(stem, _rows(list(entries), base, given, source), points)
 

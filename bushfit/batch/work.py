@@ -166,7 +166,7 @@ def _verdict(diagnosis: Diagnosis) -> Record:
     """What a diagnosis adds to the record of a row."""
     return {
         "verdict": diagnosis.verdict,
-        "effects": [named.name for named in diagnosis.effects],
+        "effects": [named.label for named in diagnosis.effects],
         "alternatives": [name for named in diagnosis.effects for name in named.alternatives],
         "warnings": list(diagnosis.notes),
     }

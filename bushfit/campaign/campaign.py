@@ -67,7 +67,7 @@ def load_campaign(path: str | Path) -> Campaign:
         MeasurementError: a measurement that cannot be used.
     """
     path = Path(path)
-    _refuse_tests(path)
+    refuse_tests([path])
     content = read_toml(path, CampaignFile)
     if not (content.loops or content.sweeps or content.simulate):
         raise CampaignError(
@@ -123,21 +123,20 @@ def _check_bodies(bushing: Bushing | None, specimens: Sequence[Specimen]) -> Non
         raise CampaignError("two specimens have one name", place="[[specimens]]", found=", ".join(sorted(doubles)))
 
 
-def _refuse_tests(path: Path) -> None:
-    """Raise a CampaignError where a test file, a folder or a model was given in place of a campaign."""
-    ending, is_folder = path.suffix.lower(), path.is_dir()
-    if not (is_folder or (ending in (*TEST_FILES, ".json") and path.exists())):
+def refuse_tests(paths: Sequence[Path]) -> None:
+    """Raise a CampaignError where test files, a folder or a model were given in place of a campaign."""
+    first = paths[0]
+    tests = [path for path in paths if path.is_dir() or (path.suffix.lower() in TEST_FILES and path.exists())]
+    if not tests and not (first.suffix.lower() == ".json" and first.exists()):
         return
-    files = f"{typed(path)}/*.csv" if is_folder else typed(path)
-    found = "a folder" if is_folder else "a test file"
-    hint = (
-        f'bushfit init {files} --inner-radius "10 mm" --outer-radius "18 mm" --length "34 mm" makes one, with '
-        "the sizes of your rubber"
-    )
-    if ending == ".json" and not is_folder:
-        found, hint = "a model", f"bushfit predict {files} predicts from a model"
     expected = "a .toml file that names the bushing and its tests"
-    raise CampaignError("a campaign is needed", file=path, found=found, expected=expected, hint=hint)
+    if tests:
+        found = "a folder" if tests[0].is_dir() else "a test file" if len(tests) == 1 else "test files"
+        sizes = '--inner-radius "10 mm" --outer-radius "18 mm" --length "34 mm"'
+        hint = f"bushfit init {' '.join(map(typed, tests))} {sizes} makes one, with the sizes of your rubber"
+    else:
+        found, hint = "a model", f"bushfit predict {typed(first)} predicts from a model"
+    raise CampaignError("a campaign is needed", file=(tests or paths)[0], found=found, expected=expected, hint=hint)
 
 
 def reader_keywords(
@@ -167,7 +166,10 @@ def reader_keywords(
         with naming(campaign, place=test.file):
             stated["direction"] = place_tested(test.specimen, test.direction, specimens)
             if amplitude := stated.pop("at_amplitude", None):
-                stated["at_amplitude"] = quantity(amplitude, stated["direction"].motion.displacement_unit)
+                held = quantity(amplitude, stated["direction"].motion.displacement_unit)
+                if held <= 0.0:
+                    raise CampaignError("at_amplitude is not positive", found=f'"{amplitude}"', expected="above zero")
+                stated["at_amplitude"] = held
         yield {
             **stated,
             "file": file,

@@ -216,7 +216,7 @@ def campaign_options(function: F, soft_l1: str = "points far off pull less, outl
         soft_l1: what the robust loss does in this command, for its help.
     """
 
-    @click.argument("campaign", type=click.Path(path_type=Path))
+    @click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=click.Path(path_type=Path))
     @click.option(
         "--loss",
         type=click.Choice(["linear", "soft_l1"]),
@@ -231,10 +231,26 @@ def campaign_options(function: F, soft_l1: str = "points far off pull less, outl
     @shared_options
     @wraps(function)
     def wrapped(*args: Any, options: Options, **kwargs: Any) -> Any:
-        task = Task(kwargs.pop("campaign"), kwargs.pop("loss"), kwargs.pop("max_nrmse"), options)
+        campaign = _only(kwargs.pop("campaigns"))
+        task = Task(campaign, kwargs.pop("loss"), kwargs.pop("max_nrmse"), options)
         return function(*args, task=task, **kwargs)
 
     return wrapped  # type: ignore[return-value]
+
+
+def _only(campaigns: Sequence[Path]) -> Path:
+    """The one campaign of a command line; several test files in its place are told what makes one of them."""
+    from bushfit.campaign.campaign import refuse_tests
+
+    first, *others = campaigns
+    if others:
+        refuse_tests(campaigns)
+        extra = "argument" if len(others) == 1 else "arguments"
+        raise click.UsageError(
+            f"Got unexpected extra {extra} ({' '.join(map(str, others))}). bushfit batch takes several campaigns.",
+            click.get_current_context(),
+        )
+    return first
 
 
 def open_model(file: Path) -> Result:
@@ -247,8 +263,8 @@ def open_model(file: Path) -> Result:
     from bushfit.model.file import load_result
 
     ending = file.suffix.lower()
-    if file.is_file() and ending in (".toml", *TEST_FILES):
-        found = "a campaign" if ending == ".toml" else "a test file"
+    if file.is_dir() or (file.is_file() and ending in (".toml", *TEST_FILES)):
+        found = "a folder" if file.is_dir() else "a campaign" if ending == ".toml" else "a test file"
         way = f"bushfit run {typed(file)}" if ending == ".toml" else f"bushfit init {typed(file)} ..., then bushfit run"
         raise ModelError(
             "a fitted model is needed",

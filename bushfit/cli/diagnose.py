@@ -28,9 +28,15 @@ _COLOURS = {"consistent": "green", "named": "green", "ambiguous": "yellow", "par
     help="Start from this model's effects [the paper's three]; its values are fitted anew.",
 )
 @click.option(
-    "--adopt", multiple=True, metavar="EFFECT", help="Add this effect by hand, such as inertia; may be given again."
+    "--adopt",
+    multiple=True,
+    metavar="EFFECT",
+    help="Add this effect by hand, such as inertia, or mend a mistake in the record of a test, such as "
+    "peak_to_peak:sweep_axial; may be given again.",
 )
-@click.option("--without", multiple=True, metavar="EFFECT", help="Do not consider this effect; may be given again.")
+@click.option(
+    "--without", multiple=True, metavar="EFFECT", help="Do not consider this effect or mistake; may be given again."
+)
 @click.option("--max-effects", type=click.IntRange(0, 5), default=3, show_default=True, help="Effects to add at most.")
 @click.option("--tolerance", default="1 %", show_default=True, help="Gaps below this share of |K| do not count.")
 @partial(campaign_options, soft_l1="the same with outliers left out")
@@ -45,8 +51,9 @@ def command(
     """Find where the model and the tests of CAMPAIGN disagree, name the missing effect, add it, show the gap shrink.
 
     All tests are used, in every direction. The verdict is one of: consistent (nothing is missing), named (what was
-    added closes the gap), ambiguous (look-alikes: all are listed, none is added), partly (a remainder stays) or
-    unexplained (no known effect closes the gap; the model is left as it was).
+    added closes the gap; or the tests agree if one of them was recorded wrongly, which is told and never mended unless
+    adopted), ambiguous (look-alikes: all are listed, none is added), partly (a remainder stays) or unexplained (no
+    known effect closes the gap; the model is left as it was).
 
     Writes diagnosis.json, model.json with what was added, gap.csv, candidates.csv and gap.png.
     """
@@ -70,8 +77,9 @@ def tell_diagnosis(options: Options, name: str, outcome: Diagnosed) -> None:
     diagnosis = outcome.diagnosis
     tell_verdict(options, name, outcome)
     tell_findings(options, outcome)
-    if diagnosis.verdict in ("named", "partly") or options.verbose:
-        options.console.print(parameter_table("model with what was added", diagnosis.result))
+    if diagnosis.added or options.verbose:
+        title = "model with what was added" if diagnosis.added else "model as it was"
+        options.console.print(parameter_table(title, diagnosis.result))
     warn(options, (*diagnosis.notes, *diagnosis.result.warnings))
 
 
@@ -112,13 +120,16 @@ def _tell_effect(options: Options, effect: Mapping[str, Any]) -> None:
     from rich.markup import escape
 
     console = options.console
-    console.print(f"  [bold]{effect['name']}[/bold] ({effect['level']}): {escape(effect['sentence'])}")
+    test = f" in {effect['test']}" if effect["test"] else ""
+    console.print(f"  [bold]{effect['name']}[/bold]{escape(test)} ({effect['level']}): {escape(effect['sentence'])}")
     for parameter, entry in effect["parameters"].items():
         unit, factor = for_people(entry["unit"], 1.0, entry["value"])
         value, *ends = alike([factor * x for x in (entry["value"], *(entry["ci95"] or ()))], 4, least=2)
         size = f"{value} {unit}".removesuffix(" -")
         console.print(f"    {parameter} = {size}" + (f", 95 % {' to '.join(ends)}" if ends else ""))
     console.print(f"    {escape(effect['evidence'])}")
+    if effect["correction"]:
+        console.print(f"    the line that puts it right: {escape(effect['correction'])}")
     if effect["alternatives"]:
         console.print(f"    cannot be told from: {escape(', '.join(effect['alternatives']))}")
     if effect["richer"]:

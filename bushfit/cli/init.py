@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bushfit.cli.common import Options, example, naming_option, shared_options
-from bushfit.cli.inspect import KEYS, tell_assumed
+from bushfit.cli.inspect import KEYS, tell_assumed, tell_left_out
 from bushfit.cli.raw import direction_error, file_options, options_named
 from bushfit.cli.show import warn
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, typed
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 @click.option("--inner-diameter", help='such as "20 mm".')
 @click.option("--outer-radius", help='Of the rubber, such as "18 mm"; or else')
 @click.option("--outer-diameter", help='such as "36 mm".')
-@click.option("--length", required=True, help='Mean length of the rubber, such as "34 mm".')
+@click.option("--length", help='Mean length of the rubber, such as "34 mm".')
 @click.option("--name", help="Of the bushing [the folder of the first file].")
 @file_options(*KEYS)
 @shared_options
@@ -48,43 +48,35 @@ def command(
 ) -> None:
     """Write a campaign from test files and the geometry of the bushing.
 
-    Loops and sweeps are told apart by their columns, the direction by the file's name or columns. What only you can
-    know, such as a unit, the rate of a loop without time, or the direction, is asked for in an error that names the
-    option. An option holds for all files of its kind; where files differ otherwise, edit the campaign. Numbers are
-    written with a decimal point. Raw stepped-sine histories go through `bushfit reduce` first.
+    FILE may be a folder, or a workbook with several tests; what holds no test is told and left out. The columns tell
+    what a test is; names of file and sheet, or columns, its direction, and names an amplitude or frequency without a
+    column (Dyn_axial_A0,05mm.csv). What only you can know, such as a unit, is asked for in an error that names the
+    option. An option holds for all files of its kind, and goes before names; numbers have a decimal point. Where files
+    differ otherwise, edit the campaign. Raw stepped-sine histories go through `bushfit reduce` first. Tests of a
+    modulus, or with --area and --thickness of a stiffness, are of a specimen and need no size of a bushing.
 
-    Writes campaign.toml, which names the files as seen from its folder; -o may also name the file itself, such as
-    -o my_bushing.toml.
+    Writes campaign.toml, which names the files as seen from its folder; -o may name it: -o my_bushing.toml.
     """
+    from bushfit.geometry import Specimen
     from bushfit.inspection.draft import campaign_text
-    from bushfit.inspection.opening import inspect, stated_of_each
 
-    name = name or files[0].resolve().parent.name
-    table = {
-        "name": name,
-        "inner_radius": _radius("inner", inner_radius, inner_diameter),
-        "outer_radius": _radius("outer", outer_radius, outer_diameter),
-        "length": length,
-    }
+    name = name or (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name
     folder, target = _place(options, name)
-    given = {"inner_radius": inner_diameter, "outer_radius": outer_diameter}
-    bushing = _bushing(table, folder / target, [key for key, diameter in given.items() if diameter])
+    sizes = (inner_radius, inner_diameter, outer_radius, outer_diameter, length)
+    bushing = _bushing(name, *sizes) if any(sizes) else None
     options.require_free(folder, [target])
-    with options_named():
-        seen = [_usable(inspect(file, own)) for file, own in zip(files, stated_of_each(files, stated), strict=True)]
-    _check_once(files)
-    text = campaign_text(table, seen, folder)
-    inner, outer, long = (1e3 * size for size in (2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length))
-    options.console.print(
-        f"{name}: rubber from {inner:.6g} to {outer:.6g} mm in diameter, {(outer - inner) / 2:.6g} mm thick, "
-        f"{long:.6g} mm long",
-        markup=False,
-    )
+    seen, left_out = _usable(files, stated, is_bushing=bushing is not None or "specimen" not in stated)
+    if bushing is None and not all(isinstance(one.direction, Specimen) for one in seen):
+        bushing = _bushing(name, *sizes)
+    text = campaign_text(name, bushing and bushing[1], seen, folder)
+    if bushing:
+        _tell_bushing(options, bushing[0])
     for one in seen:
         _tell(options, one)
+    tell_left_out(options, left_out)
     options.write(folder, {target: text.encode()})
     options.console.print(f"next: bushfit run {typed(folder / target)}", markup=False)
-    options.tell({"campaign": text, "files": [one.to_document() for one in seen]})
+    options.tell({"campaign": text, "files": [one.to_document() for one in seen], "left_out": left_out})
 
 
 def _radius(side: str, radius: str | None, diameter: str | None) -> str:
@@ -112,14 +104,33 @@ def _place(options: Options, name: str) -> tuple[Path, str]:
     return options.folder(folder_name(name)), "campaign.toml"
 
 
-def _bushing(table: Mapping[str, str], file: Path, halved: Sequence[str]) -> Bushing:
-    """The bushing of the campaign to be; errors name the options, diameters where these were given and halved."""
+def _bushing(
+    name: str,
+    inner_radius: str | None,
+    inner_diameter: str | None,
+    outer_radius: str | None,
+    outer_diameter: str | None,
+    length: str | None,
+) -> tuple[Bushing, dict[str, str]]:
+    """The bushing of the campaign to be, and the keys of its sizes there.
+
+    Errors name the options, diameters where these were given and halved.
+    """
     from bushfit.campaign.schema import BushingTable
     from bushfit.geometry import Bushing
     from bushfit.validation import check_tables
 
+    if length is None:
+        raise click.UsageError("Missing option '--length'.")
+    table = {
+        "inner_radius": _radius("inner", inner_radius, inner_diameter),
+        "outer_radius": _radius("outer", outer_radius, outer_diameter),
+        "length": length,
+    }
+    given = {"inner_radius": inner_diameter, "outer_radius": outer_diameter}
+    halved = [key for key, diameter in given.items() if diameter]
     try:
-        return Bushing(**vars(check_tables(table, file, BushingTable)))
+        return Bushing(**vars(check_tables({"name": name, **table}, None, BushingTable))), table
     except BushfitError as error:
         error.file = None
         if error.place:
@@ -131,36 +142,66 @@ def _bushing(table: Mapping[str, str], file: Path, halved: Sequence[str]) -> Bus
         raise
 
 
-def _usable(seen: Inspected) -> Inspected:
-    """A loop or sweep of a known direction.
+def _usable(files: Sequence[Path], stated: Mapping[str, Any], *, is_bushing: bool) -> tuple[list[Inspected], list[str]]:
+    """The loops and sweeps among files, each of a known direction or specimen, and why others are left out.
+
+    Args:
+        files: files and folders.
+        stated: keys of their tables in a campaign that the user states.
+        is_bushing: whether a bushing may have been tested, and not specimens alone.
 
     Raises:
-        MeasurementError: it is another, with the way on.
+        MeasurementError: a file that the user names is another, with the way on.
     """
-    if seen.kind == "history":
-        raise MeasurementError(
-            "this is a raw stepped-sine history, not a sweep",
-            file=seen.file,
-            expected="hysteresis loops and sweeps",
-            hint=f"bushfit reduce {typed(seen.file)} --direction {seen.direction or '...'} makes a sweep.csv of it; "
-            "give that instead",
-        )
-    if seen.direction is None:
-        raise direction_error(seen.file)
-    return seen
+    from bushfit.geometry import Specimen
+    from bushfit.inspection.gathering import gather
 
-
-def _check_once(files: Sequence[Path]) -> None:
-    places = [file.resolve() for file in files]
-    if twice := [file for file, place in zip(files, places, strict=True) if places.count(place) > 1]:
+    sources, left_out = gather(files, stated)
+    places = [(source.file.resolve(), source.sheet) for source in sources]
+    if twice := [source for source, place in zip(sources, places, strict=True) if places.count(place) > 1]:
         raise CampaignError("a file is given twice", found=str(twice[0]), expected="each file once")
+    seen: list[Inspected] = []
+    others = list(left_out)
+    for source in sources:
+        with options_named():
+            one = source.inspect()
+        if not (is_bushing or isinstance(one.direction, Specimen)):
+            raise click.UsageError(
+                "These are tests of a stiffness: of a specimen in shear, which needs --area and --thickness, or of a "
+                "bushing, which needs --inner-radius, --outer-radius and --length."
+            )
+        if one.kind != "history":
+            if one.direction is None:
+                raise direction_error(source.file, source.sheet)
+            seen.append(one)
+            continue
+        hint = f"bushfit reduce {typed(one.file)} --direction {one.direction or '...'} makes a sweep.csv of it"
+        if source.is_named:
+            raise MeasurementError(
+                "this is a raw stepped-sine history, not a sweep",
+                file=one.file,
+                expected="hysteresis loops and sweeps",
+                hint=f"{hint}; give that instead",
+            )
+        others.append(f"{source}: a raw stepped-sine history; {hint}")
+    return seen, others
+
+
+def _tell_bushing(options: Options, bushing: Bushing) -> None:
+    inner, outer, long = (1e3 * size for size in (2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length))
+    options.console.print(
+        f"{bushing.name}: rubber from {inner:.6g} to {outer:.6g} mm in diameter, {(outer - inner) / 2:.6g} mm thick, "
+        f"{long:.6g} mm long",
+        markup=False,
+    )
 
 
 def _tell(options: Options, seen: Inspected) -> None:
     """One line of what a file is, what was assumed, and what is odd."""
     facts = seen.looked.facts
     wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
-    kept = [f"{key}: {facts[key]}" for key in wanted if key in facts]
-    options.console.print(f"{seen.file}: {seen.kind}, {seen.direction}; {'; '.join(kept)}", markup=False)
-    warn(options, [f"{seen.file.name}: {sentence}" for sentence in seen.looked.odd])
+    kept = [f"{key}: {value}" for key, value in facts.items() if key in wanted or key.startswith("from ")]
+    place = seen.file.parent / seen.label
+    options.console.print(f"{place}: {seen.kind}, {seen.direction}; {'; '.join(kept)}", markup=False)
+    warn(options, [f"{seen.label}: {sentence}" for sentence in seen.looked.odd])
     tell_assumed(options, seen)

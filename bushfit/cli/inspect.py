@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,10 +17,13 @@ from bushfit.errors import BushfitError
 if TYPE_CHECKING:
     from bushfit.inspection.record import Inspected
 
+#: Keys of a campaign's tables that say how a file is written.
+FORMAT_KEYS = ("encoding", "delimiter", "decimal", "thousands", "header_line", "sheet")
 #: Keys of a campaign's tables that inspect and init take as options.
 KEYS = (
-    *("force_sign", "rate", "frequency", "waveform", "amplitude"),
-    *("encoding", "delimiter", "decimal", "thousands", "header_line", "sheet"),
+    *("force_sign", "rate", "frequency", "waveform", "amplitude", "at_amplitude", "at_frequency", "temperature"),
+    *("specimen", "area", "thickness", "elements"),
+    *FORMAT_KEYS,
 )
 #: Kinds of test file, in words.
 _KINDS = {"loop": "a hysteresis loop", "sweep": "a sweep", "history": "a raw stepped-sine history"}
@@ -38,10 +41,11 @@ _FILES_A_PICTURE = 5
 def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options) -> None:
     """Look at test files before a campaign names them: loops, sweeps, raw stepped-sine histories, in any mixture.
 
-    For each FILE: how every column was understood, in which unit, and its range; cycles, sampling, waveform, noise,
-    frequencies, amplitudes, repeats; and what is odd beyond noise, in sentences with figures. Odd is an amplitude or
-    frequency other than the file's name says, a gap, rows that stand still, cut-off tops, outliers, drift, cycles that
-    still settle, a motion off zero, a force that counts the other way; in sweeps copied rows, missing frequencies, a
+    FILE may be a folder, or a workbook with several tests; what holds no test is told and left out. For each test:
+    how every column was understood, in which unit, and its range; cycles, sampling, waveform, noise, frequencies,
+    amplitudes, repeats; and what is odd beyond noise, in sentences with figures. Odd is an amplitude or frequency
+    other than the file's name says, a gap, rows that stand still, cut-off tops, outliers, drift, cycles that still
+    settle, a motion off zero, a force that counts the other way; in sweeps copied rows, missing frequencies, a
     repeat that is off or drifts, loss factors below zero. Rows count from 1 below the header.
 
     The text for the campaign goes to standard output; it names the files by their full path, to be pasted into a
@@ -53,19 +57,21 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     """
     from bushfit.campaign.naming import folder_name
     from bushfit.inspection.draft import pasted_text
-    from bushfit.inspection.opening import inspect, stated_of_each
+    from bushfit.inspection.gathering import gather
 
     folder = options.folder(folder_name(files[0].stem))
-    last = math.ceil(len(files) / _FILES_A_PICTURE)
+    sources, left_out = gather(files, stated)
+    tell_left_out(options, left_out)
+    last = math.ceil(len(sources) / _FILES_A_PICTURE)
     pages = ["inspect.png", *(f"inspect_{page}.png" for page in range(2, last + 1))]
     if options.plots:
         options.require_free(folder, pages)
     seen: list[Inspected] = []
     failed: list[BushfitError] = []
-    for file, own in zip(files, stated_of_each(files, stated), strict=True):
+    for source in sources:
         try:
             with options_named():
-                seen.append(inspect(file, own))
+                seen.append(source.inspect())
         except BushfitError as error:
             failed.append(error)
         else:
@@ -83,7 +89,7 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
         groups = (seen[start : start + _FILES_A_PICTURE] for start in range(0, len(seen), _FILES_A_PICTURE))
         figures = (inspection_figure(group) for group in groups)
         options.write(folder, {page: to_png(figure) for page, figure in zip(pages, figures, strict=True)})
-    options.tell({"files": [one.to_document() for one in seen], "campaign": text})
+    options.tell({"files": [one.to_document() for one in seen], "left_out": list(left_out), "campaign": text})
 
 
 def tell(options: Options, seen: Inspected) -> None:
@@ -93,7 +99,7 @@ def tell(options: Options, seen: Inspected) -> None:
     console = options.console
     written = ", ".join(f"{label} {value}" for label, value in seen.written.items())
     table = new_table(
-        f"{seen.file}: {_KINDS[seen.kind]}, {seen.direction or 'direction unknown'}",
+        f"{seen.file.parent / seen.label}: {_KINDS[seen.kind]}, {seen.direction or 'direction unknown'}",
         "column", "taken for", "unit", "from", "to",
     )  # fmt: skip
     for column in seen.columns:
@@ -107,6 +113,12 @@ def tell(options: Options, seen: Inspected) -> None:
         console.print(f"  [yellow]odd:[/yellow] {escape(sentence)}")
     if not seen.looked.odd:
         console.print("  nothing odd")
+
+
+def tell_left_out(options: Options, left_out: Sequence[str]) -> None:
+    """A line for each file or sheet that holds no test."""
+    for sentence in left_out:
+        options.console.print(f"left out: {sentence}", markup=False)
 
 
 def tell_assumed(options: Options, seen: Inspected) -> None:

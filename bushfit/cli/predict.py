@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, example, open_model, place_option, shared_options
+from bushfit.cli.common import Options, example, naming_option, open_model, place_option, shared_options
 from bushfit.cli.show import new_table, tell_tests, warn
 
 if TYPE_CHECKING:
@@ -44,6 +44,8 @@ _MOST_AMPLITUDES = 8
 @click.option("--amplitudes", help='Zero-to-peak, such as "0.1, 0.2, 0.5 mm" [the campaign\'s].')
 @click.option("--torsion-amplitudes", help='Zero-to-peak rotation, for --direction torsion ["0.5, 1, 2 deg"].')
 @click.option("--strain-amplitudes", help='Zero-to-peak strain, for specimens that give a modulus ["1, 2, 5 %"].')
+@click.option("--mass", help='Predict its resonance on each place, too: such as "1.2 kg", with --base-acceleration.')
+@click.option("--base-acceleration", help='Amplitude of the base under the mass, such as "0.1 g" or "1 m/s^2".')
 @shared_options
 def command(
     model: Path,
@@ -54,6 +56,8 @@ def command(
     amplitudes: str | None,
     torsion_amplitudes: str | None,
     strain_amplitudes: str | None,
+    mass: str | None,
+    base_acceleration: str | None,
     options: Options,
 ) -> None:
     """Dynamic stiffness and loss factor of MODEL (the model.json of run, fit or diagnose, or dynamic.json) over a grid.
@@ -62,6 +66,8 @@ def command(
     of each; with --campaign measured.csv, its sweeps beside the model. Effects of the rig are left out. Without a grid
     in the options or the campaign it is that of the campaign's sweeps at each place, or the paper's as far as it was
     measured. A warning names what leaves the fitted directions, strains or frequencies.
+
+    --mass shakes the base under a mass: the transmissibility over frequency, in <place>_resonance.csv.
 
     --bushing carries the compound to another shape: effects of the material are kept, those of the old bushing and its
     rig are left out, and it is said which.
@@ -87,17 +93,39 @@ def command(
             parse_grid(torsion_amplitudes, "--torsion-amplitudes", "rad"),
             directions or None,
             parse_grid(strain_amplitudes, "--strain-amplitudes", "1"),
-        )
+        ),
+        *_shaken(mass, base_acceleration),
     )
     folder = options.folder(loaded.slug if loaded else folder_name(result.name))
     measured = ["measured.csv"] if loaded and loaded.sweeps else []
     options.require_free(folder, [*job.names(result, loaded, options.formats), *measured])
     outcome = job.run(result, loaded, tuple(notes))
     tell_predictions(options, outcome)
+    for found in outcome.resonances:
+        frequency, largest = found.peak
+        peak = f"resonance at {frequency:.4g} Hz, |T| {largest:.3g}"
+        options.console.print(f"{found.place} under {mass}, base at {base_acceleration}: {peak}", markup=False)
     tell_tests(options, outcome.tests, outcome.usable)
     warn(options, of_fit)
     options.write(folder, outcome.files_beside(options.formats))
     options.tell(outcome.document)
+
+
+def _shaken(mass: str | None, base_acceleration: str | None) -> tuple[float, float] | tuple[()]:
+    """Mass [kg] and acceleration of the base [m/s^2], where they are given."""
+    from bushfit.errors import UnitError
+    from bushfit.units import quantity
+
+    if (mass is None) != (base_acceleration is None):
+        raise click.UsageError("'--mass' and '--base-acceleration' go together.")
+    values = []
+    for option, text, unit in (("--mass", mass, "kg"), ("--base-acceleration", base_acceleration, "m/s^2")):
+        if text is not None:
+            with naming_option(option):
+                values.append(quantity(text, unit))
+                if not values[-1] > 0.0:
+                    raise UnitError("this is not positive", found=text, expected="above zero")
+    return (values[0], values[1]) if values else ()
 
 
 def tell_predictions(options: Options, outcome: Predicted) -> None:

@@ -7,31 +7,39 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import reduce, wraps
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import click
 
 from bushfit.cli.common import direction_option
 from bushfit.errors import BushfitError, MeasurementError
+from bushfit.reading.headers import AmplitudeConvention
 from bushfit.reading.words import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
 
 F = TypeVar("F", bound=Callable[..., Any])
 #: Keys of a campaign's tables that are an option of the same name here, and its help.
 _SAME_NAME = {
     "force_sign": "-1: the load cell counts the other way.",
-    "rate": 'Of a loop without time: a triangle at this speed, such as "10 mm/min".',
-    "frequency": 'Of a loop without time, with --waveform, such as "0.1 Hz".',
+    "rate": 'Of a loop without time, a triangle: "10 mm/min".',
+    "frequency": 'Of a loop without time, with --waveform: "0.1 Hz".',
     "waveform": "sine or triangle.",
-    "amplitude": "Of sweeps whose header does not say: zero-to-peak or peak-to-peak.",
+    "amplitude": "zero-to-peak or peak-to-peak, if headers do not say.",
+    "at_amplitude": 'Without a column: "0.1 mm" [found in the name].',
+    "at_frequency": 'Without a column: "10 Hz" [found in the name].',
+    "temperature": 'Of the test, or of the rows to take: "23 degC".',
+    "specimen": "Name of the specimen, if no bushing [coupon].",
+    "area": 'Of one rubber block in shear, such as "772 mm^2".',
+    "thickness": 'Of one rubber block in shear, such as "6 mm".',
+    "elements": "Rubber blocks in parallel [1].",
     "encoding": 'Such as "cp1252" [detected].',
     "delimiter": "comma, semicolon, tab, pipe or blanks [detected].",
     "decimal": '"." or "," [detected].',
-    "thousands": 'What parts thousands: ".", ",", " ", "\'" or none [detected].',
+    "thousands": '".", ",", " ", "\'" or none [detected].',
     "header_line": "Line of the header, from 1 [found].",
-    "sheet": "Of a workbook [the only one with such a table].",
+    "sheet": "Of a workbook [all with a test].",
 }
 #: Keys that are whole numbers.
-_NUMBERS = ("force_sign", "header_line")
+_NUMBERS = ("force_sign", "header_line", "elements")
 #: An inline table of TOML in the hint of an error.
 _TABLE = re.compile(r"\{[^}]*\}")
 #: One entry of such a table that is an option here.
@@ -54,6 +62,7 @@ def file_options(*keys: str, sweeps: bool = True) -> Callable[[F], F]:
             stated = {key: kwargs.pop(key) for key in ("direction", *keys)}
             stated["columns"] = _pairs(kwargs.pop("columns"), "--column", "force=Kraft", known)
             stated["units"] = _pairs(kwargs.pop("units"), "--unit", "force=kN", known)
+            _check_amplitude(stated.get("amplitude"))
             return function(*args, stated={key: value for key, value in stated.items() if value}, **kwargs)
 
         return reduce(lambda command, option: option(command), reversed(_options(keys, sweeps=sweeps)), wrapped)  # type: ignore[return-value]
@@ -63,15 +72,11 @@ def file_options(*keys: str, sweeps: bool = True) -> Callable[[F], F]:
 
 def _options(keys: Sequence[str], *, sweeps: bool) -> list[Callable[[Any], Any]]:
     """The options that state what a file does not say itself."""
-    roles, of_all = (
-        f"ROLEs: {', '.join(LOOP_COLUMNS)}; of resonance tests: {', '.join(RESONANCE_COLUMNS)}",
-        "all files given",
-    )
+    roles = f"ROLEs: {', '.join(LOOP_COLUMNS)}; of resonance tests: {', '.join(RESONANCE_COLUMNS)}"
     if sweeps:
         roles = f"ROLEs of loops: {', '.join(LOOP_COLUMNS)}; of sweeps: {', '.join(SWEEP_COLUMNS)}"
-        of_all = "all files given that have the role"
     return [
-        direction_option(help="{directions}, of all files given [found from their names and columns]."),
+        direction_option(help="{directions} [found in names or columns]."),
         click.option(
             "--column",
             "columns",
@@ -84,7 +89,7 @@ def _options(keys: Sequence[str], *, sweeps: bool) -> list[Callable[[Any], Any]]
             "units",
             multiple=True,
             metavar="ROLE=UNIT",
-            help=f'Such as "force=kN", of {of_all}; ROLEs as above.',
+            help='Such as "force=kN"; ROLEs as above.',
         ),
         *(
             click.option("--" + key.replace("_", "-"), key, type=int if key in _NUMBERS else str, help=_SAME_NAME[key])
@@ -103,20 +108,37 @@ def options_named() -> Iterator[None]:
         named = [f'--{kind} "{role}={text}"' for kind, role, text in _PAIRED.findall(hint)]
         keys = _TABLE.sub("", hint)  # in a table, amplitude is a role
         named += ["--" + key.replace("_", "-") for key in _SAME_NAME if re.search(rf"\b{key} = ", keys)]
+        if error.file is None and error.place in _SAME_NAME:
+            error.place = "--" + error.place.replace("_", "-")
         if named:
             error.hint = f"{hint}; for this command: {', '.join(dict.fromkeys(named))}"
         raise
 
 
-def direction_error(file: Path) -> MeasurementError:
-    """The error for a file of a direction that nothing settles."""
+def direction_error(file: Path, sheet: str | None = None) -> MeasurementError:
+    """The error for a file, or a sheet of it, of a direction that nothing settles."""
     return MeasurementError(
         "nothing says in which direction this was tested",
         file=file,
+        place=sheet and f'sheet "{sheet}"',
         found="neither its name nor its columns say axial, radial or torsion",
         expected="a direction",
         hint="state it: --direction axial (or radial, torsion)",
     )
+
+
+def _check_amplitude(counting: str | None) -> None:
+    """Refuse a value where the counting of amplitudes is stated."""
+    known = get_args(AmplitudeConvention)
+    if counting and counting not in known:
+        raise MeasurementError(
+            "this does not say how amplitudes are counted",
+            place="--amplitude",
+            found=f'"{counting}"',
+            expected=" or ".join(known),
+            hint=f'--at-amplitude "{counting if counting[0].isdigit() else "0.1 mm"}" states the amplitude of files '
+            "that have no column for it",
+        )
 
 
 def _pairs(texts: Sequence[str], option: str, example: str, known: Sequence[str]) -> Mapping[str, str]:

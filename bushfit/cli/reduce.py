@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from bushfit.cli.common import Options, example, naming_option, shared_options
-from bushfit.cli.inspect import KEYS
+from bushfit.cli.inspect import FORMAT_KEYS
 from bushfit.cli.raw import direction_error, file_options, options_named
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import BushfitError, MeasurementError
@@ -40,7 +40,7 @@ _LINES_AN_OCTAVE = 3
     ),
 )
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@file_options(*(key for key in KEYS if key not in ("rate", "frequency", "waveform", "amplitude")), sweeps=False)
+@file_options("force_sign", *FORMAT_KEYS, sweeps=False)
 @click.option(
     "--levels",
     help='Amplitudes that were asked for, such as "0.1, 0.2 mm" [found].',
@@ -232,13 +232,15 @@ def _positive(key: str, unit: str, moving: Mapping[str, str | None]) -> float | 
 
 def _read(files: Sequence[Path], stated: Mapping[str, Any]) -> list[Loop]:
     """The histories, of one direction, named by their stems, or by their paths where stems agree."""
-    from bushfit.inspection.opening import read_history, stated_of_each
+    from bushfit.inspection.gathering import Source, stated_of_each
+    from bushfit.inspection.opening import read_history
 
     stems = [file.stem for file in files]
     histories: list[Loop] = []
-    for file, stem, own in zip(files, stems, stated_of_each(files, stated), strict=True):
+    sources = stated_of_each([Source(file) for file in files], stated)
+    for file, stem, source in zip(files, stems, sources, strict=True):
         with options_named():
-            history, direction = read_history(file, own)
+            history, direction = read_history(file, source.stated or {})
         if direction is None:
             raise direction_error(file)
         if histories and direction is not histories[0].direction:

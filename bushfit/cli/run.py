@@ -67,7 +67,7 @@ def _which(folder: Path, outcome: Ran) -> str:
     """Which of the files to use."""
     which = "the joint fit"
     if outcome.diagnosed and outcome.added:
-        found = ", ".join(effect.name for effect in outcome.diagnosed.diagnosis.effects)
+        found = ", ".join(effect.label for effect in outcome.diagnosed.diagnosis.effects)
         which = f"with {found}; joint.json is without"
     return f"the model to use: {folder / 'model.json'}, {which}"
 

@@ -8,7 +8,8 @@ from typing import Any, Literal
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.holdout import HoldOut
-from bushfit.effects import effect_named, effect_of, parameter_named
+from bushfit.effects import effect_of, parameter_named
+from bushfit.effects.mistakes import candidate_named, labelled
 from bushfit.geometry import Place
 from bushfit.model.result import Result
 
@@ -65,12 +66,23 @@ class Named:
         evidence: in words.
         alternatives: effects these tests cannot tell from it.
         richer: effects that contain it as a limit, and whose further parameters these tests do not show.
+        test: of a mistake in the record, the test in which it was made; None of what is not made in a test.
+        sentence: of a mistake, what would be so; else that of the effect.
+        correction: of a mistake, what to write into the campaign.
     """
 
     name: str
     evidence: str
     alternatives: tuple[str, ...] = ()
     richer: tuple[str, ...] = ()
+    test: str | None = None
+    sentence: str = ""
+    correction: str = ""
+
+    @property
+    def label(self) -> str:
+        """The name as --adopt takes it."""
+        return labelled(self.name, self.test)
 
 
 @dataclass(frozen=True)
@@ -100,8 +112,9 @@ class Diagnosis:
         next_test: the measurement that would decide or confirm, or "".
         candidates: every effect of the library, judged.
         before: the model as it came, refitted to all tests.
-        after: the model with what was added.
-        result: `after` with its uncertainty, ready for `predict`.
+        after: the model with what was added; where a mistake in the record is named, fitted to the mended tests.
+        result: the model to use with its uncertainty, ready for `predict`: `after`; `before` where the record is
+            mistaken.
         notes: what a user must know besides.
     """
 
@@ -117,6 +130,16 @@ class Diagnosis:
     after: Evidence
     result: Result
     notes: tuple[str, ...] = ()
+
+    @property
+    def changed(self) -> bool:
+        """Whether something was found that the model, or a warning with it, has to tell."""
+        return self.after is not self.before
+
+    @property
+    def added(self) -> bool:
+        """Whether the model to use holds more than the one that came."""
+        return self.result.model is not self.before.model
 
     @property
     def calibration(self) -> tuple[float, float]:
@@ -143,13 +166,15 @@ class Diagnosis:
         }
 
     def _effect(self, named: Named) -> dict[str, Any]:
-        effect, model = effect_named(named.name), self.result.model
+        effect, model = candidate_named(named.name), self.result.model
         judged = {judged.name: judged.parameters for judged in self.candidates}
         values = model.values if named.name in model.effects else judged.get(named.name, {})
         return {
             "name": named.name,
             "level": str(effect.level),
-            "sentence": effect.sentence,
+            "test": named.test,
+            "sentence": named.sentence or effect.sentence,
+            "correction": named.correction or None,
             "parameters": {
                 name: self._parameter(name, value) for name, value in values.items() if effect_of(name) == named.name
             },

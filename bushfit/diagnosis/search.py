@@ -16,6 +16,7 @@ from bushfit.diagnosis.propose import Proposal, proposals
 from bushfit.diagnosis.record import Settings
 from bushfit.diagnosis.refit import EXCLUDED, Candidate, can_reach, refits
 from bushfit.diagnosis.score_test import SENSITIVITY_LEFT, ScoreTest
+from bushfit.effects import effect_named, qualified
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.solve import Bounds
@@ -154,10 +155,22 @@ class Search:
             current, added = best.evidence, [*added, best.name]
         return current, added
 
-    def trace(self) -> Candidate | None:
-        """The best candidate on the base model where it is real but too small to matter."""
+    @cached_property
+    def matters(self) -> bool:
+        """Whether the best candidate on the base model is real and large enough to matter."""
         best = self.first.real
-        return best if best and footprint(self.base, best.evidence) <= self.settings.tolerance else None
+        return best is not None and footprint(self.base, best.evidence) > self.settings.tolerance
+
+    def trace(self) -> Candidate | None:
+        """The best candidate on the base model where it is real but too small to matter.
+
+        One whose amount comes to rest on its bound is none: it would close more of the gap than it may.
+        """
+        best = self.first.real
+        if best is None or self.matters:
+            return None
+        effect = effect_named(best.name)
+        return None if qualified(effect, effect.amount) in best.evidence.solution.at_bound else best
 
     def reconsider(self, current: Evidence, added: Sequence[str]) -> tuple[Evidence, list[Step]]:
         """Try every added effect's rivals in its place, and dropping it; swap where that is better."""

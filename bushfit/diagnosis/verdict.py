@@ -50,30 +50,30 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
         if remainder is None:
             words = "nothing is missing beyond noise and tolerance"
             words += f"; what there is of {trace.name} stays below the tolerance" if trace else ""
-            return _finish(search, "consistent", words, base, ())
-        return _finish(search, "unexplained", remainder.words, base, (), fault=remainder.fault)
-    fault = _worst_fault(search, base)
+            return finish(search, "consistent", words, base, ())
+        return finish(search, "unexplained", remainder.words, base, (), fault=remainder.fault)
+    fault = worst_fault(search, base)
     worth = base.bic - final.bic
     if fault and fault.worth > worth + SAME:
-        return _finish(search, "unexplained", _fault_words(fault), base, (), fault=fault)
+        return finish(search, "unexplained", _fault_words(fault), base, (), fault=fault)
     if fault and fault.worth > worth - SAME:
         leaders = [replace(_named(step), alternatives=(f"fault: {fault.suspect.words}",)) for step in steps]
         words = f"{' and '.join(step.name for step in steps)}, or a fault of the measurement: {fault.suspect.words}"
-        return _finish(search, "ambiguous", f"these tests cannot tell {words}", base, leaders, fault=fault)
+        return finish(search, "ambiguous", f"these tests cannot tell {words}", base, leaders, fault=fault)
     names = [_named(step) for step in steps]
     held = hold_out(base, final)
     if not held.passed:
         words = f"{_closing(names)} the gap only where fitted, so the name is taken back"
-        return _finish(search, "unexplained", words, base, ())
+        return finish(search, "unexplained", words, base, ())
     if any(step.rivals for step in steps):
         return _ambiguous(search, final, steps, names)
     remainder = find_remainder(search, final)
     if remainder is None:
-        return _finish(search, "named", f"{_closing(names)} the gap", final, names)
+        return finish(search, "named", f"{_closing(names)} the gap", final, names)
     if held.after < _PARTLY * held.before:
         words = f"{_closing(names)} part of the gap; {remainder.words}"
-        return _finish(search, "partly", words, final, names, fault=remainder.fault)
-    return _finish(search, "unexplained", remainder.words, base, (), fault=remainder.fault)
+        return finish(search, "partly", words, final, names, fault=remainder.fault)
+    return finish(search, "unexplained", remainder.words, base, (), fault=remainder.fault)
 
 
 def _ambiguous(search: Search, final: Evidence, steps: Sequence[Step], names: Sequence[Named]) -> Diagnosis:
@@ -87,12 +87,18 @@ def _ambiguous(search: Search, final: Evidence, steps: Sequence[Step], names: Se
     sets = "; ".join(f"{name.name} from {' or '.join(name.alternatives)}" for name in names if name.alternatives)
     rivals = [[final.model, *(rival.evidence.model for rival in step.rivals)] for step in steps if step.rivals]
     words = f"these tests cannot tell {sets}"
-    return _finish(search, "ambiguous", words, kept, names, next_test=deciding_test(rivals[0], final.data_sets))
+    return finish(search, "ambiguous", words, kept, names, next_test=deciding_test(rivals[0], final.data_sets))
+
+
+def is_consistent(search: Search) -> bool:
+    """Whether nothing is missing beyond noise and tolerance."""
+    trace = search.trace()
+    return not search.matters and find_remainder(search, trace.evidence if trace else search.base) is None
 
 
 def find_remainder(search: Search, evidence: Evidence) -> Remainder | None:
     """What is left beyond noise and tolerance: a fault at one place, or something smooth."""
-    fault = _worst_fault(search, evidence)
+    fault = worst_fault(search, evidence)
     if fault:
         return Remainder(_fault_words(fault), fault)
     columns = contrasts(evidence)
@@ -105,7 +111,7 @@ def find_remainder(search: Search, evidence: Evidence) -> Remainder | None:
     return None
 
 
-def _worst_fault(search: Search, evidence: Evidence) -> Fault | None:
+def worst_fault(search: Search, evidence: Evidence) -> Fault | None:
     """The worthiest fault, where it is more than chance, more than its price and larger than the tolerance."""
     found, chance = faults(evidence, _CHANCE_LEVEL)
     worst = max(found, key=lambda fault: fault.worth, default=None)
@@ -133,7 +139,7 @@ def _named(step: Step) -> Named:
     return Named(step.name, words, alternatives, richer)
 
 
-def _finish(
+def finish(
     search: Search,
     verdict: Verdict,
     summary: str,
@@ -143,6 +149,7 @@ def _finish(
     fault: Fault | None = None,
     next_test: str = "",
 ) -> Diagnosis:
+    """The whole finding, once the verdict stands."""
     base = search.base
     if not next_test and effects:
         next_test = confirming_test(effects[0].name)

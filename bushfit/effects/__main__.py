@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from bushfit.effects import LIBRARY, Effect, qualified
+from bushfit.effects.mistakes import MISTAKES
 
 #: The page, and the comments between which its tables stand.
 PAGE = Path(__file__).with_name("README.md")
@@ -16,7 +17,8 @@ def renewed(page: str) -> str:
     """The text of the page with its tables made from the records, and all else as it was."""
     before, rest = page.split(BEGIN)
     _, after = rest.split(END)
-    return before + BEGIN + "\n" + effects_table() + "\n" + sources_table() + "\n" + END + after
+    tables = (effects_table(), sources_table(), mistakes_table())
+    return before + BEGIN + "\n" + "\n".join(tables) + "\n" + END + after
 
 
 def effects_table() -> str:
@@ -34,6 +36,16 @@ def sources_table() -> str:
     head = "| name | source | cheapest test that would prove it |\n|---|---|---|\n"
     return head + "".join(
         f"| {_link(effect)} | {effect.source} | {effect.confirmed_by} |\n" for effect in LIBRARY.values()
+    )
+
+
+def mistakes_table() -> str:
+    """Every mistake in the record: what would be so, the true value by the one stated, and where it can be made."""
+    head = "| mistake | what would be so | true value | in |\n|---|---|---|---|\n"
+    return head + "".join(
+        f"| `{mistake.name}` | {mistake.sentence.format(files='FILE')} | `{mistake.equation}` "
+        f"| {' or '.join(mistake.kinds) or '[bushing]'} |\n"
+        for mistake in MISTAKES.values()
     )
 
 

@@ -56,11 +56,12 @@ class StiffnessBelow:
 
 
 class Level(IntEnum):
-    """Where an effect acts, from the rubber outward. Prediction leaves the instrument out."""
+    """Where an effect acts, from the rubber outward. Prediction leaves the instrument out; a record is no model."""
 
     MATERIAL = 1
     COMPONENT = 2
     INSTRUMENT = 3
+    RECORD = 4
 
     def __str__(self) -> str:
         return self.name.lower()

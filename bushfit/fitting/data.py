@@ -126,7 +126,7 @@ class Data:
         if places is None:
             return [*_compound(self.loops), *_compound(self.sweeps)]
         with naming(self.campaign.path):
-            wanted = [place_named(place, self.campaign.specimens) for place in places]
+            wanted = [place_named(str(place), self.campaign.specimens) for place in places]
         chosen = [data_set for data_set in data_sets if data_set.direction in wanted]
         if not chosen:
             raise FitError(

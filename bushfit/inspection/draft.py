@@ -8,29 +8,49 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from bushfit.geometry import Specimen
 from bushfit.inspection.record import Inspected
 
 #: For each kind of test the array of tables that lists it in a campaign.
 _TABLES = {"loop": "loops", "sweep": "sweeps"}
 
 
-def campaign_text(bushing: Mapping[str, str], files: Sequence[Inspected], folder: Path) -> str:
+def campaign_text(name: str, bushing: Mapping[str, str] | None, files: Sequence[Inspected], folder: Path) -> str:
     """The text of a whole campaign file.
 
     Args:
-        bushing: keys of [bushing], quantities as texts.
-        files: loops and sweeps, each with a direction.
+        name: of the campaign, and of the bushing.
+        bushing: other keys of [bushing], quantities as texts; None where specimens alone were tested.
+        files: loops and sweeps, each of a specimen or with a direction.
         folder: where the campaign will lie; its files are named from there.
     """
-    head = ["[bushing]", *(f"{key} = {toml_value(value)}" for key, value in bushing.items())]
+    head = [f"name = {toml_value(name)}", *(f"{key} = {toml_value(value)}" for key, value in (bushing or {}).items())]
     order = [seen for kind in _TABLES for seen in files if seen.kind == kind]
-    return "\n".join([*head, "", *(file_text(seen, folder) for seen in order)])
+    tables = [*_specimens(files), *(file_text(seen, folder) for seen in order)]
+    return "\n".join([*(["[bushing]"] if bushing else []), *head, "", *tables])
+
+
+def _specimens(files: Sequence[Inspected]) -> list[str]:
+    """The table of each specimen that was tested."""
+    bodies = dict.fromkeys(seen.direction for seen in files if isinstance(seen.direction, Specimen))
+    return [_specimen_text(body) for body in bodies]
+
+
+def _specimen_text(body: Specimen) -> str:
+    keys: dict[str, Any] = {"name": body.name, "kind": body.kind}
+    if body.strain != "engineering":
+        keys["strain"] = body.strain
+    if body.area and body.thickness:
+        keys |= {"area": f"{1e6 * body.area:.12g} mm^2", "thickness": f"{1e3 * body.thickness:.12g} mm"}
+        keys["elements"] = body.elements
+    return "\n".join(["[[specimens]]", *(f"{key} = {toml_value(value)}" for key, value in keys.items()), ""])
 
 
 def pasted_text(files: Sequence[Inspected]) -> str:
     """Tables to paste into a campaign in any folder: files are named by their full path."""
     head = "# files by their full path, which holds in any folder; bushfit init writes them as seen from the campaign\n"
-    return head * any(seen.kind in _TABLES for seen in files) + "\n".join(file_text(seen) for seen in files)
+    tables = [*_specimens(files), *(file_text(seen) for seen in files)]
+    return head * any(seen.kind in _TABLES for seen in files) + "\n".join(tables)
 
 
 def file_text(seen: Inspected, folder: Path | None = None) -> str:
@@ -45,7 +65,9 @@ def file_text(seen: Inspected, folder: Path | None = None) -> str:
     if seen.kind == "history":
         stated = f" --direction {seen.direction}" if seen.direction else " --direction ..."
         return f"# {name} is a raw history: bushfit reduce {_quoted(name)}{stated} makes a sweep of it\n"
-    lines = [f"[[{_TABLES[seen.kind]}]]", f"file = {toml_value(name)}", f"direction = {direction}"]
+    lines = [f"[[{_TABLES[seen.kind]}]]", f"file = {toml_value(name)}"]
+    if not isinstance(seen.direction, Specimen):
+        lines.append(f"direction = {direction}")
     lines += [f"{key} = {toml_value(value)}" for key, value in seen.entry.items()]
     return "\n".join(lines) + "\n"
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from bushfit.inspection.channels import clock, odd_channels
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.record import Looked
 from bushfit.reading.measurement import Loop
+from bushfit.reading.names import Said
 from bushfit.reduction.steps import reduce
 
 
-def look_at_history(history: Loop, file: Path) -> Looked:
-    """Facts and oddities of a history; `file` is where it was read.
+def look_at_history(history: Loop, named: Said) -> Looked:
+    """Facts and oddities of a history; `named` is what the names of its file and sheet say.
 
     Raises:
         MeasurementError: no steady sine in it.
@@ -30,7 +29,7 @@ def look_at_history(history: Loop, file: Path) -> Looked:
         "noise": f"{100 * max(step.gain_error for step in steps):.2g} % of |K| at most, a point",
     }
     odd = (
-        *wrong_labels(file, history.direction, levels, frequencies),
+        *wrong_labels(named, history.direction, levels, frequencies),
         *odd_channels(history),
         *reduction.warnings,
     )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.effects.mistake import shown
+from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.drive import Drive, drive_of
 from bushfit.fitting.preload import TOLD_MEAN
 from bushfit.fitting.waveform import waveform
@@ -17,6 +18,7 @@ from bushfit.inspection.channels import clock, odd_channels
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.record import Looked
 from bushfit.reading.measurement import Loop
+from bushfit.reading.names import Said
 from bushfit.reduction.cycles import least_prominence
 from bushfit.units import alike, for_people, number
 
@@ -30,12 +32,14 @@ _OFF_ZERO = 0.02
 _MOST_END_CYCLES = 6
 #: Harmonics that are fitted to a cycle; chosen: a loop of rubber has next to nothing beyond.
 _HARMONICS = 7
+#: [s] A cycle that takes longer is in doubt; chosen: quasi-static tests take minutes.
+_LONGEST_CYCLE = 3000.0
 #: Rows of a cycle for each harmonic that is fitted; chosen: twice the unknowns and some.
 _ROWS_PER_HARMONIC = 5
 
 
-def look_at_loop(loop: Loop, file: Path) -> Looked:
-    """Facts and oddities of a loop; `file` is where it was read.
+def look_at_loop(loop: Loop, named: Said) -> Looked:
+    """Facts and oddities of a loop; `named` is what the names of its file and sheet say.
 
     Raises:
         FitError: no whole cycle, or a loop that runs the wrong way round.
@@ -59,10 +63,11 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
         "noise": f"{number(100 * drive.noise / half_force, 2)} % of half the {names[1]}'s range, a row",
     }
     odd = [
-        *wrong_labels(file, loop.direction, [amplitude, half_motion], [drive.frequency]),
+        *wrong_labels(named, loop.direction, [amplitude, half_motion], [drive.frequency]),
         *odd_channels(loop),
         *drive.notes,
         *_changing(drive),
+        *_crawling(drive),
     ]
     if _OFF_ZERO * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and not drive.from_rest:
         odd.append(
@@ -72,13 +77,21 @@ def look_at_loop(loop: Loop, file: Path) -> Looked:
     return Looked(facts, tuple(odd))
 
 
-def look_at_programme(record: Loop, loops: Sequence[Loop], file: Path) -> Looked:
+def _crawling(drive: Drive) -> Iterator[str]:
+    """A sentence on a loop that takes longer than any laboratory waits, and on what the file may say instead."""
+    if drive.frequency * _LONGEST_CYCLE < 1.0:
+        mistakes = [mistake for mistake in MISTAKES.values() if mistake.time < 1.0]
+        unless = ", or ".join(mistake.sentence.format(files=shown(drive.loop)) for mistake in mistakes)
+        yield f"one cycle takes {number(1.0 / drive.frequency / 60.0, 2)} min, as hardly any test does, unless {unless}"
+
+
+def look_at_programme(record: Loop, loops: Sequence[Loop], named: Said) -> Looked:
     """Facts and oddities of a record that holds several loops.
 
     Args:
         record: the whole record.
         loops: its parts, in order.
-        file: where it was read.
+        named: what the names of its file and sheet say.
 
     Raises:
         FitError: a part that has no whole cycle, or runs the wrong way round.
@@ -93,7 +106,7 @@ def look_at_programme(record: Loop, loops: Sequence[Loop], file: Path) -> Looked
         f"at {_in_turn(frequencies)} Hz, {_span(cycles)} cycles used of each; "
         f"{100 * (1 - used / record.displacement.size):.2g} % of the rows left out",
     }
-    odd = [*wrong_labels(file, record.direction, amplitudes, frequencies), *odd_channels(record)]
+    odd = [*wrong_labels(named, record.direction, amplitudes, frequencies), *odd_channels(record)]
     for place, (loop, drive) in enumerate(zip(loops, drives, strict=True), start=1):
         left_out = loop.part.left_out if loop.part else None
         motion = (

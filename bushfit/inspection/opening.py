@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import fields
 from itertools import chain
@@ -13,17 +13,18 @@ import numpy as np
 
 from bushfit.campaign.campaign import reader_keywords
 from bushfit.campaign.schema import LoopFile, SweepFile
-from bushfit.errors import BushfitError, MeasurementError, NoColumnError
-from bushfit.geometry import Direction, Place
+from bushfit.errors import BushfitError, MeasurementError, naming
+from bushfit.geometry import Direction, Place, Specimen
 from bushfit.inspection.histories import look_at_history
 from bushfit.inspection.loops import look_at_loop, look_at_programme
-from bushfit.inspection.recognition import direction_of, open_table, recognised
+from bushfit.inspection.outside import keys_outside, names_of
+from bushfit.inspection.recognition import direction_of, place_of, recognised
 from bushfit.inspection.record import ColumnSeen, Inspected, Kind, Looked
 from bushfit.inspection.sweeps import look_at_sweep
-from bushfit.reading.directions import named_direction
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.reading.sweeps import STIFFNESS_PAIRS, read_sweep
+from bushfit.reading.names import Said
+from bushfit.reading.sweeps import ONE_TEST, STIFFNESS_PAIRS, read_sweep
 from bushfit.reading.table import Table
 from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reduction.programme import clock_stated, programme
@@ -38,68 +39,44 @@ _TURNED = {"force_sign": -1}
 _DELIMITER_NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "pipe", " ": "blanks"}
 
 
-def stated_of_each(files: Sequence[Path], stated: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """What the user states of each of several files.
-
-    A column that is stated for all, and that only some of the files have, is left out for the others.
-    """
-    columns: Mapping[str, str] = stated.get("columns", {})
-    has = {role: [_has_column(file, role, stated) for file in files] for role in columns}
-    return [
-        {
-            **stated,
-            "columns": {
-                role: header
-                for role, header in columns.items()
-                if has[role][number] is not False or True not in has[role]
-            },
-        }
-        for number in range(len(files))
-    ]
-
-
-def _has_column(file: Path, role: str, stated: Mapping[str, Any]) -> bool | None:
-    """Whether a file has the column that is stated for a role; None where it cannot be told."""
-    names = LOOP_COLUMNS if role in LOOP_COLUMNS else SWEEP_COLUMNS
-    try:
-        return role in open_table(file, names, {**stated, "columns": {role: stated["columns"][role]}}).roles
-    except NoColumnError:
-        return False
-    except BushfitError:  # which the inspection of the file tells
-        return None
-
-
-def inspect(file: Path, stated: Mapping[str, Any]) -> Inspected:
+def inspect(file: Path, stated: Mapping[str, Any], beside: Said | None = None) -> Inspected:
     """Recognise a test file, and say what it holds and what is odd about it.
 
     Args:
         file: a loop, a sweep or a raw stepped-sine history.
         stated: keys of [[loops]] and [[sweeps]] that the user states, as TOML has them; each is used where it fits.
+            So are the sizes of a specimen in shear.
+        beside: what other sheets of its workbook say of all its tests.
 
     Raises:
+        NoTestError: a file that holds no test.
         MeasurementError, UnitError, CampaignError, FitError: a file or a statement that cannot be used.
     """
     table, is_sweep = recognised(file, stated)
-    direction = direction_of(file, table, stated)
+    direction = place_of(file, table, stated)
     # which of two translations it is makes no difference to reading
     read_as = direction or Direction.AXIAL
-    entry = _entry(SweepFile if is_sweep else LoopFile, stated, table)
+    entry = _entry(SweepFile if is_sweep else LoopFile, stated, table, direction)
+    by_name = names_of(file, stated)
+    outside = keys_outside(table, read_as, entry, by_name, beside or Said(), is_sweep=is_sweep)
+    if "at_amplitude" in outside.keys:
+        entry.pop("amplitude", None)  # counted already
+    entry |= outside.keys
     odd: list[str] = []
     measured: Loop | Sweep
     kind: Kind
     if is_sweep:
         measured = read_sweep(**_keywords(file, read_as, entry, SweepFile))
-        kind, looked = "sweep", look_at_sweep(measured, file)
+        kind, looked = "sweep", look_at_sweep(measured, by_name)
     else:
         measured, entry, odd = _read_loop(file, read_as, entry, table)
-        kind, looked = _look(measured, file, clock_stated(_keywords(file, read_as, entry, LoopFile)))
+        kind, looked = _look(measured, by_name, clock_stated(_keywords(file, read_as, entry, LoopFile)))
     columns = _columns(table, is_sweep=is_sweep)
-    named = named_direction([file.stem])
-    if direction and named and named is not direction:
+    named = by_name.direction
+    if direction and named and not isinstance(direction, Specimen) and named is not direction:
         odd.append(f"the name says {named}, it is taken for {direction} as stated")
-    facts, counted = dict(looked.facts), False
-    if is_sweep:
-        amplitude = table.roles["amplitude"]
+    facts, counted = {**looked.facts, **outside.facts}, outside.is_counted
+    if is_sweep and (amplitude := table.roles.get("amplitude")):
         counted = amplitude.convention is not None
         if "peak-to-peak" in (amplitude.convention, entry.get("amplitude")):
             facts["amplitudes"] += f', half of "{amplitude.header}", which counts peak-to-peak'
@@ -123,11 +100,13 @@ def read_history(file: Path, stated: Mapping[str, Any]) -> tuple[Loop, Direction
             hint="name it in the campaign under [[sweeps]]",
         )
     direction = direction_of(file, table, stated)
-    entry = _entry(LoopFile, stated, table)
+    entry = _entry(LoopFile, stated, table, direction)
     return read_loop(**_keywords(file, direction or Direction.AXIAL, entry, LoopFile)), direction
 
 
-def _entry(schema: type[LoopFile | SweepFile], stated: Mapping[str, Any], table: Table) -> dict[str, Any]:
+def _entry(
+    schema: type[LoopFile | SweepFile], stated: Mapping[str, Any], table: Table, place: Place | None
+) -> dict[str, Any]:
     """The stated keys that a file's table in a campaign has, less those that the file makes needless."""
     roles = LOOP_COLUMNS if schema is LoopFile else SWEEP_COLUMNS
     known = {field.name for field in fields(schema)} - {"direction"}
@@ -136,17 +115,25 @@ def _entry(schema: type[LoopFile | SweepFile], stated: Mapping[str, Any], table:
         own = {role: text for role, text in entry.pop(key, {}).items() if role in roles}
         if own:
             entry[key] = own
+    needless = {"specimen"} | {f"at_{role}" for role in table.roles}
     if "time" in table.roles:
-        entry = {key: value for key, value in entry.items() if key not in ("rate", "frequency", "waveform")}
-    return entry
+        needless |= {"rate", "frequency", "waveform"}
+    if column := table.roles.get("temperature"):
+        found = table.read({"temperature": column}, fewest_rows=1)["temperature"]
+        needless |= {"temperature"} if np.ptp(found) <= ONE_TEST else set()
+    entry = {key: value for key, value in entry.items() if key not in needless}
+    return {**({"specimen": place.name} if isinstance(place, Specimen) else {}), **entry}
 
 
 def _keywords(
     file: Path, direction: Place, entry: Mapping[str, Any], schema: type[LoopFile] | type[SweepFile]
 ) -> dict[str, Any]:
     """What a reader is called with for a file that a campaign lists with these keys."""
-    test = check_tables({**entry, "file": str(file), "direction": str(direction)}, file, schema)
-    return {**next(reader_keywords(Path(), [test])), "name": file.stem}
+    specimens = [direction] if isinstance(direction, Specimen) else []
+    tested = {} if specimens else {"direction": str(direction)}
+    test = check_tables({**entry, "file": str(file), **tested}, file, schema)
+    with naming(file, "at_amplitude"):  # which alone is converted there
+        return {**next(reader_keywords(Path(), [test], specimens)), "name": file.stem}
 
 
 def _read_loop(
@@ -169,7 +156,7 @@ def _read_loop(
     return turned, {**entry, **_TURNED}, [odd]
 
 
-def _look(measured: Loop, file: Path, clock: Mapping[str, Any]) -> tuple[Kind, Looked]:
+def _look(measured: Loop, by_name: Said, clock: Mapping[str, Any]) -> tuple[Kind, Looked]:
     """The kind of a recorded test, a loop, a programme of loops or a history, with its facts and oddities."""
     found = sines(measured)
     points = {(round(np.log(frequency), 2), round(np.log(amplitude), 1)) for frequency, amplitude, _ in found}
@@ -177,11 +164,11 @@ def _look(measured: Loop, file: Path, clock: Mapping[str, Any]) -> tuple[Kind, L
     fast = max(frequencies) > _QUASI_STATIC
     if len(points) > 1 and fast:
         with suppress(MeasurementError):  # no steady sine after all
-            return "history", look_at_history(measured, file)
+            return "history", look_at_history(measured, by_name)
     loops = programme(measured, **clock)
     if len(loops) > 1:
-        return "loop", look_at_programme(measured, loops, file)
-    looked = look_at_loop(loops[0], file)
+        return "loop", look_at_programme(measured, loops, by_name)
+    looked = look_at_loop(loops[0], by_name)
     if fast or len(points) > 1:
         what = f"at {max(frequencies):.3g} Hz" if fast else "of several amplitudes"
         either = f"a motion {what} is taken for a loop; should it be a stepped sine, bushfit reduce makes points of it"
@@ -191,7 +178,8 @@ def _look(measured: Loop, file: Path, clock: Mapping[str, Any]) -> tuple[Kind, L
 
 def _columns(table: Table, *, is_sweep: bool) -> tuple[ColumnSeen, ...]:
     """All columns of a file in order, with the range of their values as the file has them."""
-    ranged = {*chain(*STIFFNESS_PAIRS), "frequency", "amplitude", "repeat"} if is_sweep else set(table.roles)
+    of_sweeps = {*chain(*STIFFNESS_PAIRS), "frequency", "amplitude", "temperature", "repeat"}
+    ranged = of_sweeps if is_sweep else set(table.roles)
     wanted = {role: column for role, column in table.roles.items() if role in ranged}
     values = table.read(wanted, fewest_rows=1)  # the scales of `roles` are 1: not in SI
     columns = [ColumnSeen(header, None, None) for header in table.headers]

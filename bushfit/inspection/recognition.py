@@ -1,20 +1,31 @@
-"""Which test a file holds, by its columns, and in which direction."""
+"""Which test a table holds, by its columns, and on which body or in which direction."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from bushfit.errors import BushfitError
-from bushfit.geometry import Direction
+from bushfit.campaign.schema import SpecimenTable
+from bushfit.errors import BushfitError, NoTestError, typed
+from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
 from bushfit.reading.directions import direction_of_file
 from bushfit.reading.headers import Vocabulary
 from bushfit.reading.layout import FileFormat
+from bushfit.reading.resonance import is_resonance
 from bushfit.reading.sweeps import STIFFNESS_PAIRS
 from bushfit.reading.table import Table
-from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
+from bushfit.reading.words import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS, of_motion
+from bushfit.validation import check_tables
+
+#: What an error says besides its problem.
+_PARTS = ("file", "place", "found", "expected", "hint")
+#: The name of a specimen of which no other is stated.
+UNNAMED_SPECIMEN = "coupon"
+#: Headers of a bar in tension: E', |E*|, "tensile strain".
+_TENSILE = re.compile(r"\W*E(?![^\W_])|.*(?:young|tensile|tension|traction|zug)", re.IGNORECASE)
 
 
 def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
@@ -25,21 +36,26 @@ def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
         stated: keys of [[loops]] and [[sweeps]] that the user states, as TOML has them; each is used where it fits.
 
     Raises:
-        MeasurementError, UnitError: a file that cannot be opened as a table, or whose columns make no test.
+        NoTestError: a file that cannot be opened as a table, or whose columns make no test.
+        MeasurementError, UnitError: one whose columns might, if they were clear.
     """
     opened: list[tuple[Table, bool]] = []
     failed: list[tuple[Mapping[str, Sequence[str]], BushfitError]] = []
-    for names, is_sweep in ((LOOP_COLUMNS, False), (SWEEP_COLUMNS, True)):
+    kinds = [(names, motion) for motion in (TRANSLATION, STRAINING) for names in (LOOP_COLUMNS, SWEEP_COLUMNS)]
+    for names, motion in kinds:
+        is_sweep = names is SWEEP_COLUMNS
         try:
-            table = open_table(file, names, stated)
+            table = open_table(file, names, stated, motion)
         except BushfitError as error:
-            failed.append((names, error))
+            failed.append((of_motion(names, motion), error))
             continue
         opened.append((table, is_sweep))
         if _missing(table, is_sweep=is_sweep) is None:
             return table, is_sweep
+    _refuse_resonance(file, stated)
     if not opened:
-        raise failed[0][1]
+        reason = failed[0][1]
+        raise NoTestError(reason.problem, **{key: getattr(reason, key) for key in _PARTS})
     best, is_sweep = max(opened, key=lambda one: len(one[0].roles))
     for usual, failure in failed:
         if len(best.roles) <= max(1, len(Vocabulary(usual, {}).roles(best.headers))):
@@ -47,6 +63,7 @@ def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
     known = ", ".join(role.replace("_", " ") for role in best.roles)
     raise best.error(
         "the columns do not make a test",
+        kind=NoTestError,
         line=best.layout.header_line,
         found=", ".join(best.headers) + (f" (understood: {known})" if known else ""),
         expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
@@ -54,16 +71,50 @@ def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
     )
 
 
+def _refuse_resonance(file: Path, stated: Mapping[str, Any]) -> None:
+    """Refuse a resonance test, with the way to make a sweep of it."""
+    try:
+        table = open_table(file, RESONANCE_COLUMNS, stated)
+    except BushfitError:  # then it is none
+        return
+    if is_resonance(table):
+        raise table.error(
+            "this is a resonance test, not a sweep",
+            kind=NoTestError,
+            expected="loops and sweeps",
+            hint=f'bushfit reduce {typed(file)} --mass "..." makes a sweep of it',
+        )
+
+
+def place_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Place | None:
+    """What a test was made on: a specimen, or the bushing in a direction, as stated or as the file says; else None.
+
+    A modulus is that of a specimen; a stiffness is that of the bushing, unless sizes of a block in shear are stated.
+
+    Raises:
+        MeasurementError: units of torsion where the user states another direction.
+        CampaignError, UnitError, ModelError: sizes that make no specimen.
+    """
+    sizes = {key: stated[key] for key in ("area", "thickness", "elements") if key in stated}
+    body = {"name": stated.get("specimen", UNNAMED_SPECIMEN)}
+    if table.motion is STRAINING:
+        if any(_TENSILE.match(column.header) for column in table.roles.values()):
+            body["strain"] = "tension"
+        return Specimen(**vars(check_tables({**body, "kind": "modulus"}, None, SpecimenTable)))
+    if sizes:
+        return Specimen(**vars(check_tables({**body, **sizes, "kind": "shear"}, None, SpecimenTable)))
+    return direction_of(file, table, stated)
+
+
 def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Direction | None:
-    """The direction of a test as the user states it, or else as its file does; None where neither does.
+    """The direction of a test of the bushing as the user states it, or else as its file does; None where neither does.
 
     Raises:
         MeasurementError: units of torsion where the user states another direction.
     """
     turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
-    found = direction_of_file(file, table.headers, turns=turns)
     if "direction" not in stated:
-        return found
+        return direction_of_file(file, table.headers, turns=turns, sheet=stated.get("sheet"))
     if turns and not Direction(stated["direction"]).is_rotation:
         raise table.error(
             "the units say torsion",
@@ -76,17 +127,24 @@ def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Directi
 
 
 def _missing(table: Table, *, is_sweep: bool) -> str | None:
-    """The first role that a table lacks to be a test; None where it is one."""
+    """The first role that a table lacks to be a test; None where it is one.
+
+    Of a sweep, frequency or amplitude may be held, and stated outside the table.
+    """
     roles = set(table.roles)
     nearest = max(STIFFNESS_PAIRS, key=lambda pair: len(roles & set(pair)))
-    needed = ("frequency", "amplitude", *nearest) if is_sweep else ("displacement", "force")
+    needed = nearest if is_sweep else ("displacement", "force")
+    if is_sweep and not roles & {"frequency", "amplitude"}:
+        return "frequency"
     return next((role for role in needed if role not in roles), None)
 
 
-def open_table(file: Path, names: Mapping[str, Sequence[str]], stated: Mapping[str, Any]) -> Table:
+def open_table(
+    file: Path, names: Mapping[str, Sequence[str]], stated: Mapping[str, Any], motion: Motion = TRANSLATION
+) -> Table:
     """The table of a file if it is that of a test whose columns go by `names`, with what the user states of those."""
     own = {
         key: {role: text for role, text in stated.get(key, {}).items() if role in names} for key in ("columns", "units")
     }
     written = FileFormat(**{field.name: stated.get(field.name) for field in fields(FileFormat)})
-    return Table.open(file, names, own["columns"], own["units"], written)
+    return Table.open(file, names, own["columns"], own["units"], written, motion)

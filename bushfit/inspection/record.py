@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from bushfit.geometry import Place
+from bushfit.geometry import Place, Specimen
 from bushfit.reading.measurement import Loop, Sweep
 
 #: A hysteresis loop, a sweep, or the raw history of a stepped sine.
@@ -72,16 +72,30 @@ class Inspected:
     counted: bool = False
 
     @property
+    def label(self) -> str:
+        """The name of the file, with the sheet where it has several."""
+        sheet = self.entry.get("sheet")
+        return f"{self.file.name}, sheet {sheet}" if sheet else self.file.name
+
+    @property
     def assumed(self) -> str | None:
-        """What was assumed, in a sentence with the option that says otherwise; None where nothing was."""
-        if self.kind != "sweep" or self.counted or "amplitude" in self.entry:
-            return None
-        return "its header does not say how amplitudes are counted: taken zero-to-peak, else --amplitude peak-to-peak"
+        """What was assumed, with the option or key that says otherwise; None where nothing was."""
+        said = []
+        if isinstance(self.direction, Specimen) and self.direction.kind == "modulus":
+            in_tension = self.direction.strain == "tension"
+            taken = "that of a bar in tension" if in_tension else "the engineering shear strain"
+            other = "engineering" if in_tension else "tension"
+            said.append(f'its strain is taken as {taken}, else strain = "{other}" or "tensor" in [[specimens]]')
+        if self.kind == "sweep" and not self.counted and "amplitude" not in self.entry:
+            what = "nothing says" if "at_amplitude" in self.entry else "its header does not say"
+            said.append(f"{what} how amplitudes are counted: taken zero-to-peak, else --amplitude peak-to-peak")
+        return "; ".join(said) or None
 
     def to_document(self) -> dict[str, Any]:
         """All of it but the content, as JSON has it."""
         return {
             "file": str(self.file),
+            "sheet": self.entry.get("sheet"),
             "kind": self.kind,
             "direction": self.direction and str(self.direction),
             "written": dict(self.written),

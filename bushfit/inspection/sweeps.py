@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 from scipy.stats import linregress, poisson
 
 from bushfit.effects.contract import Array
+from bushfit.effects.mistake import shown
+from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.record import Looked
-from bushfit.reading.measurement import Sweep
+from bushfit.reading.measurement import Sweep, loss_factor
+from bushfit.reading.names import Said
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 from bushfit.units import number
 
@@ -44,8 +46,8 @@ _MOST_LISTED = 4
 _MOST_LEVELS = 8
 
 
-def look_at_sweep(sweep: Sweep, file: Path) -> Looked:
-    """Facts and oddities of a sweep; `file` is where it was read."""
+def look_at_sweep(sweep: Sweep, named: Said) -> Looked:
+    """Facts and oddities of a sweep; `named` is what the names of its file and sheet say."""
     unit, factor = sweep.direction.display.displacement
     frequencies, levels = np.unique(sweep.frequency), np.unique(sweep.amplitude)
     repeats = np.unique(sweep.repeat)
@@ -58,13 +60,14 @@ def look_at_sweep(sweep: Sweep, file: Path) -> Looked:
         "noise": noise.describe(),
     }
     odd = [
-        *wrong_labels(file, sweep.direction, [float(x) for x in levels], [float(x) for x in frequencies]),
+        *wrong_labels(named, sweep.direction, [float(x) for x in levels], [float(x) for x in frequencies]),
         *_copies(sweep, noise),
         *_missing(sweep, unit, factor),
         *_outliers(sweep, noise, unit, factor),
         *_odd_blocks(sweep, unit, factor),
         *_missed(sweep, unit, factor),
         *_negative(sweep, unit, factor),
+        *_doubtful_loss(sweep),
     ]
     return Looked(facts, tuple(odd))
 
@@ -200,6 +203,15 @@ def _negative(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
             f"{bad.size} point{'s' * (bad.size > 1)} with a loss factor below zero, the first at "
             f"{sweep.frequency[row]:.4g} Hz, {factor * sweep.amplitude[row]:.4g} {unit}"
         )
+
+
+def _doubtful_loss(sweep: Sweep) -> Iterator[str]:
+    """A sentence on a loss that hardly any filled rubber has, and on what the file may say instead."""
+    mistakes = [mistake for mistake in MISTAKES.values() if mistake.doubt and mistake.possible(sweep)]
+    if mistakes:
+        unless = ", or ".join(mistake.sentence.format(files=shown(sweep)) for mistake in mistakes)
+        loss = float(np.median(loss_factor(sweep.stiffness)))
+        yield f"the loss factor is {number(loss, 2)} in the median, that of hardly any rubber, unless {unless}"
 
 
 def _groups(*keys: Array) -> list[Array]:

@@ -11,9 +11,10 @@ from bushfit.campaign.schema import PredictSettings
 from bushfit.fitting.agreement import met_within, misfits
 from bushfit.fitting.data_sets import SweepData, sweep_data
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Specimen, place_named
-from bushfit.prediction import Prediction, caveats, default_grid, predict
-from bushfit.report.artifacts import artifact_names, measured_file, place_files, prediction_files
-from bushfit.report.tables import prediction_table
+from bushfit.prediction import PredictedResonance, Prediction, caveats, default_grid, predict, predict_resonance
+from bushfit.reading.csvfile import to_csv
+from bushfit.report.artifacts import artifact_names, measured_file, place_files, prediction_files, resonance_files
+from bushfit.report.tables import prediction_table, shaken_table
 
 if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
@@ -33,17 +34,20 @@ class Predicted:
         predictions: of each place.
         measured: sweeps of places that the model can predict.
         notes: what else a user must know.
+        resonances: of the mass that was asked for, on each place.
     """
 
     result: Result
     predictions: Sequence[Prediction]
     measured: Sequence[SweepData]
     notes: tuple[str, ...] = ()
+    resonances: Sequence[PredictedResonance] = ()
 
     @property
     def document(self) -> Mapping[str, Any]:
         tables = {str(p.direction): prediction_table(p).to_dict(orient="list") for p in self.predictions}
-        return {**tables, "warnings": self.warnings}
+        shaken = {f"{found.place}_resonance": shaken_table(found).to_dict(orient="list") for found in self.resonances}
+        return {**tables, **shaken, "warnings": self.warnings}
 
     @property
     def warnings(self) -> list[str]:
@@ -71,7 +75,10 @@ class Predicted:
         return fitted, left
 
     def files(self, formats: Collection[str]) -> dict[str, bytes]:
-        return prediction_files(self.result, self.predictions, self.measured, formats, self.notes)
+        names = resonance_files([found.place for found in self.resonances])
+        tables = {name: to_csv(shaken_table(found)) for name, found in zip(names, self.resonances, strict=True)}
+        files = prediction_files(self.result, self.predictions, self.measured, formats, self.notes)
+        return files | (tables if "csv" in formats else {})
 
     def files_beside(self, formats: Collection[str]) -> dict[str, bytes]:
         """The same, and the measured points beside the model's as a table."""
@@ -80,9 +87,16 @@ class Predicted:
 
 @dataclass(frozen=True)
 class Predict:
-    """Dynamic stiffness over a grid: the one asked for, else the campaign's [predict], else that of its sweeps."""
+    """Dynamic stiffness over a grid: the one asked for, else the campaign's [predict], else that of its sweeps.
+
+    Args:
+        asked: places and grid.
+        mass, base_acceleration: of a resonance to predict at each place [kg], [m/s^2]; None for none.
+    """
 
     asked: PredictSettings = field(default_factory=PredictSettings)
+    mass: float | None = None
+    base_acceleration: float | None = None
 
     def places(self, result: Result | None, campaign: Campaign | None) -> list[Place]:
         """Those asked for, else the paper's directions where there is a bushing, and all specimens.
@@ -103,7 +117,9 @@ class Predict:
 
     def names(self, result: Result | None, campaign: Campaign | None, formats: Collection[str]) -> list[str]:
         """The files of each place."""
-        return artifact_names(place_files(self.places(result, campaign)), formats)
+        places = self.places(result, campaign)
+        shaken = resonance_files(places) if self.mass and "csv" in formats else []
+        return [*artifact_names(place_files(places), formats), *shaken]
 
     def run(self, result: Result, campaign: Campaign | None, notes: tuple[str, ...] = ()) -> Predicted:
         """One prediction a place.
@@ -122,7 +138,12 @@ class Predict:
             }[place.motion]
             predictions.append(predict(result, place, settings.frequencies or frequencies, asked or amplitudes))
         known = [each for each in sweep_data(sweeps) if result.model.bushing or isinstance(each.direction, Specimen)]
-        return Predicted(result, predictions, known, notes)
+        resonances = [
+            predict_resonance(result, place, self.mass, self.base_acceleration, settings.frequencies)
+            for place in self.places(result, campaign)
+            if self.mass and self.base_acceleration
+        ]
+        return Predicted(result, predictions, known, notes, resonances)
 
     def _settings(self, campaign: Campaign | None) -> PredictSettings:
         given = {key: value for key, value in vars(self.asked).items() if value is not None}

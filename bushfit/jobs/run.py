@@ -53,7 +53,7 @@ class Ran:
     @property
     def added(self) -> bool:
         """Whether the model to use holds more than the joint fit."""
-        return self.result is not self.joint.result
+        return self.result.model.effects != self.joint.result.model.effects
 
     @cached_property
     def document(self) -> Mapping[str, Any]:
@@ -92,7 +92,7 @@ class Run:
         joint = Fit().run(data)
         diagnosed = Diagnose().run(data) if data.free(FIVE) else None
         found = diagnosed and diagnosed.diagnosis
-        result = found.result if found and found.after is not found.before else joint.result
+        result = found.result if found and found.changed else joint.result
         return Ran(data, static, two_step, why_not, joint, diagnosed, Predict().run(result, data.campaign))
 
 

@@ -40,7 +40,7 @@ _STATED_AGREEMENT = 0.1
 #: [K] Distance from the stated temperature within which a row was tested at it; chosen: chambers keep to less.
 _SAME_TEMPERATURE = 2.0
 #: [K] Range of temperatures that one test may have; chosen: a rubber warms up by as much while it is tested.
-_ONE_TEST = 5.0
+ONE_TEST = 5.0
 #: Share of |K| within which columns that say the same agree; chosen: some are rounded to few digits.
 _AGREEMENT = 0.02
 #: What else may be done about a column that is not there.
@@ -263,12 +263,12 @@ def _of_temperature(
     if "temperature" not in values:
         return rows, stated
     found, unit = values["temperature"], table.roles["temperature"].unit
-    if unit is None and stated is None and np.ptp(found) <= _ONE_TEST:
+    if unit is None and stated is None and np.ptp(found) <= ONE_TEST:
         return rows, None
     column = table.column("temperature", "K")
     celsius = found + (si.kelvin(unit or "") or (1.0, 0.0))[1] - si.CELSIUS
     if stated is None:
-        if np.ptp(celsius) <= _ONE_TEST:
+        if np.ptp(celsius) <= ONE_TEST:
             return rows, round(float(celsius.mean()), 2) + si.CELSIUS
         problem, expected = "this file holds tests at several temperatures", "one temperature"
     else:

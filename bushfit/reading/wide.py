@@ -40,6 +40,8 @@ _LEVEL = re.compile(
 _SYMBOLS = {"f": "frequency", "a": "amplitude", "x": "amplitude", "s": "amplitude", "\u03b3": "amplitude"}
 #: What joins a level to a quantity in a header, and says no more.
 _JOINTS = re.compile(r"[\[(]\s*(?:at|bei)?\s*[\])]|(?<!\w)(?:at|bei|für|for|à|a|@|:|,|;|=|-)(?!\w)")
+#: How amplitudes are counted, in the header of a long table.
+_COUNTED: dict[AmplitudeConvention | None, str] = {"peak-to-peak": " p-p", "zero-to-peak": " 0-p", None: ""}
 #: A level that may have thousands: 1,250.
 _OPEN = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
 #: What parts the two roles that a corner names: "f [Hz] \ A [mm]".
@@ -188,7 +190,7 @@ def _said(text: str, vocabulary: Vocabulary) -> _Said:
     if is_like_number(text):
         return _Said(level=text)
     heading = vocabulary.heading(text)
-    if heading and (heading.unit is None or units.is_unit(heading.unit) or heading.role == "temperature"):
+    if heading and (heading.unit is None or units.is_unit(heading.unit)):
         if heading.role in _STEPPED:
             return _Said(stepped=heading.role, level_unit=heading.unit, convention=heading.convention)
         return _Said(heading.role, heading.unit)
@@ -250,21 +252,22 @@ def _joined(series: Sequence[_Series], source: RowSource, file: Path, delimiter:
     if len(down) > 1 or len(across) > 1 or len(quantities) > len(by_role):
         expected = "one unit for each quantity, and levels of one kind"
         raise error("this wide table counts one thing in two ways", _told(series), expected)
-    headers = [_header(*said) for said in (*down, *across, *quantities)]
+    headers = [
+        f"{role}{_COUNTED[convention]}{f' [{unit}]' if unit else ''}".replace("_", " ")
+        for role, unit, convention in (*down, *across, *quantities)
+    ]
     rows = [
-        (line, [value, _level(columns[0].said.level or ""), *(column.points[index][2] for column in columns)])
+        (
+            line,
+            [value, text if _OPEN.fullmatch(text) else _value(text), *(column.points[index][2] for column in columns)],
+        )
         for columns in zip(*by_role.values(), strict=True)
+        if (text := columns[0].said.level or "")
         for index, (line, value, _) in enumerate(columns[0].points)
     ]
     header_line = min(line for line, _ in rows) - 1
     sheet = _Unfolded(source.sheet or "", [cells for _, cells in rows], numbers=[line for line, _ in rows])
     return sheet, Layout(delimiter, tuple(headers), header_line, ("",) * len(headers), None)
-
-
-def _header(role: str | None, unit: str | None, convention: AmplitudeConvention | None) -> str:
-    """The header of a long table's column: its role, how it counts, and its unit."""
-    counted = {"peak-to-peak": " p-p", "zero-to-peak": " 0-p", None: ""}[convention]
-    return (role or "").replace("_", " ") + counted + (f" [{unit}]" if unit else "")
 
 
 def _points(columns: Sequence[_Series]) -> list[tuple[float, list[float]]]:
@@ -278,12 +281,6 @@ def _value(text: str | float | None) -> float:
         return float(str(text).replace(",", "."))
     except ValueError:
         return math.nan
-
-
-def _level(text: str) -> str | float:
-    """A level as a number, whatever the decimal mark of the cells; a text where it may have thousands."""
-    value = _value(text)
-    return text if math.isnan(value) or _OPEN.fullmatch(text) else value
 
 
 def _told(series: Sequence[_Series]) -> str:

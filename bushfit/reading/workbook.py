@@ -9,13 +9,14 @@ import io
 import re
 import zipfile
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bushfit.errors import MeasurementError, did_you_mean
-from bushfit.reading.files import Bytes
+from bushfit.reading.files import Bytes, view_bytes
 from bushfit.reading.source import Sheet
 
 if TYPE_CHECKING:
@@ -58,38 +59,62 @@ def open_sheet(data: bytes, file: Path, name: str | None, is_usable: Callable[[S
     Raises:
         MeasurementError: no xlsx workbook, one that is far too large, or no single usable sheet.
     """
-    _check(data, file)
-    import python_calamine as calamine
-
-    try:
-        book = calamine.load_workbook(io.BytesIO(data))
-        if name is not None:
-            if name not in book.sheet_names:
-                names = book.sheet_names
-                raise MeasurementError(
-                    "there is no such sheet",
-                    file=file,
-                    found=f'"{name}"',
-                    expected=_listed(names),
-                    hint=did_you_mean(name, names),
-                )
-            return _sheet(book, name)
-        visible = [sheet.name for sheet in book.sheets_metadata if sheet.visible == calamine.SheetVisibleEnum.Visible]
-        sheets = [_sheet(book, name) for name in visible or book.sheet_names]
-    except (calamine.CalamineError, OSError, ValueError) as error:
+    if name is not None:
+        with _opened(data, file) as book:
+            if name in book.sheet_names:
+                return _sheet(book, name)
+            names = book.sheet_names
         raise MeasurementError(
-            "the workbook cannot be read", file=file, found=str(error), hint="save it again as xlsx, or as CSV"
-        ) from error
-    usable = [sheet for sheet in sheets if is_usable(sheet)] if len(sheets) > 1 else sheets
+            "there is no such sheet",
+            file=file,
+            found=f'"{name}"',
+            expected=_listed(names),
+            hint=did_you_mean(name, names),
+        )
+    visible = _visible(data, file)
+    usable = [sheet for sheet in visible if is_usable(sheet)] if len(visible) > 1 else visible
     if len(usable) == 1:
         return usable[0]
     raise MeasurementError(
         "more than one sheet holds such a table" if usable else "no sheet holds such a table",
         file=file,
-        found=_listed([sheet.sheet for sheet in usable or sheets]),
+        found=_listed([sheet.sheet for sheet in usable or visible]),
         expected="one",
         hint='choose it in the campaign: sheet = "..."',
     )
+
+
+def sheets(file: Path) -> list[Sheet]:
+    """The visible sheets of a workbook; none where the file is no workbook.
+
+    Raises:
+        MeasurementError: no xlsx workbook, or one that is far too large.
+    """
+    data = view_bytes(file, MeasurementError)
+    return _visible(data[:], file) if is_workbook(data) else []
+
+
+def _visible(data: bytes, file: Path) -> list[Sheet]:
+    """The visible sheets of a workbook, or all where none is."""
+    with _opened(data, file) as book:
+        import python_calamine as calamine
+
+        visible = [sheet.name for sheet in book.sheets_metadata if sheet.visible == calamine.SheetVisibleEnum.Visible]
+        return [_sheet(book, name) for name in visible or book.sheet_names]
+
+
+@contextmanager
+def _opened(data: bytes, file: Path) -> Iterator[CalamineWorkbook]:
+    """A workbook, with errors of reading it in the project's words."""
+    _check(data, file)
+    import python_calamine as calamine
+
+    try:
+        yield calamine.load_workbook(io.BytesIO(data))
+    except (calamine.CalamineError, OSError, ValueError) as error:
+        raise MeasurementError(
+            "the workbook cannot be read", file=file, found=str(error), hint="save it again as xlsx, or as CSV"
+        ) from error
 
 
 def _sheet(book: CalamineWorkbook, name: str) -> Sheet:

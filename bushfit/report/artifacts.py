@@ -98,17 +98,25 @@ def place_files(places: Sequence[Place]) -> list[str]:
     return names
 
 
+def resonance_files(places: Sequence[Place]) -> list[str]:
+    """The names of the tables of a mass on each place."""
+    return [f"{name}_resonance.csv" for name in place_files(places)]
+
+
 def diagnosis_files(diagnosis: Diagnosis, title: str, formats: Collection[str]) -> dict[str, bytes]:
     """`gap.csv`, `candidates.csv` and `gap.png` of a diagnosis."""
     before, after = diagnosis.before, diagnosis.after
     files = {}
     if "csv" in formats:
-        files["gap.csv"] = to_csv(tables.gap_table(before.model, after.model, before.data_sets))
+        files["gap.csv"] = to_csv(tables.gap_table(before.model, after.model, before.data_sets, after.data_sets))
         files["candidates.csv"] = to_csv(tables.candidates_table(diagnosis))
     if "png" in formats:
         from bushfit.report.plots import gap_figure, to_png
 
-        files["gap.png"] = to_png(gap_figure(before.model, after.model, before.data_sets, title, diagnosis.summary))
+        figure = gap_figure(
+            before.model, after.model, before.data_sets, title, diagnosis.summary, mended=after.data_sets
+        )
+        files["gap.png"] = to_png(figure)
     return files
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bushfit.effects import effect_named
+from bushfit.effects.mistakes import candidate_named
 from bushfit.geometry import STRAINING, TRANSLATION
 from bushfit.reading.measurement import loss_factor
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
     from bushfit.geometry import Place
     from bushfit.model.model import Model
-    from bushfit.prediction import Prediction
+    from bushfit.prediction import PredictedResonance, Prediction
     from bushfit.reduction.resonance import Resonance
     from bushfit.reduction.result import Reduction
 
@@ -54,6 +54,23 @@ def prediction_table(prediction: Prediction) -> pd.DataFrame:
                 for name, (band, scale) in bands.items()
                 for end in ("low", "high")
             },
+        }
+    )
+
+
+def shaken_table(found: PredictedResonance) -> pd.DataFrame:
+    """The table of a mass on a mount: transmissibility, deformation and stiffness over frequency."""
+    import pandas as pd
+
+    (length, length_factor), _, (stiffness, factor) = found.place.display
+    return pd.DataFrame(
+        {
+            "frequency [Hz]": found.frequency,
+            "transmissibility [-]": np.abs(found.transmissibility),
+            "phase [deg]": np.degrees(np.angle(found.transmissibility)),
+            f"amplitude [{length}]": found.amplitude * length_factor,
+            f"stiffness [{stiffness}]": np.abs(found.stiffness) * factor,
+            "loss factor [-]": loss_factor(found.stiffness),
         }
     )
 
@@ -111,19 +128,24 @@ def sweeps_table(model: Model, data_sets: Sequence[SweepData]) -> pd.DataFrame:
     return pd.concat([rows(data_set) for data_set in data_sets], ignore_index=True)
 
 
-def gap_table(before: Model, after: Model, data_sets: Sequence[DataSet]) -> pd.DataFrame:
-    """Every residual of a diagnosis, before and after, in units of noise: a row per sweep point or loop row."""
+def gap_table(
+    before: Model, after: Model, data_sets: Sequence[DataSet], mended: Sequence[DataSet] | None = None
+) -> pd.DataFrame:
+    """Every residual of a diagnosis, before and after, in units of noise: a row per sweep point or loop row.
+
+    `mended` are the tests that belong to the model after, where they are others: a row says where it was recorded.
+    """
     import pandas as pd
 
-    def rows(data_set: DataSet) -> pd.DataFrame:
+    def rows(data_set: DataSet, later: DataSet) -> pd.DataFrame:
         columns: dict[str, Any] = {"test": data_set.name, "kind": data_set.kind, "direction": str(data_set.direction)}
         columns |= data_set.columns()
-        for name, model in (("before", before), ("after", after)):
-            parts = data_set.components(data_set.residual(model))
+        for name, model, test in (("before", before, data_set), ("after", after, later)):
+            parts = test.components(test.residual(model))
             columns |= {f"{part} {name} [noise]": values for part, values in parts.items()}
         return pd.DataFrame(columns)
 
-    return pd.concat([rows(data_set) for data_set in data_sets], ignore_index=True)
+    return pd.concat([rows(*pair) for pair in zip(data_sets, mended or data_sets, strict=True)], ignore_index=True)
 
 
 def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
@@ -133,7 +155,7 @@ def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
     rows = [
         {
             "effect": judged.name,
-            "level": str(effect_named(judged.name).level),
+            "level": str(candidate_named(judged.name).level),
             "score": judged.score,
             "chi-square gain": judged.gain,
             "BIC gain": judged.bic,

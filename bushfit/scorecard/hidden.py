@@ -86,18 +86,24 @@ class _OutOfReachError(Exception):
     """No amount of an effect shows at a size in range."""
 
 
-def hidden_campaign(seed: int, hidden: Sequence[str], outside: str = "") -> tuple[Simulated, Sealed]:
+def hidden_campaign(
+    seed: int,
+    hidden: Sequence[str],
+    outside: str = "",
+    directions: Sequence[Direction] = (Direction.AXIAL, Direction.RADIAL),
+) -> tuple[Simulated, Sealed]:
     """One hidden campaign; the same seed makes the same.
 
     Args:
         seed: of everything random.
         hidden: effects of the library to hide; none for a clean campaign.
         outside: one of OUTSIDE, or "".
+        directions: of the two sweeps.
     """
     random = np.random.default_rng([seed, 7])
     for _ in range(_TRIES):
         plain = _bushing(random)
-        plan = _plan(plain, random, seed)
+        plan = _plan(plain, random, seed, directions)
         with suppress(_OutOfReachError):
             model, visible = _with_hidden(plain, hidden, plan, random)
             break
@@ -128,10 +134,10 @@ def _bushing(random: Generator) -> Model:
     )
 
 
-def _plan(plain: Model, random: Generator, seed: int) -> SimulateSettings:
-    """Two directions at three levels of like strain, two loops, three repeats."""
-    top, directions = random.uniform(0.03, 0.06), (Direction.AXIAL, Direction.RADIAL)
-    axial, radial = (float(f"{top / plain.unit_strain(direction):.2g}") for direction in directions)
+def _plan(plain: Model, random: Generator, seed: int, directions: Sequence[Direction]) -> SimulateSettings:
+    """Two directions at three levels of like strain, two axial loops, three repeats."""
+    top = random.uniform(0.03, 0.06)
+    axial, second = (float(f"{top / plain.unit_strain(direction):.2g}") for direction in directions)
     shared = random.random() < 0.5
     return SimulateSettings(
         seed=seed,
@@ -144,7 +150,7 @@ def _plan(plain: Model, random: Generator, seed: int) -> SimulateSettings:
         loops=tuple(SimulatedLoop(Direction.AXIAL, factor * axial, 0.1, cycles=3) for factor in (1.0, 2.0)),
         sweeps=tuple(
             SimulatedSweep(direction, tuple((_LEVELS * largest).tolist()), _FREQUENCIES)
-            for direction, largest in zip(directions, (axial, radial), strict=True)
+            for direction, largest in zip(directions, (axial, second), strict=True)
         ),
     )
 

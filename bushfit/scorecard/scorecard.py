@@ -13,16 +13,27 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from bushfit.campaign.campaign import load_campaign
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.locate import largest_smooth_misfit
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
+from bushfit.effects.mistakes import MISTAKES, mistake_named
+from bushfit.errors import MeasurementError
 from bushfit.fitting.data import Data
 from bushfit.report.folder import write_files
 from bushfit.scorecard.hidden import OUTSIDE, Sealed, hidden_campaign, hideable
+from bushfit.scorecard.mistaken import mistaken_campaign
 from bushfit.simulation import to_files
+
+#: What is hidden in the campaigns of a card.
+Family = Literal["effects", "mistakes"]
+#: The verdict of the reader, where it does not take a file with a mistake.
+REFUSED = "refused"
 
 #: Gain in chi-square from which an effect counts as plain: ten times what chance makes.
 PLAIN = 200.0
@@ -32,13 +43,26 @@ _SLOWEST = 2.0
 _LARGEST_SET = 3
 #: Held-out gap at most, in units of noise, for a named effect to count as confirmed.
 _CONFIRMED = 1.1
-#: Shares of the kinds of campaigns in a card.
-_KINDS = {"single": 0.5, "clean": 0.2, "pair": 0.1, "outside": 0.1, "lacking": 0.1}
+#: Shares of the kinds of campaigns in a card, by its family.
+_KINDS = {
+    "effects": {"single": 0.5, "clean": 0.2, "pair": 0.1, "outside": 0.1, "lacking": 0.1},
+    "mistakes": {"mistake": 0.4, "clean": 0.6},
+}
+#: What of |K|, or of a parameter, is off where a mistake in the record matters.
+_MATTERS = 0.02
 
 
 @dataclass(frozen=True)
 class Task:
-    """One hidden campaign to make and to diagnose."""
+    """One hidden campaign to make and to diagnose.
+
+    Args:
+        kind: of the campaign.
+        seed: of its own.
+        hidden: effects; of a kind "mistake" the mistake.
+        outside: what the library does not have.
+        without: effects that the library is made to lack.
+    """
 
     kind: str
     seed: int
@@ -62,6 +86,8 @@ class Outcome:
         heldout: gap on held-out data after, in units of noise.
         covered: per hidden effect that was added: whether the 95 % interval of its amount holds the truth.
         seconds: processor time of the diagnosis, whatever else the machine does.
+        matters: of a mistake, whether it leaves more than the tolerance for a plain model, and more than _MATTERS of
+            |K| or of a parameter.
         error: what went wrong, or "".
     """
 
@@ -75,6 +101,7 @@ class Outcome:
     heldout: float
     covered: tuple[bool, ...]
     seconds: float
+    matters: bool = False
     error: str = ""
 
     @property
@@ -84,9 +111,23 @@ class Outcome:
         return all(any(name in members for members in small) or name in self.richer for name in self.task.hidden)
 
     @property
+    def mistake_told(self) -> bool:
+        """Whether the mistake, in the tests in which it was made, was named, stands in a set of at most three, or had
+        its file refused by the reader."""
+        hidden = set(self.sealed.hidden) if self.sealed else set()
+        claims = [set(self.named), *(set(other.split(" + ")) for members in self.sets for other in members[1:])]
+        small = all(len(members) <= _LARGEST_SET for members in self.sets)
+        return self.verdict == REFUSED or (hidden in claims and small)
+
+    @property
+    def mistake_alone(self) -> bool:
+        """Whether the mistake alone was named, in just the tests in which it was made."""
+        return self.verdict == "named" and self.sealed is not None and set(self.named) == set(self.sealed.hidden)
+
+    @property
     def single_wrong(self) -> bool:
         """A confident name (verdict named) that is neither the truth nor said to be a limit of it."""
-        wrong = set(self.named) - set(self.task.hidden)
+        wrong = set(self.named) - {*self.task.hidden, *(self.sealed.hidden if self.sealed else ())}
         return self.verdict == "named" and bool(wrong) and not set(self.task.hidden) & set(self.richer)
 
     @property
@@ -95,15 +136,17 @@ class Outcome:
         return self.verdict == "named" and set(self.named) == set(self.task.hidden)
 
 
-def tasks(count: int, seed: int) -> list[Task]:
-    """A balanced card: every effect alone in turn, none, pairs, outside the list, and leave-one-out."""
+def tasks(count: int, seed: int, family: Family = "effects") -> list[Task]:
+    """A balanced card: every effect alone in turn, none, pairs, outside the list, and leave-one-out; or every mistake
+    in turn, and none."""
     random = np.random.default_rng(seed)
-    names = hideable()
     made: list[Task] = []
-    for kind, share in _KINDS.items():
+    for kind, share in _KINDS[family].items():
+        names = list(MISTAKES) if kind == "mistake" else hideable()
         for number in range(max(1, round(share * count))):
             own = int(random.integers(2**31))
-            hidden: tuple[str, ...] = (names[number % len(names)],) if kind in ("single", "lacking") else ()
+            in_turn = kind in ("single", "lacking", "mistake")
+            hidden: tuple[str, ...] = (names[number % len(names)],) if in_turn else ()
             if kind == "pair":
                 hidden = tuple(random.choice(names, 2, replace=False).tolist())
             outside = OUTSIDE[number % len(OUTSIDE)] if kind == "outside" else ""
@@ -131,7 +174,10 @@ def work(task: Task, folder: Path) -> Outcome:
     place = folder / f"{task.kind}_{task.seed}"
     sealed_file = folder / "sealed" / f"{task.kind}_{task.seed}.json"
     try:
-        simulated, sealed = hidden_campaign(task.seed, task.hidden, task.outside)
+        if task.kind == "mistake":
+            simulated, sealed = mistaken_campaign(task.seed, task.hidden[0])
+        else:
+            simulated, sealed = hidden_campaign(task.seed, task.hidden, task.outside)
         files = to_files(simulated)
         del files["truth.json"]
         write_files(place, files, force=True)
@@ -141,9 +187,18 @@ def work(task: Task, folder: Path) -> Outcome:
         diagnosis = diagnose(data, None, Settings(without=task.without))
         seconds = time.process_time() - started
         truth = Sealed(**json.loads(sealed_file.read_text()))
+    except MeasurementError as refusal:
+        if task.kind != "mistake":
+            return _failed(task, refusal)
+        return Outcome(task, sealed, REFUSED, (), (), (), 0.0, 0.0, (), 0.0, matters=True)
     except Exception as wrong:  # one campaign that fails is one row of the card, and is shown there
-        return Outcome(task, None, "failed", (), (), (), 0.0, 0.0, (), 0.0, f"{type(wrong).__name__}: {wrong}")
+        return _failed(task, wrong)
     return _outcome(task, truth, diagnosis, seconds)
+
+
+def _failed(task: Task, wrong: Exception) -> Outcome:
+    error = f"{type(wrong).__name__}: {wrong}"
+    return Outcome(task, None, "failed", (), (), (), 0.0, 0.0, (), 0.0, error=error)
 
 
 def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) -> Outcome:
@@ -155,14 +210,22 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
         task,
         truth,
         diagnosis.verdict,
-        tuple(effect.name for effect in diagnosis.effects),
-        tuple((effect.name, *effect.alternatives) for effect in diagnosis.effects),
+        tuple(effect.label for effect in diagnosis.effects),
+        tuple((effect.label, *effect.alternatives) for effect in diagnosis.effects),
         tuple(name for effect in diagnosis.effects for name in effect.richer),
-        max((judged.gain or 0.0 for judged in diagnosis.candidates), default=0.0),
+        max((judged.gain or 0.0 for judged in diagnosis.candidates if not mistake_named(judged.name)), default=0.0),
         diagnosis.holdout.after,
         tuple(covered),
         seconds,
+        task.kind == "mistake" and _matters(diagnosis.before, truth),
     )
+
+
+def _matters(before: Evidence, truth: Sealed) -> bool:
+    """Whether a mistake shows at all, and leaves more than _MATTERS of |K| or of a parameter."""
+    gap = largest_smooth_misfit(before)
+    off = max(abs(before.model.values[name] / value - 1.0) for name, value in truth.values.items())
+    return gap > Settings().tolerance and max(gap, off) > _MATTERS
 
 
 @dataclass(frozen=True)
@@ -179,13 +242,14 @@ class Row:
 def card(outcomes: Sequence[Outcome]) -> list[Row]:
     """Every target of the workflow, measured."""
     good = [outcome for outcome in outcomes if not outcome.error]
-    kinds = {kind: [outcome for outcome in good if outcome.task.kind == kind] for kind in _KINDS}
+    if any(outcome.task.kind == "mistake" for outcome in good):
+        return _card_of_mistakes(good)
+    kinds = {kind: [outcome for outcome in good if outcome.task.kind == kind] for kind in _KINDS["effects"]}
     single, clean, pair, outside, lacking = kinds.values()
     plain = [outcome for outcome in single if outcome.gain >= PLAIN]
     named = [outcome for outcome in good if outcome.verdict == "named" and outcome.task.hidden]
     covered = [hit for outcome in good if outcome.exact for hit in outcome.covered]
     strange, hidden = [*outside, *lacking], [*single, *pair, *outside]
-    seconds = [outcome.seconds for outcome in good]
     shares: list[tuple[str, Sequence[Outcome], Callable[[Outcome], bool], str, float, float]] = [
         ("false alarm on clean campaigns", clean, lambda o: o.verdict != "consistent", "<= 1 %", 0.0, 0.01),
         ("truth named alone or in a set of at most three", single, lambda o: o.truth_in_sets, ">= 97 %", 0.97, 1.0),
@@ -209,10 +273,36 @@ def card(outcomes: Sequence[Outcome]) -> list[Row]:
     sizes = [len(members) for outcome in good for members in outcome.sets]
     members = f"{np.mean(sizes):.2f} / {max(sizes)}" if sizes else "no case"
     rows.append(Row("size of the sets of names, mean / largest", members, len(sizes), "", None))
+    return [*rows, _time(good)]
+
+
+def _card_of_mistakes(good: Sequence[Outcome]) -> list[Row]:
+    """Every target of mistakes in the record, measured."""
+    made, clean = ([outcome for outcome in good if outcome.task.kind == kind] for kind in _KINDS["mistakes"])
+    matters = [outcome for outcome in made if outcome.matters]
+    silent = [outcome for outcome in made if not outcome.matters]
+    told, alone, wrong, alarm = (
+        [outcome.mistake_told for outcome in matters],
+        [outcome.mistake_alone for outcome in matters if outcome.verdict != REFUSED],
+        [outcome.single_wrong for outcome in made],
+        [outcome.verdict != "consistent" for outcome in clean],
+    )
+    return [
+        _share("mistake told where it matters", told, ">= 95 %", 0.95, 1.0),
+        _share("  of these by the reader, which refuses the file", [o.verdict == REFUSED for o in matters], "", 0, 1),
+        _share("  of what can be read: named alone", alone, "", 0.0, 1.0),
+        _share("told where it does not matter or cannot show", [o.mistake_told for o in silent], "", 0.0, 1.0),
+        _share("another mistake or an effect named", wrong, "<= 1 %", 0.0, 0.01),
+        _share("anything named on clean campaigns", alarm, "<= 1 %", 0.0, 0.01),
+        _time(good),
+    ]
+
+
+def _time(good: Sequence[Outcome]) -> Row:
+    seconds = [outcome.seconds for outcome in good]
     took = f"{np.median(seconds):.1f} s / {max(seconds):.1f} s" if seconds else "no case"
     met = bool(max(seconds) <= _SLOWEST) if seconds else None
-    rows.append(Row("processor time of one diagnosis, median / longest", took, len(seconds), "<= 2 s", met))
-    return rows
+    return Row("processor time of one diagnosis, median / longest", took, len(seconds), "<= 2 s", met)
 
 
 def _share(measure: str, hits: Sequence[bool], target: str, low: float, high: float) -> Row:
@@ -226,7 +316,8 @@ def confusion(outcomes: Sequence[Outcome]) -> dict[str, Counter[str]]:
     """Per hidden effect (or kind): how often which verdict with which names was given."""
     table: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for outcome in outcomes:
-        truth = " + ".join(outcome.task.hidden) or outcome.task.outside or "none"
+        hidden = outcome.sealed.hidden if outcome.sealed else outcome.task.hidden
+        truth = " + ".join(hidden) or outcome.task.outside or "none"
         lacks = " (library lacks it)" if outcome.task.without else ""
         sets = " + ".join("|".join(members) for members in outcome.sets)
         table[truth + lacks][": ".join(filter(None, (outcome.verdict, sets)))] += 1

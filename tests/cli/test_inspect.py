@@ -114,7 +114,7 @@ def test_an_error_names_the_option_that_settles_it(
     ("header", "said", "unsaid"),
     [
         ("frequency [Hz],amplitude [mm],K7 [N/mm],loss factor [-]", "--column stiffness=...", "force="),
-        ("x [Hz],amplitude [mm],stiffness [N/mm],loss factor [-]", "--column frequency=...", "force="),
+        ("x [Hz],amplitude [mm],stiffness [N/mm],loss factor [-]", "--at-frequency", "force="),
         ("frequency [Hz],amplitude,stiffness [N/mm],loss factor [-]", '--unit "amplitude=', "--amplitude"),
         ("frequency [Hz],amplitude [mm],stiffness [N/mm],K* [N/mm]", "could be the stiffness", "force"),
     ],
@@ -202,7 +202,7 @@ def test_a_column_is_named_where_it_stands(typed: Callable, tmp_path: Path) -> N
             ("amplitude [mm]", "amplitude [mm]"),
             ('axial_0.csv, line 1: there is no column "Pegel SS"', "the header that"),
         ),
-        (("Pegel SS [mm]", "Niveau [mm]"), ("axial_1.csv, line 1", "--column amplitude=...")),
+        (("Pegel SS [mm]", "Niveau [mm]"), ("axial_1.csv, line 1", '--column "amplitude=..."', "--at-amplitude")),
     ],
 )
 def test_a_column_that_no_file_has_is_refused(

@@ -11,7 +11,6 @@ from looking import look, without
 from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
 from bushfit.inspection.draft import file_text
-from bushfit.inspection.labels import labelled
 from bushfit.inspection.opening import inspect
 from bushfit.reading.csvfile import raw_loop_table, to_csv
 from bushfit.reading.measurement import Loop, Sweep
@@ -38,11 +37,7 @@ def test_label_of_a_sweep(sweep: Sweep, tmp_path: Path) -> None:
     assert look(tmp_path, one, "sweep_axial_0.2mm.csv").looked.odd == ()
     (said,) = look(tmp_path, one, "sweep_axial_0.4mm.csv").looked.odd
     assert "the amplitude is 0.2 mm zero-to-peak: the name may count peak-to-peak" in said
-
-
-def test_labels_are_read_with_their_units() -> None:
-    assert labelled(Path("a_0,25mm_300um_2deg.csv"), "m") == [("0.25 mm", 2.5e-4), ("300 µm", pytest.approx(3e-4))]
-    assert labelled(Path("x_50mHz.csv"), "Hz") == [("50 mHz", pytest.approx(0.05))]
+    assert look(tmp_path, one, "sweep_axial_0.4mm_pp.csv").looked.odd == ()
 
 
 @pytest.mark.parametrize(

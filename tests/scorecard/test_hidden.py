@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 
 from bushfit.effects import BASE
+from bushfit.effects.mistakes import MISTAKES
+from bushfit.geometry import ROTATION, Direction
 from bushfit.model.model import FIVE
+from bushfit.reading.measurement import Loop
 from bushfit.scorecard.hidden import OUTSIDE, hidden_campaign, hideable
+from bushfit.scorecard.mistaken import mistaken_campaign
 
 
 def test_the_same_seed_makes_the_same_campaign() -> None:
@@ -49,3 +53,22 @@ def test_what_the_library_lacks_disturbs_the_tests_and_not_the_model(outside: st
 def test_every_effect_but_the_paper_s_can_be_hidden() -> None:
     assert not set(hideable()) & set(BASE)
     assert {"inertia", "rig_compliance", "delay"} <= set(hideable())
+
+
+@pytest.mark.parametrize("name", [name for name in MISTAKES if name != "diameters"])
+def test_a_mistake_mends_what_the_card_makes(name: str) -> None:
+    """What is written into a file with a mistake is the clean test again, once it is mended."""
+    turns = MISTAKES[name].motion is ROTATION
+    directions = (Direction.AXIAL, Direction.TORSION if turns else Direction.RADIAL)
+    (clean, _), (stated, sealed) = hidden_campaign(5, (), directions=directions), mistaken_campaign(5, name)
+    names = {label.partition(":")[2] for label in sealed.hidden}
+    assert names
+    for true, made in zip((*clean.loops, *clean.sweeps), (*stated.loops, *stated.sweeps), strict=True):
+        assert true.name == made.name
+        mended = MISTAKES[name].mended(made) if made.name in names else made
+        assert mended is not None
+        assert mended.direction is true.direction
+        columns = ("time", "displacement", "force") if isinstance(true, Loop) else ("amplitude", "stiffness")
+        for column in columns:
+            assert np.allclose(getattr(mended, column), getattr(true, column), rtol=1e-9)
+            assert made.name in names or np.array_equal(getattr(made, column), getattr(true, column))

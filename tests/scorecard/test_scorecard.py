@@ -13,6 +13,7 @@ import pytest
 
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import BASE, LIBRARY
+from bushfit.effects.mistakes import MISTAKES
 from bushfit.scorecard.hidden import OUTSIDE, hideable
 from bushfit.scorecard.scorecard import Outcome, Task, card, confusion, run, tasks
 
@@ -196,3 +197,45 @@ def test_confusion_is_by_truth() -> None:
         "inertia (library lacks it)": {"unexplained": 1},
         "none": {"consistent": 1},
     }
+
+
+def test_a_card_of_mistakes_has_every_mistake_and_clean_campaigns() -> None:
+    large = tasks(500, 1, "mistakes")
+    assert {kind: sum(task.kind == kind for task in large) for kind in ("mistake", "clean")} == {
+        "mistake": 200,
+        "clean": 300,
+    }
+    assert {task.hidden[0] for task in large if task.kind == "mistake"} == set(MISTAKES)
+
+
+@pytest.fixture(scope="module")
+def mistaken(tmp_path_factory: pytest.TempPathFactory) -> list[Outcome]:
+    """The first of the mistakes, which are the most frequent, and as many clean campaigns."""
+    large = tasks(500, 7, "mistakes")
+    chosen = [next(task for task in large if task.hidden == hidden) for hidden in (("peak_to_peak",), ("inch",), ())]
+    return run([*chosen, Task("mistake", 6, ("complement",))], tmp_path_factory.mktemp("mistaken"), 1, lambda: None)
+
+
+def test_mistakes_are_told_and_none_is_made_up(mistaken: list[Outcome]) -> None:
+    for outcome in mistaken:
+        print(outcome.task.hidden, outcome.verdict, outcome.named, f"matters: {outcome.matters}")
+    peaks, inches, clean, refused = mistaken
+    assert peaks.mistake_alone
+    assert inches.mistake_alone
+    assert not any(outcome.single_wrong for outcome in mistaken)
+    assert (clean.verdict, clean.named) == ("consistent", ())
+    assert refused.verdict == "refused"
+    rows = {row.measure: row for row in card(mistaken)}
+    for row in rows.values():
+        print(row)
+    assert rows["mistake told where it matters"].met
+    assert rows["another mistake or an effect named"].met
+    assert rows["anything named on clean campaigns"].met
+
+
+def test_another_mistake_counts_as_wrong(mistaken: list[Outcome]) -> None:
+    wrong = replace(mistaken[1], named=("pound_per_inch:sweep_axial",), sets=(("pound_per_inch:sweep_axial",),))
+    assert wrong.single_wrong
+    assert not any((wrong.mistake_told, wrong.mistake_alone))
+    rows = {row.measure: row for row in card([wrong, mistaken[2]])}
+    assert not rows["another mistake or an effect named"].met

@@ -20,7 +20,7 @@ from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, parted
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.report.plots.fits import loop_labels, loops_legend
-from bushfit.report.plots.misfit import Curve, Map, Side, columns, has_holes, side_of
+from bushfit.report.plots.misfit import Curve, Map, Side, columns, has_holes, replaced, side_of
 from bushfit.report.plots.points import SECTORS, Kind, by_direction, by_kind
 from bushfit.report.plots.prediction import axis_label
 from bushfit.report.plots.style import (
@@ -92,7 +92,15 @@ _SUMMARY_LETTERS = 92
 _COLUMN_LETTERS = 40
 
 
-def gap_figure(before: Model, after: Model, data_sets: Sequence[DataSet], title: str, summary: str) -> Figure:
+def gap_figure(
+    before: Model,
+    after: Model,
+    data_sets: Sequence[DataSet],
+    title: str,
+    summary: str,
+    *,
+    mended: Sequence[DataSet] | None = None,
+) -> Figure:
     """How far measurement and model are apart, before and after: sweeps over frequency and amplitude, loops over phase.
 
     Every value is measured less model, the mean of the repeats or of a sector of the cycle, in units of the noise of
@@ -105,10 +113,17 @@ def gap_figure(before: Model, after: Model, data_sets: Sequence[DataSet], title:
         data_sets: the tests of the diagnosis, at least one.
         title: names the bushing.
         summary: the finding in a sentence or two.
+        mended: the tests that belong to the model after, where they are others; drawn where they were recorded.
     """
     every_loop, every_sweep = parted(data_sets)
     loops, sweeps = by_direction(every_loop), by_kind(every_sweep)
-    sides = [side_of(model, name, data_sets, sweeps, loops) for model, name in columns(before, after, data_sets)]
+    later = dict(zip(data_sets, mended or data_sets, strict=True))
+    sides = [
+        side_of(model, name, list(tests.values()), replaced(sweeps, tests), replaced(loops, tests))
+        for (model, name), tests in zip(
+            columns(before, after, later), ({test: test for test in later}, later), strict=False
+        )
+    ]
     rows = [(kind, part) for kind in sweeps for part in ("storage", "loss")]
     heights = [_map_height(sides[0].maps[kind]) for kind, _ in rows]
     heights += [_loops_height(mine, len(sides)) for mine in loops.values()]

@@ -45,7 +45,7 @@ def inspection_figure(files: Sequence[Inspected]) -> Figure:
     grid = figure.add_gridspec(len(files), 1)
     for row, seen in enumerate(files):
         place = grid[row, 0]
-        name = file_name(seen.file.name, _NAME_LETTERS)
+        name = file_name(seen.label, _NAME_LETTERS)
         words = f"{seen.kind}, {seen.direction or 'direction unknown'}"
         words += ", force turned" * (seen.entry.get("force_sign") == -1)
         title = f"{name}: {words}" + (f", {len(seen.looked.odd)} odd" if seen.looked.odd else "")

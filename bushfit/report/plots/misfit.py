@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar, cast
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.report.plots.points import Kind, Repeats, held_beside, over_sectors
+
+_T = TypeVar("_T", SweepData, LoopData)
+_K = TypeVar("_K")
 
 #: Most rows of a map: each is then 1.7 mm high, and its bars and the lines between rows are still seen.
 _MOST_ROWS = 24
@@ -52,12 +55,22 @@ class Side(NamedTuple):
     loops: Mapping[Place, Sequence[Curve]]
 
 
-def columns(before: Model, after: Model, data_sets: Sequence[DataSet]) -> list[tuple[Model, str]]:
-    """The models that stand side by side, and their titles: one model where both respond alike."""
-    if all(np.array_equal(data_set.residual(before), data_set.residual(after)) for data_set in data_sets):
+def columns(before: Model, after: Model, later: Mapping[DataSet, DataSet]) -> list[tuple[Model, str]]:
+    """The models that stand side by side, and their titles: one model where both respond alike.
+
+    `later` has for each test the one that belongs to the model after: the same, or the test as mended.
+    """
+    if all(np.array_equal(test.residual(before), mended.residual(after)) for test, mended in later.items()):
         return [(before, "nothing added")]
+    if any(test is not mended for test, mended in later.items()):
+        return [(before, "the tests as they are"), (after, "if the record is mistaken")]
     added = [name for name in after.effects if name not in before.effects]
     return [(before, "before"), (after, f"after adding {' and '.join(added)}" if added else "after")]
+
+
+def replaced(tests: Mapping[_K, Sequence[_T]], later: Mapping[DataSet, DataSet]) -> dict[_K, list[_T]]:
+    """The tests as mended, under the directions they were recorded as."""
+    return {kind: [cast(_T, later[test]) for test in mine] for kind, mine in tests.items()}
 
 
 def side_of(

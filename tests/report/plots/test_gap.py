@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -222,3 +223,17 @@ def test_numbers_of_the_scale_stay_apart(paper_model: Model, swept: Swept, stiff
     boxes = [label.get_window_extent() for label in labels]
     assert all(right.x0 - left.x1 > 2.0 for left, right in pairwise(boxes))
     assert labels[-1].get_text() == f"{bar.get_xticks()[-1]:g}", "where the scale ends"
+
+
+def test_a_mended_test_is_drawn_where_it_was_recorded(paper_model: Model, swept: Swept) -> None:
+    """A radial sweep that was filed as axial: after, it is one of the radial direction, in the same row."""
+    radial = swept(paper_model, Direction.RADIAL)
+    filed = replace(radial, sweep=replace(radial.sweep, direction=Direction.AXIAL))
+    figure = gap_figure(paper_model, paper_model, [filed], "mount", "", mended=[radial])
+    assert names(figure) == ["axial storage", "axial loss"]
+    (before, after) = headings(figure)
+    print(before, "|", after)
+    assert before.startswith("the tests as they are")
+    assert after.startswith("if the record is mistaken")
+    storage = maps(figure)[:2]
+    assert np.abs(values(storage[0])).min() > 10.0 > 3.0 * np.sqrt(np.mean(np.square(values(storage[1]))))

@@ -1,0 +1,295 @@
+"""Mistakes in the record: would the tests agree if one of them were read in another way?
+
+A mistake has no free parameter, so it costs only the logarithm of how many were looked at; in turn it has to close the
+whole gap, and to beat every effect and every fault. Nothing is mended here unless the user adopts it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from bushfit.effects import BASE
+from bushfit.effects.contract import Array
+from bushfit.effects.mistake import Mistake, shown
+from bushfit.effects.mistakes import MISTAKES, SEPARATOR, labelled, mistake_named
+from bushfit.errors import ModelError
+from bushfit.fitting.data import Data
+from bushfit.fitting.data_set import DataSet
+from bushfit.fitting.data_sets import SweepData, loop_data, sweep_data
+from bushfit.geometry import Bushing, Place
+from bushfit.model.model import Model
+from bushfit.reading.measurement import Loop, Sweep
+
+#: Values of alpha that are tried before any fit: those of all rubbers.
+_ALPHA = np.linspace(0.05, 0.6, 10)
+#: Values of eps_half that are tried before any fit: those of all filled rubbers, with room for amplitudes 2 times off.
+_EPS_HALF = np.geomspace(2e-4, 0.2, 24)
+#: Least relative error of a point that is tried before any fit: what the grid of values misses by.
+_COARSE = 1e-3
+#: Points of a test that are tried before any fit at most: they show its shape.
+_MOST_POINTS = 60
+#: Misfit of a claim over that of the tests as they are, before any fit, up to which it is worth a fit: the grid misses
+#: what is small.
+_WORTH_A_FIT = 1.3
+#: Share by which a claim changes the misfit at least; one that does not has a twin among the parameters.
+_LEAST_CHANGE = 1e-6
+#: Share of mu in a modulus that keeps three columns from being one.
+_RIDGE = 1e-12
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One mistake, made alike in some tests.
+
+    Args:
+        mistake: which.
+        tests: the data sets it was made in, by their place; none for [bushing].
+    """
+
+    mistake: Mistake
+    tests: tuple[int, ...]
+
+    @property
+    def each(self) -> list[Claim]:
+        """The same of each test alone."""
+        return [Claim(self.mistake, (place,)) for place in self.tests] or [self]
+
+    def test(self, data: Data) -> str | None:
+        """The name of its one test; None of [bushing]."""
+        return [*data.loops, *data.sweeps][self.tests[0]].name if self.tests else None
+
+    def labels(self, data: Data) -> tuple[str, ...]:
+        """The mistake with each of its tests, as --adopt takes it."""
+        return tuple(labelled(self.mistake.name, one.test(data)) for one in self.each)
+
+    def words(self, data: Data) -> str:
+        """What would be so, in words."""
+        every = [*data.loops, *data.sweeps]
+        files = [shown(every[place].test) for place in self.tests]
+        return self.mistake.sentence.format(files=" and ".join(filter(None, (", ".join(files[:-1]), *files[-1:]))))
+
+    def corrections(self, data: Data) -> tuple[str, ...]:
+        """What to write into the campaign, a line each."""
+        every = [*data.loops, *data.sweeps]
+        return tuple(self.mistake.corrected(every[place].test) for place in self.tests) or (
+            self.mistake.corrected(None),
+        )
+
+    def mended(self, data: Data) -> Data:
+        """The campaign as it was measured if the mistake was made."""
+        campaign = data.campaign
+        if not self.tests:
+            bushing = campaign.bushing and self.mistake.mended_bushing(campaign.bushing)
+            return replace(data, campaign=replace(campaign, bushing=bushing))
+        loops, sweeps, count = list(data.loops), [sweep.test for sweep in data.sweeps], len(data.loops)
+        for place in self.tests:
+            test = self.mistake.mended([*data.loops, *data.sweeps][place].test)
+            if isinstance(test, Loop):
+                loops[place] = loop_data([test], without_outliers=data.robust)[0]
+            elif isinstance(test, Sweep):
+                sweeps[place - count] = test
+        if all(place < count for place in self.tests):
+            return replace(data, loops=tuple(loops))
+        return replace(data, loops=tuple(loops), sweeps=tuple(sweep_data(sweeps, campaign.fit.residuals)))
+
+
+def adopted(data: Data, names: Collection[str]) -> tuple[Data, list[str]]:
+    """The campaign with mistakes mended that the user adopts, and a sentence on each.
+
+    Raises:
+        ModelError: a mistake that was not made in the test named, or no such test.
+    """
+    said = []
+    for name in names:
+        claim = _claimed(data, name)
+        said.append(f"mended by --adopt {name}: read as if {claim.words(data)}; {claim.corrections(data)[0]}")
+        data = claim.mended(data)
+    return data, said
+
+
+def _claimed(data: Data, name: str) -> Claim:
+    """What one --adopt claims."""
+    mistake, test = mistake_named(name), name.partition(SEPARATOR)[2]
+    every = [*data.loops, *data.sweeps]
+    possible = [place for place, one in enumerate(every) if mistake and mistake.possible(one.test)]
+    tests = tuple(place for place in possible if every[place].name == test)
+    if mistake is None or bool(tests) != bool(mistake.kinds) or (test and not tests):
+        expected = [labelled(name.partition(SEPARATOR)[0], every[place].name) for place in possible]
+        raise ModelError(
+            "this mistake cannot have been made there",
+            found=name,
+            expected="one of " + ", ".join(expected) if expected else "another mistake: no test has room for this one",
+        )
+    return Claim(mistake, tests)
+
+
+def claims(data: Data, without: Collection[str]) -> list[Claim]:
+    """Every mistake that may have been made: in one test, in all of a kind or of a direction, or in all."""
+    every: list[DataSet] = [*data.loops, *data.sweeps]
+    found = []
+    for mistake in MISTAKES.values():
+        if mistake.name in without:
+            continue
+        if not mistake.kinds:
+            found += [Claim(mistake, ())] if data.campaign.bushing else []
+            continue
+        places = [
+            place
+            for place, data_set in enumerate(every)
+            if mistake.possible(data_set.test) and labelled(mistake.name, data_set.name) not in without
+        ]
+        groups: list[tuple[int, ...]] = [(place,) for place in places]
+        groups += [tuple(p for p in places if every[p].kind == kind) for kind in ("loop", "sweep")]
+        directions = dict.fromkeys(data_set.direction for data_set in every)
+        groups += [tuple(p for p in places if every[p].direction == direction) for direction in directions]
+        found += [Claim(mistake, group) for group in dict.fromkeys([*groups, tuple(places)]) if group]
+    return found
+
+
+class _Normal(NamedTuple):
+    """Normal equations at each point of a grid.
+
+    Args:
+        gram: products of the columns, (g, 3, 3).
+        along: products of the columns and what is to be met, (g, 3).
+        total: sum of squares of what is to be met.
+    """
+
+    gram: Array
+    along: Array
+    total: float
+
+    @classmethod
+    def summed(cls, parts: Sequence[_Normal]) -> _Normal:
+        """The equations of several tests together."""
+        gram, along = np.sum([part.gram for part in parts], axis=0), np.sum([part.along for part in parts], axis=0)
+        return cls(gram, along, sum(part.total for part in parts))
+
+
+@dataclass(frozen=True, eq=False)
+class Screen:
+    """How well the plain model could meet the tests under each claim, before any fit.
+
+    The stiffness is linear in mu, m and sigma_fmax; alpha and eps_half are tried on a grid. What a test adds to the
+    normal equations depends on that test alone, so that claims about many tests are sums.
+    """
+
+    data: Data
+
+    def best(self, found: Sequence[Claim], most: int) -> list[Claim]:
+        """The claims under which the tests could agree best, as far as these are worth a fit."""
+        before, misfits = self.misfit(None), np.array([self.misfit(claim) for claim in found])
+        changed = np.abs(misfits - before) > _LEAST_CHANGE * before
+        order = np.argsort(misfits, kind="stable")
+        return [found[place] for place in order if changed[place] and misfits[place] < _WORTH_A_FIT * before][:most]
+
+    def misfit(self, claim: Claim | None) -> float:
+        """Least sum of squares over the grid, in units of a coarse noise; infinite where no model has a response."""
+        bushing = self.data.campaign.bushing
+        if claim and not claim.tests and bushing:
+            bushing = claim.mistake.mended_bushing(bushing)
+        try:
+            whole = self._whole(bushing)
+            if claim:
+                mended = [self._part(place, claim.mistake, bushing) for place in claim.tests]
+                plain = [self._part(place, None, bushing) for place in claim.tests]
+                whole = _Normal.summed([whole, *mended, *(_Normal(-g, -a, -t) for g, a, t in plain)])
+        except ModelError:  # a shape for which a formula was not checked
+            return np.inf
+        scale = np.sqrt(np.einsum("gii->gi", whole.gram)) + 1e-300
+        unit = whole.gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(3)
+        right = whole.along / scale
+        explained = np.einsum("gi,gi->g", right, np.linalg.solve(unit, right[..., None])[..., 0])
+        return max(_least((whole.total - explained).reshape(_EPS_HALF.size, _ALPHA.size)), 0.0)
+
+    def _whole(self, bushing: Bushing | None) -> _Normal:
+        """The normal equations of all tests as they are."""
+        key, count = (-1, "", bushing), len(self.data.loops) + len(self.data.sweeps)
+        if key not in self._known:
+            self._known[key] = _Normal.summed([self._part(place, None, bushing) for place in range(count)])
+        return self._known[key]
+
+    @cached_property
+    def _known(self) -> dict[tuple[int, str, Bushing | None], _Normal]:
+        return {}
+
+    def _part(self, place: int, mistake: Mistake | None, bushing: Bushing | None) -> _Normal:
+        """What a test adds to the normal equations."""
+        key = (place, mistake.name if mistake else "", bushing)
+        if key not in self._known:
+            data_set = [*self.data.loops, *self.data.sweeps][place]
+            direction, frequency, amplitude, stiffness, error = _points(data_set, mistake)
+            columns = self._columns(bushing, direction, frequency, amplitude) / (stiffness * error)
+            columns = np.concatenate((columns.real, columns.imag), axis=-1)
+            wanted = np.concatenate((1.0 / error, np.zeros_like(error)))
+            gram = columns @ columns.transpose(0, 2, 1)
+            self._known[key] = _Normal(gram, columns @ wanted, float(wanted @ wanted))
+        return self._known[key]
+
+    def _columns(self, bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
+        """`_columns`, once for all mistakes that leave the operating points as they are."""
+        key = (bushing, direction, frequency.tobytes(), amplitude.tobytes())
+        if key not in self._responses:
+            self._responses[key] = _columns(bushing, direction, frequency, amplitude)
+        return self._responses[key]
+
+    @cached_property
+    def _responses(self) -> dict[tuple[Bushing | None, Place, bytes, bytes], Array]:
+        return {}
+
+
+def _least(misfit: Array) -> float:
+    """The least value between the points of a grid, by a paraboloid through the least point and its neighbours."""
+    row, column = (
+        int(np.clip(i, 1, n - 2))
+        for i, n in zip(np.unravel_index(int(np.argmin(misfit)), misfit.shape), misfit.shape, strict=True)
+    )
+    y, x = (axis.ravel() for axis in np.mgrid[-1:2, -1:2])
+    near = misfit[row - 1 : row + 2, column - 1 : column + 2].ravel()
+    terms = np.stack((np.ones(9), x, y, x**2, x * y, y**2), axis=1)
+    _, *slope, xx, xy, yy = np.linalg.lstsq(terms, near, rcond=None)[0].tolist()
+    if xx <= 0.0 or 4.0 * xx * yy <= xy**2:
+        return float(near.min())
+    step = np.clip(np.linalg.solve([[2.0 * xx, xy], [xy, 2.0 * yy]], np.negative(slope)), -1.0, 1.0)
+    fall = float(np.dot(slope, step) + xx * step[0] ** 2 + xy * step[0] * step[1] + yy * step[1] ** 2)
+    return float(near[4]) + min(fall, 0.0)
+
+
+def _columns(bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
+    """Stiffness for each unit of mu, m and sigma_fmax at every alpha and eps_half of the grid, (g, 3, n)."""
+    names = ("mu", "m", "sigma_fmax")
+    alpha, eps_half = (axis.reshape(-1, 1) for axis in np.meshgrid(_ALPHA, _EPS_HALF))
+    model = Model.started(bushing, BASE, {})
+    none = {**dict.fromkeys(names, 0.0), "alpha": alpha, "eps_half": eps_half}
+    each = [
+        np.broadcast_to(
+            model.stiffness(direction, frequency, amplitude, values={**none, name: 1.0}), (alpha.size, frequency.size)
+        )
+        for name in names
+    ]
+    return np.stack(each, axis=1)
+
+
+def _points(data_set: DataSet, mistake: Mistake | None) -> tuple[Place, Array, Array, Array, Array]:
+    """Direction, frequency, amplitude, stiffness and relative error of a test's points, (n,) each, as mended."""
+    if isinstance(data_set, SweepData):
+        sweep, noise = data_set.sweep, np.hypot(data_set.relative_noise, max(data_set.noise.shared))
+        mended = (mistake and mistake.mended_sweep(sweep)) or sweep
+    else:
+        sweep, noise = (
+            Sweep(data_set.name, data_set.direction, data_set.frequency, data_set.amplitude, data_set.measured),
+            0.0,
+        )
+        mended = mistake.mended_cycle(sweep) if mistake else sweep
+    points = np.stack((mended.frequency, mended.amplitude_reached))
+    distinct, place, count = np.unique(points, axis=1, return_inverse=True, return_counts=True)
+    place = place.ravel()
+    mean = (np.bincount(place, mended.stiffness.real) + 1j * np.bincount(place, mended.stiffness.imag)) / count
+    thin = np.unique(np.linspace(0, count.size - 1, min(count.size, _MOST_POINTS)).round().astype(int))
+    error = np.hypot(noise / np.sqrt(count[thin]), _COARSE)
+    return mended.direction, *distinct[:, thin], mean[thin], error

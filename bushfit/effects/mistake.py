@@ -1,0 +1,116 @@
+"""The record that describes one mistake in what a file says, and the test as it was measured if it was made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from bushfit.effects.contract import Effect, Level
+from bushfit.geometry import Bushing, Direction, Motion, Place
+from bushfit.reading.measurement import Complex, Loop, Sweep
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mistake(Effect):
+    """What the record says is not what was measured.
+
+    `sentence` is what would be so, with a slot for the files: "the amplitudes of {files} are peak-to-peak".
+
+    Args:
+        line: what to write into the campaign, or to correct where no key does it.
+        sweep_line: the same for a sweep, where it differs.
+        kinds: tests in which it is made; none for one that is made in [bushing].
+        motion: of the tests in which it is made; None for any.
+        displacement, force, time: true value over the one stated.
+        stiffness: true complex stiffness by the one stated, (n,) each, for what the three factors cannot say; of a
+            sweep only.
+        doubt: whether a complex stiffness as stated leaves room for the mistake; None for always.
+        swaps: whether the direction is another one.
+    """
+
+    level: Level = Level.RECORD
+    parameters: tuple[()] = ()
+    source: str = "usage in test laboratories"
+    line: str
+    sweep_line: str = ""
+    kinds: tuple[Literal["sweep", "loop"], ...]
+    motion: Motion | None = None
+    displacement: float = 1.0
+    force: float = 1.0
+    time: float = 1.0
+    stiffness: Callable[[Complex], Complex] | None = None
+    doubt: Callable[[Complex], bool] | None = None
+    swaps: bool = False
+
+    def mended(self, test: Loop | Sweep) -> Loop | Sweep | None:
+        """The test as it was measured if this mistake was made in it; None where it cannot have been made."""
+        return self.mended_loop(test) if isinstance(test, Loop) else self.mended_sweep(test)
+
+    def mended_loop(self, loop: Loop) -> Loop | None:
+        """The same of a loop."""
+        if not self.possible(loop):
+            return None
+        return replace(
+            loop,
+            direction=self._direction(loop.direction),
+            time=self.time * loop.time,
+            displacement=self.displacement * loop.displacement,
+            force=self.force * loop.force,
+        )
+
+    def mended_sweep(self, sweep: Sweep) -> Sweep | None:
+        """The same of a sweep."""
+        if not self.possible(sweep):
+            return None
+        return replace(
+            sweep,
+            direction=self._direction(sweep.direction),
+            amplitude=self.displacement * sweep.amplitude,
+            reached=None if sweep.reached is None else self.displacement * sweep.reached,
+            stiffness=self.force * (self.stiffness(sweep.stiffness) if self.stiffness else sweep.stiffness),
+        )
+
+    def mended_cycle(self, cycle: Sweep) -> Sweep:
+        """The fundamental of a mended loop, from the fundamental of the loop as stated."""
+        return replace(
+            cycle,
+            direction=self._direction(cycle.direction),
+            frequency=cycle.frequency / self.time,
+            amplitude=self.displacement * cycle.amplitude,
+            stiffness=self.force / self.displacement * cycle.stiffness,
+        )
+
+    def possible(self, test: Loop | Sweep) -> bool:
+        """Whether it can have been made in a test."""
+        kind, place = "loop" if isinstance(test, Loop) else "sweep", test.direction
+        fits = kind in self.kinds and self.motion in (None, place.motion)
+        doubtful = self.doubt is None or (isinstance(test, Sweep) and self.doubt(test.stiffness))
+        return fits and doubtful and not (self.swaps and other_direction(place) is None)
+
+    def _direction(self, place: Place) -> Place:
+        return (other_direction(place) if self.swaps else None) or place
+
+    def mended_bushing(self, bushing: Bushing) -> Bushing:
+        """The bushing whose radii were stated as diameters."""
+        return replace(bushing, inner_radius=bushing.inner_radius / 2.0, outer_radius=bushing.outer_radius / 2.0)
+
+    def corrected(self, test: Loop | Sweep | None) -> str:
+        """What to write into the campaign for a test, or to correct in its file; None stands for the bushing."""
+        if test is None:
+            return self.line
+        other = other_direction(test.direction) if self.swaps else None
+        kind, line = ("loops", self.line) if isinstance(test, Loop) else ("sweeps", self.sweep_line or self.line)
+        return f"[[{kind}]] of {shown(test)}: {line.format(direction=other)}"
+
+
+def shown(test: Loop | Sweep) -> str:
+    """The file of a test, or its name where it came from none."""
+    return test.source.file.name if test.source else test.name
+
+
+def other_direction(place: Place) -> Direction | None:
+    """Radial for axial and the reverse; None for what cannot be taken for either."""
+    if place is Direction.AXIAL:
+        return Direction.RADIAL
+    return Direction.AXIAL if place is Direction.RADIAL else None

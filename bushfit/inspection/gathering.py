@@ -1,0 +1,177 @@
+"""The tests among files, the sheets of workbooks, and the files of folders."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from bushfit.campaign.campaign import TEST_FILES
+from bushfit.errors import BushfitError, NoColumnError, NoTestError
+from bushfit.inspection.opening import inspect
+from bushfit.inspection.recognition import open_table, recognised
+from bushfit.inspection.record import Inspected
+from bushfit.reading.names import Said, stated_above
+from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
+from bushfit.reading.workbook import sheets
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file, or a sheet of a workbook with several, that holds a test.
+
+    Args:
+        file: the file.
+        sheet: the sheet; None for a whole file.
+        is_named: whether the user named this very file, and not its folder.
+        stated: keys of [[loops]] and [[sweeps]] that the user states of it.
+        beside: what the sheets of its workbook without a test say of all its tests.
+    """
+
+    file: Path
+    sheet: str | None = None
+    is_named: bool = True
+    stated: Mapping[str, Any] | None = None
+    beside: Said | None = None
+
+    def __str__(self) -> str:
+        return f"{self.file}, sheet {self.sheet}" if self.sheet else str(self.file)
+
+    def inspect(self) -> Inspected:
+        """See `opening.inspect`."""
+        return inspect(self.file, self.stated or {}, self.beside)
+
+
+class Gathered(NamedTuple):
+    """The tests among what the user gave, and a sentence for each file and sheet that holds none."""
+
+    sources: tuple[Source, ...]
+    left_out: tuple[str, ...]
+
+
+def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> Gathered:
+    """The tests among files, the sheets of workbooks, and the files of folders, of which no deeper ones are opened.
+
+    A file that the user names and that is no workbook with several sheets is not opened.
+
+    Args:
+        paths: files and folders.
+        stated: keys of [[loops]] and [[sweeps]] that the user states.
+
+    Raises:
+        NoTestError: a folder without a test.
+    """
+    sources: list[Source] = []
+    left_out: list[str] = []
+    for path in paths:
+        if path.is_dir():
+            files, others = _in_folder(path)
+            left_out += others
+        else:
+            files = [Source(path)]
+        found: list[Source] = []
+        for file in files:
+            parts = stated_of_each(_parts(file, stated), stated)
+            tests, others = _tests(parts) if len(parts) > 1 or not file.is_named else (parts, [])
+            if not tests and file.is_named:  # the error of the whole file says why
+                tests, others = stated_of_each([file], stated), []
+            found += tests
+            left_out += others
+        if not found:
+            raise NoTestError(
+                "no file of this folder holds a test",
+                file=path,
+                found="; ".join(left_out) or "nothing",
+                expected="loops or sweeps, as " + ", ".join(TEST_FILES[:4]) + " or .xlsx",
+                hint="bushfit inspect FILE says what it makes of one",
+            )
+        sources += found
+    return Gathered(tuple(stated_of_each(sources, stated)), tuple(left_out))
+
+
+def stated_of_each(sources: Sequence[Source], stated: Mapping[str, Any]) -> list[Source]:
+    """Sources with what the user states of each.
+
+    A column that is stated for all, and that only some of them have, is left out for the others.
+    """
+    columns: Mapping[str, str] = stated.get("columns", {})
+    own = [{**stated, **({"sheet": source.sheet} if source.sheet else {})} for source in sources]
+    has = {
+        role: [_has_column(source.file, role, keys) for source, keys in zip(sources, own, strict=True)]
+        for role in columns
+    }
+    return [
+        replace(
+            source,
+            stated={
+                **keys,
+                "columns": {
+                    role: header
+                    for role, header in columns.items()
+                    if has[role][number] is not False or True not in has[role]
+                },
+            },
+        )
+        for number, (source, keys) in enumerate(zip(sources, own, strict=True))
+    ]
+
+
+def _has_column(file: Path, role: str, stated: Mapping[str, Any]) -> bool | None:
+    """Whether a file has the column that is stated for a role; None where it cannot be told."""
+    names = LOOP_COLUMNS if role in LOOP_COLUMNS else SWEEP_COLUMNS
+    try:
+        return role in open_table(file, names, {**stated, "columns": {role: stated["columns"][role]}}).roles
+    except NoColumnError:
+        return False
+    except BushfitError:  # which the inspection of the file tells
+        return None
+
+
+def _in_folder(folder: Path) -> tuple[list[Source], list[str]]:
+    """The files of a folder that may hold tests, in order of their names, and why the others do not."""
+    files: list[Source] = []
+    left_out: list[str] = []
+    for path in sorted(folder.iterdir()):
+        if path.name.startswith((".", "~$")):
+            continue
+        if path.is_file() and path.suffix.lower() in TEST_FILES:
+            files.append(Source(path, is_named=False))
+        else:
+            left_out.append(f"{path}: {'a folder' if path.is_dir() else 'no table, by its ending'}")
+    return files, left_out
+
+
+def _parts(source: Source, stated: Mapping[str, Any]) -> list[Source]:
+    """The sheets of a workbook with several of which the user states none; else the file itself."""
+    if stated.get("sheet"):
+        return [source]
+    try:
+        names = [sheet.sheet for sheet in sheets(source.file)]
+    except BushfitError:  # which the inspection of the file tells
+        return [source]
+    return [replace(source, sheet=name) for name in names] if len(names) > 1 else [source]
+
+
+def _tests(parts: Sequence[Source]) -> tuple[list[Source], list[str]]:
+    """Those of some sheets, or of one file, that hold a test or might, and why the others do not."""
+    tests: list[Source] = []
+    left_out: list[str] = []
+    without: set[str | None] = set()
+    for part in parts:
+        try:
+            recognised(part.file, part.stated or {})
+        except NoTestError as error:
+            without.add(part.sheet)
+            why = f"{error.problem} ({error.found})" if error.found else f"{error.problem}; {error.hint}"
+            left_out.append(f"{part}: {why}")
+            continue
+        except BushfitError:  # which the inspection of the test tells
+            pass
+        tests.append(part)
+    if tests and tests[0].sheet and without:
+        beside = stated_above(
+            line for sheet in sheets(tests[0].file) if sheet.sheet in without for line in sheet.head()
+        )
+        tests = [replace(test, beside=beside) for test in tests]
+    return tests, left_out

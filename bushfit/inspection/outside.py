@@ -1,0 +1,125 @@
+"""What is said of a test outside its columns, by names and the lines above its table, as keys of a campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from bushfit.errors import MeasurementError
+from bushfit.geometry import Place
+from bushfit.reading.names import Named, Said, named, stated_above
+from bushfit.reading.table import Table
+
+#: Conditions of a test, which a campaign carries on, in words.
+_CONDITIONS = {
+    "temperature": "temperature",
+    "preload": "preload",
+    "date": "date",
+    "operator": "operator",
+    "specimen_number": "specimen",
+}
+#: What a sweep may hold, by the key that states it.
+_HELD = {"at_amplitude": "amplitude", "at_frequency": "frequency"}
+
+
+class Outside(NamedTuple):
+    """What is said of a test outside its columns.
+
+    Args:
+        keys: of its table in a campaign.
+        facts: where what was found, in words, by label.
+        is_counted: whether it is known how an amplitude counts that no column has.
+    """
+
+    keys: dict[str, Any]
+    facts: dict[str, str]
+    is_counted: bool
+
+
+def names_of(file: Path, stated: Mapping[str, Any]) -> Said:
+    """What the name of a sheet and of its file say of a test; they count amplitudes as is stated, if it is."""
+    said = named(stated.get("sheet", ""), file.stem)
+    counting = stated.get("amplitude")
+    if counting is None:
+        return said
+    frequencies = said.of("Hz")
+    counted = (each if each in frequencies else each._replace(convention=counting) for each in said.quantities)
+    return replace(said, quantities=tuple(counted))
+
+
+def keys_outside(
+    table: Table, place: Place, stated: Mapping[str, Any], by_name: Said, beside: Said, *, is_sweep: bool
+) -> Outside:
+    """The keys that a test has by what is said outside its columns, and where they were found.
+
+    What is stated goes first, then the table, the names, the lines above the table, and what lies beside it.
+
+    Args:
+        table: of the test.
+        place: of the test, which settles the unit of an amplitude.
+        stated: keys of its table in a campaign that the user states.
+        by_name: what its names say.
+        beside: what is said of all tests of its file.
+        is_sweep: whether frequency and amplitude have to be known.
+
+    Raises:
+        MeasurementError: a sweep of which nothing says the amplitude, or the frequency.
+    """
+    above = stated_above(line for line in table.source.head() if line.number < table.layout.header_line)
+    sources = {"from its name": by_name, "from the lines above the table": above, "from the other sheets": beside}
+    keys: dict[str, Any] = {}
+    facts: dict[str, list[str]] = {}
+    is_counted = True
+    for key in _HELD if is_sweep else ():
+        role = _HELD[key]
+        if role not in table.roles and key not in stated:
+            label, found = _held(table, place, key, sources)
+            counted = stated.get("amplitude") or found.convention
+            is_half = role == "amplitude" and counted == "peak-to-peak"
+            keys[key] = _half(found.text) if is_half else found.text
+            words = f"{keys[key]}, half of {found.text}" if is_half else keys[key]
+            facts.setdefault(label, []).append(f"{role} {words}")
+            is_counted &= role != "amplitude" or counted is not None
+    for key, word in _CONDITIONS.items():
+        if key in table.roles or key in stated:
+            continue
+        for label, said in sources.items():
+            if text := getattr(said, key):
+                keys[key] = text
+                facts.setdefault(label, []).append(f"{word} {text}")
+                break
+    return Outside(keys, {label: ", ".join(words) for label, words in facts.items()}, is_counted)
+
+
+def _held(table: Table, place: Place, key: str, sources: Mapping[str, Said]) -> tuple[str, Named]:
+    """Where the amplitude or frequency is said that a sweep held, and what."""
+    role = _HELD[key]
+    expected = place.motion.displacement_unit if role == "amplitude" else "Hz"
+    for label, said in sources.items():
+        found = said.of(expected)
+        if len(found) > 1:
+            raise _unsaid(table, key, found[0].text, f"{label}: {' and '.join(each.text for each in found)}")
+        if found:
+            return label, found[0]
+    usual = {"m": "0.1 mm", "Hz": "10 Hz", "1": "0.1 %"}
+    raise _unsaid(table, key, usual.get(expected, "1 deg"), None)
+
+
+def _half(text: str) -> str:
+    """Half of a quantity."""
+    number, _, unit = text.partition(" ")
+    return f"{float(number) / 2.0:g} {unit}"
+
+
+def _unsaid(table: Table, key: str, example: str, found: str | None) -> MeasurementError:
+    """The error for a sweep without amplitude or frequency, with one that a user may state."""
+    role = _HELD[key]
+    return table.error(
+        f"nothing says at which {role} this was tested",
+        line=table.layout.header_line,
+        found=found or ", ".join(table.headers),
+        expected=f"a column for the {role}, or one number with its unit in the name of the file",
+        hint=f'state {key} = "{example}" in the campaign, or name the column: columns = {{ {role} = "..." }}',
+    )

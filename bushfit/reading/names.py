@@ -1,0 +1,261 @@
+"""What the name of a file or sheet, and the lines above its table, say of its test: amplitude, direction and so on."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
+from functools import reduce
+from typing import Any, NamedTuple
+
+from bushfit import units
+from bushfit.errors import UnitError
+from bushfit.geometry import Direction
+from bushfit.reading.directions import named_direction
+from bushfit.reading.headers import AmplitudeConvention, Vocabulary, plain, split_convention
+from bushfit.reading.layout import Line
+from bushfit.reading.words import SWEEP_COLUMNS
+
+#: Units as names have them, in lower case, with the usual spelling of those that have another one elsewhere.
+_UNITS = {
+    **{"mm": "mm", "um": "µm", "µm": "µm", "μm": "µm", "deg": "deg", "grad": "deg", "rad": "rad"},
+    **{"%": "%", "pct": "%", "mhz": "mHz", "hz": "Hz", "n": "N", "kn": "kN"},
+    **{"degc": "degC", "gradc": "degC", "grdc": "degC", "°c": "degC", "c": "degC"},
+}
+#: A quantity in a name, "0.5mm", "A0,5 mm", "0p5mm", "10Hz", "2deg", with the word before it and its sign; not the
+#: "20Hz" of "5-20Hz" nor "10mm_min".
+_QUANTITY = re.compile(
+    r"(?<![^\W_])(?<!\d[.,-])(?:(?P<word>[^\W\d_]+)(?P<gap>[\s_=:]*))?(?P<sign>\+/?-|±|-|\+)?\s*"
+    r"(?P<number>\d+(?:[.,p]\d+)?)[ _-]?"
+    rf"(?P<unit>{'|'.join(sorted(_UNITS, key=len, reverse=True))})(?=[^A-Za-z]|pp|pkpk|ss|spsp|$)"
+    r"(?![\s/_-]*(?:(?:per|pro|p)[\s_-]*)?(?:min|s|sec)(?![A-Za-z]|-s))",
+    re.IGNORECASE,
+)
+#: Words, glued to a number or before it, that say what it is.
+_AMPLITUDE_WORDS = {"a", "amp", "ampl", "amplitude", "amplitud"}
+_WORDS = {
+    "Hz": {"f", "freq", "frequency", "frequenz", "frequence", "frecuencia"},
+    "K": {"t", "temp", "temperature", "temperatur", "temperatura"},
+    "N": {"f", "fz", "fx", "fy", "fv", "fm"},
+}
+#: Words of a preload, in English, German, French and Spanish, beside a length or a force.
+_PRELOAD_WORDS = {
+    *("preload", "pre", "mean", "static", "offset", "vorlast", "vorkraft", "vorspannung", "mittellast", "mittelkraft"),
+    *("mittelweg", "statisch", "precharge", "statique", "precarga"),
+}
+#: Words of a size of the specimen: the length beside them is no amplitude.
+_SIZE_WORDS = {
+    *("d", "di", "da", "dia", "diameter", "durchmesser", "diametre", "l", "length", "lange", "longueur", "h", "height"),
+    *("t", "thickness", "dicke", "epaisseur", "w", "width", "breite", "radius", "r"),
+}
+#: A date: 2024-05-03, 2024_05_03, 20240503 or 03.05.2024.
+_DATE = re.compile(
+    r"(?<!\d)(?:20\d\d([-_.]?)(?:0[1-9]|1[0-2])\1(?:0[1-9]|[12]\d|3[01])"
+    r"|(?:0?[1-9]|[12]\d|3[01])\.(?:0?[1-9]|1[0-2])\.20\d\d)(?!\d)"
+)
+#: A number of a specimen: "SN12", "Nr. 7", "Probe_3", "#4".
+_SPECIMEN_NUMBER = re.compile(
+    r"(?:(?<![^\W_])(?:s[/_]?n|serial|nr|no|probe|specimen|sample|muster|prüfling|pruefling|éprouvette|probeta)|#)"
+    r"[\s_.:#-]*(\d[A-Za-z0-9]*)(?![^\W_]|[.,]\d)",
+    re.IGNORECASE,
+)
+#: What the temperature of a test may be [degC], so that a part's number with a C is none; chosen.
+_TEMPERATURES = (-100.0, 300.0)
+#: For each thing that the lines above a table may state, the names it goes by; amplitude and frequency are headers.
+_KEYS = {
+    "temperature": ("temperature", "test temperature", "temp", "Temperatur", "Prüftemperatur", "température"),
+    "preload": ("preload", "mean load", "Vorlast", "Vorkraft", "Mittellast", "précharge", "precarga"),
+    "date": ("date", "test date", "Datum", "Prüfdatum", "fecha"),
+    "operator": ("operator", "tested by", "Prüfer", "Bediener", "Bearbeiter", "opérateur", "operador"),
+    "specimen_number": (
+        *(
+            "specimen number",
+            "specimen no",
+            "specimen",
+            "sample",
+            "sample no",
+            "sample id",
+            "serial number",
+            "serial no",
+        ),
+        *(
+            "Probe",
+            "Probennummer",
+            "Proben-Nr",
+            "Probe Nr",
+            "Prüfling",
+            "Prüflingsnummer",
+            "Seriennummer",
+            "éprouvette",
+        ),
+    ),
+}
+_KEY_OF = {plain(name): key for key, names in _KEYS.items() for name in names}
+#: The names that an amplitude and a frequency go by there.
+_VOCABULARY = Vocabulary({role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}, {})
+#: What parts a key from its value above a table.
+_AFTER_KEY = re.compile(r"\t|;|:\s|:$|\s=\s|=|,(?!\d)")
+#: A decimal comma of the number that begins a value.
+_COMMA = re.compile(r"^([+-]?\d+),(?=\d+(?!\d|[.,]\d))")
+#: Characters of the longest value above a table that is taken; chosen: a longer one is a text.
+_LONGEST_VALUE = 60
+
+
+class Named(NamedTuple):
+    """A quantity as a name has it.
+
+    Args:
+        text: number and unit, such as "0.05 mm".
+        unit: its unit.
+        is_marked: whether a word or sign beside it says that it is the amplitude.
+        convention: how it counts an amplitude, where that is said.
+    """
+
+    text: str
+    unit: str
+    is_marked: bool = False
+    convention: AmplitudeConvention | None = None
+
+
+@dataclass(frozen=True)
+class Said:
+    """What is said of a test outside its table; empty or None where nothing is.
+
+    Args:
+        quantities: what may be its amplitude or frequency.
+        direction: of the test.
+        temperature, preload, date, operator, specimen_number: as a campaign has them.
+    """
+
+    quantities: tuple[Named, ...] = ()
+    direction: Direction | None = None
+    temperature: str | None = None
+    preload: str | None = None
+    date: str | None = None
+    operator: str | None = None
+    specimen_number: str | None = None
+
+    def of(self, expected: str) -> list[Named]:
+        """The quantities of the dimension of a unit, each once; those that are marked alone, if any is."""
+        found = [each for each in dict.fromkeys(self.quantities) if units.agrees(each.unit, expected)]
+        return [each for each in found if each.is_marked] or found
+
+    def __or__(self, other: Said) -> Said:
+        """What both say; what this one says goes first."""
+        own = {unit for unit in ("m", "rad", "1", "Hz") if self.of(unit)}
+        more = tuple(each for each in other.quantities if not any(units.agrees(each.unit, unit) for unit in own))
+        either = {field.name: getattr(self, field.name) or getattr(other, field.name) for field in fields(self)}
+        return Said(**{**either, "quantities": self.quantities + more})
+
+
+def named(*names: str) -> Said:
+    """What names say of a test, such as those of its sheet and its file; what an earlier one says goes first.
+
+    Only a number with its unit counts: dates and numbers of parts are no amplitudes.
+    """
+    return reduce(lambda said, name: said | _named(unicodedata.normalize("NFC", name)), names, Said())
+
+
+def _named(name: str) -> Said:
+    date = _DATE.search(name)
+    rest = _DATE.sub(" ", name)
+    number = _SPECIMEN_NUMBER.search(rest)
+    quantities: list[Named] = []
+    stated: dict[str, str] = {}
+    for match in _QUANTITY.finditer(rest):
+        word, is_glued = plain(match["word"] or ""), bool(match["word"]) and not match["gap"] and not match["sign"]
+        unit, digits = _UNITS[match["unit"].lower()], re.sub("[,p]", ".", match["number"].lower())
+        # a dash after a word parts it from the number, unless the word says what the number is
+        known = word in _PRELOAD_WORDS | _WORDS["K"] | _WORDS["N"] or not match["word"] or bool(match["gap"])
+        text = f"{'-' if match['sign'] == '-' and known else ''}{float(digits):g} {unit}"
+        if word in _PRELOAD_WORDS or (unit in ("N", "kN") and word in _WORDS["N"]):
+            stated.setdefault("preload", text)
+        elif unit == "degC":
+            is_plain = match["unit"].lower() != "c" or len(match["number"]) > 1
+            low, high = _TEMPERATURES
+            is_said = word in _WORDS["K"] or (is_plain and not is_glued)
+            if is_said and low < float(text.split()[0]) < high:
+                stated.setdefault("temperature", text)
+        elif unit not in ("N", "kN") and float(text.split()[0]) > 0.0:
+            quantities += _amplitude_or_frequency(word, match, rest, text, unit, is_glued=is_glued)
+    return Said(
+        tuple(quantities),
+        named_direction([name], short=True),
+        stated.get("temperature"),
+        stated.get("preload"),
+        date[0] if date else None,
+        None,
+        number[1] if number else None,
+    )
+
+
+def _amplitude_or_frequency(
+    word: str, match: re.Match[str], name: str, text: str, unit: str, *, is_glued: bool
+) -> list[Named]:
+    """The quantity of a match, unless a word beside it says that it is another one."""
+    if unit in ("Hz", "mHz"):
+        return [Named(text, unit, word in _WORDS["Hz"])] if not is_glued or word in _WORDS["Hz"] else []
+    padded = re.match(r"0\d", match["number"])  # "05mm" may be 5 mm or 0.5 mm
+    if padded or word in _SIZE_WORDS or (is_glued and word not in _AMPLITUDE_WORDS):
+        return []
+    is_peak = match["sign"] in ("+-", "+/-", "±")
+    convention = "zero-to-peak" if is_peak else split_convention(name[match.end("unit") :])[1]
+    return [Named(text, unit, is_peak or word in _AMPLITUDE_WORDS, convention)]
+
+
+def stated_above(lines: Iterable[Line]) -> Said:
+    """What lines such as those above a table state of its test: each a name and a value, as "Temperature: 23 degC".
+
+    What is not understood is left out; so is a quantity without a unit.
+    """
+    return reduce(lambda said, line: said | _stated(line), lines, Said())
+
+
+def _stated(line: Line) -> Said:
+    cells = _cells(line)
+    if len(cells) < 2 or len(cells[0]) > _LONGEST_VALUE:
+        return Said()
+    name, unit = units.split_header(cells[0])
+    values = [_COMMA.sub(r"\1.", value) for value in (cells[1], " ".join(cells[1:3]), f"{cells[1]} {unit or ''}")]
+    key = _KEY_OF.get(plain(name))
+    if key in ("date", "operator", "specimen_number"):
+        stated: dict[str, Any] = {key: cells[1]} if len(cells[1]) <= _LONGEST_VALUE else {}
+        return Said(**stated)
+    for value in values:
+        if key == "temperature" and _is_temperature(value):
+            return Said(temperature=value)
+        if key == "preload" and (_is_quantity(value, "m") or _is_quantity(value, "N")):
+            return Said(preload=value)
+        heading = _VOCABULARY.heading(cells[0])
+        if heading and heading.role in ("frequency", "amplitude") and not key:
+            found = [unit for unit in ("Hz", "m", "rad", "1") if _is_quantity(value, unit) and value[0].isdigit()]
+            if found and (found[0] == "Hz") == (heading.role == "frequency"):
+                return Said((Named(value, value.split()[-1], True, heading.convention),))
+    return Said()
+
+
+def _cells(line: Line) -> Sequence[str]:
+    """The filled cells of a line of a sheet, or key and value of a line of text."""
+    if isinstance(line.content, str):
+        cells = _AFTER_KEY.split(line.content.lstrip("#%/; "))
+    else:
+        cells = [cell if isinstance(cell, str) else f"{cell:.12g}" for cell in line.content]
+        cells = [*_AFTER_KEY.split(cells[0], maxsplit=1), *cells[1:]]
+    return [cell.strip(' "') for cell in cells if cell.strip(' "')]
+
+
+def _is_quantity(text: str, expected: str) -> bool:
+    try:
+        units.quantity(text, expected)
+    except UnitError:
+        return False
+    return True
+
+
+def _is_temperature(text: str) -> bool:
+    try:
+        units.temperature(text)
+    except UnitError:
+        return False
+    return True

@@ -1,0 +1,116 @@
+"""Mistakes in the record of the paper's bushing on the rig: told, never mended unless adopted, and not made up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from asking import INERTIA, asked, said
+from rigged import SHARED, Diagnosed, Measured
+
+from bushfit.campaign.campaign import Campaign
+from bushfit.effects.mistakes import MISTAKES
+from bushfit.errors import ModelError
+from bushfit.geometry import Bushing, Direction
+from bushfit.reading.measurement import Loop, Sweep
+
+AXIAL, RADIAL = "peak_to_peak:sweep_axial", "peak_to_peak:sweep_radial"
+
+
+def doubled(sweep: Sweep) -> Sweep:
+    return replace(sweep, amplitude=2.0 * sweep.amplitude)
+
+
+def on_sweeps(change: Callable[[Sweep], Sweep], *numbers: int) -> Callable[[Campaign], Campaign]:
+    return lambda c: replace(c, sweeps=tuple(change(s) if i in numbers else s for i, s in enumerate(c.sweeps)))
+
+
+def on_loops(change: Callable[[Loop], Loop], *numbers: int) -> Callable[[Campaign], Campaign]:
+    return lambda c: replace(c, loops=tuple(change(x) if i in numbers else x for i, x in enumerate(c.loops)))
+
+
+def in_diameters(c: Campaign) -> Campaign:
+    assert c.bushing is not None
+    wide = Bushing(c.bushing.name, 2.0 * c.bushing.inner_radius, 2.0 * c.bushing.outer_radius, c.bushing.length)
+    return replace(c, bushing=wide)
+
+
+MADE: dict[str, Callable[[Campaign], Campaign]] = {
+    f"{AXIAL} {RADIAL}": on_sweeps(doubled, 0, 1),
+    AXIAL: on_sweeps(doubled, 0),
+    "zero_to_peak:sweep_radial": on_sweeps(lambda s: replace(s, amplitude=s.amplitude / 2.0), 1),
+    "sixty_times_faster:loop_axial_2": on_loops(lambda x: replace(x, time=60.0 * x.time), 1),
+    "ten_times_slower:loop_axial_1 ten_times_slower:loop_axial_2": on_loops(
+        lambda x: replace(x, time=x.time / 10), 0, 1
+    ),
+    "kilogram_force:loop_axial_1": on_loops(lambda x: replace(x, force=x.force / 9.80665), 0),
+    "phase_in_radians:sweep_axial": on_sweeps(
+        lambda s: replace(s, stiffness=np.abs(s.stiffness) * np.exp(1j * np.radians(np.angle(s.stiffness)))), 0
+    ),
+    "other_direction:sweep_radial": on_sweeps(lambda s: replace(s, direction=Direction.AXIAL), 1),
+    "diameters": in_diameters,
+}
+
+
+@pytest.mark.parametrize("truth", MADE)
+def test_a_mistake_is_named_with_the_line_that_puts_it_right(truth: str, measured: Measured) -> None:
+    campaign = MADE[truth](measured(None, SHARED))
+    diagnosis = asked(campaign)
+    assert diagnosis.verdict == "named"
+    assert [effect.label for effect in diagnosis.effects] == truth.split()
+    assert diagnosis.summary.startswith("these tests agree if ")
+    for effect, entry in zip(diagnosis.effects, diagnosis.to_document()["effects"], strict=True):
+        assert (entry["level"], entry["parameters"], entry["test"]) == ("record", {}, effect.test)
+        assert entry["correction"] in diagnosis.next_test
+    before, after = diagnosis.calibration
+    print(f"{truth}: gap {before:.2f} to {after:.2f} if it was made")
+    assert after < 1.02 < before - 0.02  # root mean squares over thousands of rows of loops, which agree
+    # nothing is mended: the model to use is that of the tests as they are, and says so
+    assert diagnosis.result.model is diagnosis.before.model
+    assert not diagnosis.added
+    assert any("fitted to the tests as they are" in warning for warning in diagnosis.result.warnings)
+    mended = asked(campaign, adopt=tuple(truth.split()))
+    assert mended.verdict == "consistent"
+    assert mended.calibration[0] == pytest.approx(after, rel=1e-6)
+    assert [line for line in mended.notes if line.startswith("mended by --adopt ")]
+    assert [line for line in mended.result.warnings if line.startswith("mended by --adopt ")]
+
+
+def test_what_cannot_be_told_apart_is_ambiguous(measured: Measured) -> None:
+    """Loops in kgf, or sweeps multiplied by 9.81 once too often: the same ratio."""
+    made = on_loops(lambda x: replace(x, force=x.force / 9.80665), 0, 1)
+    diagnosis = asked(made(measured(None, SHARED)))
+    assert diagnosis.verdict == "ambiguous"
+    assert [effect.label for effect in diagnosis.effects] == [f"kilogram_force:loop_axial_{n}" for n in (1, 2)]
+    assert diagnosis.effects[0].alternatives == ("twice_in_newton:sweep_axial + twice_in_newton:sweep_radial",)
+    assert diagnosis.after is diagnosis.before
+
+
+def test_what_all_tests_share_is_not_seen_and_not_named(measured: Measured) -> None:
+    """All forces in kgf are all moduli 9.81 times too small: the tests agree."""
+    campaign = on_loops(lambda x: replace(x, force=x.force / 9.80665), 0, 1)(measured(None, SHARED))
+    campaign = on_sweeps(lambda s: replace(s, stiffness=s.stiffness / 9.80665), 0, 1)(campaign)
+    assert said(asked(campaign)) == "consistent "
+
+
+def test_a_mistake_can_be_left_out(measured: Measured) -> None:
+    campaign = MADE[AXIAL](measured(None, SHARED))
+    for without in ("peak_to_peak", AXIAL):
+        diagnosis = asked(campaign, without=(without,))
+        assert AXIAL not in [effect.label for effect in diagnosis.effects]
+
+
+def test_no_mistake_is_made_up_beside_an_effect(diagnosed: Diagnosed) -> None:
+    diagnosis = diagnosed(INERTIA, SHARED)
+    assert [effect.label for effect in diagnosis.effects] == ["inertia"]
+    assert not {judged.name.partition(":")[0] for judged in diagnosis.candidates} & MISTAKES.keys()
+
+
+@pytest.mark.parametrize(
+    "name", ["peak_to_peak", "peak_to_peak:lost", "peak_to_peak:loop_axial_1", "diameters:sweep_axial"]
+)
+def test_a_mistake_that_cannot_have_been_made_there_is_refused(name: str, measured: Measured) -> None:
+    with pytest.raises(ModelError, match="cannot have been made there"):
+        asked(measured(None, SHARED), adopt=(name,))

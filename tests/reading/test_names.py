@@ -1,0 +1,132 @@
+"""What the name of a file says of its test, and what lines above its table do."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bushfit import units
+from bushfit.geometry import Direction
+from bushfit.reading.layout import Line
+from bushfit.reading.names import Said, named, stated_above
+
+
+def amplitudes(said: Said, expected: str = "m") -> list[tuple[str, str | None]]:
+    return [(each.text, each.convention) for each in said.of(expected)]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "convention"),
+    [
+        ("Dyn_axial_A0,05mm", "0.05 mm", None),
+        ("axial 0p1mm", "0.1 mm", None),
+        ("+-2mm", "2 mm", "zero-to-peak"),
+        ("radial ±0,5 mm 10Hz", "0.5 mm", "zero-to-peak"),
+        ("2mm_pp", "2 mm", "peak-to-peak"),
+        ("2mmpp_radial", "2 mm", "peak-to-peak"),
+        ("ax_2mm p-p_10Hz", "2 mm", "peak-to-peak"),
+        ("A0.05mm_SS", "0.05 mm", "peak-to-peak"),
+        ("1mm 0-p", "1 mm", "zero-to-peak"),
+        ("100 um", "100 µm", None),
+        ("Amplitude_0.2mm_bushing_18mm", "0.2 mm", None),
+        ("CMP15961_2024-05-03_0.1mm", "0.1 mm", None),
+        ("03.05.2024 radial 0.1mm", "0.1 mm", None),
+        ("d20mm_L34mm_0.3mm", "0.3 mm", None),
+        ("abc18mm_1mm", "1 mm", None),
+        ("preload_1.5mm_0.2mm", "0.2 mm", None),
+        ("loop 1,0 mm 10mm_min", "1 mm", None),
+        ("5-155Hz_0.1mm", "0.1 mm", None),
+    ],
+)
+def test_the_amplitude_in_a_name(name: str, text: str, convention: str | None) -> None:
+    assert amplitudes(named(name)) == [(text, convention)]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "CMP15961",
+        "2024-05-03",
+        "20240503_12",
+        "test 7",
+        "axial_05mm",
+        "0.1-1mm",
+        "A0.05",
+        "v2mm",
+        "D 20 mm",
+        "12,5",
+        "",
+    ],
+)
+def test_no_amplitude_where_there_is_no_single_number_with_its_unit(name: str) -> None:
+    assert amplitudes(named(name)) == []
+
+
+def test_two_lengths_of_which_neither_is_marked_are_two() -> None:
+    assert amplitudes(named("axial_18mm_bushing_1mm")) == [("18 mm", None), ("1 mm", None)]
+
+
+@pytest.mark.parametrize(
+    ("name", "keys"),
+    [
+        ("axial_23C", {"direction": Direction.AXIAL, "temperature": "23 degC"}),
+        ("x_-10degC_Fz-2kN", {"temperature": "-10 degC", "preload": "-2 kN"}),
+        ("rad-23°C", {"direction": Direction.RADIAL, "temperature": "23 degC"}),
+        ("Vorlast2kN_T40C_Wdh1", {"preload": "2 kN", "temperature": "40 degC"}),
+        ("preload_1.5mm", {"preload": "1.5 mm"}),
+        ("tors_SN12_2024-05-03", {"direction": Direction.TORSION, "specimen_number": "12", "date": "2024-05-03"}),
+        ("Probe 3 radial", {"direction": Direction.RADIAL, "specimen_number": "3"}),
+        ("part 3C", {}),
+        ("2kN", {}),
+        ("0.02rad", {}),
+    ],
+)
+def test_what_else_a_name_says(name: str, keys: dict[str, object]) -> None:
+    said = named(name)
+    assert {key: value for key, value in vars(said).items() if value and key != "quantities"} == keys
+
+
+def test_frequencies_and_strains() -> None:
+    said = named("DMA_10Hz_0,05%")
+    assert [each.text for each in said.of("Hz")] == ["10 Hz"]
+    assert amplitudes(said, "1") == [("0.05 %", None)]
+    assert [each.text for each in named("x_50mHz").of("Hz")] == ["50 mHz"]
+    assert named("5-155Hz").of("Hz") == []
+
+
+def test_a_sheet_goes_before_its_file() -> None:
+    said = named("radial 0.3mm", "axial 0.1mm 20Hz")
+    assert said.direction is Direction.RADIAL
+    assert amplitudes(said) == [("0.3 mm", None)]
+    assert [each.text for each in said.of("Hz")] == ["20 Hz"]
+
+
+def test_lines_above_a_table() -> None:
+    lines = [
+        "# Prüftemperatur: 23,5 °C",
+        "Datum;2024-05-03",
+        ["Operator", "", "3"],
+        "Amplitude (p-p): 0,2 mm",
+        "Frequency\t10\tHz",
+        ["Vorlast [kN]", 2.0],
+        "Temperatures were kept: see the log of the chamber, please",
+        ["Serial number", 17.0],
+        "Amplitude: large",
+    ]
+    said = stated_above(Line(number, content) for number, content in enumerate(lines, start=1))
+    assert said.temperature == "23.5 °C"
+    assert units.temperature(said.temperature) == pytest.approx(296.65)
+    assert (said.date, said.operator, said.preload, said.specimen_number) == ("2024-05-03", "3", "2 kN", "17")
+    assert amplitudes(said) == [("0.2 mm", "peak-to-peak")]
+    assert [each.text for each in said.of("Hz")] == ["10 Hz"]
+
+
+@given(st.text())
+def test_any_name_and_any_line_say_something_that_can_be_read(text: str) -> None:
+    for said in (named(text), stated_above([Line(1, text)]), stated_above([Line(1, [text, text])])):
+        for expected in ("m", "rad", "1", "Hz"):
+            for each in said.of(expected):
+                assert units.quantity(each.text, expected) >= 0.0
+        if said.temperature:
+            assert units.temperature(said.temperature) > 0.0
