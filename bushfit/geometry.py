@@ -1,7 +1,4 @@
-"""What is tested, and how: a bushing in a direction, or a specimen of its compound; equivalent strain and stiffness.
-
-Eqs. 7, 8, 10, 11, 12. Source: Garcia Tarrago, Kari, Vinolas, Gil-Negrete, Polymer Testing 26 (2007) 629-638.
-"""
+"""What a test is made on: a bushing in a direction, or a specimen of its compound; equivalent strain and stiffness."""
 
 from __future__ import annotations
 
@@ -9,28 +6,15 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Literal, NamedTuple
 
-from scipy.special import ive, kve
-
+from bushfit import tube
 from bushfit.errors import ModelError
 from bushfit.shape import NO_CORRECTION, Correction, radial_correction
 
 #: Which radial formulas a bushing goes by: the paper's as they are, or corrected by finite elements.
 Shape = Literal["paper", "calibrated"]
-#: Inner over outer radius for which the radial formula was checked against 60-digit arithmetic.
-RADIUS_RATIO_RANGE = (0.1, 0.97)
-#: Length over outer radius for which the radial formula was checked against 60-digit arithmetic.
-SLENDERNESS_RANGE = (0.05, 100.0)
-#: Relative width by which the two ranges are widened: 1.8 mm over 18 mm is not quite 0.1 in binary.
-_ROUNDING = 1e-9
-#: q = (b^2 - a^2)/(b^2 + a^2) up to which ln(b/a) - q is summed as a series; above it, the two no longer cancel.
-_LARGEST_Q_OF_SERIES = 0.5
-#: Terms of that series; at the largest q, the first one left out is 1e-17 of the sum.
-_SERIES_TERMS = 30
-#: Bushings whose radial factors are kept: a fit asks for those of one bushing thousands of times.
-_CACHED_BUSHINGS = 256
 
 
 class Unit(NamedTuple):
@@ -156,11 +140,6 @@ class Bushing:
                 hint='check the units of the geometry, or take shape = "paper"',
             )
 
-    @cached_property
-    def log_ratio(self) -> float:
-        """ln(b/a), with full precision for thin bushings too."""
-        return math.log1p((self.outer_radius - self.inner_radius) / self.inner_radius)
-
     @property
     def proportions(self) -> tuple[float, float]:
         """Inner over outer radius, and length over outer radius."""
@@ -171,18 +150,20 @@ class Bushing:
         """What finite elements make of the radial formulas, applied or not; None where none were computed."""
         return radial_correction(*self.proportions)
 
-    @property
-    def applied(self) -> Correction:
-        """The correction of the radial formulas that this bushing goes by."""
-        return self.correction if self.shape == "calibrated" and self.correction else NO_CORRECTION
-
     def unit_strain(self, direction: Direction) -> float:
         """Equivalent strain per unit displacement [1/m], or per unit rotation [1/rad]."""
-        return _DEFINITIONS[direction].unit_strain(self)
+        strain = _DEFINITIONS[direction].unit_strain(self.inner_radius, self.outer_radius)
+        return strain * self._corrected(direction).strain
 
     def stiffness_per_modulus(self, direction: Direction) -> float:
         """Stiffness per unit equivalent shear modulus: [m], or [m^3/rad] of a rotation."""
-        return _DEFINITIONS[direction].stiffness_per_modulus(self)
+        sizes = self.inner_radius, self.outer_radius, self.length
+        return _DEFINITIONS[direction].stiffness_per_modulus(*sizes) * self._corrected(direction).stiffness
+
+    def _corrected(self, direction: Direction) -> Correction:
+        """The correction that this bushing's formulas for a direction go by."""
+        calibrated = direction is Direction.RADIAL and self.shape == "calibrated"
+        return self.correction if calibrated and self.correction else NO_CORRECTION
 
 
 @dataclass(frozen=True)
@@ -258,11 +239,6 @@ class Specimen:
             return self.elements * self.area / self.thickness
         return 3.0 if self.strain == "tension" else 1.0
 
-    @property
-    def stated_strain(self) -> float:
-        """What one unit of strain as its files state it is as it is counted: 2 of the tensor's shear, else 1."""
-        return 2.0 if self.strain == "tensor" else 1.0
-
 
 #: Where a response is measured or predicted: a direction of the bushing, or a specimen of its compound.
 Place = Direction | Specimen
@@ -302,7 +278,7 @@ def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
 
 def stated_strain(place: Place) -> float:
     """What one unit of displacement or strain in a test's file is as it is counted: 2 of the tensor's shear, else 1."""
-    return place.stated_strain if isinstance(place, Specimen) else 1.0
+    return 2.0 if isinstance(place, Specimen) and place.strain == "tensor" else 1.0
 
 
 def _present(bushing: Bushing | None, place: Direction) -> Bushing:
@@ -316,105 +292,17 @@ def _present(bushing: Bushing | None, place: Direction) -> Bushing:
     return bushing
 
 
-def _axial_strain(tube: Bushing) -> float:
-    """e/d = 1 / sqrt(2 (b^2 - a^2) ln(b/a)) (Eq. 7)."""
-    return 1.0 / math.sqrt(2.0 * _area(tube) * tube.log_ratio)
-
-
-def _axial_stiffness(tube: Bushing) -> float:
-    """k/mu = 2 pi L / ln(b/a) (Eq. 10)."""
-    return 2.0 * math.pi * tube.length / tube.log_ratio
-
-
-@lru_cache(maxsize=_CACHED_BUSHINGS)
-def _radial_strain(tube: Bushing) -> float:
-    """e/d = sqrt((a^2 + b^2) / ((b^4 - a^4) ln(b/a) - (a^2 - b^2)^2)) (Eq. 8), corrected where the shape is calibrated.
-
-    Notes: with q = (b^2 - a^2)/(b^2 + a^2) this is 1 / sqrt((b^2 - a^2) (ln(b/a) - q)). Where ln(b/a) and q cancel, the
-    difference is summed as q^3/3 + q^5/5 + ..., because ln(b/a) = atanh(q).
-    """
-    q = _q(tube)
-    series = (q ** (2 * j + 3) / (2 * j + 3) for j in range(_SERIES_TERMS))
-    difference = tube.log_ratio - q if q > _LARGEST_Q_OF_SERIES else math.fsum(series)
-    return tube.applied.strain / math.sqrt(_area(tube) * difference)
-
-
-@lru_cache(maxsize=_CACHED_BUSHINGS)
-def _radial_stiffness(tube: Bushing) -> float:
-    """k/mu = 10 pi L / (7/2 ln(b/a) - 3/2 q + D), with q = (b^2 - a^2)/(b^2 + a^2) and D of Eq. 12 (Eq. 11).
-
-    Raises:
-        ModelError: a shape for which the formula was not checked.
-
-    Notes: every Bessel product of D is written with the scaled functions, and the common factor exp(alpha (b - a)) is
-    divided out of numerator and denominator, so short bushings neither over- nor underflow. Agrees with 60-digit
-    arithmetic to 1e-9, and to 1e-7 for tubes that are both long and thin, over the checked range.
-    """
-    a, b, length = tube.inner_radius, tube.outer_radius, tube.length
-    if not (_within(a / b, RADIUS_RATIO_RANGE) and _within(length / b, SLENDERNESS_RANGE)):
-        raise ModelError(
-            "the radial formula (Eqs. 11, 12) was not checked for this shape",
-            place="inner_radius, outer_radius, length",
-            found=f"inner/outer = {a / b:.3g}, length/outer = {length / b:.3g}",
-            expected="inner/outer 0.1 to 0.97 and length/outer 0.05 to 100",
-            hint="check the units of the geometry; the axial direction has no such limit",
-        )
-    alpha = math.sqrt(60.0) / length
-    inner, outer = alpha * a, alpha * b
-    once, twice = math.exp(inner - outer), math.exp(2.0 * (inner - outer))
-    (i0a, i0b), (i1a, i1b) = ive(0, [inner, outer]), ive(1, [inner, outer])
-    (k0a, k0b), (k1a, k1b) = kve(0, [inner, outer]), kve(1, [inner, outer])
-    numerator = (
-        4.0 * (b**2 + a**2) * once
-        - outer * (b**2 + 3.0 * a**2) * (i1b * k0a + i0a * k1b * twice)
-        - inner * (3.0 * b**2 + a**2) * (i1a * k0b * twice + i0b * k1a)
-    )
-    denominator = inner * outer * (b**2 + a**2) * (i1b * k1a - i1a * k1b * twice)
-    paper = 10.0 * math.pi * length / (3.5 * tube.log_ratio - 1.5 * _q(tube) + float(numerator / denominator))
-    return tube.applied.stiffness * paper
-
-
-def _torsion_strain(tube: Bushing) -> float:
-    """e/theta = a b / (b^2 - a^2), from the energy: k theta^2/2 = V mu (2 e)^2/2."""
-    return tube.inner_radius * tube.outer_radius / _area(tube)
-
-
-def _torsion_stiffness(tube: Bushing) -> float:
-    """k/mu = 4 pi L a^2 b^2 / (b^2 - a^2)."""
-    return 4.0 * math.pi * tube.length * (tube.inner_radius * tube.outer_radius) ** 2 / _area(tube)
-
-
-def _area(tube: Bushing) -> float:
-    """b^2 - a^2 [m^2], with full precision for thin bushings too."""
-    return (tube.outer_radius - tube.inner_radius) * (tube.outer_radius + tube.inner_radius)
-
-
-def _q(tube: Bushing) -> float:
-    """(b^2 - a^2)/(b^2 + a^2)."""
-    return _area(tube) / (tube.inner_radius * tube.inner_radius + tube.outer_radius * tube.outer_radius)
-
-
-def _within(value: float, limits: tuple[float, float]) -> bool:
-    return limits[0] * (1.0 - _ROUNDING) <= value <= limits[1] * (1.0 + _ROUNDING)
-
-
 class _Definition(NamedTuple):
-    """What a direction is: its kind of motion, and a bushing's two formulas for it.
-
-    Args:
-        motion: translation or rotation.
-        unit_strain: equivalent strain per unit displacement [1/m], or per unit rotation [1/rad].
-        stiffness_per_modulus: stiffness per unit equivalent shear modulus: [m], or [m^3/rad] of a rotation.
-    """
+    """A direction's kind of motion, and the formulas of a tube for it, by its radii and length."""
 
     motion: Motion
-    unit_strain: Callable[[Bushing], float]
-    stiffness_per_modulus: Callable[[Bushing], float]
+    unit_strain: Callable[[float, float], float]
+    stiffness_per_modulus: Callable[[float, float, float], float]
 
 
 #: A new direction is a name in `Direction` and an entry here.
 _DEFINITIONS = {
-    Direction.AXIAL: _Definition(TRANSLATION, _axial_strain, _axial_stiffness),
-    Direction.RADIAL: _Definition(TRANSLATION, _radial_strain, _radial_stiffness),
-    Direction.TORSION: _Definition(ROTATION, _torsion_strain, _torsion_stiffness),
+    Direction.AXIAL: _Definition(TRANSLATION, tube.axial_strain, tube.axial_stiffness),
+    Direction.RADIAL: _Definition(TRANSLATION, tube.radial_strain, tube.radial_stiffness),
+    Direction.TORSION: _Definition(ROTATION, tube.torsion_strain, tube.torsion_stiffness),
 }

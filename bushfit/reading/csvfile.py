@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
-from bushfit.geometry import STRAINING, Display, Place, Specimen, Unit
+from bushfit.geometry import STRAINING, Display, Place, Unit, stated_strain
 from bushfit.reading.measurement import loss_factor
 
 if TYPE_CHECKING:
@@ -127,5 +127,5 @@ def raw_resonance_table(test: ResonanceTest) -> pd.DataFrame:
 def _as_stated(place: Place) -> Display:
     """The units in which files of a place have displacement, force and stiffness; tensor strain is half of gamma."""
     (unit, factor), force, stiffness = place.display
-    stated = place.stated_strain if isinstance(place, Specimen) else 1.0
+    stated = stated_strain(place)
     return Display(Unit(unit, factor / stated), force, stiffness)

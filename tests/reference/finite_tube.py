@@ -205,12 +205,12 @@ def shapes(radii: int, lengths: int) -> list[tuple[float, float]]:
     return list(product((1.0 / (1.0 + thickness)).tolist(), (flat * (long / flat) ** nodes[1]).tolist()))
 
 
-def corrections(tubes: Sequence[tuple[float, float]]) -> Array:
-    """Stiffness over Eq. 11, strain over Eq. 8 and softening of each shape, (n, 3)."""
+def corrections(tubes: Sequence[tuple[float, float]], *, fineness: float = 1.0) -> Array:
+    """Stiffness over Eq. 11, strain over Eq. 8 and softening of each shape, (n, 3), on meshes of this fineness."""
     rows = []
     for inner, length in tubes:
-        paper, solved = Bushing("tube", inner, 1.0, length), solve_tube(inner, length)
-        soft = solve_tube(inner, length, bulk=_SOFTER)
+        paper, solved = Bushing("tube", inner, 1.0, length), solve_tube(inner, length, fineness=fineness)
+        soft = solve_tube(inner, length, bulk=_SOFTER, fineness=fineness)
         rows.append(
             (
                 solved.stiffness / paper.stiffness_per_modulus(Direction.RADIAL),

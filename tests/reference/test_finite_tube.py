@@ -122,11 +122,12 @@ def test_the_correction_on_kept_shapes() -> None:
 
 @pytest.mark.slow
 def test_the_correction_on_many_kept_shapes() -> None:
-    judge(kept_shapes(12, 120))
+    """On a coarser mesh, which moves no error by more than 0.02 % (see `test_finer_meshes_change_nothing`)."""
+    judge(kept_shapes(12, 48), fineness=0.7)
 
 
-def judge(kept: list[tuple[float, float]]) -> None:
-    solved, found = corrections(kept), shipped(kept)
+def judge(kept: list[tuple[float, float]], *, fineness: float = 1.0) -> None:
+    solved, found = corrections(kept, fineness=fineness), shipped(kept)
     stiffness, strain = 100.0 * np.abs(found / solved - 1.0).max(axis=0)[:2]
     print(f"{len(kept)} kept shapes: largest error in stiffness {stiffness:.2f} %, in strain {strain:.2f} %")
     assert stiffness < 1.0
