@@ -15,9 +15,10 @@ from bushfit.campaign.toml import read_toml
 from bushfit.errors import CampaignError, naming, typed
 from bushfit.geometry import Bushing, Specimen, place_named
 from bushfit.reading.layout import FileFormat
+from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.sweeps import read_sweep
-from bushfit.reduction.programme import read_programme
+from bushfit.reduction.programme import programme
 from bushfit.units import CELSIUS, quantity
 
 #: Endings of test files, which `bushfit init` makes a campaign of.
@@ -88,7 +89,9 @@ def load_campaign(path: str | Path) -> Campaign:
         path,
         bushing,
         tuple(
-            loop for keywords in reader_keywords(path, content.loops, specimens) for loop in read_programme(**keywords)
+            loop
+            for keywords in reader_keywords(path, content.loops, specimens)
+            for loop in programme(read_loop(**keywords), **keywords)
         ),
         tuple(read_sweep(**keywords) for keywords in reader_keywords(path, content.sweeps, specimens)),
         content.fit,

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from bushfit.effects import is_parameter, parameter_named, parameter_names
 from bushfit.errors import CampaignError, naming
 from bushfit.units import quantity
 from bushfit.validation import unknown_key
@@ -17,30 +18,14 @@ _LARGEST_NUMBER = 1e100
 _S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
 
 
-def known_parameters() -> tuple[str, ...]:
-    """Names of all parameters of the library; a stiffness factor may have other places than are listed."""
-    from bushfit.effects import parameter_names
-
-    return parameter_names()
-
-
-def is_parameter(name: str) -> bool:
-    """Whether a key is the name of a parameter."""
-    from bushfit.effects import is_parameter
-
-    return is_parameter(name)
-
-
 def parameter_value(place: str, name: str, raw: Any) -> float:
     """The SI value of a model parameter by its name in files; an error names the place.
 
     Ratios, and parameters of added effects, may be plain numbers.
     """
-    from bushfit.effects import parameter_named
-
     with naming(place=place):
         if not is_parameter(name):
-            raise unknown_key(name, known_parameters())
+            raise unknown_key(name, parameter_names())
         unit = _S_TO_ALPHA.sub("", parameter_named(name).unit)
         is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
         if is_number and (unit == "1" or "." in name) and abs(raw) <= _LARGEST_NUMBER:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Any
 
 from bushfit.errors import CampaignError, naming
@@ -10,9 +10,11 @@ from bushfit.geometry import Direction, Place, Specimen
 
 #: Keys of a table that tell it.
 KEYS = ("direction", "specimen")
+#: Lists of tests in [simulate].
+_LISTS = ("loops", "sweeps", "resonances")
 
 
-def place_tested(specimen: object, direction: object, specimens: Iterable[Specimen]) -> Place:
+def place_tested(specimen: object, direction: object, specimens: Sequence[Specimen]) -> Place:
     """The direction or the specimen that the two keys of a test mean.
 
     Args:
@@ -42,30 +44,25 @@ def place_tested(specimen: object, direction: object, specimens: Iterable[Specim
     return known[specimen]
 
 
-def with_places(tables: Any, kinds: Iterable[str], specimens: Iterable[Specimen]) -> Any:
-    """A parsed table of lists of tests, with the place itself for the keys that tell it; what is no list is left alone.
-
-    Args:
-        tables: the parsed table.
-        kinds: keys of its lists.
-        specimens: of the campaign.
+def with_places(tables: Any, specimens: Sequence[Specimen]) -> Any:
+    """A parsed [simulate] with the place itself for the keys that tell it; what is no table is left alone.
 
     Raises:
         CampaignError: as of `place_tested`.
     """
-    if not isinstance(tables, dict):
-        return tables
-    known = tuple(specimens)
 
     def placed(test: Any, place: str) -> Any:
         if not isinstance(test, dict):
             return test
         with naming(place=place):
-            direction = place_tested(test.get("specimen"), test.get("direction"), known)
+            direction = place_tested(test.get("specimen"), test.get("direction"), specimens)
         return {**{key: value for key, value in test.items() if key not in KEYS}, "direction": direction}
 
-    lists = [kind for kind in kinds if isinstance(tables.get(kind), list)]
+    if not isinstance(tables, dict):
+        return tables
     return {
-        **tables,
-        **{kind: [placed(test, f"{kind} #{number}") for number, test in enumerate(tables[kind], 1)] for kind in lists},
+        key: [placed(test, f"{key} #{number}") for number, test in enumerate(table, 1)]
+        if key in _LISTS and isinstance(table, list)
+        else table
+        for key, table in tables.items()
     }

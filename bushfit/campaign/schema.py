@@ -9,14 +9,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, InstanceOf
 
-from bushfit.campaign.parameters import (
-    effect_values,
-    is_parameter,
-    known_parameters,
-    parameter_settings,
-    parameter_values,
-)
+from bushfit.campaign.parameters import effect_values, parameter_settings, parameter_values
 from bushfit.campaign.places import KEYS, with_places
+from bushfit.effects import is_parameter, parameter_names
 from bushfit.errors import CampaignError
 from bushfit.geometry import TRANSLATION, Direction, Place, Shape, Specimen
 from bushfit.reading.headers import AmplitudeConvention
@@ -100,11 +95,7 @@ def _roles(known: Collection[str]) -> BeforeValidator:
 
 #: Puts the direction or specimen itself into each test of [simulate].
 _SIMULATED_PLACES = converted(
-    lambda raw, info: with_places(
-        raw,
-        ("loops", "sweeps", "resonances"),
-        (Specimen(**vars(table)) for table in info.data.get("specimens", ())),
-    )
+    lambda raw, info: with_places(raw, [Specimen(**vars(table)) for table in info.data.get("specimens", ())])
 )
 Temperature = Annotated[float, converted(lambda raw, _: temperature(raw))]
 Length = Annotated[float, _si("m"), Field(gt=0)]
@@ -228,10 +219,7 @@ class FitSettings:
 
     Args:
         dynamic_amplitudes: [m or rad] that fit-dynamic uses; none for the smallest.
-        residuals: what a sweep's residuals compare.
-        loss: what is summed over the residuals.
         effects: added to the paper's model, such as "stiffness_factor.mount".
-        parameters: start value and bounds by parameter.
     """
 
     dynamic_amplitudes: Annotated[tuple[Annotated[float, _si("m", "rad"), Field(gt=0)], ...], _FIRST_ERROR] = ()
@@ -239,7 +227,7 @@ class FitSettings:
     loss: Loss = "linear"
     effects: tuple[Text, ...] = ()
     parameters: Annotated[Mapping[str, ParameterSetting], _table(parameter_settings)] = field(
-        default_factory=dict, metadata=standing_in_table(known_parameters)
+        default_factory=dict, metadata=standing_in_table(parameter_names)
     )
 
 
@@ -269,8 +257,7 @@ class SimulatedTest:
 
 @dataclass(frozen=True)
 class SimulatedLoop(SimulatedTest):
-    """[[simulate.loops]]: zero-to-peak amplitude [m or rad, or strain], frequency [Hz], cycles and
-    waveform.
+    """[[simulate.loops]]: zero-to-peak amplitude [m or rad, or strain], frequency [Hz], cycles and waveform.
 
     In place of one amplitude or one frequency a programme has amplitudes or frequencies: all amplitudes in turn at each
     frequency, `cycles` of each, recorded in one go from rest, with `pause` [s] at zero between them.

@@ -27,7 +27,7 @@ from bushfit.reading.names import Said
 from bushfit.reading.sweeps import ONE_TEST, STIFFNESS_PAIRS, read_sweep
 from bushfit.reading.table import Table
 from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
-from bushfit.reduction.programme import clock_stated, programme
+from bushfit.reduction.programme import programme
 from bushfit.reduction.steps import sines
 from bushfit.validation import check_tables
 
@@ -70,7 +70,7 @@ def inspect(file: Path, stated: Mapping[str, Any], beside: Said | None = None) -
         kind, looked = "sweep", look_at_sweep(measured, by_name)
     else:
         measured, entry, odd = _read_loop(file, read_as, entry, table)
-        kind, looked = _look(measured, by_name, clock_stated(_keywords(file, read_as, entry, LoopFile)))
+        kind, looked = _look(measured, by_name, _keywords(file, read_as, entry, LoopFile))
     columns = _columns(table, is_sweep=is_sweep)
     named = by_name.direction
     if direction and named and not isinstance(direction, Specimen) and named is not direction:
@@ -156,7 +156,7 @@ def _read_loop(
     return turned, {**entry, **_TURNED}, [odd]
 
 
-def _look(measured: Loop, by_name: Said, clock: Mapping[str, Any]) -> tuple[Kind, Looked]:
+def _look(measured: Loop, by_name: Said, keywords: Mapping[str, Any]) -> tuple[Kind, Looked]:
     """The kind of a recorded test, a loop, a programme of loops or a history, with its facts and oddities."""
     found = sines(measured)
     points = {(round(np.log(frequency), 2), round(np.log(amplitude), 1)) for frequency, amplitude, _ in found}
@@ -165,7 +165,7 @@ def _look(measured: Loop, by_name: Said, clock: Mapping[str, Any]) -> tuple[Kind
     if len(points) > 1 and fast:
         with suppress(MeasurementError):  # no steady sine after all
             return "history", look_at_history(measured, by_name)
-    loops = programme(measured, **clock)
+    loops = programme(measured, **keywords)
     if len(loops) > 1:
         return "loop", look_at_programme(measured, loops, by_name)
     looked = look_at_loop(loops[0], by_name)

@@ -6,7 +6,7 @@ the crossings of their middles. A run of alike ones is a part; ramps, pauses and
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError
-from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Floats, Loop, Part, rebuild_time
 from bushfit.reduction.cycles import least_prominence, lone_outliers, middle_crossings, turning_points
 
@@ -100,22 +99,12 @@ class _Span:
         return bool(abs(ranges) < _SAME_AMPLITUDE and abs(periods) < _SAME_RATE)
 
 
-def read_programme(**keywords: Any) -> tuple[Loop, ...]:
-    """The loops of a file, most often one: `read_loop` with these keywords, then `programme`."""
-    return programme(read_loop(**keywords), **clock_stated(keywords))
-
-
-def clock_stated(keywords: Mapping[str, Any]) -> dict[str, Any]:
-    """The keywords of `read_loop` that settle the time of a record without it."""
-    return {key: keywords[key] for key in _CLOCK if key in keywords}
-
-
-def programme(loop: Loop, **clock: Any) -> tuple[Loop, ...]:
+def programme(loop: Loop, **keywords: Any) -> tuple[Loop, ...]:
     """The loops of a record in their order: one for each part of constant amplitude and rate.
 
     Args:
         loop: the whole record.
-        clock: rate, frequency and waveform as `rebuild_time` takes them, for a record without time.
+        keywords: it was read with; rate, frequency and waveform settle the time of a record without it.
 
     Returns:
         The record itself where it has but one amplitude and rate, whatever comes before and after; else its parts,
@@ -134,6 +123,7 @@ def programme(loop: Loop, **clock: Any) -> tuple[Loop, ...]:
         return (loop,)
     if all(span.like(spans[0]) for span in spans[1:]):
         return (replace(loop, softening=_softening(loop, spans[0], from_rest=True)),)
+    clock = {key: keywords[key] for key in _CLOCK if key in keywords}
     return tuple(_loops(loop, time, spans, clock))
 
 
