@@ -34,13 +34,7 @@ class Display(NamedTuple):
 
 @dataclass(frozen=True)
 class Motion:
-    """A kind of motion: what moves, what resists it, and the units of both.
-
-    Args:
-        words: what moves, what resists it, and what relates the two, as files and reports call them.
-        displacement_unit, force_unit, stiffness_unit: SI units, as `units` writes them.
-        display: the units in which engineers read them.
-    """
+    """A kind of motion: in words what moves, what resists it and what relates the two; SI units, and engineers'."""
 
     words: tuple[str, str, str]
     displacement_unit: str
@@ -102,8 +96,7 @@ class Bushing:
 
     Args:
         name: label of the bushing.
-        inner_radius: a, radius of the inner sleeve [m].
-        outer_radius: b, radius of the outer sleeve [m].
+        inner_radius, outer_radius: a and b, of the sleeves [m].
         length: L, mean length of the rubber [m].
         shape: whether the radial formulas are the paper's, or corrected by finite elements.
 
@@ -171,13 +164,11 @@ class Specimen:
     """A body of the compound that is tested in one way only: a coupon, or a mount in plain shear.
 
     Args:
-        name: of the specimen; its tests and tables go by it.
         kind: "modulus" where tests give strain and modulus, "shear" where they give displacement and force of rubber
             blocks in shear.
         strain: of a modulus test, what its files state: engineering shear strain gamma = 2 e, the tensor's shear e (it
             is read as gamma), or the strain of a bar in tension, with Young's modulus.
-        area: of one block in shear [m^2].
-        thickness: of one block [m].
+        area, thickness: of one block in shear [m^2, m].
         elements: blocks in parallel.
 
     Raises:
@@ -225,20 +216,6 @@ class Specimen:
         """The units in which engineers read its displacement, force and stiffness, or strain, stress and modulus."""
         return self.motion.display
 
-    @property
-    def unit_strain(self) -> float:
-        """Equivalent strain per unit displacement [1/m], or per unit of its strain [1]."""
-        if self.thickness is not None:
-            return 0.5 / self.thickness
-        return math.sqrt(3.0) / 2.0 if self.strain == "tension" else 0.5
-
-    @property
-    def stiffness_per_modulus(self) -> float:
-        """Stiffness per unit equivalent shear modulus [m], or modulus that a test gives over it [1]."""
-        if self.area is not None and self.thickness is not None:
-            return self.elements * self.area / self.thickness
-        return 3.0 if self.strain == "tension" else 1.0
-
 
 #: Where a response is measured or predicted: a direction of the bushing, or a specimen of its compound.
 Place = Direction | Specimen
@@ -262,7 +239,11 @@ def unit_strain(bushing: Bushing | None, place: Place) -> float:
     Raises:
         ModelError: a direction where there is no bushing.
     """
-    return place.unit_strain if isinstance(place, Specimen) else _present(bushing, place).unit_strain(place)
+    if not isinstance(place, Specimen):
+        return _present(bushing, place).unit_strain(place)
+    if place.thickness is not None:
+        return 0.5 / place.thickness
+    return math.sqrt(3.0) / 2.0 if place.strain == "tension" else 0.5
 
 
 def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
@@ -271,9 +252,11 @@ def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
     Raises:
         ModelError: a direction where there is no bushing.
     """
-    if isinstance(place, Specimen):
-        return place.stiffness_per_modulus
-    return _present(bushing, place).stiffness_per_modulus(place)
+    if not isinstance(place, Specimen):
+        return _present(bushing, place).stiffness_per_modulus(place)
+    if place.area is not None and place.thickness is not None:
+        return place.elements * place.area / place.thickness
+    return 3.0 if place.strain == "tension" else 1.0
 
 
 def stated_strain(place: Place) -> float:

@@ -54,13 +54,11 @@ _RUN_IN_CYCLES = 40
 
 @dataclass(frozen=True, eq=False)
 class Undisturbed:
-    """What a rig without error writes.
+    """What a rig without error writes of a model.
 
     Args:
-        truth: the model on the rig.
         loops: each planned loop and its record.
-        sweeps: each planned sweep and its complex stiffness, (held, steps): (levels, frequencies) where the frequency
-            is stepped.
+        sweeps: each planned sweep and its complex stiffness, (held, steps).
         resonances: each planned resonance test and its complex transmissibility, (frequencies,).
     """
 
@@ -74,12 +72,7 @@ class Undisturbed:
 class Simulated:
     """A simulated campaign: the true model, the plan, and what the rig wrote.
 
-    Args:
-        truth: the model on the rig.
-        plan: the tests and their noise.
-        loops, sweeps: as measured.
-        resonances: the mass [kg] and the record of each resonance test.
-        specimens: that were tested.
+    `resonances` has the mass [kg] and the record of each resonance test; `specimens`, those that were tested.
     """
 
     truth: Model
@@ -117,7 +110,7 @@ def model_of(campaign: Campaign) -> Model:
             expected="a [simulate] table with parameters",
             hint="or fit the campaign first and simulate its model.json",
         )
-    values = dict(campaign.simulate.parameters)
+    values = campaign.simulate.parameters
     missing = [name for name in FIVE if name not in values]
     if missing:
         raise CampaignError(
@@ -136,9 +129,7 @@ def model_of(campaign: Campaign) -> Model:
 def simulate(truth: Model, plan: SimulateSettings) -> Simulated:
     """Put a model on the virtual rig and measure it as planned; the same seed gives the same data.
 
-    Args:
-        truth: bushing and effects, those of the rig included.
-        plan: tests, repeats, noise and seed; the paper's tests where it names none.
+    The model has the effects of the rig too; a plan that names no tests has those of the paper.
     """
     return measure(undisturbed(truth, plan), plan)
 
@@ -147,8 +138,6 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
     """What the rig would write if it measured without error: the slow part of a simulation.
 
     Args:
-        truth: bushing and effects.
-        plan: the tests.
         steps_per_cycle: time steps of the sweeps; the rig's error falls in proportion to them.
 
     Raises:
@@ -215,7 +204,7 @@ def _clean_loop(truth: Model, test: SimulatedLoop) -> rig.Record:
         waveform=test.waveform,
         kind="loop",
     )
-    return _thinned(measured, _STEPS_PER_ROW)
+    return _thinned(measured)
 
 
 def _clean_programme(truth: Model, test: SimulatedLoop) -> rig.Record:
@@ -237,21 +226,20 @@ def _clean_programme(truth: Model, test: SimulatedLoop) -> rig.Record:
         phase = np.arange(round(test.cycles / (frequency * step))) * (frequency * step)
         motions += [amplitude * rig.wave(test.waveform, phase), rest]
     whole = rig.imposed(truth, test.direction, np.concatenate([*motions[:-1], [0.0]]), step, test.parts[0][0])
-    return _thinned(whole, _STEPS_PER_ROW)
+    return _thinned(whole)
 
 
-def _thinned(record: rig.Record, every: int) -> rig.Record:
-    """Every so many rows of a record."""
+def _thinned(record: rig.Record) -> rig.Record:
+    """One row of a record for so many time steps."""
+    every = _STEPS_PER_ROW
     return rig.Record(record.time[::every], record.displacement[::every], record.force[::every])
 
 
 def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Array:
     """Complex stiffness, (held, steps)."""
-    frequency, amplitude = _points(test)
-    points = frequency.ravel(), amplitude.ravel()
-    return rig.dynamic_stiffness(truth, test.direction, *points, steps_per_cycle=steps_per_cycle).reshape(
-        frequency.shape
-    )
+    points = (values.ravel() for values in _points(test))
+    found = rig.dynamic_stiffness(truth, test.direction, *points, steps_per_cycle=steps_per_cycle)
+    return found.reshape(len(test.held), -1)
 
 
 def _points(test: SimulatedSweep) -> tuple[Array, Array]:
@@ -280,13 +268,6 @@ def _clean_resonance(truth: Model, test: SimulatedResonance, steps_per_cycle: in
 
 def _near(truth: Model, place: Place, frequency: Array, amplitude: Array, stiffness: Array) -> Callable[[Array], Array]:
     """The rig's stiffness at amplitudes near those at which it is known: it changes as that of the closed form does.
-
-    Args:
-        truth: the model on the rig.
-        place: of the test.
-        frequency: [Hz], (n,).
-        amplitude: zero-to-peak, of the known points, (n,).
-        stiffness: complex, of the known points, (n,).
 
     Notes:
         The rig is within 0.1 % of the closed form, and this ratio hardly changes with the amplitude: 2 % away the error
@@ -338,7 +319,7 @@ def _reached(test: SimulatedSweep, plan: SimulateSettings, random: Generator) ->
 def _resonance(
     test: SimulatedResonance, clean: Array, name: str, plan: SimulateSettings, random: Generator
 ) -> ResonanceTest:
-    """A resonance test: one run, with the gain and phase of its two accelerometers."""
+    """One run, with the gain and phase of its two accelerometers."""
     return ResonanceTest(
         name,
         test.direction,
@@ -366,12 +347,13 @@ def to_files(simulated: Simulated) -> dict[str, bytes]:
     from bushfit.model.file import to_document
     from bushfit.reading.csvfile import raw_loop_table, raw_resonance_table, raw_sweep_table, to_csv
 
-    files = {f"{loop.name}.csv": to_csv(raw_loop_table(loop)) for loop in simulated.loops}
-    files |= {f"{sweep.name}.csv": to_csv(raw_sweep_table(sweep)) for sweep in simulated.sweeps}
-    files |= {f"{test.name}.csv": to_csv(raw_resonance_table(test)) for _, test in simulated.resonances}
-    files["campaign.toml"] = _campaign_toml(simulated).encode()
-    files["truth.json"] = (json.dumps(to_document(simulated.result), indent=1) + "\n").encode()
-    return files
+    return {
+        **{f"{loop.name}.csv": to_csv(raw_loop_table(loop)) for loop in simulated.loops},
+        **{f"{sweep.name}.csv": to_csv(raw_sweep_table(sweep)) for sweep in simulated.sweeps},
+        **{f"{test.name}.csv": to_csv(raw_resonance_table(test)) for _, test in simulated.resonances},
+        "campaign.toml": _campaign_toml(simulated).encode(),
+        "truth.json": (json.dumps(to_document(simulated.result), indent=1) + "\n").encode(),
+    }
 
 
 def _campaign_toml(simulated: Simulated) -> str:

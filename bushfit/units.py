@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -186,11 +186,7 @@ def agrees(text: str, expected: str) -> bool:
 
 
 def quantity(value: object, *expected: str) -> float:
-    """The SI value of a text such as "10 mm".
-
-    Args:
-        value: what the user wrote.
-        expected: the SI units that it may agree with, such as "m".
+    """The SI value of a text such as "10 mm" that agrees with one of the expected SI units, such as "m".
 
     Raises:
         UnitError: no text, no number, no unit, or a unit of another dimension.
@@ -202,13 +198,7 @@ def quantity(value: object, *expected: str) -> float:
 
 
 def for_people(unit: str, factor: float, size: float) -> tuple[str, float]:
-    """Unit and factor from SI in which people read numbers of that size: MPa for 1.09e6 Pa, kPa for 1.46e4 Pa.
-
-    Args:
-        unit: SI, or another.
-        factor: from SI to it.
-        size: of the numbers, in SI.
-    """
+    """Unit and factor from SI in which people read numbers of that size in SI: MPa for 1.09e6 Pa, kPa for 1.46e4 Pa."""
     unit, factor = _WRITTEN.get(unit, (unit, factor))
     number = abs(size) * factor
     if unit == "s":
@@ -221,12 +211,9 @@ def for_people(unit: str, factor: float, size: float) -> tuple[str, float]:
 
 
 def number(value: float, digits: int, sign: str = "") -> str:
-    """A number with at most so many digits: 32940, 0.3, 1.09e8; an exponent only where zeros would hide it.
+    """A number with at most so many digits, up to 15: 32940, 0.3, 1.09e8; an exponent only where zeros would hide it.
 
-    Args:
-        value: any number.
-        digits: significant ones, up to 15.
-        sign: "+" to have it said of positive numbers too.
+    With "+" as `sign`, positive numbers have theirs too.
     """
     rounded = float(f"{value:.{digits}g}")
     if rounded == 0.0 or not math.isfinite(rounded):
@@ -284,21 +271,18 @@ def _kind(expected: str) -> tuple[str, str]:
 
 def _split_quantity(value: object, expected: str) -> tuple[float, str]:
     kind, unit = _kind(expected)
-    wanted = f'{kind} with its unit, such as "10 {unit}"'
+    refused = partial(UnitError, expected=f'{kind} with its unit, such as "10 {unit}"')
     text = str(value).strip()
     number = _NUMBER.match(text)
     if not isinstance(value, str | int | float) or isinstance(value, bool) or number is None:
-        raise UnitError("this is no quantity", found=f'"{text}"' if isinstance(value, str) else text, expected=wanted)
+        raise refused("this is no quantity", found=f'"{text}"' if isinstance(value, str) else text)
     rest = text[number.end() :].strip()
     if not rest:
-        hint = None if expected == "1" else f'write "{text} {unit}"'
-        raise UnitError("a number without a unit", found=text, expected=wanted, hint=hint)
+        raise refused("a number without a unit", found=text, hint=None if expected == "1" else f'write "{text} {unit}"')
     if rest[0] in ",.":
-        raise UnitError(
-            "this is no quantity", found=f'"{text}"', expected=wanted, hint="write numbers with a decimal point"
-        )
+        raise refused("this is no quantity", found=f'"{text}"', hint="write numbers with a decimal point")
     if not math.isfinite(float(number[0])):
-        raise UnitError("the number is too large", found=f'"{text}"', expected=wanted)
+        raise refused("the number is too large", found=f'"{text}"')
     return float(number[0]), rest
 
 

@@ -97,14 +97,9 @@ def check_tables(
     *,
     kind: type[BushfitError] = CampaignError,
 ) -> T:
-    """A parsed TOML or JSON file as the dataclass `schema`, all quantities in SI.
+    """A parsed TOML or JSON file as the dataclass `schema`, which pydantic can check; all quantities in SI.
 
-    Args:
-        tables: the parsed file.
-        file: where the tables stand, for errors.
-        schema: a dataclass that pydantic can check.
-        place: where in the file they stand, for errors; None for a whole file.
-        kind: class of the errors.
+    Errors name the file and the place in it, None for a whole file.
 
     Raises:
         kind: keys or values that are not understood.

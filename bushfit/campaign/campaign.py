@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -30,16 +31,13 @@ _CONDITIONS = ("preload", "date", "operator", "specimen_number")
 
 @dataclass(frozen=True, eq=False)
 class Campaign:
-    """A bushing, specimens of its compound, their tests in SI, and the settings of what to do with them.
+    """A bushing, specimens of its compound, their tests, and the settings of what to do with them, all in SI.
 
     Args:
         name: of the campaign; default the name of the bushing, or of the first specimen.
         path: the campaign file.
-        bushing: geometry [m]; None where specimens alone were tested.
-        loops, sweeps: the measurements, SI.
-        fit, predict: settings, SI; their defaults where the file has none.
-        simulate: settings, SI; None where the file has none.
-        specimens: other bodies of the compound.
+        bushing: None where specimens alone were tested.
+        simulate: None where the file has no such table.
     """
 
     name: str
@@ -153,9 +151,8 @@ def reader_keywords(
     Raises:
         CampaignError: a test that is listed twice, or one of no body.
     """
-    names = _test_names(tests)
     seen = set()
-    for test, name in zip(tests, names, strict=True):
+    for test, name in zip(tests, _test_names(tests), strict=True):
         file = campaign.parent / test.file
         if (place := (os.path.normpath(file), test.sheet, test.temperature)) in seen:
             raise CampaignError(
@@ -173,23 +170,17 @@ def reader_keywords(
                 if held <= 0.0:
                     raise CampaignError("at_amplitude is not positive", found=f'"{amplitude}"', expected="above zero")
                 stated["at_amplitude"] = held
-        yield {
-            **stated,
-            "file": file,
-            "name": name,
-            "listed_as": Path(test.file),
-            "written": written,
-            "conditions": conditions,
-        }
+        named = {"file": file, "name": name, "listed_as": Path(test.file)}
+        yield {**stated, **named, "written": written, "conditions": conditions}
 
 
 def _test_names(tests: Sequence[LoopFile | SweepFile]) -> list[str]:
     """A name of its own for each test."""
-    stems = [Path(test.file).stem for test in tests]
-    names = [stem if stems.count(stem) == 1 else test.file for test, stem in zip(tests, stems, strict=True)]
-    files = [test.file for test in tests]
-    for place, test in enumerate(tests):
-        if files.count(test.file) > 1:
-            at = None if test.temperature is None else f"{test.temperature - CELSIUS:.4g} degC"
-            names[place] = " ".join(filter(None, (stems[place], test.sheet, at)))
+    files, stems = Counter(test.file for test in tests), Counter(Path(test.file).stem for test in tests)
+    names = []
+    for test in tests:
+        stem = Path(test.file).stem
+        at = None if test.temperature is None else f"{test.temperature - CELSIUS:.4g} degC"
+        in_file = " ".join(filter(None, (stem, test.sheet, at)))
+        names.append(in_file if files[test.file] > 1 else test.file if stems[stem] > 1 else stem)
     return names

@@ -17,10 +17,6 @@ _LISTS = ("loops", "sweeps", "resonances")
 def place_tested(specimen: object, direction: object, specimens: Sequence[Specimen]) -> Place:
     """The direction or the specimen that the two keys of a test mean.
 
-    Args:
-        specimen, direction: as the file has them; None where it does not.
-        specimens: of the campaign.
-
     Raises:
         CampaignError: an unknown specimen, a bushing without a direction, or a specimen with one of the bushing's.
     """

@@ -142,7 +142,6 @@ class TestFile(FileFormat):
     """What [[loops]] and [[sweeps]] say alike: a file, what was tested in it, and under which conditions.
 
     Args:
-        file: from the campaign's folder.
         direction: of the bushing; a specimen has none, which may be written "shear".
         specimen: by its name in [[specimens]]; the bushing unless stated.
         noise: relative standard deviation of a point, where it is known.
@@ -288,11 +287,9 @@ class SimulatedLoop(SimulatedTest):
 
 @dataclass(frozen=True)
 class SimulatedSweep(SimulatedTest):
-    """[[simulate.sweeps]]: all combinations of amplitudes and frequencies.
+    """[[simulate.sweeps]]: all combinations of amplitudes, zero-to-peak [m or rad, or strain], and frequencies [Hz].
 
     Args:
-        amplitudes: zero-to-peak [m or rad, or strain].
-        frequencies: [Hz].
         stepped: what changes from point to point of a run; the other is held.
         reached: standard deviation of the amplitude that a point really reached, relative to the one that was asked.
     """
@@ -315,12 +312,9 @@ class SimulatedSweep(SimulatedTest):
 
 @dataclass(frozen=True)
 class SimulatedResonance(SimulatedTest):
-    """[[simulate.resonances]]: a mass on the bushing, or on blocks in shear, whose base is shaken with a sine.
+    """[[simulate.resonances]]: a mass [kg] on the bushing, or on blocks in shear, whose base is shaken with a sine.
 
-    Args:
-        mass: that moves on the mount [kg].
-        base_acceleration: zero-to-peak [m/s^2], the same at all frequencies.
-        frequencies: [Hz].
+    `base_acceleration` is zero-to-peak [m/s^2], the same at all frequencies [Hz].
     """
 
     mass: Annotated[float, _si("kg"), _SHAKEN]

@@ -23,7 +23,6 @@ def read_toml(path: Path, schema: type[T], *, what: str = "a campaign file", lar
     """The content of a TOML file as the dataclass `schema`, all quantities in SI.
 
     Args:
-        path: the file.
         schema: a pydantic dataclass, or one of its tables; unknown keys are refused.
         what: the file in words, for errors.
         largest: size of the file at most [bytes].

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 from bushfit.geometry import Bushing, Place, Specimen
 
@@ -12,11 +12,11 @@ def body_lines(bushing: Bushing | None, specimens: Iterable[Specimen]) -> list[s
     """The lines of [bushing] and [[specimens]]."""
     lines = []
     if bushing:
-        lines += ["[bushing]", f"name = {quoted(bushing.name)}"]
+        lines += ["[bushing]", f"name = {toml_value(bushing.name)}"]
         lines += [f"{key} = {_mm(getattr(bushing, key))}" for key in ("inner_radius", "outer_radius", "length")]
         lines += [f'shape = "{bushing.shape}"'] if bushing.shape != "paper" else []
     for specimen in specimens:
-        lines += ["", "[[specimens]]", f"name = {quoted(specimen.name)}", f'kind = "{specimen.kind}"']
+        lines += ["", "[[specimens]]", f"name = {toml_value(specimen.name)}", f'kind = "{specimen.kind}"']
         if specimen.strain != "engineering":
             lines.append(f'strain = "{specimen.strain}"')
         if specimen.area and specimen.thickness:
@@ -27,13 +27,18 @@ def body_lines(bushing: Bushing | None, specimens: Iterable[Specimen]) -> list[s
 
 def table_lines(kind: str, file: str, place: Place) -> list[str]:
     """The lines of one of [[loops]] or [[sweeps]], with the file and what was tested."""
-    tested = f"specimen = {quoted(place.name)}" if isinstance(place, Specimen) else f'direction = "{place}"'
-    return ["", f"[[{kind}]]", f"file = {quoted(file)}", tested]
+    tested = f"specimen = {toml_value(place.name)}" if isinstance(place, Specimen) else f'direction = "{place}"'
+    return ["", f"[[{kind}]]", f"file = {toml_value(file)}", tested]
 
 
-def quoted(text: str) -> str:
-    """A text as TOML writes it, without control characters."""
-    return json.dumps(text, ensure_ascii=False)
+def toml_value(value: Any) -> str:
+    """A value as TOML writes it."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {toml_value(entry)}" for key, entry in value.items()) + " }"
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return '"' + "".join(c if c >= " " and c != "\x7f" else f"\\u{ord(c):04x}" for c in escaped) + '"'
+    return str(value)
 
 
 def _mm(length: float) -> str:

@@ -7,8 +7,6 @@ is left out too, because nobody knows how many cycles went by there.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from bushfit.effects.contract import Array
@@ -112,7 +110,7 @@ def _steady_part_between(loop: Loop, time: Array, holes: Array) -> tuple[Loop, s
 def _cut(loop: Loop, first: float, last: float) -> Loop:
     """The rows between two times [s], both counted in."""
     kept = slice(np.searchsorted(loop.time, first), np.searchsorted(loop.time, last, side="right"))
-    return replace(loop, **{name: getattr(loop, name)[kept] for name in ("time", "displacement", "force")})
+    return loop.at(kept)
 
 
 def _period(time: Array, motion: Array) -> float | None:

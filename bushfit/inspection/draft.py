@@ -8,6 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from bushfit.campaign.written import toml_value
 from bushfit.geometry import Specimen
 from bushfit.inspection.record import Inspected
 
@@ -83,13 +84,3 @@ def _named(file: Path, folder: Path | None) -> str:
 def _quoted(name: str) -> str:
     """A name as a word of a command line."""
     return f'"{name}"' if " " in name else name
-
-
-def toml_value(value: Any) -> str:
-    """A value as TOML writes it."""
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {toml_value(entry)}" for key, entry in value.items()) + " }"
-    if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        return '"' + "".join(c if c >= " " and c != "\x7f" else f"\\u{ord(c):04x}" for c in escaped) + '"'
-    return str(value)

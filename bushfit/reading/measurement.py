@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
@@ -101,6 +101,11 @@ class Loop:
 
     def __post_init__(self) -> None:
         _check_lengths(self.name, self.time, self.displacement, self.force)
+
+    def at(self, rows: slice | NDArray[np.bool_]) -> Loop:
+        """The record of these rows alone."""
+        channels = {name: getattr(self, name)[rows] for name in ("time", "displacement", "force")}
+        return replace(self, **channels)
 
 
 @dataclass(frozen=True, eq=False)

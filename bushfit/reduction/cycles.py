@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import comb
+from math import comb, prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,12 +113,7 @@ class Cycles:
         return [slice(int(a), int(b)) for a, b in pairwise(border) if not hole[a]]
 
     def fundamentals(self, run: slice, values: Floats) -> Complex:
-        """Complex fundamental of a channel in each cycle of a run, (k,): fitted with its mean by least squares.
-
-        Args:
-            run: the cycles, k of them.
-            values: of the channel in each row, (n,).
-        """
+        """Complex fundamental of a channel, (n,), in each cycle of a run, (k,): least squares, with its mean."""
         edges, first = self.edges[run.start : run.stop + 1], self.first_rows[run.start : run.stop + 1]
         rows = slice(first[0], first[-1])
         count = np.diff(first)
@@ -175,11 +170,7 @@ def least_prominence(values: Floats) -> float:
 
 
 def lone_outliers(time: Floats, values: Floats) -> NDArray[np.bool_]:
-    """Which rows lie alone far off their neighbours, as faults of a record do, (n,).
-
-    Args:
-        time: of each row [s], (n,).
-        values: of a channel in each row, (n,).
+    """Which rows of a channel, (n,), lie alone far off their neighbours, as faults of a record do, (n,).
 
     Notes:
         Such a row is farther off the cubic through the two rows before and the two after it than these spread, and
@@ -196,10 +187,7 @@ def lone_outliers(time: Floats, values: Floats) -> NDArray[np.bool_]:
         apart = [clock[place : stop + place] - clock[2 : stop + 2] for place in (0, 1, 3, 4)]
         cubic, gain = np.zeros(stop), np.ones(stop)
         for value, node in zip(near, apart, strict=True):
-            weight = np.ones(stop)
-            for other in apart:
-                if other is not node:
-                    weight *= other / (other - node)
+            weight = prod(other / (other - node) for other in apart if other is not node)
             cubic += weight * value
             gain += weight * weight
         reach = least * np.sqrt(gain / _EVEN_GAIN)
@@ -217,7 +205,7 @@ def turning_points(values: Floats, least: float) -> Integers:
     moved = np.concatenate(([0], 1 + np.flatnonzero(np.diff(values) != 0.0)))
     sense = np.sign(np.diff(values[moved]))
     inner = 1 + np.flatnonzero(sense[1:] != sense[:-1])
-    turns = np.concatenate((moved[:1], moved[inner], moved[-1:] if moved.size > 1 else moved[:0]))
+    turns = np.concatenate((moved[:1], moved[inner], moved[1:][-1:]))
     while turns.size > 2:
         height = np.abs(np.diff(values[turns]))
         padded = np.concatenate(([np.inf], height, [np.inf]))
@@ -252,8 +240,10 @@ def pieces(edges: Floats, log_amplitude: Floats) -> list[slice]:
     period = float(np.median(np.diff(edges)))
     phase = (edges - edges[0]) / period - np.arange(edges.size)
     # of white noise, squared weights of second differences sum up to 6, of first ones to 2
-    jitter = max(_deviation(np.diff(phase, 2)) / 6.0**0.5, _LEAST_JITTER)
-    spread = max(_deviation(np.diff(log_amplitude)) / 2.0**0.5, _LEAST_SCATTER)
+    jitter = spread = 0.0
+    if log_amplitude.size > 1:
+        jitter, spread = scatter(np.diff(phase, 2))[1] / 6.0**0.5, scatter(np.diff(log_amplitude))[1] / 2.0**0.5
+    jitter, spread = max(jitter, _LEAST_JITTER), max(spread, _LEAST_SCATTER)
     found, open_parts = [], [slice(0, log_amplitude.size)]
     while open_parts:
         part = open_parts.pop()
@@ -266,11 +256,7 @@ def pieces(edges: Floats, log_amplitude: Floats) -> list[slice]:
 
 
 def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
-    """Whether the frequency of a run sweeps all the time and does not step from piece to piece.
-
-    Args:
-        edges: time of the crossings [s], (m + 1,).
-        parts: the pieces of the run.
+    """Whether the frequency of a run of crossings [s], (m + 1,), sweeps all the time and does not step between parts.
 
     Notes:
         In a sweep the period changes within the pieces as it does between them; in steps it is constant within.
@@ -294,8 +280,7 @@ def _cut(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
     Args:
         phase: of the crossings, less that of an even sine [jitter], (m + 1,).
         level: ln of the amplitude of each cycle [spread], (m,).
-        jitter: standard deviation of a crossing [periods].
-        spread: standard deviation of ln of an amplitude.
+        jitter, spread: standard deviation of a crossing [periods], and of ln of an amplitude.
     """
     count = level.size
     if count < 2 * _FEWEST_CYCLES:
@@ -332,8 +317,7 @@ def mean_from_steady(motion: Complex, stiffness: Complex, fewest: int) -> slice:
     """The steady cycles of a step: those left when both ends are cut so that the mean is most certain.
 
     Args:
-        motion: complex amplitude of the displacement in each cycle [m or rad], (m,).
-        stiffness: complex stiffness in each cycle [N/m or N m/rad], (m,).
+        motion, stiffness: complex, in each cycle [m or rad, N/m or N m/rad], (m,).
         fewest: cycles that are kept at least.
 
     Notes:
@@ -347,12 +331,7 @@ def mean_from_steady(motion: Complex, stiffness: Complex, fewest: int) -> slice:
 
 
 def _truncation(series: Complex, most: int) -> int:
-    """Number of entries to cut at the start, `most` or fewer, so that the standard error of the mean is least.
-
-    Args:
-        series: (k, m); their squared errors are added.
-        most: entries that may be cut.
-    """
+    """Entries of series, (k, m), to cut at the start, up to `most`, so that the means have the least squared error."""
     if most < 1:
         return 0
     back = (series - series.mean(axis=1, keepdims=True))[:, ::-1]
@@ -360,8 +339,3 @@ def _truncation(series: Complex, most: int) -> int:
     squares = np.cumsum(np.abs(back) ** 2, axis=1) - np.abs(np.cumsum(back, axis=1)) ** 2 / n
     error = (squares.sum(axis=0) / n**2)[::-1]
     return int(np.argmin(error[: most + 1]))
-
-
-def _deviation(values: Floats) -> float:
-    """Standard deviation that outliers hardly move; 0 of no values."""
-    return scatter(values)[1] if values.size else 0.0

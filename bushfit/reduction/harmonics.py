@@ -38,7 +38,6 @@ class HarmonicFit:
     """Drift and harmonics of displacement and force over the whole cycles of one step, and their residuals.
 
     Args:
-        frequency: [Hz].
         solution: of both channels, (p, 2): drift, then cosine and negative sine of each harmonic.
         covariance: of the solution for unit variance of the values, (p, p).
         freedom: degrees of freedom: rows less unknowns.
@@ -58,9 +57,7 @@ class HarmonicFit:
         """The fit with the frequency at which the phase of the displacement does not drift from cycle to cycle.
 
         Args:
-            time: [s], (n,).
-            displacement: [m or rad], (n,).
-            force: [N or N m], (n,).
+            time, displacement, force: [s], [m or rad] and [N or N m], (n,).
             edges: where the cycles begin and the last one ends [s], (cycles + 1,).
         """
         middle = (edges[0] + edges[-1]) / 2.0

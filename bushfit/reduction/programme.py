@@ -98,6 +98,11 @@ class _Span:
         ranges, periods = np.log(self.range / other.range), np.log(self.period / other.period)
         return bool(abs(ranges) < _SAME_AMPLITUDE and abs(periods) < _SAME_RATE)
 
+    def goes_on(self, other: _Span) -> bool:
+        """Whether the part after it is the same one, which a disturbance broke off."""
+        gap = (other.begin - self.end) / self.period
+        return self.like(other) and gap < _DISTURBED and abs(2.0 * gap - round(2.0 * gap)) < 2.0 * _SAME_PHASE
+
 
 def programme(loop: Loop, **keywords: Any) -> tuple[Loop, ...]:
     """The loops of a record in their order: one for each part of constant amplitude and rate.
@@ -164,23 +169,20 @@ def _spans(loop: Loop, time: Floats, motion: Floats) -> list[_Span]:
                 found.append(_Span(float(across[first]), float(across[last]), period, part))
     if not found:
         _check_not_changing(loop, size[1:-1])
+        return []
     joined: list[_Span] = []
     for span in found:
-        goes_on = bool(joined) and _goes_on(joined[-1], span)
-        joined[-1:] = [replace(joined[-1], end=span.end)] if goes_on else [*joined[-1:], span]
-    limits = [time[0], *(span.end for span in joined)], [*(span.begin for span in joined), time[-1]]
-    return [
-        _to_its_ends(span, time, motion, float(before), float(after))
-        for span, before, after in zip(joined, limits[0][:-1], limits[1][1:], strict=True)
-    ]
+        if joined and joined[-1].goes_on(span):
+            joined[-1] = replace(joined[-1], end=span.end)
+        else:
+            joined.append(span)
+    before = [float(time[0]), *(span.end for span in joined[:-1])]
+    after = [*(span.begin for span in joined[1:]), float(time[-1])]
+    return [_to_its_ends(span, time, motion, *limits) for span, *limits in zip(joined, before, after, strict=True)]
 
 
 def _check_not_changing(loop: Loop, size: Floats) -> None:
-    """Refuse a record without a part whose strokes, of these ranges [m or rad], go up and down by ever other amounts.
-
-    Raises:
-        MeasurementError: they do.
-    """
+    """Refuse a record without a part whose strokes, of ranges [m or rad], go up and down by ever other amounts."""
     if size.size >= _FEWEST_CHANGING and np.ptp(np.log(size)) > _CHANGING:
         unit, factor = loop.direction.display.displacement
         raise MeasurementError(
@@ -217,21 +219,10 @@ def _runs(changes: NDArray[np.bool_]) -> list[slice]:
     return [slice(int(a), int(b)) for a, b in pairwise(border) if b - a > 1]
 
 
-def _goes_on(one: _Span, other: _Span) -> bool:
-    """Whether a part is the one before it, which a disturbance broke off."""
-    gap = (other.begin - one.end) / one.period
-    return one.like(other) and gap < _DISTURBED and abs(2.0 * gap - round(2.0 * gap)) < 2.0 * _SAME_PHASE
-
-
 def _to_its_ends(span: _Span, time: Floats, motion: Floats, before: float, after: float) -> _Span:
     """A part with the half cycle that lies beyond its crossings on either side, where that is as a period on.
 
-    Args:
-        span: between its crossings.
-        time: of the rows, (n,).
-        motion: displacement of the rows [m or rad], (n,).
-        before: where the part before it ends, or the record begins.
-        after: where the part after it begins, or the record ends.
+    `before` is where the part before it ends, or the record begins; `after` where the next begins, or the record ends.
     """
     begin, end = max(span.begin - span.period / 2.0, before), min(span.end + span.period / 2.0, after)
 
@@ -243,17 +234,13 @@ def _to_its_ends(span: _Span, time: Floats, motion: Floats, before: float, after
     begin = begin if same(begin, span.begin, span.period) else span.begin
     end = end if same(span.end, end, -span.period) else span.end
     near = _AT_END * span.period
-    return replace(
-        span,
-        begin=float(time[0]) if begin - time[0] < near else begin,
-        end=float(time[-1]) if time[-1] - end < near else end,
-    )
+    begin = float(time[0]) if begin - time[0] < near else begin
+    return replace(span, begin=begin, end=float(time[-1]) if time[-1] - end < near else end)
 
 
 def _loops(loop: Loop, time: Floats, spans: Sequence[_Span], clock: dict[str, Any]) -> Iterator[Loop]:
     """A loop for each part, with what was left out between them."""
-    whole, every = _clock(loop), ("time", "displacement", "force")
-    last_end = float(time[0])
+    whole, last_end = _clock(loop), float(time[0])
     for number, span in enumerate(spans, start=1):
         begin = span.begin
         if begin > time[0] and span.cycles > _THREE:
@@ -268,8 +255,7 @@ def _loops(loop: Loop, time: Floats, spans: Sequence[_Span], clock: dict[str, An
         cycles = (span.end - begin) / span.period
         said = f"{' and '.join(left_out)} are left out; {cycles:.3g} cycles are used" if left_out else None
         part = replace(
-            loop,
-            **{name: getattr(loop, name)[rows] for name in every},
+            loop.at(rows),
             name=f"{loop.name}_part_{number}",
             part=Part(rows.start, said),
             softening=_softening(loop, span, from_rest=number == 1),

@@ -45,7 +45,6 @@ class Resonance:
     """What a resonance test was reduced to: points with the amplitude that each reached and its standard error.
 
     Args:
-        test: as measured.
         mass: that moves on the mount [kg].
         turned: whether the test counts phases the other way (loss is positive here).
         frequency: [Hz], (k,).
@@ -91,7 +90,6 @@ class Resonance:
 
 
 def _warnings(found: Resonance) -> Iterator[str]:
-    """Sentences on points left out, the sign of the phases, and a resonance that was not reached."""
     left, total = found.left_out, found.left_out.size + found.frequency.size
     if left.size:
         yield (
@@ -111,13 +109,7 @@ def _refused(test: ResonanceTest, problem: str, expected: str, hint: str, found:
 
 
 def transmissibility(stiffness: Complex, mass: float, frequency: Floats) -> Complex:
-    """Complex transmissibility T = K/(K - M omega^2) of a mass on a mount whose base moves [-], (n,).
-
-    Args:
-        stiffness: complex K [N/m], (n,).
-        mass: M [kg].
-        frequency: [Hz], (n,).
-    """
+    """Complex transmissibility T = K/(K - M omega^2) [-], (n,), of a mass [kg] on a mount, with K [N/m], (n,)."""
     return stiffness / (stiffness - mass * (2.0 * np.pi * frequency) ** 2)
 
 
@@ -129,8 +121,7 @@ def response(
     Args:
         stiffness: complex K [N/m], (n,), at the frequencies for zero-to-peak amplitudes of the mount [m], (n,).
         mass: that moves on the mount [kg].
-        frequency: [Hz], (n,).
-        base_amplitude: displacement of the base, zero-to-peak [m], (n,).
+        frequency, base_amplitude: [Hz], and displacement of the base, zero-to-peak [m], (n,).
 
     Notes:
         Solves X = |T(K(X)) - 1| X_base by halving an interval of ln X. Should a mount be so soft that several X do, as
@@ -141,7 +132,7 @@ def response(
     def excess(amplitude: Floats) -> Floats:
         return amplitude * np.abs(stiffness(amplitude) - inertia) - inertia * base_amplitude
 
-    low = high = np.asarray(base_amplitude, dtype=float)
+    low = high = base_amplitude
     while (above := excess(low) > 0.0).any():
         low = np.where(above, low / 2.0, low)
     while (below := excess(high) < 0.0).any():
@@ -240,11 +231,6 @@ def _is_turned(test: ResonanceTest) -> bool:
 
 def _scatter(frequency: Floats, amplitude: Floats, ratio: Complex) -> Floats:
     """Standard deviation of the real and of the imaginary part of dT/T at each point, (k,), by what lies around it.
-
-    Args:
-        frequency: [Hz], (k,).
-        amplitude: [m], (k,).
-        ratio: transmissibility, complex [-], (k,).
 
     Notes:
         1/T = 1 - M omega^2/K is linear in the flexibility 1/K. That is fitted over all points by a function linear in

@@ -26,13 +26,11 @@ _MOST_TOLD = 5
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """The operating point that the steady cycles of one step give.
+    """The operating point that the steady cycles of one step of a history give.
 
     Args:
-        name: of the history.
         start, end: of the cycles used [s].
-        cycles: whole cycles used.
-        found: cycles of the whole step.
+        cycles, found: whole cycles used, and of the whole step.
         rows_per_cycle: mean number of rows in a cycle.
         frequency: fundamental [Hz].
         amplitude: of the displacement's fundamental, zero-to-peak, as really reached [m or rad].
@@ -72,13 +70,9 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Skipped:
-    """A stretch of a history with cycles that make no operating point.
+    """A stretch of a history [s] with cycles that make no operating point, and why.
 
-    Args:
-        name: of the history.
-        start, end: of the stretch [s].
-        why: why it makes none.
-        steady: whether it has as many cycles as a step needs, and is no mere ramp or pause.
+    `steady` is whether it has as many cycles as a step needs, and is no mere ramp or pause.
     """
 
     name: str
@@ -93,7 +87,6 @@ class Reduction:
     """What histories of one direction were reduced to.
 
     Args:
-        direction: of the test.
         steps: in the order of the histories and of time.
         skipped: stretches that make no step.
         outliers: number of rows that were left out as outliers.

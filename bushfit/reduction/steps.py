@@ -54,7 +54,9 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
     Raises:
         MeasurementError: no steady sine in any of them, or one far off every level.
     """
-    sound = [_without_outliers(history) for history in histories]
+    sound = [  # the fits need no even clock
+        one.at(~(lone_outliers(one.time, one.displacement) | lone_outliers(one.time, one.force))) for one in histories
+    ]
     outliers = sum(one.time.size for one in histories) - sum(one.time.size for one in sound)
     found = [_steps_of(history, fewest_cycles) for history in sound]
     steps = [step for some, _ in found for step in some]
@@ -71,12 +73,6 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
     direction = histories[0].direction
     _check_reach(steps, levels, direction)
     return Reduction(direction, tuple(_grouped(steps, levels)), skipped, outliers)
-
-
-def _without_outliers(history: Loop) -> Loop:
-    """A history without the rows in which a channel is an outlier; the fits need no even clock."""
-    kept = ~(lone_outliers(history.time, history.displacement) | lone_outliers(history.time, history.force))
-    return replace(history, **{name: getattr(history, name)[kept] for name in ("time", "displacement", "force")})
 
 
 def sines(history: Loop) -> list[tuple[float, float, int]]:
@@ -120,13 +116,9 @@ def _steps_of(history: Loop, fewest: int) -> tuple[list[Step], list[Skipped]]:
 
 
 def _joined(found: Sequence[tuple[float, float, Step]]) -> list[Step]:
-    """The steps of a history, and only the longest part of one that fell into several.
+    """The steps of a history, each with start and end of its cycles [s], and only the longest part of a broken one.
 
-    Args:
-        found: steps with start and end of the cycles they were taken from [s].
-
-    Notes:
-        An outlier, or an amplitude that creeps, breaks a step: its sine goes on in phase after a cycle or two.
+    An outlier, or an amplitude that creeps, breaks a step: its sine goes on in phase after a cycle or two.
     """
     kept: list[Step] = []
     last_end = -np.inf
@@ -169,8 +161,7 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
         history: the record.
         cycles: all cycles of the record.
         inside: the piece, k of them.
-        motion: complex fundamental of the displacement in each cycle of the piece [m or rad], (k,).
-        force: complex fundamental of the force in each cycle of the piece [N or N m], (k,).
+        motion, force: complex fundamental in each cycle of the piece [m or rad, N or N m], (k,).
         fewest: steady cycles that make a point.
     """
     steady = mean_from_steady(motion, force / motion, fewest)
@@ -233,8 +224,7 @@ def _check_reach(steps: Sequence[Step], levels: Sequence[float], direction: Plac
 
 def _grouped(steps: Sequence[Step], levels: Sequence[float]) -> list[Step]:
     """The steps with their nominal frequency, level and repeat."""
-    frequency = np.array([step.frequency for step in steps])
-    amplitude = np.array([step.amplitude for step in steps])
+    frequency, amplitude = np.array([(step.frequency, step.amplitude) for step in steps]).T
     groups = _clusters(np.log(frequency), _SAME_FREQUENCY)
     nominal = np.array([np.median(frequency[groups == group]) for group in groups])
     if levels:
