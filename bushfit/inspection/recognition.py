@@ -22,10 +22,8 @@ from bushfit.validation import check_tables
 
 #: What an error says besides its problem.
 _PARTS = ("file", "place", "found", "expected", "hint")
-#: The name of a specimen of which no other is stated.
-UNNAMED_SPECIMEN = "coupon"
-#: Headers of a bar in tension: E', |E*|, "tensile strain".
-_TENSILE = re.compile(r"\W*E(?![^\W_])|.*(?:young|tensile|tension|traction|zug)", re.IGNORECASE)
+#: Headers of a bar in tension: E', |E*|, "storage modulus E'", "tensile strain".
+_TENSILE = re.compile(r"(?<![^\W_])E(?![^\W_])|young|tensile|tension|traction|zug", re.IGNORECASE)
 
 
 def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
@@ -96,10 +94,10 @@ def place_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Place | Non
         CampaignError, UnitError, ModelError: sizes that make no specimen.
     """
     sizes = {key: stated[key] for key in ("area", "thickness", "elements") if key in stated}
-    body = {"name": stated.get("specimen", UNNAMED_SPECIMEN)}
+    body = {"name": stated.get("specimen", "coupon")}
     if table.motion is STRAINING:
-        if any(_TENSILE.match(column.header) for column in table.roles.values()):
-            body["strain"] = "tension"
+        if any(_TENSILE.search(column.header) for column in table.roles.values()):
+            body = {"name": stated.get("specimen", "bar"), "strain": "tension"}
         return Specimen(**vars(check_tables({**body, "kind": "modulus"}, None, SpecimenTable)))
     if sizes:
         return Specimen(**vars(check_tables({**body, **sizes, "kind": "shear"}, None, SpecimenTable)))

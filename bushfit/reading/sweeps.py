@@ -19,7 +19,10 @@ from bushfit.reading.table import Table
 from bushfit.reading.words import OF_MOTION, SWEEP_COLUMNS
 
 #: The pairs of columns that each make a complex stiffness, in order of preference.
-STIFFNESS_PAIRS = (("stiffness", "loss_factor"), ("stiffness", "phase"), ("storage_stiffness", "loss_stiffness"))
+STIFFNESS_PAIRS = (
+    *(("stiffness", "loss_factor"), ("stiffness", "phase"), ("storage_stiffness", "loss_stiffness")),
+    *(("storage_stiffness", "loss_factor"), ("storage_stiffness", "phase")),
+)
 #: Columns of which every value is above zero.
 _POSITIVE = ("frequency", "amplitude", "amplitude_reached", "stiffness", "storage_stiffness", "relative_error")
 #: Rows of the shortest sweep; chosen: fewer show no dependence on frequency or amplitude.
@@ -306,15 +309,21 @@ def _convention(table: Table, column: Column | None, stated: AmplitudeConvention
 
 
 def _complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> tuple[Complex, Floats]:
-    """Complex stiffness and loss factor by one of STIFFNESS_PAIRS, (n,) each; from 90 deg on the latter is nan."""
-    first, second = (values[role] for role in pair)
+    """Complex stiffness and loss factor by one of STIFFNESS_PAIRS, (n,) each."""
+    size, loss = (values[role] for role in pair)
     match pair:
-        case ("stiffness", "loss_factor"):
-            return (first / np.hypot(1.0, second)) * (1.0 + 1j * second), second
+        case (_, "loss_stiffness"):
+            return size + 1j * loss, loss / size
         case ("stiffness", "phase"):
-            return first * np.exp(1j * second), np.where(np.abs(second) < np.pi / 2, np.tan(second), np.nan)
-        case _:
-            return first + 1j * second, second / first
+            return size * np.exp(1j * loss), _tangent(loss)
+    factor = _tangent(loss) if pair[1] == "phase" else loss
+    storage = size / np.hypot(1.0, factor) if pair[0] == "stiffness" else size
+    return storage * (1.0 + 1j * factor), factor
+
+
+def _tangent(phase: Floats) -> Floats:
+    """The loss factor of a phase [rad], (n,); nan from 90 deg on."""
+    return np.where(np.abs(phase) < np.pi / 2, np.tan(phase), np.nan)
 
 
 def _repeats(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> NDArray[np.int64] | None:

@@ -128,6 +128,17 @@ def test_a_force_that_counts_the_other_way_is_turned_and_said(
     assert load_campaign(tmp_path / "x/campaign.toml").loops
 
 
+def test_coupons_alone_make_a_campaign_without_a_bushing(typed: Callable, tmp_path: Path) -> None:
+    for symbol in ("E", "G"):
+        rows = "\n".join(f"{f},{a},{1 + f / 1e3},0.1" for a in (0.1, 1) for f in range(5, 60, 5))
+        text = f"Frequency [Hz],Strain [%],Storage Modulus {symbol}' [MPa],tan delta [-]\n{rows}\n"
+        (tmp_path / f"{symbol}.csv").write_text(text, encoding="utf-8")
+    done = typed("init", tmp_path / "E.csv", tmp_path / "G.csv", "-o", "dma.toml")
+    assert done.returncode == 0, done.stderr
+    specimens = load_campaign(tmp_path / "dma.toml").specimens
+    assert [(one.name, one.strain) for one in specimens] == [("bar", "tension"), ("coupon", "engineering")]
+
+
 @pytest.mark.parametrize(
     ("files", "options", "said"),
     [
