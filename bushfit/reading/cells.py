@@ -18,14 +18,7 @@ _LONGEST_FOUND = 200
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """A table as its file has it: a header and rows of cells.
-
-    Args:
-        file: where it lies.
-        source: the file's rows.
-        layout: its header, units row and delimiter.
-        stated: what the user states of the file's format.
-    """
+    """A table as its file has it: a header and rows of cells; `stated` is what the user states of its format."""
 
     file: Path
     source: RowSource
@@ -57,13 +50,12 @@ class Cells:
         line: int | None = None,
         column: Column | None = None,
         found: str | None = None,
-        expected: str | None = None,
-        hint: str | None = None,
         kind: type[MeasurementError] = MeasurementError,
+        **said: str | None,
     ) -> MeasurementError:
-        """An error in this table, at a line (from 1) and column where they are known."""
+        """An error in this table, at a line (from 1) and column where they are known, with what else is `said`."""
         found = found if found is None or len(found) <= _LONGEST_FOUND else found[:_LONGEST_FOUND] + "..."
-        return kind(problem, file=self.file, place=self.place(line, column), found=found, expected=expected, hint=hint)
+        return kind(problem, file=self.file, place=self.place(line, column), found=found, **said)
 
     def place(self, line: int | None, column: Column | None) -> str | None:
         """A place in the file in words: its sheet, line and column, as far as there are such."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
@@ -25,11 +25,7 @@ _FIRST_CELLS = 1000
 
 @dataclass(frozen=True, eq=False)
 class Columns(Cells):
-    """A table of which the columns are recognised.
-
-    Args:
-        roles: the recognised columns, by what they hold.
-    """
+    """A table of which the columns are recognised; `roles` has them by what they hold."""
 
     roles: Mapping[str, Column]
 
@@ -45,6 +41,7 @@ class Columns(Cells):
         if layout.delimiter == "," and not source.may_have_comma(layout):
             ways = tuple(way for way in ways if "," not in (way.decimal, way.thousands)) or ways
         evidence = weigh(self._texts(), ways)
+        columns = {column.index: column for column in self.roles.values()}
         if evidence.contrary is None and source.may_group(layout, evidence.ways[0].decimal):
             evidence = weigh(self._texts(), ways, all_cells=True)
         if evidence.contrary:
@@ -52,7 +49,7 @@ class Columns(Cells):
             raise self.error(
                 "this number is written in another way than those before it",
                 line=line,
-                column=self._column_at(index),
+                column=columns[index],
                 found=f'"{text}"',
                 expected=f"numbers with a decimal {'comma' if evidence.ways[0].decimal == ',' else 'point'}",
                 hint='write all numbers in one way, or state decimal = "..." and thousands = "..." in the campaign',
@@ -63,7 +60,7 @@ class Columns(Cells):
             raise self.error(
                 "this number can be read in two ways",
                 line=line,
-                column=self._column_at(index),
+                column=columns[index],
                 found=f'"{text}", and no number in the file that settles it',
                 expected=" or ".join(f"{reading:.15g}" for reading in readings),
                 hint='state decimal = "." or decimal = "," in the campaign',
@@ -83,6 +80,17 @@ class Columns(Cells):
             raise self.error("too few rows", found=f"{found}", expected=f"at least {fewest_rows}")
         return values
 
+    def check_positive(self, roles: Sequence[str], wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> None:
+        """Refuse a value that is not positive in one of some columns, as far as there are such among `values`.
+
+        Raises:
+            MeasurementError: there is such a value.
+        """
+        for role in roles:
+            if role in values:
+                problem = f"the {role.replace('_', ' ')} is not positive"
+                self.refuse(values[role] <= 0.0, wanted[role], problem, "a number above zero")
+
     def refuse(
         self, bad: NDArray[np.bool_], column: Column, problem: str, expected: str, hint: str | None = None
     ) -> None:
@@ -100,11 +108,8 @@ class Columns(Cells):
     def _open_ways(self) -> tuple[Numerals, ...]:
         """The ways to write numbers that the user leaves open."""
         decimal, thousands = self.stated.decimal, self.stated.thousands
-        ways = tuple(
-            way
-            for way in ALL_NUMERALS
-            if decimal in (None, way.decimal) and thousands in (None, way.thousands or "none")
-        )
+        fitting = (way for way in ALL_NUMERALS if decimal in (None, way.decimal))
+        ways = tuple(way for way in fitting if thousands in (None, way.thousands or "none"))
         if not ways:
             raise self.error("decimal mark and thousands separator are the same", found=decimal, expected="two signs")
         return ways
@@ -117,9 +122,6 @@ class Columns(Cells):
                 if index < len(cells) and isinstance(cell := cells[index], str):
                     yield (line, index), cell
 
-    def _column_at(self, index: int) -> Column:
-        return next(column for column in self.roles.values() if column.index == index)
-
     def _by_library(self, wanted: Mapping[str, Column]) -> dict[str, Floats] | None:
         """The wanted columns as a library reads them; None where they have to be read row by row.
 
@@ -131,11 +133,9 @@ class Columns(Cells):
         if len(decimals) > 1 or not fits(first, len(self.headers)):
             return None
         numerals = Numerals(decimals.pop())
-        # a library may take a column of TRUE for numbers
-        if not all(
-            isinstance(cell := first[column.index], str) and numerals.allows(cell) for column in wanted.values()
-        ):
-            return None
+        cells = [first[column.index] for column in wanted.values()]
+        if not all(isinstance(cell, str) and numerals.allows(cell) for cell in cells):
+            return None  # a library may take a column of TRUE for numbers
         scales = {column.index: column.scale for column in wanted.values()}
         values = self.source.columns(self.layout, len(first), scales, numerals)
         return None if values is None else {role: values[column.index] for role, column in wanted.items()}

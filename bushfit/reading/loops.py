@@ -43,7 +43,7 @@ def read_loop(
 
     Args:
         file: a table with columns time (optional), displacement and force.
-        direction: direction of the test, which settles the units that fit.
+        direction: direction of the test, or its specimen, which settles the headers and units that fit.
         name: of the loop; default the stem of the file.
         listed_as: the file as the campaign names it, for provenance; default its name.
         columns: header of a role (a key of LOOP_COLUMNS), where it is not a usual one.

@@ -69,26 +69,9 @@ _KEYS = {
     "date": ("date", "test date", "Datum", "Prüfdatum", "fecha"),
     "operator": ("operator", "tested by", "Prüfer", "Bediener", "Bearbeiter", "opérateur", "operador"),
     "specimen_number": (
-        *(
-            "specimen number",
-            "specimen no",
-            "specimen",
-            "sample",
-            "sample no",
-            "sample id",
-            "serial number",
-            "serial no",
-        ),
-        *(
-            "Probe",
-            "Probennummer",
-            "Proben-Nr",
-            "Probe Nr",
-            "Prüfling",
-            "Prüflingsnummer",
-            "Seriennummer",
-            "éprouvette",
-        ),
+        *("specimen number", "specimen no", "specimen", "sample", "sample no", "sample id", "serial number"),
+        *("serial no", "Probe", "Probennummer", "Proben-Nr", "Probe Nr", "Prüfling", "Prüflingsnummer"),
+        *("Seriennummer", "éprouvette"),
     ),
 }
 _KEY_OF = {plain(name): key for key, names in _KEYS.items() for name in names}
@@ -103,14 +86,7 @@ _LONGEST_VALUE = 60
 
 
 class Named(NamedTuple):
-    """A quantity as a name has it.
-
-    Args:
-        text: number and unit, such as "0.05 mm".
-        unit: its unit.
-        is_marked: whether a word or sign beside it says that it is the amplitude.
-        convention: how it counts an amplitude, where that is said.
-    """
+    """A quantity such as "0.05 mm" as a name has it; `is_marked` where a word or sign says that it is the amplitude."""
 
     text: str
     unit: str
@@ -120,13 +96,7 @@ class Named(NamedTuple):
 
 @dataclass(frozen=True)
 class Said:
-    """What is said of a test outside its table; empty or None where nothing is.
-
-    Args:
-        quantities: what may be its amplitude or frequency.
-        direction: of the test.
-        temperature, preload, date, operator, specimen_number: as a campaign has them.
-    """
+    """What is said of a test outside its table: `quantities` that may be its amplitude or frequency, and keys."""
 
     quantities: tuple[Named, ...] = ()
     direction: Direction | None = None
@@ -158,11 +128,10 @@ def named(*names: str) -> Said:
 
 
 def _named(name: str) -> Said:
-    date = _DATE.search(name)
-    rest = _DATE.sub(" ", name)
+    date, rest = _DATE.search(name), _DATE.sub(" ", name)
     number = _SPECIMEN_NUMBER.search(rest)
     quantities: list[Named] = []
-    stated: dict[str, str] = {}
+    stated: dict[str, Any] = {"date": date and date[0], "specimen_number": number and number[1]}
     for match in _QUANTITY.finditer(rest):
         word, is_glued = plain(match["word"] or ""), bool(match["word"]) and not match["gap"] and not match["sign"]
         unit, digits = _UNITS[match["unit"].lower()], re.sub("[,p]", ".", match["number"].lower())
@@ -179,15 +148,7 @@ def _named(name: str) -> Said:
                 stated.setdefault("temperature", text)
         elif unit not in ("N", "kN") and float(text.split()[0]) > 0.0:
             quantities += _amplitude_or_frequency(word, match, rest, text, unit, is_glued=is_glued)
-    return Said(
-        tuple(quantities),
-        named_direction([name], short=True),
-        stated.get("temperature"),
-        stated.get("preload"),
-        date[0] if date else None,
-        None,
-        number[1] if number else None,
-    )
+    return Said(tuple(quantities), named_direction([name], short=True), **stated)
 
 
 def _amplitude_or_frequency(
@@ -223,13 +184,13 @@ def _stated(line: Line) -> Said:
         stated: dict[str, Any] = {key: cells[1]} if len(cells[1]) <= _LONGEST_VALUE else {}
         return Said(**stated)
     for value in values:
-        if key == "temperature" and _is_temperature(value):
+        if key == "temperature" and _is(value, "K"):
             return Said(temperature=value)
-        if key == "preload" and (_is_quantity(value, "m") or _is_quantity(value, "N")):
+        if key == "preload" and (_is(value, "m") or _is(value, "N")):
             return Said(preload=value)
         heading = _VOCABULARY.heading(cells[0])
         if heading and heading.role in ("frequency", "amplitude") and not key:
-            found = [unit for unit in ("Hz", "m", "rad", "1") if _is_quantity(value, unit) and value[0].isdigit()]
+            found = [unit for unit in ("Hz", "m", "rad", "1") if _is(value, unit) and value[0].isdigit()]
             if found and (found[0] == "Hz") == (heading.role == "frequency"):
                 return Said((Named(value, value.split()[-1], True, heading.convention),))
     return Said()
@@ -245,17 +206,10 @@ def _cells(line: Line) -> Sequence[str]:
     return [cell.strip(' "') for cell in cells if cell.strip(' "')]
 
 
-def _is_quantity(text: str, expected: str) -> bool:
+def _is(text: str, expected: str) -> bool:
+    """Whether a text is a quantity of the dimension of an SI unit."""
     try:
-        units.quantity(text, expected)
-    except UnitError:
-        return False
-    return True
-
-
-def _is_temperature(text: str) -> bool:
-    try:
-        units.temperature(text)
+        units.temperature(text) if expected == "K" else units.quantity(text, expected)
     except UnitError:
         return False
     return True

@@ -16,7 +16,7 @@ from bushfit.reading.table import Table
 from bushfit.reading.words import RESONANCE_COLUMNS
 
 #: The columns that each make a transmissibility, in order of preference; a base acceleration may stand beside them.
-TRANSMISSIBILITY_WAYS = (
+_WAYS = (
     ("transmissibility", "phase"),
     ("transmissibility_real", "transmissibility_imaginary"),
     ("base_acceleration", "mass_acceleration", "base_phase", "mass_phase"),
@@ -61,7 +61,7 @@ def read_resonance(table: Table, direction: Place, base_acceleration: float | No
     """The resonance test in a table that was opened with RESONANCE_COLUMNS.
 
     Args:
-        table: with a frequency and the columns of one of TRANSMISSIBILITY_WAYS.
+        table: with a frequency and the columns of one of _WAYS.
         direction: of the motion.
         base_acceleration: amplitude of the base [m/s^2], for a table without one.
 
@@ -70,10 +70,7 @@ def read_resonance(table: Table, direction: Place, base_acceleration: float | No
     """
     wanted = _wanted(table, stated=base_acceleration is not None)
     values = table.read(wanted, fewest_rows=FEWEST_ROWS)
-    for role in _POSITIVE:
-        if role in values:
-            problem = f"the {role.replace('_', ' ')} is not positive"
-            table.refuse(values[role] <= 0.0, wanted[role], problem, "a number above zero")
+    table.check_positive(_POSITIVE, wanted, values)
     ratio, base = _ratio(values, base_acceleration)
     bad = ~(np.isfinite(ratio) & (base > 0.0) & (ratio != 0.0))
     table.refuse(bad, wanted["frequency"], "base or mass stands still here", "two accelerations that are not zero")
@@ -83,15 +80,10 @@ def read_resonance(table: Table, direction: Place, base_acceleration: float | No
 
 
 def _wanted(table: Table, *, stated: bool) -> dict[str, Column]:
-    """The frequency, and the columns of the first of TRANSMISSIBILITY_WAYS that a table has, each with its unit.
-
-    Args:
-        table: the table.
-        stated: whether the user states the acceleration of the base.
-    """
-    way = next((way for way in TRANSMISSIBILITY_WAYS if set(way) <= set(table.roles)), None)
+    """The frequency, and the columns of the first of _WAYS that a table has; the base's acceleration may be stated."""
+    way = next((way for way in _WAYS if set(way) <= set(table.roles)), None)
     if way is None:
-        ways = ", or ".join(" and ".join(way) for way in TRANSMISSIBILITY_WAYS).replace("_", " ")
+        ways = ", or ".join(" and ".join(way) for way in _WAYS).replace("_", " ")
         raise table.error(
             "the columns give no complex transmissibility",
             line=table.layout.header_line,
@@ -116,8 +108,8 @@ def _wanted(table: Table, *, stated: bool) -> dict[str, Column]:
             expected="a column such as base acceleration [g]",
             hint='state it: --base-acceleration "0.1 g"',
         )
-    beside = ["base_acceleration"] if "base_acceleration" in table.roles else []
-    columns = {role: table.column(role, _unit(role)) for role in dict.fromkeys(("frequency", *way, *beside))}
+    roles = dict.fromkeys(("frequency", *way, "base_acceleration"))
+    columns = {role: table.column(role, _unit(role)) for role in roles if role in (*way, "frequency", *table.roles)}
     return {role: _zero_to_peak(column) for role, column in columns.items()}
 
 

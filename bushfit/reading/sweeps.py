@@ -78,19 +78,13 @@ def read_sweep(
         file: a table with columns frequency, amplitude and one of STIFFNESS_PAIRS, long or wide (see `wide`). More are
             optional: repeat (without it, an operating point that occurs again is a repeat), amplitude reached (where
             the rig missed the amplitude of the level), temperature, and relative error.
-        direction: direction of the test, or its specimen, which settles the headers and units that fit.
-        name: of the sweep; default the stem of the file.
-        listed_as: the file as the campaign names it, for provenance; default its name.
-        columns: header of a role (a key of SWEEP_COLUMNS), where it is not a usual one.
-        units: unit of a role, where the file does not tell it.
-        written: how the file is written, where it does not tell.
+        direction, name, listed_as, columns, units, written: as of `read_loop`, with the roles of SWEEP_COLUMNS.
         amplitude: how file and campaign count amplitudes, where its header does not say so: zero-to-peak unless stated.
             The sweep has them zero-to-peak.
         at_amplitude: of a file without a column for it [m or rad, or strain], counted as `amplitude` has it.
         at_frequency: of a file without a column for it [Hz].
-        noise, weight: of the sweep, see `Sweep`.
+        noise, weight, conditions: as of `read_loop`.
         temperature: at which it was tested [K], where it is stated; of a file with a column for it, the rows near it.
-        conditions: what else is stated of the test, for provenance.
 
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
@@ -104,7 +98,7 @@ def read_sweep(
     if at_amplitude is not None:  # as the file counts
         at["amplitude"] = at_amplitude * stated_strain(direction) * _ZERO_TO_PEAK[amplitude or "zero-to-peak"] / to_peak
     values = table.read(wanted, fewest_rows=_FEWEST_SWEEP_ROWS)
-    _check_positive(table, wanted, values)
+    table.check_positive(_POSITIVE, wanted, values)
     for role, value in at.items():
         values[role] = _stated(table, wanted.get(role), values, value)
     with np.errstate(over="ignore"):
@@ -158,16 +152,9 @@ def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str], at: Ma
     their units fit. Of a temperature, the zero is still that of its unit.
     """
     length, stiffness = direction.motion.displacement_unit, direction.motion.stiffness_unit
-    units = dict.fromkeys(SWEEP_COLUMNS, stiffness) | {
-        "frequency": "Hz",
-        "amplitude": length,
-        "amplitude_reached": length,
-        "phase": "rad",
-        "loss_factor": "1",
-        "repeat": "1",
-        "relative_error": "1",
-        "temperature": "K",
-    }
+    units = dict.fromkeys(SWEEP_COLUMNS, "1") | {"frequency": "Hz", "phase": "rad", "temperature": "K"}
+    units |= dict.fromkeys(("amplitude", "amplitude_reached"), length)
+    units |= dict.fromkeys(("stiffness", "storage_stiffness", "loss_stiffness"), stiffness)
     needed = [role for role in ("frequency", "amplitude") if role in table.roles or role not in at]
     optional = [role for role in ("amplitude_reached", "repeat", "relative_error") if role in table.roles]
     degrees = table.roles.get("temperature")
@@ -179,18 +166,6 @@ def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str], at: Ma
         if role in found:
             found[role] = replace(found[role], scale=stated_strain(direction) * found[role].scale)
     return found if degrees is None else {"temperature": degrees, **found}
-
-
-def _check_positive(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> None:
-    """Refuse a column of _POSITIVE with a value that is not."""
-    for role in _POSITIVE:
-        if role in values:
-            table.refuse(
-                values[role] <= 0.0,
-                wanted[role],
-                f"the {role.replace('_', ' ')} is not positive",
-                "a number above zero",
-            )
 
 
 def _check_loss(table: Table, column: Column, loss_factor: Floats) -> None:
@@ -256,12 +231,7 @@ def _stated(table: Table, column: Column | None, values: Mapping[str, Floats], s
 def _of_temperature(
     table: Table, values: Mapping[str, Floats], stated: float | None
 ) -> tuple[NDArray[np.intp], float | None]:
-    """The rows of a test, by index, and its temperature [K]: as stated, or else the mean of its column if it has one.
-
-    Raises:
-        MeasurementError: several temperatures of which none is stated, or too few rows near the one that is.
-        UnitError: a column without its unit where it matters.
-    """
+    """The rows of a test, by index, and its temperature [K]: as stated, or else the mean of its column if it has one."""
     rows = np.arange(values["frequency"].size)
     if "temperature" not in values:
         return rows, stated
