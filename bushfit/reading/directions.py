@@ -11,20 +11,11 @@ from bushfit.geometry import Direction
 
 #: For the starts of words in English, German, French and Spanish, without accents, the direction they name.
 _WORD_STARTS = {
-    "axial": Direction.AXIAL,
-    "axiaux": Direction.AXIAL,
-    "radial": Direction.RADIAL,
-    "radiaux": Direction.RADIAL,
-    "torsi": Direction.TORSION,
-    "tordu": Direction.TORSION,
-    "verdreh": Direction.TORSION,
-    "drehwinkel": Direction.TORSION,
-    "drehmoment": Direction.TORSION,
-    "rotation": Direction.TORSION,
-    "rotacion": Direction.TORSION,
+    **dict.fromkeys(("axial", "axiaux"), Direction.AXIAL),
+    **dict.fromkeys(("radial", "radiaux"), Direction.RADIAL),
+    **dict.fromkeys(("torsi", "tordu", "verdreh", "drehwinkel", "drehmoment"), Direction.TORSION),
+    **dict.fromkeys(("rotation", "rotacion"), Direction.TORSION),
 }
-
-
 #: Short for a direction in names; in headers rad is a unit.
 _SHORT = {"ax": Direction.AXIAL, "rad": Direction.RADIAL, "tors": Direction.TORSION, "tor": Direction.TORSION}
 #: A word, without the letters of a unit behind a number.
@@ -34,13 +25,10 @@ _WORD = re.compile(r"(?<![a-z\d.,])(?:[a-z]+)")
 def named_direction(texts: Iterable[str], *, short: bool = False) -> Direction | None:
     """The one direction that texts, such as headers, name; None where they name none or several.
 
-    Args:
-        texts: of which the words count.
-        short: whether "ax", "rad" and "tors" count as well, as in names of files.
+    With `short`, "ax", "rad" and "tors" count as well, as in names of files.
     """
     plain = unicodedata.normalize("NFKD", " ".join(texts)).encode("ascii", "ignore").decode().casefold()
-    words = re.findall(r"[a-z]+", plain)
-    found = {_WORD_STARTS[start] for start in _WORD_STARTS for word in words if word.startswith(start)}
+    found = {named for start, named in _WORD_STARTS.items() if re.search(rf"(?<![a-z]){start}", plain)}
     if short and not found:
         found = {_SHORT[word] for word in _WORD.findall(plain) if word in _SHORT}
     return found.pop() if len(found) == 1 else None

@@ -41,12 +41,7 @@ _COMMON_CHINESE = re.compile(rb"(?:[\xa1-\xa3\xb0-\xd7][\xa1-\xfe])+")
 
 
 def to_utf8(data: Bytes, file: Path, stated: str | None = None) -> tuple[Bytes, str]:
-    """A text as UTF-8 without byte order mark, and the encoding it had.
-
-    Args:
-        data: bytes of the file.
-        file: the file, which errors name.
-        stated: the encoding, where the user states it.
+    """A text as UTF-8 without byte order mark, and the encoding it had; errors name `file`.
 
     Raises:
         MeasurementError: no text, or not in the encoding stated.

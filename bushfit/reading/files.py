@@ -6,8 +6,9 @@ import codecs
 import hashlib
 import mmap
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from pathlib import Path
+from threading import Thread
 from typing import TypeVar
 
 from bushfit.errors import BushfitError, did_you_mean
@@ -32,14 +33,8 @@ def read_bytes(
 ) -> bytes:
     """The bytes of a file, read once.
 
-    Args:
-        file: the file.
-        kind: class of the error to raise.
-        largest: refuse more bytes than this, before reading them.
-        hint: what to do about a file that is too large.
-
     Raises:
-        kind: the file is missing, no regular file, not readable, empty, or too large.
+        kind: the file is missing, no regular file, not readable, empty, or has more than `largest` bytes (with `hint`).
     """
     return _checked(file, kind, largest, hint, Path.read_bytes)
 
@@ -86,9 +81,6 @@ def read_utf8(
     file: Path, kind: type[BushfitError], *, largest: int = _LARGEST_BYTES, hint: str = "thin it out"
 ) -> bytes:
     """The bytes of a text file in UTF-8; a byte order mark stays in place.
-
-    Args:
-        file, kind, largest, hint: as of `read_bytes`.
 
     Raises:
         kind: as `read_bytes`, or the file is not UTF-8 text.
@@ -138,15 +130,13 @@ def line_of(data: bytes, index: int) -> str:
 
 def sha256(data: Bytes) -> Future[str]:
     """SHA-256 of a file's bytes as hexadecimal digits; that of a large file is made meanwhile, in a thread."""
+    future: Future[str] = Future()
+
+    def digest() -> None:
+        future.set_result(hashlib.sha256(data).hexdigest())
+
     if len(data) >= _MAPPED_BYTES:
-        thread = ThreadPoolExecutor(max_workers=1)
-        future = thread.submit(_sha256, data)
-        thread.shutdown(wait=False)
-        return future
-    done: Future[str] = Future()
-    done.set_result(_sha256(data))
-    return done
-
-
-def _sha256(data: Bytes) -> str:
-    return hashlib.sha256(data).hexdigest()
+        Thread(target=digest).start()
+    else:
+        digest()
+    return future

@@ -231,7 +231,7 @@ def _stated(table: Table, column: Column | None, values: Mapping[str, Floats], s
 def _of_temperature(
     table: Table, values: Mapping[str, Floats], stated: float | None
 ) -> tuple[NDArray[np.intp], float | None]:
-    """The rows of a test, by index, and its temperature [K]: as stated, or else the mean of its column if it has one."""
+    """The rows of a test, by index, and its temperature [K]: as stated, or else the mean of its column."""
     rows = np.arange(values["frequency"].size)
     if "temperature" not in values:
         return rows, stated
