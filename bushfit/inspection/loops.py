@@ -86,12 +86,7 @@ def _crawling(drive: Drive) -> Iterator[str]:
 
 
 def look_at_programme(record: Loop, loops: Sequence[Loop], named: Said) -> Looked:
-    """Facts and oddities of a record that holds several loops.
-
-    Args:
-        record: the whole record.
-        loops: its parts, in order.
-        named: what the names of its file and sheet say.
+    """Facts and oddities of a record that holds several loops, in order.
 
     Raises:
         FitError: a part that has no whole cycle, or runs the wrong way round.
@@ -99,11 +94,11 @@ def look_at_programme(record: Loop, loops: Sequence[Loop], named: Said) -> Looke
     drives = [drive_of(loop) for loop in loops]
     unit, factor = record.direction.display.displacement
     amplitudes, frequencies = [drive.amplitude for drive in drives], [drive.frequency for drive in drives]
-    cycles = sorted(drive.cycles for drive in drives)
+    cycles = [drive.cycles for drive in drives]
     used = sum(drive.loop.displacement.size for drive in drives)
     facts = {
-        "programme": f"{len(loops)} loops in one record: {_in_turn([factor * size for size in amplitudes])} {unit} "
-        f"at {_in_turn(frequencies)} Hz, {_span(cycles)} cycles used of each; "
+        "programme": f"{len(loops)} loops in one record: {_told([factor * size for size in amplitudes])} {unit} "
+        f"at {_told(frequencies)} Hz, {_told([min(cycles), max(cycles)], ' to ')} cycles used of each; "
         f"{100 * (1 - used / record.displacement.size):.2g} % of the rows left out",
     }
     odd = [*wrong_labels(named, record.direction, amplitudes, frequencies), *odd_channels(record)]
@@ -119,24 +114,15 @@ def look_at_programme(record: Loop, loops: Sequence[Loop], named: Said) -> Looke
     return Looked(facts, tuple(odd))
 
 
-def _in_turn(values: Sequence[float]) -> str:
+def _told(values: Sequence[float], between: str = ", ") -> str:
     """Values in their order, each told once: "0.2, 0.5, 1"."""
-    return ", ".join(dict.fromkeys(f"{value:.3g}" for value in values))
-
-
-def _span(rising: Sequence[float]) -> str:
-    """The first and the last of some numbers: "4 to 5", or the one that they are."""
-    return " to ".join(dict.fromkeys(f"{value:.3g}" for value in (rising[0], rising[-1])))
+    return between.join(dict.fromkeys(f"{value:.3g}" for value in values))
 
 
 class _EndCycles(NamedTuple):
-    """The cycles at both ends of a loop, k of them.
+    """Force amplitude, mean force and mean motion of the cycles at both ends of a loop, (k,) each.
 
-    Args:
-        amplitude: of the force in each [N or N m], (k,).
-        mean_force: in each [N or N m], (k,).
-        mean_motion: in each [m or rad], (k,).
-        error: noise of the force over the root of the rows of a cycle [N or N m].
+    `error` is the noise of the force over the root of the rows of a cycle [N or N m].
     """
 
     amplitude: Array
@@ -207,10 +193,7 @@ def _changing(drive: Drive) -> Iterator[str]:
 def _cycle(phase: Array, values: Array, order: int) -> tuple[Array, Array, float]:
     """Mean and complex fundamental of each column over one cycle, and the scatter that the fit leaves of the first.
 
-    Args:
-        phase: of the rows [cycles], (n,).
-        values: (n, columns).
-        order: harmonics that are fitted.
+    The phase of the rows is in cycles, (n,), the values (n, columns); `order` is the harmonics that are fitted.
     """
     turns = 2.0 * np.pi * np.outer(phase, np.arange(1, order + 1))
     basis = np.hstack((np.ones((phase.size, 1)), np.cos(turns), -np.sin(turns)))

@@ -25,12 +25,9 @@ _HELD = {"at_amplitude": "amplitude", "at_frequency": "frequency"}
 
 
 class Outside(NamedTuple):
-    """What is said of a test outside its columns.
+    """What is said of a test outside its columns: keys of its table in a campaign, and where what was found, by label.
 
-    Args:
-        keys: of its table in a campaign.
-        facts: where what was found, in words, by label.
-        is_counted: whether it is known how an amplitude counts that no column has.
+    `is_counted` tells whether it is known how an amplitude counts that no column has.
     """
 
     keys: dict[str, Any]
@@ -44,9 +41,9 @@ def names_of(file: Path, stated: Mapping[str, Any]) -> Said:
     counting = stated.get("amplitude")
     if counting is None:
         return said
-    frequencies = said.of("Hz")
-    counted = (each if each in frequencies else each._replace(convention=counting) for each in said.quantities)
-    return replace(said, quantities=tuple(counted))
+    held = said.of("Hz")
+    counted = tuple(each if each in held else each._replace(convention=counting) for each in said.quantities)
+    return replace(said, quantities=counted)
 
 
 def keys_outside(
@@ -54,15 +51,8 @@ def keys_outside(
 ) -> Outside:
     """The keys that a test has by what is said outside its columns, and where they were found.
 
-    What is stated goes first, then the table, the names, the lines above the table, and what lies beside it.
-
-    Args:
-        table: of the test.
-        place: of the test, which settles the unit of an amplitude.
-        stated: keys of its table in a campaign that the user states.
-        by_name: what its names say.
-        beside: what is said of all tests of its file.
-        is_sweep: whether frequency and amplitude have to be known.
+    What is stated goes first, then the table, its names (`by_name`), the lines above it, and what is said `beside` it
+    of all tests of its file. Of a sweep, frequency and amplitude have to be known; the place settles its unit.
 
     Raises:
         MeasurementError: a sweep of which nothing says the amplitude, or the frequency.
@@ -77,19 +67,18 @@ def keys_outside(
         if role not in table.roles and key not in stated:
             label, found = _held(table, place, key, sources)
             counted = stated.get("amplitude") or found.convention
-            is_half = role == "amplitude" and counted == "peak-to-peak"
-            keys[key] = _half(found.text) if is_half else found.text
-            words = f"{keys[key]}, half of {found.text}" if is_half else keys[key]
+            keys[key] = words = found.text
+            if role == "amplitude" and counted == "peak-to-peak":
+                number, _, unit = found.text.partition(" ")
+                keys[key] = f"{float(number) / 2.0:g} {unit}"
+                words = f"{keys[key]}, half of {found.text}"
             facts.setdefault(label, []).append(f"{role} {words}")
             is_counted &= role != "amplitude" or counted is not None
     for key, word in _CONDITIONS.items():
-        if key in table.roles or key in stated:
-            continue
-        for label, said in sources.items():
-            if text := getattr(said, key):
-                keys[key] = text
-                facts.setdefault(label, []).append(f"{word} {text}")
-                break
+        label, text = next(((label, text) for label, said in sources.items() if (text := getattr(said, key))), ("", ""))
+        if text and key not in table.roles and key not in stated:
+            keys[key] = text
+            facts.setdefault(label, []).append(f"{word} {text}")
     return Outside(keys, {label: ", ".join(words) for label, words in facts.items()}, is_counted)
 
 
@@ -105,12 +94,6 @@ def _held(table: Table, place: Place, key: str, sources: Mapping[str, Said]) -> 
             return label, found[0]
     usual = {"m": "0.1 mm", "Hz": "10 Hz", "1": "0.1 %"}
     raise _unsaid(table, key, usual.get(expected, "1 deg"), None)
-
-
-def _half(text: str) -> str:
-    """Half of a quantity."""
-    number, _, unit = text.partition(" ")
-    return f"{float(number) / 2.0:g} {unit}"
 
 
 def _unsaid(table: Table, key: str, example: str, found: str | None) -> MeasurementError:

@@ -29,9 +29,7 @@ _TENSILE = re.compile(r"(?<![^\W_])E(?![^\W_])|young|tensile|tension|traction|zu
 def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
     """The table of a file, and whether it is a sweep's and not a loop's.
 
-    Args:
-        file: the file.
-        stated: keys of [[loops]] and [[sweeps]] that the user states, as TOML has them; each is used where it fits.
+    The user states keys of [[loops]] and [[sweeps]], as TOML has them; each is used where it fits.
 
     Raises:
         NoTestError: a file that cannot be opened as a table, or whose columns make no test.

@@ -153,7 +153,7 @@ def _from_repeats(sweep: Sweep) -> Array:
 
 
 def _blocks(sweep: Sweep) -> list[Array]:
-    """The rows of each block: a run of the rig over all frequencies at one level, of which repeats are told apart."""
+    """The rows of each block: a repeat of a level over all frequencies."""
     return _groups(sweep.repeat.astype(float), sweep.amplitude)
 
 

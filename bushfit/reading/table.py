@@ -14,6 +14,7 @@ from bushfit import units
 from bushfit.errors import MeasurementError, NoColumnError, UnitError, naming
 from bushfit.geometry import STRAINING, TRANSLATION, Motion
 from bushfit.reading.columns import Columns
+from bushfit.reading.encoding import to_utf8
 from bushfit.reading.files import Bytes, sha256, view_bytes
 from bushfit.reading.headers import Column, Heading, Vocabulary, is_angular, plain, split_convention
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
@@ -34,8 +35,7 @@ class Table(Columns):
 
     Args:
         checksum: SHA-256 of the file, perhaps still under way.
-        names: for each role the headers it usually goes by, whatever the motion.
-        motion: of what was tested.
+        names, motion: for each role the headers it usually goes by, whatever the motion, and that of what was tested.
     """
 
     checksum: Future[str]
@@ -58,8 +58,7 @@ class Table(Columns):
             file: a text in any dialect, or a workbook. Lines of other content may stand above the header, and a row of
                 units below it. A sweep's may be a wide table.
             names: for each role the headers it usually goes by, LOOP_COLUMNS or SWEEP_COLUMNS.
-            columns: for each role that goes by another header, this header.
-            stated_units: for each role of which the file does not tell the unit, this unit.
+            columns, stated_units: header and unit of roles, where it is no usual one, or the file does not tell it.
             stated: what the file does not tell of its format.
             motion: of what was tested, by which a test of strain and modulus goes by other headers.
 
@@ -153,22 +152,15 @@ class Table(Columns):
     def refuse_other_motion(self, role: str, headers: Sequence[str] | None = None) -> None:
         """Refuse headers that would name a role in a test of the other kind of motion: strain, or displacement.
 
-        Args:
-            role: for which there is no column.
-            headers: that are known to do so; else those of the table that do.
-
         Raises:
-            MeasurementError: there is such a header.
+            MeasurementError: there is such a header in the table, or one of those that are known to be (`headers`).
         """
         kinds = ("displacement and force or stiffness", "strain and modulus")
+        other, (expected, found) = STRAINING, kinds
+        hint = 'write [[specimens]] with a name and kind = "modulus" in the campaign, and specimen = "its name" here'
         if self.motion is STRAINING:
             other, (found, expected) = TRANSLATION, kinds
             hint = 'take specimen out of the campaign, or give it kind = "shear" with its area and thickness'
-        else:
-            other, (expected, found) = STRAINING, kinds
-            hint = (
-                'write [[specimens]] with a name and kind = "modulus" in the campaign, and specimen = "its name" here'
-            )
         words = Vocabulary({role: of_motion(self.names, other)[role]} if role in OF_MOTION else {}, {})
         for header in headers or filter(words.heading, self.headers):
             raise self.error(
@@ -189,12 +181,8 @@ class Table(Columns):
                 expected=f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks",
             )
         if all(is_like_number(cell) for cell in self.headers):
-            raise self.error(
-                "there is no header",
-                line=self.layout.header_line,
-                found=", ".join(self.headers),
-                expected=_EXPECTED_HEADER,
-            )
+            found = ", ".join(self.headers)
+            raise self.error("there is no header", line=self.layout.header_line, found=found, expected=_EXPECTED_HEADER)
 
     def _recognise(
         self, vocabulary: Vocabulary, columns: Mapping[str, str], stated_units: Mapping[str, str]
@@ -247,7 +235,7 @@ class Table(Columns):
 
     def _no_column(self, role: str, named: str) -> MeasurementError:
         """The error for a role whose column was named by a header that is not there."""
-        near = next(iter(get_close_matches(named, self.headers, n=1, cutoff=_ALIKE)), None)
+        near = next(iter(get_close_matches(named, self.headers, n=1, cutoff=_ALIKE)), "")
         return self.error(
             f'there is no column "{named}"',
             kind=NoColumnError,
@@ -265,7 +253,7 @@ def _source(data: Bytes, file: Path, stated: FileFormat, is_usable: Callable[[Ro
         return open_sheet(data[:], file, stated.sheet, is_usable)
     if stated.sheet:
         raise MeasurementError("this is no workbook", file=file, found=f'sheet = "{stated.sheet}"', expected="xlsx")
-    return Text.open(data, file, stated.encoding)
+    return Text(file, *to_utf8(data, file, stated.encoding))
 
 
 def _label(role: str) -> str:
