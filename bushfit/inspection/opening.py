@@ -15,8 +15,7 @@ from bushfit.campaign.campaign import reader_keywords
 from bushfit.campaign.schema import LoopFile, SweepFile
 from bushfit.errors import BushfitError, MeasurementError, naming
 from bushfit.geometry import Direction, Place, Specimen
-from bushfit.inspection.histories import look_at_history
-from bushfit.inspection.loops import look_at_loop, look_at_programme
+from bushfit.inspection.loops import look_at_history, look_at_loop, look_at_programme
 from bushfit.inspection.outside import keys_outside, names_of
 from bushfit.inspection.recognition import direction_of, place_of, recognised
 from bushfit.inspection.record import ColumnSeen, Inspected, Kind, Looked
@@ -92,10 +91,8 @@ def read_history(file: Path, stated: Mapping[str, Any]) -> tuple[Loop, Direction
     """
     table, is_sweep = recognised(file, stated)
     if is_sweep:
-        raise table.error(
+        raise table.header_error(
             "this is a sweep already",
-            line=table.layout.header_line,
-            found=", ".join(table.headers),
             expected="a raw history: time, displacement, force",
             hint="name it in the campaign under [[sweeps]]",
         )

@@ -99,9 +99,8 @@ def _held(table: Table, place: Place, key: str, sources: Mapping[str, Said]) -> 
 def _unsaid(table: Table, key: str, example: str, found: str | None) -> MeasurementError:
     """The error for a sweep without amplitude or frequency, with one that a user may state."""
     role = _HELD[key]
-    return table.error(
+    return table.header_error(
         f"nothing says at which {role} this was tested",
-        line=table.layout.header_line,
         found=found or ", ".join(table.headers),
         expected=f"a column for the {role}, or one number with its unit in the name of the file",
         hint=f'state {key} = "{example}" in the campaign, or name the column: columns = {{ {role} = "..." }}',

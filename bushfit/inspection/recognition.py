@@ -11,9 +11,9 @@ from typing import Any
 from bushfit.campaign.schema import SpecimenTable
 from bushfit.errors import BushfitError, NoTestError, typed
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
-from bushfit.reading.directions import direction_of_file
 from bushfit.reading.headers import Vocabulary
 from bushfit.reading.layout import FileFormat
+from bushfit.reading.names import direction_of_file
 from bushfit.reading.resonance import is_resonance
 from bushfit.reading.sweeps import STIFFNESS_PAIRS
 from bushfit.reading.table import Table
@@ -57,10 +57,9 @@ def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
         if len(best.roles) <= max(1, len(Vocabulary(usual, {}).roles(best.headers))):
             raise failure
     known = ", ".join(role.replace("_", " ") for role in best.roles)
-    raise best.error(
+    raise best.header_error(
         "the columns do not make a test",
         kind=NoTestError,
-        line=best.layout.header_line,
         found=", ".join(best.headers) + (f" (understood: {known})" if known else ""),
         expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
         hint=f"correct the header, or name the column: --column {_missing(best, is_sweep=is_sweep)}=...",
@@ -112,9 +111,8 @@ def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Directi
     if "direction" not in stated:
         return direction_of_file(file, table.headers, turns=turns, sheet=stated.get("sheet"))
     if turns and not Direction(stated["direction"]).is_rotation:
-        raise table.error(
+        raise table.header_error(
             "the units say torsion",
-            line=table.layout.header_line,
             found=f"{', '.join(table.headers)}; stated: {stated['direction']}",
             expected="one direction",
             hint="state --direction torsion, or none",

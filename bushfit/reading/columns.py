@@ -2,32 +2,96 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bushfit.reading.cells import Cells
+from bushfit.errors import MeasurementError
 from bushfit.reading.headers import Column
-from bushfit.reading.layout import fits
+from bushfit.reading.layout import FileFormat, Layout, fits
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, weigh
-from bushfit.reading.source import LARGEST_VALUE
+from bushfit.reading.source import LARGEST_VALUE, RowSource, rows
 
 #: Rows that are taken apart at a time where a library cannot; chosen: their texts fill some MiB.
 _CHUNK_ROWS = 1 << 16
 #: Cells in which the decimal mark has to show for a library to read a file; chosen: those of its first rows.
 _FIRST_CELLS = 1000
 
+#: Characters of what was found that an error quotes; chosen: two lines of a terminal.
+_LONGEST_FOUND = 200
+
 
 @dataclass(frozen=True, eq=False)
-class Columns(Cells):
-    """A table of which the columns are recognised; `roles` has them by what they hold."""
+class Columns:
+    """A table as its file has it, a header and rows of cells, and its columns.
 
+    Args:
+        file, source: where it lies, and its rows.
+        layout: its header, units row and delimiter.
+        stated: what the user states of the file's format.
+        roles: the recognised columns, by what they hold.
+    """
+
+    file: Path
+    source: RowSource
+    layout: Layout
+    stated: FileFormat
     roles: Mapping[str, Column]
+
+    @property
+    def headers(self) -> tuple[str, ...]:
+        """The cells of the header."""
+        return self.layout.headers
+
+    def rows(self) -> Iterator[tuple[int, Sequence[str | float]]]:
+        """Line and cells of each row of data.
+
+        Raises:
+            MeasurementError: a line or a quoted cell that is far too long.
+        """
+        try:
+            for line, cells in rows(self.source, self.layout):
+                if any(cell != "" for cell in cells):
+                    yield line, cells
+        except csv.Error as error:
+            raise self.error("the table cannot be read", found=str(error)) from error
+
+    def error(
+        self,
+        problem: str,
+        *,
+        line: int | None = None,
+        column: Column | None = None,
+        found: str | None = None,
+        kind: type[MeasurementError] = MeasurementError,
+        **said: str | None,
+    ) -> MeasurementError:
+        """An error in this table, at a line (from 1) and column where they are known, with what else is `said`."""
+        found = found if found is None or len(found) <= _LONGEST_FOUND else found[:_LONGEST_FOUND] + "..."
+        return kind(problem, file=self.file, place=self.place(line, column), found=found, **said)
+
+    def header_error(self, problem: str, *, found: str | None = None, **said: Any) -> MeasurementError:
+        """An error in the header, of which all cells were found unless `found` says what."""
+        found = ", ".join(self.headers) if found is None else found
+        return self.error(problem, line=self.layout.header_line, found=found, **said)
+
+    def place(self, line: int | None, column: Column | None) -> str | None:
+        """A place in the file in words: its sheet, line and column, as far as there are such."""
+        sheet = self.source.sheet
+        parts = [
+            f'sheet "{sheet}"' if sheet else None,
+            f"{'row' if sheet else 'line'} {line}" if line else None,
+            f'column "{column.header}"' if column else None,
+        ]
+        return ", ".join(part for part in parts if part) or None
 
     @cached_property
     def numerals(self) -> Numerals:

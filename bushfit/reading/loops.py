@@ -82,9 +82,8 @@ def _check_not_swapped(table: Table, direction: Place) -> None:
         "force", direction.motion.displacement_unit
     ):
         displacement, force = (table.roles[role].header for role in ("displacement", "force"))
-        raise table.error(
+        raise table.header_error(
             "displacement and force are swapped",
-            line=table.layout.header_line,
             found=f'"{displacement}" and "{force}"',
             expected="a displacement in units of displacement, and a force in units of force",
             hint="correct the header, or name the columns in the campaign: columns = "

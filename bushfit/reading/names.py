@@ -7,12 +7,12 @@ import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from functools import reduce
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from bushfit import units
 from bushfit.errors import UnitError
 from bushfit.geometry import Direction
-from bushfit.reading.directions import named_direction
 from bushfit.reading.headers import AmplitudeConvention, Vocabulary, plain, split_convention
 from bushfit.reading.layout import Line
 from bushfit.reading.words import SWEEP_COLUMNS
@@ -83,6 +83,18 @@ _AFTER_KEY = re.compile(r"\t|;|:\s|:$|\s=\s|=|,(?!\d)")
 _COMMA = re.compile(r"^([+-]?\d+),(?=\d+(?!\d|[.,]\d))")
 #: Characters of the longest value above a table that is taken; chosen: a longer one is a text.
 _LONGEST_VALUE = 60
+
+#: For the starts of words in English, German, French and Spanish, without accents, the direction they name.
+_WORD_STARTS = {
+    **dict.fromkeys(("axial", "axiaux"), Direction.AXIAL),
+    **dict.fromkeys(("radial", "radiaux"), Direction.RADIAL),
+    **dict.fromkeys(("torsi", "tordu", "verdreh", "drehwinkel", "drehmoment"), Direction.TORSION),
+    **dict.fromkeys(("rotation", "rotacion"), Direction.TORSION),
+}
+#: Short for a direction in names; in headers rad is a unit.
+_SHORT = {"ax": Direction.AXIAL, "rad": Direction.RADIAL, "tors": Direction.TORSION, "tor": Direction.TORSION}
+#: A word, without the letters of a unit behind a number.
+_WORD = re.compile(r"(?<![a-z\d.,])(?:[a-z]+)")
 
 
 class Named(NamedTuple):
@@ -213,3 +225,29 @@ def _is(text: str, expected: str) -> bool:
     except UnitError:
         return False
     return True
+
+
+def named_direction(texts: Iterable[str], *, short: bool = False) -> Direction | None:
+    """The one direction that texts, such as headers, name; None where they name none or several.
+
+    With `short`, "ax", "rad" and "tors" count as well, as in names of files.
+    """
+    plain = unicodedata.normalize("NFKD", " ".join(texts)).encode("ascii", "ignore").decode().casefold()
+    found = {named for start, named in _WORD_STARTS.items() if re.search(rf"(?<![a-z]){start}", plain)}
+    if short and not found:
+        found = {_SHORT[word] for word in _WORD.findall(plain) if word in _SHORT}
+    return found.pop() if len(found) == 1 else None
+
+
+def direction_of_file(file: Path, headers: Iterable[str], *, turns: bool, sheet: str | None = None) -> Direction | None:
+    """The direction that the file of a test names; None where it does not say.
+
+    Args:
+        file: of which the name, without the folders, may hold a word.
+        headers: of its columns; they count where the name says nothing.
+        turns: whether the displacement is in units of angle: then it is a rotation, torsion unless another is named.
+        sheet: of a workbook with several; its name goes before the file's.
+    """
+    named = named_direction([sheet or ""], short=True) or named_direction([file.stem], short=True)
+    named = named or named_direction(headers)
+    return Direction.TORSION if turns and not (named and named.is_rotation) else named

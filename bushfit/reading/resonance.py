@@ -27,6 +27,10 @@ _WAYS = (
 _TELLING = {role for role in RESONANCE_COLUMNS if role not in ("frequency", "phase")}
 #: Columns of which every value is above zero.
 _POSITIVE = ("frequency", "base_acceleration", "mass_acceleration", "transmissibility")
+#: SI units by the end of a role; else a role is a ratio.
+_UNITS = {"phase": "rad", "frequency": "Hz"} | dict.fromkeys(
+    ("acceleration", "base_real", "base_imaginary", "mass_real", "mass_imaginary"), "m/s^2"
+)
 #: Rows of the shortest test; chosen: a curve of five values over the frequency, and some scatter about it.
 FEWEST_ROWS = 12
 
@@ -36,12 +40,10 @@ class ResonanceTest:
     """A mass on a mount whose base is shaken with a sine, by frequency.
 
     Args:
-        name: of the test.
-        direction: of the motion, or the specimen in place of a bushing.
+        name, direction, source: as of a `Loop`.
         frequency: [Hz], (n,), rising.
         transmissibility: acceleration of the mass over that of the base, complex [-], (n,).
         base_acceleration: amplitude, zero-to-peak [m/s^2], (n,).
-        source: the file it came from.
     """
 
     name: str
@@ -60,10 +62,7 @@ def is_resonance(table: Table) -> bool:
 def read_resonance(table: Table, direction: Place, base_acceleration: float | None = None) -> ResonanceTest:
     """The resonance test in a table that was opened with RESONANCE_COLUMNS.
 
-    Args:
-        table: with a frequency and the columns of one of _WAYS.
-        direction: of the motion.
-        base_acceleration: amplitude of the base [m/s^2], for a table without one.
+    For a table without the amplitude of the base's acceleration, it is stated [m/s^2].
 
     Raises:
         MeasurementError, UnitError: a column, unit or value that cannot be used.
@@ -84,10 +83,8 @@ def _wanted(table: Table, *, stated: bool) -> dict[str, Column]:
     way = next((way for way in _WAYS if set(way) <= set(table.roles)), None)
     if way is None:
         ways = ", or ".join(" and ".join(way) for way in _WAYS).replace("_", " ")
-        raise table.error(
+        raise table.header_error(
             "the columns give no complex transmissibility",
-            line=table.layout.header_line,
-            found=", ".join(table.headers),
             expected=f"frequency, and {ways}",
             hint='correct the header, or name the column: --column "mass_acceleration=..."',
         )
@@ -101,28 +98,19 @@ def _wanted(table: Table, *, stated: bool) -> dict[str, Column]:
             hint="leave --base-acceleration out",
         )
     if not (has_base or stated):
-        raise table.error(
+        raise table.header_error(
             "nothing says how strongly the base was shaken",
-            line=table.layout.header_line,
-            found=", ".join(table.headers),
             expected="a column such as base acceleration [g]",
             hint='state it: --base-acceleration "0.1 g"',
         )
     roles = dict.fromkeys(("frequency", *way, "base_acceleration"))
-    columns = {role: table.column(role, _unit(role)) for role in roles if role in (*way, "frequency", *table.roles)}
-    return {role: _zero_to_peak(column) for role, column in columns.items()}
-
-
-def _unit(role: str) -> str:
-    """The SI unit of a role."""
-    if role.endswith("phase"):
-        return "rad"
-    return "Hz" if role == "frequency" else "1" if role.startswith("transmissibility") else "m/s^2"
-
-
-def _zero_to_peak(column: Column) -> Column:
-    """A column that counts peak-to-peak, halved."""
-    return replace(column, scale=0.5 * column.scale) if column.convention == "peak-to-peak" else column
+    wanted = {}
+    for role in (role for role in roles if role != "base_acceleration" or role in table.roles):
+        unit = next((unit for end, unit in _UNITS.items() if role.endswith(end)), "1")
+        column = table.column(role, unit)
+        to_peak = 0.5 if column.convention == "peak-to-peak" else 1.0
+        wanted[role] = replace(column, scale=to_peak * column.scale)
+    return wanted
 
 
 def _ratio(values: Mapping[str, Floats], stated: float | None) -> tuple[Complex, Floats]:

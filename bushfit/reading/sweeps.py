@@ -136,10 +136,8 @@ def _stiffness_pair(table: Table) -> tuple[str, str]:
             return pair
     for role in {role: None for pair in STIFFNESS_PAIRS for role in pair if role in OF_MOTION}:
         table.refuse_other_motion(role)
-    raise table.error(
+    raise table.header_error(
         "no pair of columns gives a complex stiffness",
-        line=table.layout.header_line,
-        found=", ".join(table.headers),
         expected=", or ".join(" and ".join(pair) for pair in STIFFNESS_PAIRS).replace("_", " "),
         hint='correct the header, or name the columns in the campaign: columns = { stiffness = "..." }',
     )
@@ -267,9 +265,8 @@ def _convention(table: Table, column: Column | None, stated: AmplitudeConvention
     if column is None:
         return stated or "zero-to-peak"
     if column.convention and stated and column.convention != stated:
-        raise table.error(
+        raise table.header_error(
             "header and campaign count amplitudes differently",
-            line=table.layout.header_line,
             column=column,
             found=f'{column.convention} in the header, amplitude = "{stated}" in the campaign',
             expected="one convention",

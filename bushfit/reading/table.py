@@ -141,10 +141,8 @@ class Table(Columns):
     def missing(self, role: str, expected: str, hint: str | None = None) -> MeasurementError:
         """The error for a role that has no column; `expected` is its SI unit."""
         self.refuse_other_motion(role)
-        return self.error(
+        return self.header_error(
             f"there is no column for the {_label(role)}",
-            line=self.layout.header_line,
-            found=", ".join(self.headers),
             expected=f'a header such as "{_label(role)} [{units.example(expected)}]"',
             hint=f'name the column in the campaign: columns = {{ {role} = "..." }}' + (f", {hint}" if hint else ""),
         )
@@ -163,9 +161,8 @@ class Table(Columns):
             hint = 'take specimen out of the campaign, or give it kind = "shear" with its area and thickness'
         words = Vocabulary({role: of_motion(self.names, other)[role]} if role in OF_MOTION else {}, {})
         for header in headers or filter(words.heading, self.headers):
-            raise self.error(
+            raise self.header_error(
                 f"this is a test of {found}",
-                line=self.layout.header_line,
                 found=f'"{header}" for the {_label(role)}',
                 expected=expected,
                 hint=hint,
@@ -174,15 +171,13 @@ class Table(Columns):
     def _check_header(self) -> None:
         """Refuse a header of one cell, or of numbers alone."""
         if len(self.headers) < 2:
-            raise self.error(
+            raise self.header_error(
                 "there is only one column",
-                line=self.layout.header_line,
                 found=self.headers[0] if self.headers else "nothing",
                 expected=f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks",
             )
         if all(is_like_number(cell) for cell in self.headers):
-            found = ", ".join(self.headers)
-            raise self.error("there is no header", line=self.layout.header_line, found=found, expected=_EXPECTED_HEADER)
+            raise self.header_error("there is no header", expected=_EXPECTED_HEADER)
 
     def _recognise(
         self, vocabulary: Vocabulary, columns: Mapping[str, str], stated_units: Mapping[str, str]
@@ -203,9 +198,8 @@ class Table(Columns):
                     roles[role] = roles[role] if angular[1] else column
                     continue
             if role in roles:
-                raise self.error(
+                raise self.header_error(
                     f"more than one column could be the {_label(role)}",
-                    line=self.layout.header_line,
                     found=f"{roles[role].header}, {header}",
                     expected="one",
                     hint=f'choose it in the campaign: columns = {{ {role} = "{header}" }}',
@@ -236,11 +230,9 @@ class Table(Columns):
     def _no_column(self, role: str, named: str) -> MeasurementError:
         """The error for a role whose column was named by a header that is not there."""
         near = next(iter(get_close_matches(named, self.headers, n=1, cutoff=_ALIKE)), "")
-        return self.error(
+        return self.header_error(
             f'there is no column "{named}"',
             kind=NoColumnError,
-            line=self.layout.header_line,
-            found=", ".join(self.headers),
             expected=f"the header that was named for the {_label(role)}",
             hint=(f'did you mean "{near}"? ' if near else "name one of this file: ")
             + f'columns = {{ {role} = "{near or "..."}" }} in the campaign',
