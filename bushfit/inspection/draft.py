@@ -18,11 +18,8 @@ _TABLES = {"loop": "loops", "sweep": "sweeps"}
 def campaign_text(name: str, bushing: Mapping[str, str] | None, files: Sequence[Inspected], folder: Path) -> str:
     """The text of a whole campaign file.
 
-    Args:
-        name: of the campaign, and of the bushing.
-        bushing: other keys of [bushing], quantities as texts; None where specimens alone were tested.
-        files: loops and sweeps, each of a specimen or with a direction.
-        folder: where the campaign will lie; its files are named from there.
+    The name is that of the bushing, too, of which `bushing` has the other keys, quantities as texts; None where
+    specimens alone were tested. Loops and sweeps are named from the folder where the campaign will lie.
     """
     head = _lines({"name": name, **(bushing or {})})
     order = [seen for kind in _TABLES for seen in files if seen.kind == kind]

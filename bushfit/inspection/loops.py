@@ -15,7 +15,7 @@ from bushfit.fitting.preload import TOLD_MEAN
 from bushfit.fitting.waveform import waveform
 from bushfit.geometry import Unit
 from bushfit.inspection.channels import clock, odd_channels
-from bushfit.inspection.labels import wrong_labels
+from bushfit.inspection.outside import wrong_labels
 from bushfit.inspection.record import Looked
 from bushfit.reading.measurement import Loop
 from bushfit.reading.names import Said

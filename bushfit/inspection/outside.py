@@ -1,27 +1,27 @@
-"""What is said of a test outside its columns, by names and the lines above its table, as keys of a campaign."""
+"""What is said of a test outside its columns, by names and the lines above its table: keys of a campaign, and slips."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from bushfit import units
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
 from bushfit.reading.names import Named, Said, named, stated_above
 from bushfit.reading.table import Table
 
 #: Conditions of a test, which a campaign carries on, in words.
-_CONDITIONS = {
-    "temperature": "temperature",
-    "preload": "preload",
-    "date": "date",
-    "operator": "operator",
-    "specimen_number": "specimen",
-}
+_CONDITIONS = {key: key for key in ("temperature", "preload", "date", "operator")} | {"specimen_number": "specimen"}
 #: What a sweep may hold, by the key that states it.
 _HELD = {"at_amplitude": "amplitude", "at_frequency": "frequency"}
+
+#: Relative difference up to which a file contains what its name states; chosen: rigs miss a level by that much.
+_AGREEMENT = 0.03
+#: Values that are listed one by one; chosen: of more a range says enough.
+_MOST_LISTED = 4
 
 
 class Outside(NamedTuple):
@@ -105,3 +105,39 @@ def _unsaid(table: Table, key: str, example: str, found: str | None) -> Measurem
         expected=f"a column for the {role}, or one number with its unit in the name of the file",
         hint=f'state {key} = "{example}" in the campaign, or name the column: columns = {{ {role} = "..." }}',
     )
+
+
+def wrong_labels(
+    named: Said, direction: Place, amplitudes: Sequence[float], frequencies: Sequence[float]
+) -> Iterator[str]:
+    """A sentence where the name of a file states an amplitude or a frequency that the file does not contain."""
+    unit, factor = direction.display.displacement
+    expected = direction.motion.displacement_unit
+    stated = [(each, _zero_to_peak(each, expected)) for each in named.of(expected)]
+    if stated and not any(_near(value, x) for _, value in stated for x in amplitudes):
+        double = any(_near(value, 2.0 * x) for _, value in stated for x in amplitudes)
+        found = _listed([factor * x for x in amplitudes])
+        yield f"the name says {_or(named.of(expected))}, the amplitude is {found} {unit} zero-to-peak" + (
+            ": the name may count peak-to-peak" if double else ""
+        )
+    said = named.of("Hz")
+    if said and not any(_near(units.quantity(each.text, "Hz"), f) for each in said for f in frequencies):
+        yield f"the name says {_or(said)}, the frequency is {_listed(frequencies)} Hz"
+
+
+def _zero_to_peak(each: Named, expected: str) -> float:
+    """The amplitude that a name states [SI]."""
+    return units.quantity(each.text, expected) / (2.0 if each.convention == "peak-to-peak" else 1.0)
+
+
+def _near(one: float, other: float) -> bool:
+    return abs(one - other) <= _AGREEMENT * other
+
+
+def _or(stated: Sequence[Named]) -> str:
+    return " or ".join(dict.fromkeys(f"{each.text} {each.convention or ''}".rstrip() for each in stated))
+
+
+def _listed(values: Sequence[float]) -> str:
+    texts = list(dict.fromkeys(f"{value:.4g}" for value in values))
+    return ", ".join(texts) if len(texts) <= _MOST_LISTED else f"{texts[0]} to {texts[-1]}"

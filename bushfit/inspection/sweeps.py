@@ -11,7 +11,7 @@ from bushfit.effects.contract import Array
 from bushfit.effects.mistake import shown
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.noise import SweepNoise, sweep_noise
-from bushfit.inspection.labels import wrong_labels
+from bushfit.inspection.outside import wrong_labels
 from bushfit.inspection.record import Looked
 from bushfit.reading.measurement import Sweep, loss_factor
 from bushfit.reading.names import Said

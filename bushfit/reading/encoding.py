@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import codecs
 import re
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -90,11 +91,9 @@ def detect(data: bytes) -> str:
     runs = _HIGH_RUN.findall(data)[:_MOST_RUNS]
     chinese = sum(_COMMON_CHINESE.fullmatch(run) is not None for run in runs)
     for encoding in ("gb18030", "cp1252") if 2 * chinese > len(runs) else ("cp1252", "gb18030"):
-        try:
+        with suppress(UnicodeDecodeError):
             data.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-        return encoding
+            return encoding
     return "latin-1"
 
 

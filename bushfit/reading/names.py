@@ -242,11 +242,8 @@ def named_direction(texts: Iterable[str], *, short: bool = False) -> Direction |
 def direction_of_file(file: Path, headers: Iterable[str], *, turns: bool, sheet: str | None = None) -> Direction | None:
     """The direction that the file of a test names; None where it does not say.
 
-    Args:
-        file: of which the name, without the folders, may hold a word.
-        headers: of its columns; they count where the name says nothing.
-        turns: whether the displacement is in units of angle: then it is a rotation, torsion unless another is named.
-        sheet: of a workbook with several; its name goes before the file's.
+    The name of its sheet goes before the file's, and that before the headers. Where the displacement `turns`, in units
+    of angle, it is torsion unless another rotation is named.
     """
     named = named_direction([sheet or ""], short=True) or named_direction([file.stem], short=True)
     named = named or named_direction(headers)

@@ -172,7 +172,7 @@ def _check_loss(table: Table, column: Column, loss_factor: Floats) -> None:
         raise table.error(
             "the loss counts the other way",
             column=column,
-            found=f"{int(np.count_nonzero(loss_factor < 0.0))} of {loss_factor.size} rows below zero",
+            found=f"{np.count_nonzero(loss_factor < 0.0)} of {loss_factor.size} rows below zero",
             expected="a force that leads the displacement: phase, loss factor and loss stiffness above zero",
             hint="turn the sign of this column in the file",
         )

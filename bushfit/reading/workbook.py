@@ -160,12 +160,8 @@ def _extent(archive: zipfile.ZipFile, part: zipfile.ZipInfo) -> int:
         while chunk := stream.read(_CHUNK_BYTES):
             text = rest + chunk
             last_row = max(last_row, *map(int, _ROW.findall(text)), 0)
-            for column, row in set(_CELL.findall(text)):
-                last_row, last_column = max(last_row, int(row)), max(last_column, _column(column))
+            for letters, row in set(_CELL.findall(text)):
+                column = reduce(lambda number, letter: 26 * number + letter - 64, letters, 0)
+                last_row, last_column = max(last_row, int(row)), max(last_column, column)
             rest = text[-_LONGEST_TAG:]
     return last_row * last_column
-
-
-def _column(letters: bytes) -> int:
-    """Number of a column, from 1, by its letters."""
-    return reduce(lambda number, letter: 26 * number + letter - 64, letters, 0)
