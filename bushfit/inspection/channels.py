@@ -103,9 +103,8 @@ def _stuck(motion: Channel, force: Channel) -> Iterator[str]:
     still = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], still.astype(np.int8), [0]))))
     starts, ends = edges[::2], edges[1::2]
-    moved = np.zeros(starts.size)
-    inside = ends < motion.values.size - 1
-    moved[inside] = np.abs(motion.values[ends[inside] + 1] - motion.values[starts[inside]])
+    after = np.minimum(ends + 1, motion.values.size - 1)  # a record may end stuck: then nothing went on
+    moved = np.abs(motion.values[after] - motion.values[starts])
     stuck = (ends - starts + 1 >= _STUCK_ROWS) & (moved > _STUCK_MOTION * np.ptp(motion.values))
     if stuck.any():
         longest = int(np.argmax(np.where(stuck, ends - starts, 0)))

@@ -84,7 +84,7 @@ def _refuse_resonance(file: Path, stated: Mapping[str, Any]) -> None:
 def place_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Place | None:
     """What a test was made on: a specimen, or the bushing in a direction, as stated or as the file says; else None.
 
-    A modulus is that of a specimen; a stiffness is that of the bushing, unless sizes of a block in shear are stated.
+    A modulus is that of a specimen, a stiffness that of the bushing unless sizes of a block in shear are stated.
 
     Raises:
         MeasurementError: units of torsion where the user states another direction.
@@ -127,9 +127,9 @@ def _missing(table: Table, *, is_sweep: bool) -> str | None:
     """
     roles = set(table.roles)
     nearest = max(STIFFNESS_PAIRS, key=lambda pair: len(roles & set(pair)))
-    needed = nearest if is_sweep else ("displacement", "force")
     if is_sweep and not roles & {"frequency", "amplitude"}:
         return "frequency"
+    needed = nearest if is_sweep else ("displacement", "force")
     return next((role for role in needed if role not in roles), None)
 
 

@@ -70,9 +70,9 @@ class Inspected:
         """What was assumed, with the option or key that says otherwise; None where nothing was."""
         said = []
         if isinstance(self.direction, Specimen) and self.direction.kind == "modulus":
-            in_tension = self.direction.strain == "tension"
-            taken = "that of a bar in tension" if in_tension else "the engineering shear strain"
-            other = "engineering" if in_tension else "tension"
+            taken, other = "the engineering shear strain", "tension"
+            if self.direction.strain == "tension":
+                taken, other = "that of a bar in tension", "engineering"
             said.append(f'its strain is taken as {taken}, else strain = "{other}" or "tensor" in [[specimens]]')
         if self.kind == "sweep" and not self.counted and "amplitude" not in self.entry:
             what = "nothing says" if "at_amplitude" in self.entry else "its header does not say"

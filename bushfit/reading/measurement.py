@@ -200,10 +200,8 @@ def _stroke_edges(displacement: Floats) -> NDArray[np.intp]:
 
     prominence = _TURN_PROMINENCE * np.ptp(displacement)
     peaks, troughs = (find_peaks(sign * displacement, prominence=prominence)[0] for sign in (1.0, -1.0))
-    turns = np.concatenate([peaks, troughs])
-    is_peak = np.arange(turns.size) < peaks.size
-    order = np.argsort(turns)
-    turns, is_peak = turns[order], is_peak[order]
+    turns = np.sort(np.concatenate([peaks, troughs]))
+    is_peak = np.isin(turns, peaks)
     turns = turns[np.append(is_peak[1:] != is_peak[:-1], True)[: turns.size]]  # equal peaks in a row are one turn
     if turns.size and displacement[turns[0]] == displacement[0]:
         turns = turns[1:]

@@ -146,17 +146,17 @@ def _stiffness_pair(table: Table) -> tuple[str, str]:
 def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str], at: Mapping[str, float]) -> dict[str, Column]:
     """The columns of a sweep with their units, in the order in which they are checked.
 
-    Beside those that are needed, which a role that is stated (`at`) is not, the pairs that say the same are read, if
-    their units fit. Of a temperature, the zero is still that of its unit.
+    Roles that are stated (`at`) are not needed; other pairs are read, too, if their units fit. A temperature still
+    counts from the zero of its unit.
     """
     length, stiffness = direction.motion.displacement_unit, direction.motion.stiffness_unit
     units = dict.fromkeys(SWEEP_COLUMNS, "1") | {"frequency": "Hz", "phase": "rad", "temperature": "K"}
     units |= dict.fromkeys(("amplitude", "amplitude_reached"), length)
     units |= dict.fromkeys(("stiffness", "storage_stiffness", "loss_stiffness"), stiffness)
     needed = [role for role in ("frequency", "amplitude") if role in table.roles or role not in at]
-    optional = [role for role in ("amplitude_reached", "repeat", "relative_error") if role in table.roles]
     degrees = table.roles.get("temperature")
-    optional += ["temperature"] * (degrees is not None and degrees.unit is not None)
+    optional = [role for role in ("amplitude_reached", "repeat", "relative_error") if role in table.roles]
+    optional += ["temperature"] if degrees and degrees.unit else []
     again = [role for other in STIFFNESS_PAIRS if set(other) <= set(table.roles) for role in other]
     again = [role for role in again if units[role] == "1" or table.agrees(role, units[role])]
     found = {role: table.column(role, units[role], _HINTS.get(role)) for role in (*needed, *pair, *optional, *again)}
@@ -295,9 +295,8 @@ def _tangent(phase: Floats) -> Floats:
 
 def _repeats(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> NDArray[np.int64] | None:
     """Number of each row's repeat as its column has it, (n,); None where there is none."""
-    if "repeat" not in values:
+    if (repeat := values.get("repeat")) is None:
         return None
-    repeat = values["repeat"]
     is_count = (repeat == np.round(repeat)) & (repeat >= 0) & (repeat < _MOST_REPEATS)
     table.refuse(~is_count, wanted["repeat"], "this is no repeat number", "a whole number")
     return repeat.astype(np.int64)

@@ -103,8 +103,6 @@ class Table(Columns):
     def column(self, role: str, expected: str, hint: str | None = None) -> Column:
         """The column of a role, with the factor from its unit to the SI unit `expected`; a ratio needs no unit.
 
-        `hint` is what else may be done where there is no such column.
-
         Raises:
             MeasurementError: no such column.
             UnitError: no unit, an unknown one, or one of another dimension.

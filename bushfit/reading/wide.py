@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from bushfit import units
 from bushfit.errors import MeasurementError
-from bushfit.reading.headers import AmplitudeConvention, Vocabulary, split_convention
+from bushfit.reading.headers import AmplitudeConvention, Heading, Vocabulary, split_convention
 from bushfit.reading.layout import DELIMITERS, Layout, Line, is_comment, split
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.source import RowSource, Sheet
@@ -180,9 +180,7 @@ def _said(text: str, vocabulary: Vocabulary) -> _Said:
         return _Said(level=text)
     heading = vocabulary.heading(text)
     if heading and (heading.unit is None or units.is_unit(heading.unit)):
-        if heading.role in _STEPPED:
-            return _Said(stepped=heading.role, level_unit=heading.unit, convention=heading.convention)
-        return _Said(heading.role, heading.unit)
+        return _named(heading)
     if text and units.is_unit(bare := whole.strip("[]() ")):
         return _Said(unit=bare, convention=convention)
     if not (found := _LEVEL.search(whole)):
@@ -196,11 +194,16 @@ def _said(text: str, vocabulary: Vocabulary) -> _Said:
     if not rest:
         return level
     if heading := vocabulary.heading(rest):
-        is_stepped = heading.role in _STEPPED
-        said = _Said(stepped=heading.role, level_unit=heading.unit) if is_stepped else _Said(heading.role, heading.unit)
-        return level.also(said)
+        return level.also(_named(heading)._replace(convention=convention))
     bare = rest.strip("[]() ")
     return level._replace(level_unit=bare, stepped=_stepped_in(bare)) if not unit and _stepped_in(bare) else _Said()
+
+
+def _named(heading: Heading) -> _Said:
+    """What a header says that names a role."""
+    if heading.role in _STEPPED:
+        return _Said(stepped=heading.role, level_unit=heading.unit, convention=heading.convention)
+    return _Said(heading.role, heading.unit)
 
 
 def _stepped_in(unit: str | None) -> str | None:
