@@ -93,10 +93,8 @@ class LeaveOut:
 def misfits(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet] = ()) -> tuple[Misfit, ...]:
     """How well a model meets each test, and each run of those that have several, one after the other.
 
-    Args:
-        model: as fitted.
-        fitted: the tests that it was fitted to.
-        left: other tests.
+
+    The tests that it was fitted to come first, then the others, `left`.
     """
     pairs = [(data_set, True) for data_set in fitted] + [(data_set, False) for data_set in left]
     return tuple(found for data_set, was in pairs for found in _misfits(model, data_set.standing(), was_fitted=was))
@@ -126,10 +124,7 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
     was not fitted is predicted anyway. Where fewer than half the points of a place are predicted so, all count as the
     fit has them.
 
-    Args:
-        solution: the fit.
-        data_sets: what it was fitted to, with the weights at which it is the least sum of squares.
-        left: other tests.
+    The tests have the weights at which the solution is the least sum of squares; `left` are others.
     """
     free = [i for i, name in enumerate(solution.coordinates.names) if name not in solution.at_bound]
     whole, begin = LeaveOut.of(solution.jacobian[free], solution.residual), 0
@@ -197,11 +192,10 @@ def _slopes(solution: Solution, data_set: DataSet) -> Array:
 
 def _runs(data_set: DataSet) -> Iterator[_Run]:
     """What was recorded with each value held; a loop, and a sweep that holds nothing, is one run."""
-    stepped = data_set.sweep.stepped if isinstance(data_set, SweepData) else None
-    if not isinstance(data_set, SweepData) or stepped is None:
+    if not isinstance(data_set, SweepData) or data_set.sweep.stepped is None:
         yield _Run(None, None, None, np.ones(data_set.frequency.size, dtype=bool))
         return
-    what: Literal["amplitude", "frequency"] = "amplitude" if stepped == "frequency" else "frequency"
+    what: Literal["amplitude", "frequency"] = "amplitude" if data_set.sweep.stepped == "frequency" else "frequency"
     unit = data_set.direction.motion.displacement_unit if what == "amplitude" else "Hz"
     held = data_set.sweep.held[data_set.order]
     for value in np.unique(held):

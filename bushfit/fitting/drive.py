@@ -57,7 +57,6 @@ class Drive:
     """A loop made ready for the model.
 
     Args:
-        loop: the measured loop.
         frequency: [Hz], found from the displacement.
         cycles: whole and broken cycles in the record.
         from_rest: True where the record begins at rest, False where the loop had settled.
@@ -152,11 +151,7 @@ class Drive:
 def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
     """The cycles of a loop, its displacement cleared of noise, and its force with weights.
 
-    Outliers of either column do not disturb that.
-
-    Args:
-        loop: the measured loop.
-        without_outliers: whether rows whose force is an outlier carry no weight; else they count like any other.
+    Outliers of either column do not disturb that; `without_outliers`, rows whose force is one carry no weight.
 
     Raises:
         FitError: the displacement is not one whole cycle or more of a periodic motion, rows are missing, or the loop
@@ -205,11 +200,7 @@ def _of_the_record(loop: Loop) -> Iterator[str]:
 
 
 def _check_no_hole(loop: Loop, clock: Array, frequency: float) -> None:
-    """Across rows that are missing nothing tells how many turns the motion made, nor so its frequency.
-
-    Raises:
-        FitError: rows are missing over more than a part of a cycle.
-    """
+    """Refuse a hole of more than a part of a cycle: nothing tells how many turns the motion made in it."""
     steps = np.diff(clock)
     widest = int(np.argmax(steps))
     if steps[widest] > HOLE / frequency:
@@ -224,11 +215,7 @@ def _check_no_hole(loop: Loop, clock: Array, frequency: float) -> None:
 
 
 def _check_loses_energy(drive: Drive) -> None:
-    """A bushing loses energy: its force runs ahead of its displacement.
-
-    Raises:
-        FitError: it lags behind, beyond noise and what the delay of a rig makes.
-    """
+    """Refuse a force that lags behind the displacement, beyond noise and what the delay of a rig makes."""
     stiffness = drive.first_harmonic()
     chance = drive.noise * np.sqrt(2.0 / drive.weight.sum()) / abs(drive.coefficients[1])
     if stiffness.imag < -max(_CERTAIN * chance, _NO_LOSS * abs(stiffness)):
@@ -252,12 +239,7 @@ def _points(
 ) -> tuple[Array, Array, Array]:
     """Phase [cycles], force and weight of each row of a loop, or of each bin of phase where it is long, (n,) each.
 
-    Args:
-        loop: without run-in.
-        frequency: [Hz].
-        cycles: in the loop.
-        unweighted: rows that carry no weight.
-        each_cycle: whether every cycle has bins of its own.
+    Rows that are `unweighted` carry no weight; `each_cycle` has bins of its own, or cycles share them.
     """
     clock = loop.time - loop.time[0] if loop.time[0] else loop.time
     if loop.force.size > MOST_ROWS:
@@ -267,10 +249,7 @@ def _points(
 
 
 def _at_reversal(drive: Drive) -> Array:
-    """Rows within a step of the model's grid from a turning point, (n,).
-
-    Dry friction jumps there, and no grid can tell when.
-    """
+    """Rows within a step of the grid from a turning point, (n,): dry friction jumps there, and no grid tells when."""
     motion, position = drive.history(settles=False).value, drive.phase * GRID
     if drive.from_rest:
         turns = np.flatnonzero(reversals(motion))
@@ -285,13 +264,6 @@ def _from_rest(loop: Loop, frequency: float, half_motion: float, half_force: flo
     """Whether the record begins with nothing moved, no force, and a force that is another a cycle later.
 
     A settled loop may pass the origin too, where its load cell is off zero, but then it passes it every cycle.
-
-    Args:
-        loop: the whole record.
-        frequency: [Hz].
-        half_motion: half of the range of the displacement [m or rad].
-        half_force: half of the range of the force [N or N m].
-        noise: standard deviation of one row's force [N or N m].
     """
     unmoved = abs(loop.displacement[0]) <= _AT_REST * half_motion
     unloaded = abs(loop.force[0]) <= _AT_REST * half_force + _FIRST_ROW * noise

@@ -53,7 +53,6 @@ class _Combination:
     Args:
         formula: in words of the model.
         value: of the modulus [Pa], from the parameters and omega [rad/s]; analytic, so that it takes complex numbers.
-        names: its parameters.
         open_with: it is of interest where one of these is open.
         remark: what it means.
     """

@@ -55,11 +55,6 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
 
     The noise holds what does not repeat from cycle to cycle and what is too fast for the rubber, but not what changes
     slowly from one cycle to the next, which is settling or drift.
-
-    Args:
-        loop: one cycle or more of a periodic motion.
-        frequency: [Hz].
-        cycles: in the loop.
     """
     chosen = spread_rows(loop.time.size, MOST_ROWS)
     phase = (loop.time[chosen] - loop.time[0]) * frequency
@@ -95,15 +90,7 @@ def _significant(coefficients: Array, noise: float, rows: int) -> Array:
 
 
 def _is_triangle(triangle: Array, coefficients: Array, noise: float, phase: Array, displacement: Array) -> bool:
-    """Whether the rows of a motion agree with a triangle as well as with its own harmonics.
-
-    Args:
-        triangle: complex harmonics of the triangle, mean first.
-        coefficients: the motion's own.
-        noise: of one row about its own harmonics [m or rad].
-        phase: of the rows [cycles], (n,).
-        displacement: of the rows [m or rad], (n,).
-    """
+    """Whether the rows of a motion agree with a triangle as well as with its own harmonics, noise [m or rad] off."""
     other = coefficients.size > 3 and abs(coefficients[3] - triangle[3]) >= _NO_TRIANGLE * noise
     return bool(not other and np.std(displacement - series(triangle, phase)) < _TRIANGLE_RATIO * noise)
 
@@ -111,8 +98,7 @@ def _is_triangle(triangle: Array, coefficients: Array, noise: float, phase: Arra
 def _triangle(mean: complex, fundamental: complex) -> Array:
     """Complex harmonics of the triangle of that mean and fundamental, as far as the grid goes.
 
-    Notes:
-        c_k falls as 1/k^2 over the odd k, so slowly that its corners need them all.
+    They fall as 1/k^2 over the odd k, so slowly that its corners need them all.
     """
     order = np.arange(1, GRID // 2, 2)
     turn = 1j * fundamental / abs(fundamental)
@@ -123,13 +109,7 @@ def _triangle(mean: complex, fundamental: complex) -> Array:
 
 
 def _scatter(phase: Array, residual: Array, freedom: int) -> float:
-    """Standard deviation of the force's residuals less the slow part of each cycle's own.
-
-    Args:
-        phase: of the rows [cycles], (n,).
-        residual: of the force, (n,).
-        freedom: degrees of freedom of these residuals.
-    """
+    """Standard deviation of the force's residuals less the slow part of each cycle's own."""
     number = np.floor(phase).astype(np.intp)
     unknowns = 2 * _SLOW_HARMONICS + 1
     left = residual.copy()

@@ -34,12 +34,8 @@ NO_OUTLIERS = OutlierRows(np.empty(0, dtype=np.intp), np.empty(0))
 def residual_limit(solution: Array, residual: Array, rows: int) -> float:
     """Distance from its harmonics within which a row is no outlier, in units of the column.
 
-    Noise takes part of it, and the corners of a triangle, which so many harmonics round off, the rest.
-
-    Args:
-        solution: real coefficients of the harmonics, (2 order + 1,).
-        residual: of rows that stand for all, (n,).
-        rows: of the whole column.
+    Noise takes part of it, and the corners of a triangle, which these harmonics, (2 order + 1,), round off, the rest.
+    The residuals are of rows that stand for all `rows` of the column.
     """
     corner = _CORNER / (solution.size // 2) * first_amplitude(solution)
     return outlier_limit(rows, 1, np.inf) * _spread(residual) + corner
@@ -48,14 +44,8 @@ def residual_limit(solution: Array, residual: Array, rows: int) -> float:
 def fit_without_outliers(columns: Array, values: Array, solution: Array) -> tuple[Array, Array]:
     """Harmonics of a column fitted without its outliers, and which rows are none, (n,).
 
-    Args:
-        columns: of `basis`, (n, 2 order + 1).
-        values: of the column, (n,).
-        solution: coefficients of the least-squares fit to all rows, (2 order + 1,).
-
-    Notes:
-        Squares let so many harmonics follow a cluster of outliers. So rows are weighted down by their distance first;
-        then outliers are found and left out in turn until both agree.
+    Squares let so many harmonics follow a cluster of outliers, as `solution` does. So rows are weighted down by their
+    distance first; then outliers are found and left out in turn until both agree.
     """
     inliers, stuck = np.ones(values.size, dtype=bool), are_stuck(values)
     if _inliers(columns, values, solution, stuck).all():
@@ -73,15 +63,7 @@ def fit_without_outliers(columns: Array, values: Array, solution: Array) -> tupl
 
 
 def column_outliers(loop: Loop, frequency: float, column: Array, solution: Array, residual: Array) -> OutlierRows:
-    """Outliers among all rows of a column, whose harmonics were fitted to rows that stand for all.
-
-    Args:
-        loop: whose column it is.
-        frequency: of the loop [Hz].
-        column: displacement or force, one value a row of the loop.
-        solution: real coefficients of its harmonics, (2 order + 1,).
-        residual: of the rows that stand for all, (n,).
-    """
+    """Outliers among all rows of a column, whose harmonics and residual are of rows that stand for all."""
     grid = np.arange(GRID + 1) / GRID
     cycle = basis(grid, solution.size // 2) @ solution
     off = column - np.interp((loop.time - loop.time[0]) * frequency % 1.0, grid, cycle)

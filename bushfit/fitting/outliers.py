@@ -57,10 +57,7 @@ def from_neighbours(values: Array, rows: Array, window: int = NEIGHBOURS) -> Arr
 def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
     """Whether rows are farther than a limit off a curve and as far off their neighbours, or the channel is stuck, (n,).
 
-    Args:
-        residual: recorded less the curve, (n,).
-        recorded: what was recorded, (n,).
-        limit: in the units of the residual.
+    The residual is what was recorded less the curve, (n,).
     """
     far = np.abs(residual) > limit
     if not far.any():

@@ -59,7 +59,6 @@ def fit_joint(
     """All parameters of a model together, from loops and sweeps.
 
     Args:
-        data: the campaign.
         effects: the model; the paper's three branches, and what [fit] adds to them, unless told.
         directions: and specimens whose tests to use; see `Data.chosen`.
         profile: called with the name of each parameter when its profile likelihood is done, and how many are left;
@@ -83,10 +82,8 @@ def fit_joint(
 def fit_static(data: Data, springpot: Result | None = None) -> Result:
     """mu, sigma_fmax and eps_half from the loops, the springpot held (paper, section 4.1).
 
-    Args:
-        data: the campaign.
-        springpot: where m and alpha come from. Without it they are taken from the campaign's [fit] where both
-            have values; failing that the springpot is left out, and a warning says what this does.
+    m and alpha come from the result given, or else from the campaign's [fit] where both have values; failing that the
+    springpot is left out, and a warning says what this does.
 
     Raises:
         FitError: no loop, or data that cannot support the fit.

@@ -47,10 +47,6 @@ class _Profile:
     """The rise of chi-square by the coordinate of one parameter, the others fitted anew.
 
     Args:
-        name: the parameter.
-        best: the fit of all parameters.
-        data_sets: the data.
-        bounds: limits inside the parameters' own.
         known: the fits made so far by coordinate, the best one among them; each new one starts from the nearest.
     """
 
@@ -87,13 +83,7 @@ class _Profile:
     def end(self, start: float, bound: float, step: float, allowed: float) -> float | None:
         """Value at which the root of the rise reaches what is allowed; None where that side is open.
 
-        The search goes from the best value towards the bound in steps, and then looks between the last two.
-
-        Args:
-            start: coordinate of the best value.
-            bound: coordinate of the lower or of the upper bound.
-            step: in coordinates.
-            allowed: root of the rise at the end.
+        The search goes from the best value, `start`, towards the bound in steps, and then looks between the last two.
         """
         from scipy.optimize import brentq
 
@@ -126,10 +116,6 @@ def profile95(
     chi-square may rise to the square of that interval's half width over the linear standard error.
 
     Args:
-        best: the fit.
-        data_sets: the data.
-        covariance: of the fit.
-        bounds: limits inside the parameters' own.
         advance: called with the name of each parameter when it is done, and how many are left.
 
     Returns:

@@ -38,7 +38,6 @@ class Estimate:
     """A fit and the data behind it.
 
     Args:
-        solution: where it ended.
         data_sets: the data, outliers without weight where the loss leaves them out.
         minimised: the same with the weights at which the solution is the least sum of squares.
         weighed: the same with the weights that give its covariance.

@@ -76,11 +76,8 @@ class Solution:
     """Where a fit ended.
 
     Args:
-        model: the model with the values found.
-        coordinates: of the parameters that were fitted.
         residual: whitened residuals, model less measured, (n,).
         jacobian: their derivatives by coordinate, (k, n).
-        evaluations: of the model.
         at_bound: the parameters that ended at a bound, and at which.
         stopped: whether it was stopped before it had converged.
     """
@@ -106,8 +103,7 @@ class Solution:
 
     @property
     def flat(self) -> bool:
-        """Whether the next step would lower chi-square by no more than chance does, in units of the misfit's
-        variance."""
+        """Whether the next step would lower chi-square, in units of the misfit's variance, no more than chance does."""
         return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
 
 
@@ -136,9 +132,6 @@ def solve(
     """Fit the named parameters by least squares, from the model's own values, the others held; without names all are.
 
     Args:
-        model: where to start.
-        data_sets: the data.
-        names: parameters to move.
         bounds: limits inside the parameters' own; a parameter may come to rest on one.
         evaluations: most evaluations of the model.
         tolerance: relative change of chi-square and of the point at which the fit stops.
@@ -182,11 +175,7 @@ class _OutOfBoundsError(Exception):
 class _Problem:
     """A fit as lmfit asks for it: residuals and their derivatives by lmfit's parameters, which are coordinates.
 
-    Args:
-        data_sets: the data.
-        coordinates: in which the fit moves.
-        start, low, high: where it starts, and its bounds, (k,) each.
-        model_at: the model at a point.
+    Start and bounds are points, (k,) each.
     """
 
     data_sets: Sequence[DataSet]
@@ -260,7 +249,7 @@ def _point(parameters: lmfit.Parameters) -> tuple[float, ...]:
 def starting_point(
     model: Model, data_sets: Sequence[DataSet], names: Sequence[str], bounds: Bounds
 ) -> tuple[Coordinates, Array, Array, Array]:
-    """The coordinates of a fit, where in them the model's own values lie, and the lower and upper bounds, (k,) each.
+    """Coordinates of a fit, the model's own values in them, and the lower and upper bounds, (k,) each.
 
     Raises:
         FitError: fewer data than parameters.

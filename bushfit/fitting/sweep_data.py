@@ -13,7 +13,7 @@ from scipy.linalg import block_diag
 
 from bushfit.effects.contract import Array, Values
 from bushfit.fitting.data_set import DataSet, Freedoms, Suspect, kept, shown_amplitude
-from bushfit.fitting.noise import FLOOR, SweepNoise
+from bushfit.fitting.noise import FLOOR, SweepNoise, unit
 from bushfit.fitting.sweep_outliers import outlying_points
 from bushfit.fitting.whitening import Whitening
 from bushfit.geometry import Place
@@ -108,7 +108,6 @@ class SweepData(DataSet):
 
     @property
     def relative_noise(self) -> float:
-        """Standard deviation of one point, relative to |K|, root mean square over levels."""
         return float(np.sqrt(np.mean(np.square(list(self.noise.random.values())))))
 
     @property
@@ -151,12 +150,10 @@ class SweepData(DataSet):
 
     @cached_property
     def frequency(self) -> Array:
-        """[Hz], (n,)."""
         return self.sweep.frequency[self.order]
 
     @cached_property
     def amplitude(self) -> Array:
-        """Of the level, zero-to-peak [m or rad], (n,)."""
         return self.sweep.amplitude[self.order]
 
     @cached_property
@@ -171,12 +168,10 @@ class SweepData(DataSet):
 
     @cached_property
     def repeat(self) -> Array:
-        """Number of the repeat, (n,)."""
         return self.sweep.repeat[self.order]
 
     @cached_property
     def measured(self) -> Array:
-        """Complex stiffness [N/m or N m/rad], (n,)."""
         return self.sweep.stiffness[self.order]
 
     @cached_property
@@ -363,5 +358,4 @@ class SweepData(DataSet):
 def _polynomials(step: Array) -> Array:
     """Legendre polynomials in the logarithm of steps over their range, (n, degree + 1)."""
     x = np.log(step)
-    unit = 2.0 * (x - x.min()) / max(float(np.ptp(x)), 1e-300) - 1.0
-    return np.polynomial.legendre.legvander(unit, min(_SMOOTH_DEGREE, np.unique(x).size - 1))
+    return np.polynomial.legendre.legvander(unit(x), min(_SMOOTH_DEGREE, np.unique(x).size - 1))

@@ -46,11 +46,9 @@ def outlying_points(
 
 
 def misfit_scale(distance: Array, parts: int) -> float:
-    """Median distance of all points from the model over the median that noise alone makes; at least 1.
+    """Median distance from the model, in units of noise, over the median that noise alone makes; at least 1.
 
-    Args:
-        distance: of each point, in units of noise, (n,).
-        parts: numbers that make up a point: 1 for a force, 2 for a complex stiffness.
+    A point is made of so many `parts`: 1 for a force, 2 for a complex stiffness.
     """
     if not distance.size:
         return 1.0

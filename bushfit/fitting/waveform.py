@@ -28,9 +28,7 @@ def waveform(coefficients: Array) -> str:
 def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
     """A sentence where the time of a loop was made from its motion, but not as its rows lie; else None.
 
-    Args:
-        loop: whose time it is.
-        coefficients: complex harmonics of its displacement over that time, mean first.
+    The complex harmonics are of its displacement over that time, mean first.
     """
     if loop.timed:
         return None

@@ -42,8 +42,7 @@ class Whitening:
     def own(self, deviation: Array, *, shared: bool = True) -> Array:
         """Deviations in units of the random noise alone, complex (n,) -> (2, n).
 
-        Args:
-            shared: whether to take out the likeliest error that the block shares.
+        With `shared`, the likeliest error that a block shares is taken out.
         """
         parts = _gain_and_phase(deviation)
         if shared:

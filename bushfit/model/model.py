@@ -39,13 +39,7 @@ FIVE = tuple(parameter.name for name in BASE for parameter in effect_named(name)
 
 @dataclass(frozen=True)
 class _Structure:
-    """The effects of a model by kind, and their parameters; the same for all models with these effects.
-
-    Args:
-        records: all effects, from the rubber outward.
-        parameters: by name in files and reports.
-        branches, modifiers, layers: the effects of each kind, in that order.
-    """
+    """The effects of a model by kind, and their parameters; the same for all models with these effects."""
 
     records: tuple[Effect, ...]
     parameters: Mapping[str, Parameter]
@@ -223,15 +217,9 @@ class Model:
         kind: Kind = "sweep",
         values: Values | None = None,
     ) -> Array:
-        """Force over a displacement history [N or N m], from rest or on the steady cycle.
+        """Force over a history of displacement [m or rad], from rest or on the steady cycle: (..., n) [N or N m].
 
-        Args:
-            direction: of the test, or its name; or the specimen under test.
-            displacement: [m or rad], (..., n).
-            kind, values: as of `stiffness`.
-
-        Returns:
-            (..., n).
+        The other arguments are as of `stiffness`.
         """
         setting = _setting(self.bushing, direction, kind)
         respond = self._stack_force(setting, self.values if values is None else values, self._layers(setting))
@@ -327,13 +315,7 @@ def _check(name: str, value: float, parameter: Parameter) -> None:
 
 
 def seen_by(effect: Effect, values: Values, base: Values) -> Values:
-    """The values that an effect reads: `base` by their full names, and its own of `values` by their short names.
-
-    Args:
-        effect: who reads.
-        values: of all parameters.
-        base: the same, with the paper's parameters as the modifiers left them.
-    """
+    """The values that an effect reads: `base` by their full names, and its own of `values` by short ones."""
     if effect.name in BASE:
         return base
     return {**base, **{parameter.name: values[qualified(effect, parameter)] for parameter in effect.parameters}}
