@@ -7,7 +7,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.fourier import basis, derivative, least_squares, resolved_order, spread_rows
-from bushfit.fitting.loop_outliers import residual_limit
+from bushfit.fitting.loop_harmonics import residual_limit
 from bushfit.fitting.runin import crossings
 from bushfit.reading.measurement import Loop
 

@@ -18,13 +18,11 @@ from bushfit.effects.history import History, reversals
 from bushfit.errors import FitError
 from bushfit.fitting.clock import fundamental
 from bushfit.fitting.fourier import GRID, basis, least_squares, series
-from bushfit.fitting.loop_harmonics import MOST_ROWS, loop_harmonics
-from bushfit.fitting.loop_outliers import OutlierRows
+from bushfit.fitting.loop_harmonics import MOST_ROWS, OutlierRows, loop_harmonics
+from bushfit.fitting.motion import mean_of_preload, preload, wrong_clock
 from bushfit.fitting.noise import FLOOR
 from bushfit.fitting.phase_bins import phase_bins
-from bushfit.fitting.preload import mean_of_preload, preload
 from bushfit.fitting.runin import steady_part, thinned
-from bushfit.fitting.waveform import wrong_clock
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.cycles import HOLE
 from bushfit.units import number

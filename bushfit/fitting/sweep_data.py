@@ -14,7 +14,7 @@ from scipy.linalg import block_diag
 from bushfit.effects.contract import Array, Values
 from bushfit.fitting.data_set import DataSet, Freedoms, Suspect, kept, shown_amplitude
 from bushfit.fitting.noise import FLOOR, SweepNoise, unit
-from bushfit.fitting.sweep_outliers import outlying_points
+from bushfit.fitting.outliers import outlying_points
 from bushfit.fitting.whitening import Whitening
 from bushfit.geometry import Place
 from bushfit.model.model import Model
@@ -328,15 +328,8 @@ class SweepData(DataSet):
         return f"run {self.repeat[point]} of {self.name}, {self.direction}"
 
     def _suspect(self, words: str, kind: str, chosen: Array) -> Suspect:
-        frequency, amplitude = self.frequency[chosen], self.amplitude[chosen]
-        return Suspect(
-            words,
-            kind,
-            self.moved_together(chosen),
-            self.direction,
-            (float(frequency.min()), float(frequency.max())),
-            (float(amplitude.min()), float(amplitude.max())),
-        )
+        ends = [(float(each[chosen].min()), float(each[chosen].max())) for each in (self.frequency, self.amplitude)]
+        return Suspect(words, kind, self.moved_together(chosen), self.direction, ends[0], ends[1])
 
     def moved_together(self, chosen: Array) -> list[Array]:
         """Whitened residuals of some points, (n,) bool, off by one unit of gain, and off by one of phase."""
@@ -344,11 +337,8 @@ class SweepData(DataSet):
 
     def columns(self) -> dict[str, Any]:
         unit, factor = self.direction.display.displacement
-        return {
-            "frequency [Hz]": self.frequency,
-            f"amplitude [{unit}]": self.amplitude * factor,
-            "repeat": self.repeat,
-        }
+        amplitude = self.amplitude * factor
+        return {"frequency [Hz]": self.frequency, f"amplitude [{unit}]": amplitude, "repeat": self.repeat}
 
     def components(self, residual: Array) -> dict[str, Array]:
         storage, loss = np.split(residual, 2)
