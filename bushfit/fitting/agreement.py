@@ -91,11 +91,7 @@ class LeaveOut:
 
 
 def misfits(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet] = ()) -> tuple[Misfit, ...]:
-    """How well a model meets each test, and each run of those that have several, one after the other.
-
-
-    The tests that it was fitted to come first, then the others, `left`.
-    """
+    """How well a model meets each test, and each run of those that have several; `left` are tests not fitted."""
     pairs = [(data_set, True) for data_set in fitted] + [(data_set, False) for data_set in left]
     return tuple(found for data_set, was in pairs for found in _misfits(model, data_set.standing(), was_fitted=was))
 

@@ -34,8 +34,7 @@ class Stage:
 def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = None) -> Covariance:
     """Covariance of all parameters that a procedure estimated, each stage holding what the others found.
 
-    Args:
-        held: covariance of parameters that all stages held; they enter as they are.
+    `held` is that of parameters which all stages held.
 
     Returns:
         By parameter value. Where the residuals of a stage exceed its noise, its share is inflated by its reduced

@@ -28,11 +28,7 @@ _Kind = TypeVar("_Kind", LoopData, SweepData, DataSet)
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """A campaign made ready to fit: one data set per loop and per sweep, and the user's settings.
-
-    Args:
-        bounds: least and largest value of each parameter that [fit] names; None for none.
-    """
+    """A campaign made ready to fit: one data set per loop and per sweep, and least and largest values from [fit]."""
 
     campaign: Campaign
     loops: tuple[LoopData, ...]

@@ -105,10 +105,9 @@ class Drive:
         return complex(complex(real, imag) / self.coefficients[1])
 
     def history(self, settles: bool) -> History:
-        """The motion as the model wants it, GRID samples a cycle.
+        """One settled cycle, GRID samples long, or the whole record where it begins at rest, or the model `settles`.
 
-        One settled cycle, or the whole record where it begins at rest or the model `settles` over the cycles; in a part
-        after other cycles it has.
+        In a part after other cycles the model has settled.
         """
         return self._settling if settles and not (self.from_rest or self.follows) else self._motion
 
@@ -235,10 +234,7 @@ def _without(values: Array, rows: Array) -> Array:
 def _points(
     loop: Loop, frequency: float, cycles: float, unweighted: Array, *, each_cycle: bool
 ) -> tuple[Array, Array, Array]:
-    """Phase [cycles], force and weight of each row of a loop, or of each bin of phase where it is long, (n,) each.
-
-    Rows that are `unweighted` carry no weight; `each_cycle` has bins of its own, or cycles share them.
-    """
+    """Phase [cycles], force and weight of each row of a loop, or of each bin of phase where it is long, (n,) each."""
     clock = loop.time - loop.time[0] if loop.time[0] else loop.time
     if loop.force.size > MOST_ROWS:
         clock, force = _without(clock, unweighted), _without(loop.force, unweighted)

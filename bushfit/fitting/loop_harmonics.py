@@ -123,10 +123,7 @@ def _is_triangle(triangle: Array, coefficients: Array, noise: float, phase: Arra
 
 
 def _triangle(mean: complex, fundamental: complex) -> Array:
-    """Complex harmonics of the triangle of that mean and fundamental, as far as the grid goes.
-
-    They fall as 1/k^2 over the odd k, so slowly that its corners need them all.
-    """
+    """Complex harmonics of a triangle, by mean and fundamental; they fall so slowly that its corners need all."""
     order = np.arange(1, GRID // 2, 2)
     turn = 1j * fundamental / abs(fundamental)
     coefficients = np.zeros(GRID // 2, dtype=complex)
@@ -150,10 +147,9 @@ def _scatter(phase: Array, residual: Array, freedom: int) -> float:
 
 
 def residual_limit(solution: Array, residual: Array, rows: int) -> float:
-    """Distance from its harmonics within which a row is no outlier, in units of the column.
+    """Distance from its harmonics within which a row is no outlier, in units of the column of so many rows.
 
     Noise takes part of it, and the corners of a triangle, which these harmonics, (2 order + 1,), round off, the rest.
-    The residuals are of rows that stand for all `rows` of the column.
     """
     corner = _CORNER / (solution.size // 2) * first_amplitude(solution)
     return outlier_limit(rows, 1, np.inf) * _spread(residual) + corner

@@ -66,10 +66,7 @@ def waveform(coefficients: Array) -> str:
 
 
 def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
-    """A sentence where the time of a loop was made from its motion, but not as its rows lie; else None.
-
-    The complex harmonics are of its displacement over that time, mean first.
-    """
+    """A sentence where a loop's time was made from its motion, but not as its rows lie; else None."""
     if loop.timed:
         return None
     motion = loop.displacement

@@ -170,10 +170,7 @@ def _at_nominal(sweep: Sweep) -> Array:
 
 
 def _pooled(lines: Mapping[LineKey, _Line], measured: Sequence[_Line]) -> tuple[dict[LineKey, Array], int]:
-    """Variance of gain and phase of each line, (2,), and the degrees of freedom behind it.
-
-    One variance for all where the lines that measure it agree, else each line's own.
-    """
+    """Variance of gain and phase of each line, (2,), one for all where they agree, and its degrees of freedom."""
     alike = _of_equal_noise(measured)
     if not alike:
         return {key: line.variance for key, line in lines.items()}, min(line.freedom for line in lines.values())
@@ -257,10 +254,7 @@ def _complement(basis: Array) -> Array:
 
 
 def _least_absolute(basis: Array, values: Array) -> Array:
-    """Coefficients of a curve, (n, k), with the least sum of distances to gain and phase, (n, 2) -> (k, 2).
-
-    Outliers do not bend it: it is of least squares, weighted anew by one over the distance.
-    """
+    """Coefficients of a curve, (n, k), with the least sum of distances to gain and phase, (n, 2) -> (k, 2)."""
     root_weight = np.ones((len(values), 1))
     for _ in range(_ROUNDS):
         solution = np.linalg.lstsq(basis * root_weight, values * root_weight, rcond=None)[0]

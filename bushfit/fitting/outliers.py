@@ -43,12 +43,9 @@ _NEAR_NEIGHBOURS = 5
 
 
 def outlier_limit(rows: int, parts: int, freedom: float) -> float:
-    """Distance from the truth, in units of noise, that noise alone reaches in one test of a hundred.
+    """Distance from the truth, in units of noise, that noise alone reaches in one test of so many rows of a hundred.
 
-    Args:
-        rows: of the test.
-        parts: numbers in a row: 1 for a force, 2 for a complex stiffness.
-        freedom: degrees of freedom behind the noise; infinite where it is known.
+    A row has so many `parts`: 1 for a force, 2 for a complex stiffness. Infinite freedom is a noise that is known.
     """
     return float(np.sqrt(parts * fdtri(parts, min(freedom, _KNOWN), 1.0 - _CHANCE / max(rows, 1))))
 
@@ -61,10 +58,7 @@ def from_neighbours(values: Array, rows: Array, window: int = NEIGHBOURS) -> Arr
 
 
 def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
-    """Whether rows are farther than a limit off a curve and as far off their neighbours, or the channel is stuck, (n,).
-
-    The residual is what was recorded less the curve, (n,).
-    """
+    """Whether rows lie farther than a limit off a curve, by `residual`, and off neighbours, or are stuck, (n,)."""
     far = np.abs(residual) > limit
     if not far.any():
         return far
@@ -152,10 +146,7 @@ def outlying_points(
 
 
 def misfit_scale(distance: Array, parts: int) -> float:
-    """Median distance from the model, in units of noise, over the median that noise alone makes; at least 1.
-
-    A point is made of so many `parts`: 1 for a force, 2 for a complex stiffness.
-    """
+    """Median distance from the model, of points of so many parts, over that which noise alone makes; at least 1."""
     if not distance.size:
         return 1.0
     return max(1.0, float(np.median(distance) / np.sqrt(chdtri(parts, 0.5))))

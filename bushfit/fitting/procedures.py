@@ -34,7 +34,8 @@ _MOST_PASSES = 50
 _LONGEST_STRIDE = 5.0
 #: A filled natural rubber, to say what leaving the springpot out may do: m/mu [s^alpha] and alpha.
 _TYPICAL_SPRINGPOT = (0.18, 0.24)
-#: What is said of a fit that was stopped where chi-square is flat, and of one that was stopped on a slope.
+#: What is said of a fit that was stopped, where chi-square is flat or on a slope.
+_STOPPED = "the fit was stopped after {} evaluations of the model, where {}"
 _FLAT = "chi-square is flat: parameters that stay open could move on, for next to nothing"
 _SLOPE = "it had not come to its end: the parameters are not the best ones"
 #: What to do about a model that does not fit.
@@ -203,6 +204,7 @@ def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = Non
     fitted = tuple(name for stage in stages for name in stage.names)
     cov = covariance(model, stages, held) if stages else held or Covariance()
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
+    odd = [note for step in steps for note in cautions(model, step.solution, step.data_sets, data.bounds, cov, _NEXT)]
     return Result(
         model,
         fitted,
@@ -214,11 +216,7 @@ def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = Non
             *implausible(data.campaign.bushing, data_sets),
             *_assumed(data_sets),
             *told(outliers, robust=data.robust),
-            *(
-                line
-                for step in steps
-                for line in cautions(model, step.solution, step.data_sets, data.bounds, cov, _NEXT)
-            ),
+            *odd,
         ),
         sources(data_sets),
         outliers,
@@ -236,15 +234,14 @@ def cautions(
     covariance: Covariance,
     advice: str = "",
 ) -> list[str]:
-    """What is odd about the loops of a fit, and what its data cannot tell: bounds met, what stays open, and a model
-    that does not fit."""
+    """What is odd about the loops of a fit, and what its data cannot tell: bounds met, what stays open, a misfit."""
     names, at_bound = solution.coordinates.names, solution.at_bound
     notes = [f"{data_set.name}: {note}" for data_set in data_sets for note in data_set.notes]
     if not names:
         return [*notes, _checked(model, data_sets)]
     return [
         *notes,
-        *([_stopped(solution)] if solution.stopped else []),
+        *([_STOPPED.format(solution.evaluations, _FLAT if solution.flat else _SLOPE)] if solution.stopped else []),
         *(_at_edge(name, end, bounds) for name, end in at_bound.items()),
         *left_open(model, data_sets, [name for name in names if name not in at_bound], covariance),
         *misfit(model, data_sets, len(names), advice),
@@ -261,11 +258,6 @@ def _checked(model: Model, data_sets: Sequence[DataSet]) -> str:
         f"nothing was fitted here, every parameter is held; the values given {how} the tests {by} "
         f"(NRMSE {number(100.0 * found.nrmse, 2)} %, reduced chi-square {number(found.reduced_chi_square, 3)})"
     )
-
-
-def _stopped(solution: Solution) -> str:
-    where = _FLAT if solution.flat else _SLOPE
-    return f"the fit was stopped after {solution.evaluations} evaluations of the model, where {where}"
 
 
 def _at_edge(name: str, end: End, bounds: Bounds) -> str:

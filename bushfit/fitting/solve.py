@@ -214,11 +214,7 @@ def _point(parameters: lmfit.Parameters) -> tuple[float, ...]:
 def starting_point(
     model: Model, data_sets: Sequence[DataSet], names: Sequence[str], bounds: Bounds
 ) -> tuple[Coordinates, Array, Array, Array]:
-    """Coordinates of a fit, the model's own values in them, and the lower and upper bounds, (k,) each.
-
-    Raises:
-        FitError: fewer data than parameters.
-    """
+    """Coordinates of a fit, the model's own values in them, and the lower and upper bounds, (k,) each."""
     points = sum(data_set.size for data_set in data_sets)
     if points <= len(names):
         raise FitError("too few points for the fit", found=f"{points} points for {len(names)} parameters")

@@ -6,11 +6,12 @@ from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 from scipy.linalg import block_diag
 
+from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import Array, Values
 from bushfit.fitting.data_set import DataSet, Freedoms, Suspect, kept, shown_amplitude
 from bushfit.fitting.noise import FLOOR, SweepNoise, unit
@@ -21,8 +22,6 @@ from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.model.sensitivity import stiffness_jacobian
 from bushfit.reading.measurement import Stepped, Sweep
-
-Residuals = Literal["complex", "magnitude_loss_factor"]
 
 #: Degree, in the logarithm of what is stepped, of the Legendre polynomials that count as smooth misfit.
 _SMOOTH_DEGREE = 3
@@ -197,8 +196,7 @@ class SweepData(DataSet):
         return np.abs(self.stiffness(model) / self.measured - 1.0)[self.weights > 0.0]
 
     def distance(self, model: Model) -> Array:
-        """How far each point lies off the model less what its block shares, in units of noise: one number for gain and
-        phase, their root mean square, (n,)."""
+        """As of `DataSet`, less what its block shares; of gain and phase the root mean square."""
         return self.apart(self.deviation(model)) / np.sqrt(2.0)
 
     def change(self, one: Model, other: Model) -> float:

@@ -50,11 +50,7 @@ class _Structure:
     @classmethod
     @lru_cache(maxsize=256)
     def of(cls, names: tuple[str, ...]) -> _Structure:
-        """The structure of a model with these effects, in any order; kept, because a fit makes thousands of models.
-
-        Raises:
-            ModelError: an unknown effect, or one named twice.
-        """
+        """The structure of a model with these effects, in any order; kept, because a fit makes thousands of models."""
         doubles = {name for name in names if names.count(name) > 1}
         if doubles:
             raise ModelError("an effect is listed twice", found=", ".join(sorted(doubles)))

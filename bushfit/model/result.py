@@ -160,11 +160,7 @@ class Result:
         return self.specimens[0].name if self.specimens and not self.model.bushing else self.model.name
 
     def place(self, name: str) -> Place:
-        """The specimen of this name, or else the direction.
-
-        Raises:
-            ModelError: it is neither.
-        """
+        """The specimen of this name, or else the direction; a ModelError where it is neither."""
         return place_named(name, self.specimens)
 
     def interval(self, name: str) -> tuple[float, float] | None:

@@ -66,12 +66,9 @@ def record(
 def imposed(
     model: Model, direction: Place, motion: Array, step: float, frequency: float, *, kind: Kind = "loop"
 ) -> Record:
-    """Impose any motion from rest.
+    """Impose any motion, in even steps of time [s] from rest: displacement [m or rad], (n,).
 
-    Args:
-        motion: displacement in even steps of time [m or rad], (n,).
-        step: of time [s].
-        frequency: of its cycles [Hz], for effects that count them.
+    The frequency of its cycles [Hz] is for effects that count them.
     """
     history = History(motion, step, periodic=False, frequency=frequency)
     force = model.force(direction, history, kind=kind)
@@ -103,11 +100,7 @@ def dynamic_stiffness(
 ) -> Array:
     """Complex dynamic stiffness by stepped sine, one settled cycle per operating point: (n,) [N/m or N m/rad].
 
-    Args:
-        frequency: [Hz], (n,).
-        amplitude: zero-to-peak [m or rad], (n,).
-        run_in: cycles before the one that is evaluated.
-        steps_per_cycle: as of `record`.
+    Frequencies are in Hz, amplitudes zero-to-peak in m or rad, (n,) each.
     """
     points = zip(np.atleast_1d(frequency), np.atleast_1d(amplitude), strict=True)
     return np.array(
