@@ -184,11 +184,9 @@ def predict(
 
 @dataclass(frozen=True, eq=False)
 class PredictedResonance:
-    """A mass on a mount whose base is shaken with a sine of constant acceleration, as the model has it.
+    """A mass [kg] on a mount whose base is shaken with a sine of constant acceleration [m/s^2], as the model has it.
 
     Args:
-        mass: [kg].
-        base_acceleration: amplitude [m/s^2].
         frequency: [Hz], (n,).
         amplitude: of the mount's deformation, zero-to-peak [m], (n,).
         transmissibility: complex, acceleration of the mass over that of the base [-], (n,).

@@ -98,7 +98,7 @@ def misfits(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet] = (
 
 def _misfits(model: Model, data_set: DataSet, *, was_fitted: bool) -> Iterator[Misfit]:
     """The figures of a test without points of no weight, and of its runs where there are several."""
-    relative, gain = data_set.relative(model), np.abs(_modelled(model, data_set) / data_set.measured) - 1.0
+    relative, gain = data_set.relative(model), np.abs(data_set.noise_free(model).measured / data_set.measured) - 1.0
     squares = np.square(data_set.residual(model)).reshape(data_set.parts, -1).sum(axis=0)
     place, every = str(data_set.direction), np.ones(data_set.frequency.size, dtype=bool)
 
@@ -126,7 +126,7 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
     whole, begin = LeaveOut.of(solution.jacobian[free], solution.residual), 0
     found: dict[str, list[_Off]] = {}
     for data_set in data_sets:
-        modelled, slopes = _modelled(solution.model, data_set), _slopes(solution, data_set)[free]
+        modelled, slopes = data_set.noise_free(solution.model).measured, _slopes(solution, data_set)[free]
         for run in _runs(data_set):
             points = np.broadcast_to(run.points, (data_set.parts, data_set.size // data_set.parts))
             step = whole.step(begin + np.flatnonzero(points))
@@ -152,7 +152,7 @@ def met_within(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet])
 def _add(found: dict[str, list[_Off]], model: Model, data_sets: Sequence[DataSet], *, held_out: bool) -> None:
     """Add to `found`, by place, how far the points of tests are off."""
     for data_set in data_sets:
-        off = _off(_modelled(model, data_set), data_set.measured)
+        off = _off(data_set.noise_free(model).measured, data_set.measured)
         found.setdefault(str(data_set.direction), []).append((off, held_out))
 
 
@@ -169,11 +169,6 @@ def _usable(place: str, parts: Sequence[_Off]) -> Usable:
 def _off(modelled: Array, measured: Array) -> Array:
     """Relative difference of |K|, and difference of the loss factor, without sign, (2, n)."""
     return np.abs([np.abs(modelled / measured) - 1.0, loss_factor(modelled) - loss_factor(measured)])
-
-
-def _modelled(model: Model, data_set: DataSet) -> Array:
-    """Complex stiffness of the model at the operating points of a test [N/m, N m/rad or Pa], (n,)."""
-    return data_set.noise_free(model).measured
 
 
 def _slopes(solution: Solution, data_set: DataSet) -> Array:

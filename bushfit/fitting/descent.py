@@ -59,10 +59,9 @@ _INSIDE = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Descent:
-    """A fit under way, which never climbs.
+    """A fit under way, which never climbs; its model is the best so far.
 
     Args:
-        model: the best so far.
         low, high: bounds, (k,) each.
         point: where the model lies, (k,).
         residual: whitened, of that model, (n,).

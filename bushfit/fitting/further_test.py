@@ -134,7 +134,7 @@ def _new_sweeps(
 def _sweep(
     model: Model, sweeps: Sequence[SweepData], like: DataSet, band: tuple[float, float], amplitudes: Sequence[float]
 ) -> SweepData:
-    """A sweep as the model would have it, as noisy as the campaign's or most rigs', in its direction or that of `like`."""
+    """A sweep as the model would have it, as noisy as the campaign's or most rigs', in its direction or `like`'s."""
     frequency, amplitude = (x.ravel() for x in np.meshgrid(np.geomspace(*band, _NEW_FREQUENCIES), amplitudes))
     direction = sweeps[0].direction if sweeps else like.direction
     stiffness = model.stiffness(direction, frequency, amplitude)

@@ -36,8 +36,6 @@ class Line:
     """Mean misfit of one line of a sweep over its repeats: of all that its runs stepped through while they held one.
 
     Args:
-        direction: of the sweep.
-        stepped: what changes along the line; None where frequency and amplitude do.
         frequency: [Hz], (n,).
         amplitude: zero-to-peak [m or rad], (n,).
         misfit: measured over model less 1, complex, (n,).
@@ -78,9 +76,6 @@ class SweepData(DataSet):
     (K - K_meas)/K_meas has the gain error in its real and the phase error in its imaginary part.
 
     Args:
-        sweep: as measured.
-        noise: of the campaign's sweeps.
-        residuals: what the residual is made of.
         weight: share of its weight that each point has, (n,) in `order`; all for None.
         part: rows of the sweep that belong to it, (n,) in `order`; all for None.
     """

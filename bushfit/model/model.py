@@ -175,7 +175,7 @@ class Model:
         kind: Kind = "sweep",
         values: Values | None = None,
     ) -> Array:
-        """Complex dynamic stiffness of the steady first harmonic.
+        """Complex dynamic stiffness of the steady first harmonic [N/m or N m/rad].
 
         Args:
             direction: of the test, or its name: axial, radial or torsion; or the specimen under test.
@@ -184,9 +184,6 @@ class Model:
             kind: whether a loop or a sweep records it; only effects of the instrument tell them apart.
             values: parameter values in place of the model's own; arrays whose last axis has length 1 add
                 leading axes to the result.
-
-        Returns:
-            [N/m] or [N m/rad].
 
         Notes:
             The rubber has k = G mu^(omega, e0), with G of Eqs. 10, 11, 12 and e0 of Eqs. 7, 8 (Eqs. 6 to 12); the

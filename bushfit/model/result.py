@@ -128,16 +128,12 @@ class Result:
     """A fitted model, or one given by hand, as the JSON files hold it.
 
     Args:
-        fitted: names of the parameters the fit moved.
         covariance: of the fitted parameters, and of held ones whose error is known.
         quality: None where the model was not fitted.
         measured: operating conditions of the tests that were fitted; None where the model was not fitted.
         warnings: what a user must know before using the numbers.
-        outliers: points that lie farther off than noise explains.
         profile: 95 % intervals by profile likelihood, where they were asked for; None is an open end.
         at_bound: parameters that came to rest on the least or largest value they may have, and on which.
-        tests: how well the model meets each test, and each run of it.
-        usable: within what it meets the measurement, by place.
     """
 
     model: Model
