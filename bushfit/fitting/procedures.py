@@ -270,4 +270,9 @@ def _assumed(data_sets: Sequence[DataSet]) -> list[str]:
     """What was assumed of the noise because nothing was repeated."""
     _, sweeps = parted(data_sets)
     noises = {id(sweep.noise): sweep.noise for sweep in sweeps}
-    return [f"noise of the sweeps: {noise.describe()}" for noise in noises.values() if noise.origin == "assumed"]
+    return [
+        f"noise of the {' and '.join(dict.fromkeys(str(sweep.direction) for sweep in sweeps if sweep.noise is noise))} "
+        f"sweeps: {noise.describe()}"
+        for noise in noises.values()
+        if noise.origin == "assumed"
+    ]
