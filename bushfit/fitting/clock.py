@@ -44,9 +44,9 @@ _REPEATS_SCATTER = 6.0
 
 
 def fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, float]:
-    """Frequency [Hz] and number of cycles of a loop.
+    """Frequency [Hz] and number of cycles of a loop without run-in.
 
-    Of rows that are enough to find the cycles it takes the time [s] and the displacement [m or rad], (n,) each.
+    The clock [s] and the displacement [m or rad], (n,) each, are of rows that are enough to find the cycles.
 
     Raises:
         FitError: the loop does not hold a whole cycle.

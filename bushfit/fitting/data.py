@@ -28,7 +28,7 @@ _Kind = TypeVar("_Kind", LoopData, SweepData, DataSet)
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """A campaign made ready to fit: one data set per loop and per sweep, and least and largest values from [fit]."""
+    """A campaign made ready to fit: one data set per loop and per sweep, and the limits that [fit] gives parameters."""
 
     campaign: Campaign
     loops: tuple[LoopData, ...]
@@ -114,7 +114,7 @@ class Data:
             raise FitError(
                 "no test in the directions asked for",
                 file=self.campaign.path,
-                found=", ".join(sorted({str(data_set.direction) for data_set in data_sets})) or "no tests",
+                found=", ".join(sorted({str(data_set.direction) for data_set in data_sets})),
                 expected=", ".join(places),
             )
         return chosen

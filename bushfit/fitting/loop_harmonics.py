@@ -117,7 +117,7 @@ def _significant(coefficients: Array, noise: float, rows: int) -> Array:
 
 
 def _is_triangle(triangle: Array, coefficients: Array, noise: float, phase: Array, displacement: Array) -> bool:
-    """Whether the rows of a motion agree with a triangle as well as with its own harmonics, noise [m or rad] off."""
+    """Whether the rows of a motion agree with a triangle as well as, but for noise, with its own harmonics."""
     other = coefficients.size > 3 and abs(coefficients[3] - triangle[3]) >= _NO_TRIANGLE * noise
     return bool(not other and np.std(displacement - series(triangle, phase)) < _TRIANGLE_RATIO * noise)
 

@@ -43,7 +43,7 @@ _NEAR_NEIGHBOURS = 5
 
 
 def outlier_limit(rows: int, parts: int, freedom: float) -> float:
-    """Distance from the truth, in units of noise, that noise alone reaches in one test of so many rows of a hundred.
+    """Distance from the truth, in units of noise, that noise alone reaches in one of a hundred tests of so many rows.
 
     A row has so many `parts`: 1 for a force, 2 for a complex stiffness. Infinite freedom is a noise that is known.
     """
@@ -146,7 +146,7 @@ def outlying_points(
 
 
 def misfit_scale(distance: Array, parts: int) -> float:
-    """Median distance from the model, of points of so many parts, over that which noise alone makes; at least 1."""
+    """Median distance from the model, in units of noise, over that of noise alone, for points of so many parts; 1 or more."""
     if not distance.size:
         return 1.0
     return max(1.0, float(np.median(distance) / np.sqrt(chdtri(parts, 0.5))))

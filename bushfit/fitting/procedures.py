@@ -71,9 +71,8 @@ def fit_joint(
     data_sets = data.chosen(directions)
     found = _solve(data, data_sets, data.effects if effects is None else effects, {})
     left: list[DataSet] = [data_set for data_set in (*data.loops, *data.sweeps) if data_set not in data_sets]
-    result = _result(data, [found], notes=unfitted(found.solution.model, left, _NEXT))
-    tests = misfits(found.solution.model, found.data_sets, left)
-    result = replace(result, tests=tests, usable=usable(found.solution, found.minimised, left))
+    result = _result(data, [found], notes=unfitted(found.solution.model, left, _NEXT), left=left)
+    result = replace(result, usable=usable(found.solution, found.minimised, left))
     if profile is None:
         return result
     intervals = profile95(found.solution, found.minimised, result.covariance, data.bounds, profile)
@@ -197,13 +196,20 @@ def _solve(data: Data, data_sets: Sequence[DataSet], effects: Sequence[str], hel
     return estimate(model, data_sets, names, data.bounds, robust=data.robust)
 
 
-def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = None, notes: Sequence[str] = ()) -> Result:
+def _result(
+    data: Data,
+    steps: Sequence[Estimate],
+    held: Covariance | None = None,
+    notes: Sequence[str] = (),
+    left: Sequence[DataSet] = (),
+) -> Result:
     """What the steps of a procedure found, the last one's model, with the uncertainty of all of them."""
     model, data_sets = steps[-1].solution.model, [data_set for step in steps for data_set in step.data_sets]
     stages = [Stage(step.solution.coordinates.names, step.weighed) for step in steps if step.solution.coordinates.names]
     fitted = tuple(name for stage in stages for name in stage.names)
     cov = covariance(model, stages, held) if stages else held or Covariance()
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
+    doubts = [*implausible(data.campaign.bushing, data_sets), *_assumed(data_sets)]
     odd = [note for step in steps for note in cautions(model, step.solution, step.data_sets, data.bounds, cov, _NEXT)]
     return Result(
         model,
@@ -211,18 +217,12 @@ def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = Non
         cov,
         quality(model, data_sets, len(fitted)),
         measured_range(model, data_sets),
-        (
-            *notes,
-            *implausible(data.campaign.bushing, data_sets),
-            *_assumed(data_sets),
-            *told(outliers, robust=data.robust),
-            *odd,
-        ),
+        (*notes, *doubts, *told(outliers, robust=data.robust), *odd),
         sources(data_sets),
         outliers,
         at_bound={name: end for step in steps for name, end in step.solution.at_bound.items()},
         specimens=data.campaign.specimens,
-        tests=misfits(model, data_sets),
+        tests=misfits(model, data_sets, left),
     )
 
 
