@@ -146,7 +146,7 @@ def outlying_points(
 
 
 def misfit_scale(distance: Array, parts: int) -> float:
-    """Median distance from the model in units of noise over that of noise alone, for points of so many parts; 1 or more."""
+    """Median distance from the model over that which noise alone makes, for points of so many parts; 1 or more."""
     if not distance.size:
         return 1.0
     return max(1.0, float(np.median(distance) / np.sqrt(chdtri(parts, 0.5))))
