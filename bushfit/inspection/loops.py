@@ -11,8 +11,7 @@ from bushfit.effects.contract import Array
 from bushfit.effects.mistake import shown
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.drive import Drive, drive_of
-from bushfit.fitting.preload import TOLD_MEAN
-from bushfit.fitting.waveform import waveform
+from bushfit.fitting.motion import TOLD_MEAN, waveform
 from bushfit.geometry import Unit
 from bushfit.inspection.channels import clock, odd_channels
 from bushfit.inspection.outside import wrong_labels
