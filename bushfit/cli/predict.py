@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 #: Amplitudes of a direction that the terminal shows at most, spread from first to last; the CSV has all.
 _MOST_AMPLITUDES = 8
+#: Warnings of the fit that a prediction repeats at most; the model file has all.
+_MOST_OF_FIT = 3
 
 
 @click.command(
@@ -80,7 +82,9 @@ def command(
     from bushfit.prediction import carried
 
     result, notes = open_model(model), list[str]()
-    of_fit = [f"of the fit: {line}" for line in result.warnings]
+    of_fit = [f"of the fit: {line}" for line in result.warnings[:_MOST_OF_FIT]]
+    if more := len(result.warnings) - len(of_fit):
+        of_fit.append(f"of the fit: {more} more, under warnings in {model}")
     if bushing:
         result, note = carried(result, load_bushing(bushing))
         notes.append(note)

@@ -62,7 +62,8 @@ def tell_tests(options: Options, tested: Sequence[Misfit], usable: Sequence[Usab
     tests = [test for test in tested if options.verbose or test.held is None]
     worst = sorted(tests, key=lambda test: -test.reduced_chi_square)[: len(tests) if options.verbose else _MOST_TESTS]
     if len(tests) > 1:
-        table = new_table("test by test", "test", "place", "points", "NRMSE [%]", "chi-square", "gain off [%]", "")
+        title = "test by test: NRMSE and gain off [%], chi2 the reduced chi-square"
+        table = new_table(title, "test", "place", "points", "NRMSE", "chi2", "gain", "", names=2)
         for test in tests:
             if test in worst:
                 name = test.test if test.held is None else f"  {_held(test)}"
@@ -103,15 +104,16 @@ def warn(options: Options, lines: Sequence[str]) -> None:
         options.console.print(f"[yellow]warning:[/yellow] {escape(line)}")
 
 
-def new_table(title: str, *columns: str) -> Table:
-    """An empty table: the first column holds names, the others numbers."""
+def new_table(title: str, *columns: str, names: int = 1) -> Table:
+    """An empty table: so many columns hold names, which wrap, the others numbers."""
     from rich import box
     from rich.markup import escape
     from rich.table import Table
 
     table = Table(title=escape(title), title_justify="left", box=box.SIMPLE_HEAD, title_style="bold")
     for place, column in enumerate(columns):
-        table.add_column(escape(column), justify="right" if place else "left", no_wrap=True)
+        number = place >= names
+        table.add_column(escape(column), justify="right" if number else "left", no_wrap=number, overflow="fold")
     return table
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -35,6 +36,7 @@ from bushfit.report.plots.style import (
     file_name,
     fonts,
     logarithmic,
+    name_left,
     new_figure,
     noise_band,
     styles,
@@ -88,6 +90,8 @@ _WITHIN = 0.92
 _MOST_LABELS = 10
 #: Letters in a line of the summary, as many as the width of a figure holds.
 _SUMMARY_LETTERS = 92
+#: How the name of a row stands left of its ticks.
+_LEVEL_NAME: dict[str, Any] = {"rotation": 0, "ha": "right", "va": "center", "ma": "center"}
 #: Letters in a line of a column's heading, as many as half the width holds.
 _COLUMN_LETTERS = 40
 
@@ -245,12 +249,7 @@ def _label_maps(row: Sequence[Axes], kind: Kind, part: str, drawn: Map, sweeps: 
         axes.tick_params(labelleft=axes is row[0], labelbottom=part == "loss")
         if part == "loss":
             axes.set_xlabel(axis_label(kind.place, kind.axis), fontsize=TEXT, color=INK)
-    _name(row[0], f"{kind.place}\n{part}")
-
-
-def _name(axes: Axes, words: str) -> None:
-    """Write what a row shows left of its ticks."""
-    axes.set_ylabel(words, fontsize=TEXT, color=INK, rotation=0, ha="right", va="center", ma="center")
+    name_left(row[0], f"{kind.place}\n{part}", **_LEVEL_NAME)
 
 
 def _head(row: Sequence[Axes], sides: Sequence[Side]) -> None:
@@ -300,7 +299,7 @@ def _draw_loops(
     for axes in row:
         axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
         axes.tick_params(labelleft=axes is row[0])
-    _name(row[0], f"{direction}\nloops\n/ noise")
+    name_left(row[0], f"{direction}\nloops\n/ noise", **_LEVEL_NAME)
     loops_legend(
         row[0],
         data_sets,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import textwrap
 import warnings
 from collections.abc import Mapping, Sequence
@@ -65,6 +66,8 @@ _LOG_RATIO = 40.0
 _TITLE_LETTERS = 64
 #: Height of each further line of the title [inch].
 _TITLE_LINE = 0.42 / CM
+#: Letters in a line of a panel's name at its left, as many as the height of a panel holds.
+_LABEL_LETTERS = 26
 #: Letters in a line of the explanation, as many as the width of a figure holds.
 _NOTE_LETTERS = 112
 #: Fonts that help out for names beyond Latin, Greek and Cyrillic, where they are installed.
@@ -109,12 +112,19 @@ def fonts() -> list[str]:
 def dress(axes: Axes, x_label: str, y_label: str) -> None:
     """Give a panel its labels, ticks and a grid behind all that is drawn."""
     axes.set_xlabel(x_label, fontsize=TEXT, color=INK)
-    axes.set_ylabel(y_label, fontsize=TEXT, color=INK)
+    name_left(axes, y_label)
     axes.tick_params(labelsize=SMALL, colors=INK)
     axes.grid(color="#d9d9d9", lw=0.5)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     axes.yaxis.set_major_formatter(ScalarFormatter(useOffset=False))
+
+
+def name_left(axes: Axes, label: str, **place: Any) -> None:
+    """Write what a panel shows at its left, in several lines where one would be longer than the panel is high."""
+    whole = re.sub(r"\[.*?\]", lambda unit: unit[0].replace(" ", "\u00a0"), label)
+    lines = [part for line in whole.splitlines() for part in textwrap.wrap(line, _LABEL_LETTERS)]
+    axes.set_ylabel("\n".join(lines), fontsize=TEXT, color=INK, family=fonts(), parse_math=False, **place)
 
 
 def readable(axes: Axes, values: Array) -> None:
