@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, example, naming_option, place_option, shared_options
+from bushfit.cli.common import Options, example, naming_option, path_option, place_option, shared_options
 from bushfit.cli.show import new_table, warn
 from bushfit.units import alike, for_people
 
@@ -38,11 +38,7 @@ _SECONDS_A_LINE = 10.0
     multiple=True,
     help="What to do with each campaign: fit, diagnose, predict, may be given again; or run, the whole chain [fit].",
 )
-@place_option(
-    "directions",
-    multiple=True,
-    help="Tests to fit, as in bushfit fit.",
-)
+@place_option("directions", multiple=True, help="Tests to fit, as in bushfit fit.")
 @click.option("--effect", "effects", multiple=True, metavar="NAME", help="Add an effect, as in bushfit fit.")
 @click.option(
     "--at",
@@ -50,10 +46,8 @@ _SECONDS_A_LINE = 10.0
     metavar="POINT",
     help='Stiffness and loss factor there, such as "axial 25 Hz 0.1 mm" (zero-to-peak); may be given again.',
 )
-@click.option(
-    "--limits", type=click.Path(path_type=Path), metavar="FILE", help="Judge each bushing by this TOML file (above)."
-)
-@click.option("--junit", type=click.Path(path_type=Path), metavar="FILE", help="Write a JUnit report for CI.")
+@path_option("--limits", metavar="FILE", help="Judge each bushing by this TOML file (above).")
+@path_option("--junit", metavar="FILE", help="Write a JUnit report for CI.")
 @click.option("--jobs", type=click.IntRange(min=1), default=None, help="Worker processes [the cores there are].")
 @click.option(
     "--scheduler",
@@ -146,9 +140,6 @@ def _progress(options: Options, total: int) -> Iterator[Callable[[str], None]]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = options.console
-    if not console.is_terminal:
-        yield _lines(options, total)
-        return
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -157,35 +148,25 @@ def _progress(options: Options, total: int) -> Iterator[Callable[[str], None]]:
         TimeRemainingColumn(),
         TextColumn("{task.fields[failures]}", style="red"),
     )
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("bushings", total=total, rate="", failures="")
-        begin, count = time.monotonic(), Counter[str]()
-
-        def advance(status: str) -> None:
-            count[status] += 1
-            rate = f"{count.total() / max(time.monotonic() - begin, 1e-9):.1f}/s"
-            failures = f"{count['failed']} failed" if count["failed"] else ""
-            bar.update(task, completed=count.total(), rate=rate, failures=failures)
-
-        yield advance
-
-
-def _lines(options: Options, total: int) -> Callable[[str], None]:
     begin = said = time.monotonic()
     tenth, count = 0, Counter[str]()
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("bushings", total=total, rate="", failures="")
 
-    def advance(status: str) -> None:
-        nonlocal said, tenth
-        count[status] += 1
-        done, now = count.total(), time.monotonic()
-        if now - said < _SECONDS_A_LINE and (10 * done // total == tenth or now - begin < _SECONDS_A_LINE):
-            return
-        said, tenth, rate = now, 10 * done // total, done / (now - begin)
-        failures = f", {count['failed']} failed" if count["failed"] else ""
-        text = f"{done} of {total}, {rate:.1f}/s, {(total - done) / rate:.0f} s left{failures}"
-        options.console.print(text, markup=False)
+        def advance(status: str) -> None:
+            nonlocal said, tenth
+            count[status] += 1
+            done, now = count.total(), time.monotonic()
+            rate = done / max(now - begin, 1e-9)
+            failures = f"{count['failed']} failed" if count["failed"] else ""
+            bar.update(task, completed=done, rate=f"{rate:.1f}/s", failures=failures)
+            due = now - begin >= _SECONDS_A_LINE and 10 * done // total != tenth
+            if not console.is_terminal and (due or now - said >= _SECONDS_A_LINE):
+                said, tenth = now, 10 * done // total
+                text = f"{done} of {total}, {rate:.1f}/s, {(total - done) / rate:.0f} s left"
+                console.print(", ".join(filter(None, (text, failures))), markup=False)
 
-    return advance
+        yield advance
 
 
 def _tell(options: Options, summary: Summary, folder: Path, plan: Plan) -> None:

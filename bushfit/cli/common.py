@@ -83,6 +83,13 @@ class _Share(click.FloatRange):
 direction_option = partial(click.option, "--direction", cls=_DirectionOption, type=_Direction())
 #: The same of a command that takes specimens by their names, too.
 place_option = partial(click.option, "--direction", cls=_DirectionOption, type=_Place())
+#: Decorator of a command that takes a file.
+path_option = partial(click.option, type=click.Path(path_type=Path))
+
+
+def option_of(key: str) -> str:
+    """The option of a key: --force-sign of force_sign."""
+    return "--" + key.replace("_", "-")
 
 
 @contextmanager

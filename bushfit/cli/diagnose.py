@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, Task, campaign_options, example, naming_option, open_model
+from bushfit.cli.common import Options, Task, campaign_options, example, naming_option, open_model, path_option
 from bushfit.cli.show import new_table, parameter_table, warn
 from bushfit.errors import BushfitError
 from bushfit.units import alike, for_people, quantity
@@ -22,11 +22,7 @@ _COLOURS = {"consistent": "green", "named": "green", "ambiguous": "yellow", "par
 
 
 @click.command("diagnose", epilog=example("bushfit diagnose configs/mystery_mount.toml"))
-@click.option(
-    "--model",
-    type=click.Path(path_type=Path),
-    help="Start from this model's effects [the paper's three]; its values are fitted anew.",
-)
+@path_option("--model", help="Start from this model's effects [the paper's three]; its values are fitted anew.")
 @click.option(
     "--adopt",
     multiple=True,

@@ -6,14 +6,13 @@ from pathlib import Path
 
 import click
 
-from bushfit.cli.common import Task, campaign_options, example, open_model
+from bushfit.cli.common import Task, campaign_options, example, open_model, path_option
 from bushfit.cli.show import tell_fit
 
 
 @click.command("fit-dynamic", epilog=example("bushfit fit-dynamic configs/cmp_15961.toml"))
-@click.option(
+@path_option(
     "--static",
-    type=click.Path(path_type=Path),
     help="Hold mu, sigma_fmax and eps_half at those of this static.json [fitted to the loops on the spot].",
 )
 @campaign_options

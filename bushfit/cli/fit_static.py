@@ -6,14 +6,13 @@ from pathlib import Path
 
 import click
 
-from bushfit.cli.common import Task, campaign_options, example, open_model
+from bushfit.cli.common import Task, campaign_options, example, open_model, path_option
 from bushfit.cli.show import tell_fit
 
 
 @click.command("fit-static", epilog=example("bushfit fit-static configs/cmp_15961.toml"))
-@click.option(
+@path_option(
     "--dynamic",
-    type=click.Path(path_type=Path),
     help="Hold the springpot at m and alpha of this dynamic.json or model.json.",
 )
 @campaign_options

@@ -86,12 +86,7 @@ def write_files(folder: Path, files: Mapping[str, bytes], *, force: bool) -> Non
     """Write a set of files into a folder: all of them or none, even if this run is killed or another writes there.
 
     The steps stand at the top of this module. Runs that write into one folder take turns, and the last one's files
-    stay. What a killed run left behind is removed by the next.
-
-    Args:
-        folder: made where it does not exist.
-        files: content by file name.
-        force: whether files of these names may be replaced.
+    stay. What a killed run left behind is removed by the next. With `force` files of these names are replaced.
 
     Raises:
         OutputError: the folder cannot be written, or holds results and `force` is False.
@@ -184,15 +179,7 @@ def _exchanged(ready: Path, place: Path) -> bool:
 def _link_others(source: Path, target: Path, left: int) -> int:
     """Link every file below `source` to the same place below `target`, except where a file stands already.
 
-    Args:
-        source, target: folders of one file system.
-        left: how many files and folders may be linked at most.
-
-    Returns:
-        How many more may be linked.
-
-    Raises:
-        OSError: there are more.
+    Of at most `left` files and folders; says how many more may be linked, and raises OSError where there are more.
     """
     for entry in os.scandir(source):
         left -= 1

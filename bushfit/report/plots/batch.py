@@ -72,10 +72,7 @@ class Panel:
 def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> Figure:
     """Two columns of panels, the bushings along x in the manifest's order; of more than forty quantities the first.
 
-    Args:
-        panels: the quantities.
-        title: of the batch.
-        names: of all bushings, (n,); they stand along x too where they are few.
+    The names of the bushings, (n,), stand along x too where they are few.
     """
     drawn = panels[:_MOST_PANELS]
     along = [_short(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []

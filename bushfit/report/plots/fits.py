@@ -67,11 +67,6 @@ def sweeps_figure(model: Model, data_sets: Sequence[SweepData], title: str) -> F
 
     A row of panels per place and kind of sweep; along x lies what is stepped, or the frequency where nothing was held.
     The model keeps the effects of the rig, since sweeps hold them.
-
-    Args:
-        model: the fitted model.
-        data_sets: at least one sweep.
-        title: names the bushing.
     """
     kinds = by_kind(data_sets)
     figure = new_figure(title, (ROW + _STRIP) * len(kinds))
@@ -134,11 +129,6 @@ def loops_figure(model: Model, data_sets: Sequence[LoopData], title: str) -> Fig
 
     Of each loop at most 1600 rows, from the first and last two cycles, are drawn. The model keeps the effects of the
     rig, since loops hold them.
-
-    Args:
-        model: the fitted model.
-        data_sets: at least one loop.
-        title: names the bushing.
     """
     directions = by_direction(data_sets)
     figure = new_figure(title, _LOOPS_HEIGHT * ROW * len(directions))
@@ -184,13 +174,7 @@ def _draw_over_phase(axes: Axes, model: Model, data_sets: Sequence[LoopData]) ->
 
 
 def loops_legend(axes: Axes, data_sets: Sequence[LoopData], **words: Any) -> None:
-    """Name the loops of a panel.
-
-    Args:
-        axes: the panel.
-        data_sets: its loops.
-        words: what else `legend` takes.
-    """
+    """Name the loops of a panel; `words` are what else `legend` takes."""
     handles = [style.handle(False) for style in styles(len(data_sets), "loop")]
     legend(axes, handles, loop_labels(data_sets), **({"title": "loop"} | words))
 

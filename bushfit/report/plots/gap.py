@@ -21,7 +21,7 @@ from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, parted
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.report.plots.fits import loop_labels, loops_legend
-from bushfit.report.plots.misfit import Curve, Map, Side, columns, has_holes, replaced, side_of
+from bushfit.report.plots.misfit import Curve, Map, Side, columns, has_holes, side_of
 from bushfit.report.plots.points import SECTORS, Kind, by_direction, by_kind
 from bushfit.report.plots.prediction import axis_label
 from bushfit.report.plots.style import (
@@ -109,27 +109,17 @@ def gap_figure(
 
     Every value is measured less model, the mean of the repeats or of a sector of the cycle, in units of the noise of
     that mean. All maps share one scale of colours, the loops of a direction one axis. Models that respond alike make
-    one column.
-
-    Args:
-        before: the model as it came.
-        after: the model with what was added.
-        data_sets: the tests of the diagnosis, at least one.
-        title: names the bushing.
-        summary: the finding in a sentence or two.
-        mended: the tests that belong to the model after, where they are others; drawn where they were recorded.
+    one column. `mended` are the tests that belong to the model after, where they are others; they are drawn where
+    they were recorded.
     """
     every_loop, every_sweep = parted(data_sets)
     loops, sweeps = by_direction(every_loop), by_kind(every_sweep)
     later = dict(zip(data_sets, mended or data_sets, strict=True))
-    sides = [
-        side_of(model, name, list(tests.values()), replaced(sweeps, tests), replaced(loops, tests))
-        for (model, name), tests in zip(
-            columns(before, after, later), ({test: test for test in later}, later), strict=False
-        )
-    ]
+    shown = zip(columns(before, after, later), ({test: test for test in later}, later), strict=False)
+    sides = [side_of(model, name, tests, sweeps, loops) for (model, name), tests in shown]
     rows = [(kind, part) for kind in sweeps for part in ("storage", "loss")]
-    heights = [_map_height(sides[0].maps[kind]) for kind, _ in rows]
+    levels = [np.unique(sides[0].maps[kind].points.held).size for kind, _ in rows]
+    heights = [min(max(_LEVEL * count, _LEAST_MAP), _LARGEST_MAP) for count in levels]
     heights += [_loops_height(mine, len(sides)) for mine in loops.values()]
     lines = textwrap.wrap(summary, _SUMMARY_LETTERS)
     figure = new_figure(title, sum(heights) + _SCALE * bool(rows) + _LINE * (len(lines) + 2))
@@ -148,11 +138,6 @@ def gap_figure(
     _head(grid[0], sides)
     explain(figure, *_words(sides[0]))
     return figure
-
-
-def _map_height(drawn: Map) -> float:
-    """Height of a map [inch]."""
-    return float(np.clip(_LEVEL * np.unique(drawn.points.held).size, _LEAST_MAP, _LARGEST_MAP))
 
 
 def _loops_height(data_sets: Sequence[LoopData], sides: int) -> float:
@@ -319,12 +304,9 @@ def _words(side: Side) -> list[str]:
     within = " and ".join(["within 2 (maps)"] * maps + ["in the grey (loops)"] * loops)
     merged = max((drawn.merged for drawn in side.maps.values()), default=1)
     of = [*["its repeats"] * repeated, *[f"up to {merged} neighbouring rows"] * (merged > 1)]
-    usual = all(kind.stepped == "frequency" for kind in side.maps)
-    across = (
-        "frequency across, amplitude"
-        if usual
-        else "across what is stepped (or the frequency), what is held (or the test)"
-    )
+    across = "frequency across, amplitude"
+    if any(kind.stepped != "frequency" for kind in side.maps):
+        across = "across what is stepped (or the frequency), what is held (or the test)"
     return [
         f"Maps: {across} upwards; pale grey: model and measurement agree within the noise. A bar in a cell: 3 and more "
         "below." * maps,

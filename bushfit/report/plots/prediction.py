@@ -79,16 +79,13 @@ def prediction_figure(
 ) -> Figure:
     """Magnitude and loss factor over frequency per amplitude, and over amplitude per frequency (Figs. 7 to 9).
 
-    Sweeps that held nothing have a row of their own, if there is a model to meet them.
+    Up to six amplitudes and four frequencies become lines. Sweeps that held nothing have a row of their own.
 
     Args:
-        prediction: its amplitudes (up to six) and frequencies (up to four) become the lines.
         measured: sweeps to lay over; other directions and levels are left out.
-        title: names the bushing.
         curves: the prediction on `fine_grid`, for smooth lines; without it they run straight from point to point.
         rig: the same as these lines, with the rig's effects: drawn thin where points are laid over, which it meets.
-        model: of the prediction.
-        note: what else a reader must know, such as what the prediction leaves out.
+        model: of the prediction, to meet sweeps that held nothing.
     """
     lines = prediction if curves is None else curves
     every = [data_set for data_set in measured if data_set.direction == prediction.direction]
@@ -140,19 +137,10 @@ def draw(
     levels: Array,
     rig: Prediction | None = None,
 ) -> bool:
-    """Draw stiffness left and loss factor right, a line and its points per level.
+    """Draw stiffness left and loss factor right, a line and its points per level, and say whether there were points.
 
-    Args:
-        pair: the two panels.
-        direction: of motion.
-        lines: the model.
-        points: as measured.
-        axis: what lies along x.
-        levels: what is held, (k,): amplitudes [m or rad] or frequencies [Hz].
-        rig: the model with what belongs to the rig, as thin lines where there are points.
-
-    Returns:
-        Whether there were points.
+    `levels` are what is held, (k,): amplitudes [m or rad] or frequencies [Hz]; `rig` is the model with what belongs to
+    the rig, as thin lines where there are points.
     """
     held, units = held_beside(axis), direction.display
     scales = {"frequency": ("Hz", 1.0), "amplitude": units.displacement}
@@ -161,12 +149,9 @@ def draw(
     marked = _spots(getattr(points, held), levels, (where >= x.min() * (1 - _SAME)) & (where <= x.max() * (1 + _SAME)))
     laid = any(spots.any() for spots in marked)
     looks = styles(levels.size, held)
-    stiffness_unit, factor = for_people(*units.stiffness, float(lines.stiffness.value.max()))
-    kinds = (
-        ("stiffness", factor, stiffness_label(direction, stiffness_unit)),
-        ("loss_factor", 1.0, f"{direction} loss factor [-]"),
-    )
-    for axes, (kind, factor, name) in zip(pair, kinds, strict=True):
+    stiffness_factor, names = pair_labels(direction, float(lines.stiffness.value.max()))
+    kinds = (("stiffness", stiffness_factor), ("loss_factor", 1.0))
+    for axes, name, (kind, factor) in zip(pair, names, kinds, strict=True):
         line, point = (_scaled(getattr(one, kind), factor) for one in (lines, points))
         for look, level, spots in zip(looks, levels, marked, strict=True):
             at = getattr(lines, held) == level
@@ -183,8 +168,8 @@ def draw(
         "with the rig": Line2D([], [], color=INK, lw=_THIN, marker="o", **POINT),
     }
     unit, scale = scales[held]
-    names = [f"{scale * level:.3g} {unit}" for level in levels]
-    name_levels(pair[-1], names, held, [bool(spots.any()) for spots in marked], besides if laid and rig else None)
+    called = [f"{scale * level:.3g} {unit}" for level in levels]
+    name_levels(pair[-1], called, held, [bool(spots.any()) for spots in marked], besides if laid and rig else None)
     return laid
 
 
@@ -212,10 +197,13 @@ def _draw_points(axes: Axes, look: Style, x: Array, band: Band, at: Array) -> No
     axes.plot(x[at], band.value[at], look.marker, color=look.color, **POINT)
 
 
-def stiffness_label(place: Place, unit: str) -> str:
-    """The label of an axis with the stiffness, or the modulus, of a place."""
+def pair_labels(place: Place, largest: float) -> tuple[float, tuple[str, str]]:
+    """The factor from SI in which stiffness (or modulus) up to `largest` is drawn, and the labels of the panels of
+    stiffness and loss factor of a place."""
+    unit, factor = for_people(*place.display.stiffness, largest)
     resisted = words(place)[2]
-    return f"{place} {resisted}{' |K|' if resisted == 'stiffness' else ''} [{unit}]"
+    magnitude = " |K|" if resisted == "stiffness" else ""
+    return factor, (f"{place} {resisted}{magnitude} [{unit}]", f"{place} loss factor [-]")
 
 
 def axis_label(place: Place, axis: Axis) -> str:
@@ -224,22 +212,11 @@ def axis_label(place: Place, axis: Axis) -> str:
 
 
 def draw_as_it_came(pair: Sequence[Axes], place: Place, model: Model, data_sets: Sequence[SweepData]) -> None:
-    """Draw sweeps that held nothing over the frequency: points as measured, and the model at the same points.
-
-    Args:
-        pair: the panels of stiffness and loss factor.
-        place: of the sweeps.
-        model: its lines meet each point at the amplitude that it reached.
-        data_sets: the sweeps, a colour each.
-    """
-    largest = max(float(np.abs(data_set.measured).max()) for data_set in data_sets)
-    unit, factor = for_people(*place.display.stiffness, largest)
+    """Draw sweeps that held nothing over the frequency: points as measured, and the model at the same points."""
+    factor, names = pair_labels(place, max(float(np.abs(data_set.measured).max()) for data_set in data_sets))
     looks = styles(len(data_sets), "loop")
-    kinds: tuple[tuple[Callable[[Array], Array], float, str], ...] = (
-        (np.abs, factor, stiffness_label(place, unit)),
-        (loss_factor, 1.0, f"{place} loss factor [-]"),
-    )
-    for axes, (quantity, scale, name) in zip(pair, kinds, strict=True):
+    kinds: tuple[tuple[Callable[[Array], Array], float], ...] = ((np.abs, factor), (loss_factor, 1.0))
+    for axes, name, (quantity, scale) in zip(pair, names, kinds, strict=True):
         for data_set, look in zip(data_sets, looks, strict=True):
             rising = np.argsort(data_set.frequency, kind="stable")
             frequency, counted = data_set.frequency[rising], data_set.weights[rising] > 0.0

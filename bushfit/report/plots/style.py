@@ -175,18 +175,14 @@ def legend(
 ) -> None:
     """Name the lines of a panel; of more than eight name eight, spread from first to last, and say how many more.
 
-    Args:
-        axes: the panel.
-        handles, labels: of all levels.
-        title: of the legend.
-        besides: what is named after the levels, by its label.
-        place: where the legend stands, in matplotlib's words; right of the panel where nothing is said.
+    `besides` are named after the levels, by their labels; `place` says where the legend stands, in matplotlib's words,
+    or else right of the panel.
     """
-    named = spread(len(handles), MOST_NAMED)
-    lines, texts = [handles[place] for place in named], [labels[place] for place in named]
+    named = [(handles[place], labels[place]) for place in spread(len(handles), MOST_NAMED)]
     if left := len(handles) - len(named):
-        lines, texts = [*lines, Line2D([], [], ls="")], [*texts, f"and {left} more"]
-    lines, texts = [*lines, *(besides or {}).values()], [*texts, *(besides or {})]
+        named.append((Line2D([], [], ls=""), f"and {left} more"))
+    named += [(line, text) for text, line in (besides or {}).items()]
+    lines, texts = zip(*named, strict=True)
     axes.legend(lines, texts, fontsize=SMALL, title_fontsize=SMALL, **(_LEGEND | {"title": title} | place))
 
 
@@ -199,12 +195,7 @@ def name_levels(
 ) -> None:
     """Say which line is which level: by a legend, the stiffest on top, or of more than eight by a colour bar.
 
-    Args:
-        axes: the panel.
-        levels: amplitudes or frequencies in words, rising, (k,).
-        what: "amplitude" or "frequency".
-        marked: whether each has points, (k,).
-        besides: what is named after the levels, by its label.
+    `levels` are amplitudes or frequencies in words, rising, (k,); `marked`, whether each has points, (k,).
     """
     looks = styles(len(levels), what)
     if len(levels) <= MOST_NAMED:
