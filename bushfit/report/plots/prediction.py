@@ -15,23 +15,8 @@ from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.prediction import Band, Prediction
 from bushfit.reading.measurement import loss_factor
+from bushfit.report.plots import style
 from bushfit.report.plots.points import Axis, Points, held_beside, means
-from bushfit.report.plots.style import (
-    DOT,
-    INK,
-    POINT,
-    ROW,
-    Style,
-    dress,
-    explain,
-    file_name,
-    least_span,
-    legend,
-    name_levels,
-    new_figure,
-    readable,
-    styles,
-)
 from bushfit.report.tables import spread, words
 from bushfit.units import for_people
 
@@ -105,7 +90,7 @@ def prediction_figure(
         levels = known if known.size > 1 else frequencies
         rows.append(("amplitude", _lines(levels, held_by("amplitude"), _MOST_FREQUENCIES)))
     height = len(rows) + bool(free)
-    figure = new_figure(title, height * ROW)
+    figure = style.new_figure(title, height * style.ROW)
     grid = figure.subplots(height, 2, squeeze=False)
     pairs = zip(grid, rows, strict=False)
     drawn = [draw(pair, prediction.direction, lines, points, *row, rig) for pair, row in pairs]
@@ -117,7 +102,7 @@ def prediction_figure(
     through = " Thin lines: the same with what belongs to the rig, as the points were measured." if laid and rig else ""
     if amplitudes.size > _MOST_AMPLITUDES:
         through += f" Over frequency some of the {amplitudes.size} amplitudes are drawn."
-    explain(figure, f"Lines: model{shade}.{through}", points_note(every) if laid or free else "", note)
+    style.explain(figure, f"Lines: model{shade}.{through}", points_note(every) if laid or free else "", note)
     return figure
 
 
@@ -148,7 +133,7 @@ def draw(
     x, where = scale * getattr(lines, axis), scale * getattr(points, axis)
     marked = _spots(getattr(points, held), levels, (where >= x.min() * (1 - _SAME)) & (where <= x.max() * (1 + _SAME)))
     laid = any(spots.any() for spots in marked)
-    looks = styles(levels.size, held)
+    looks = style.styles(levels.size, held)
     stiffness_factor, names = pair_labels(direction, float(lines.stiffness.value.max()))
     kinds = (("stiffness", stiffness_factor), ("loss_factor", 1.0))
     for axes, name, (kind, factor) in zip(pair, names, kinds, strict=True):
@@ -160,16 +145,18 @@ def draw(
                 if rig is not None:
                     axes.plot(x[at], factor * getattr(rig, kind).value[at], color=look.color, lw=_THIN)
                 _draw_points(axes, look, where, point, spots)
-        dress(axes, axis_label(direction, axis), name)
-        readable(axes, x)
-        least_span(axes, _LEAST_STIFFNESS_SPAN * line.high.max() if kind == "stiffness" else _LEAST_LOSS_SPAN)
+        style.dress(axes, axis_label(direction, axis), name)
+        style.readable(axes, x)
+        style.least_span(axes, _LEAST_STIFFNESS_SPAN * line.high.max() if kind == "stiffness" else _LEAST_LOSS_SPAN)
     besides = {
-        "bushing": Line2D([], [], color=INK, lw=_LINE),
-        "with the rig": Line2D([], [], color=INK, lw=_THIN, marker="o", **POINT),
+        "bushing": Line2D([], [], color=style.INK, lw=_LINE),
+        "with the rig": Line2D([], [], color=style.INK, lw=_THIN, marker="o", **style.POINT),
     }
     unit, scale = scales[held]
     called = [f"{scale * level:.3g} {unit}" for level in levels]
-    name_levels(pair[-1], called, held, [bool(spots.any()) for spots in marked], besides if laid and rig else None)
+    style.name_levels(
+        pair[-1], called, held, [bool(spots.any()) for spots in marked], besides if laid and rig else None
+    )
     return laid
 
 
@@ -184,17 +171,17 @@ def _scaled(band: Band, factor: float) -> Band:
     return Band(factor * band.value, factor * band.low, factor * band.high)
 
 
-def _draw_line(axes: Axes, look: Style, x: Array, band: Band, at: Array) -> None:
+def _draw_line(axes: Axes, look: style.Style, x: Array, band: Band, at: Array) -> None:
     """A line with its band; a stroke where it has but one point."""
     marker = "_" if at.sum() == 1 else ""
     axes.plot(x[at], band.value[at], color=look.color, ls=look.dashes, lw=_LINE, marker=marker, ms=_STROKE)
     axes.fill_between(x[at], band.low[at], band.high[at], color=look.color, alpha=0.22, lw=0)
 
 
-def _draw_points(axes: Axes, look: Style, x: Array, band: Band, at: Array) -> None:
+def _draw_points(axes: Axes, look: style.Style, x: Array, band: Band, at: Array) -> None:
     """Measured points, with bars from the lowest to the highest repeat."""
     axes.vlines(x[at], band.low[at], band.high[at], color=look.color, lw=0.7, alpha=0.7)
-    axes.plot(x[at], band.value[at], look.marker, color=look.color, **POINT)
+    axes.plot(x[at], band.value[at], look.marker, color=look.color, **style.POINT)
 
 
 def pair_labels(place: Place, largest: float) -> tuple[float, tuple[str, str]]:
@@ -214,18 +201,18 @@ def axis_label(place: Place, axis: Axis) -> str:
 def draw_as_it_came(pair: Sequence[Axes], place: Place, model: Model, data_sets: Sequence[SweepData]) -> None:
     """Draw sweeps that held nothing over the frequency: points as measured, and the model at the same points."""
     factor, names = pair_labels(place, max(float(np.abs(data_set.measured).max()) for data_set in data_sets))
-    looks = styles(len(data_sets), "loop")
+    looks = style.styles(len(data_sets), "loop")
     kinds: tuple[tuple[Callable[[Array], Array], float], ...] = ((np.abs, factor), (loss_factor, 1.0))
     for axes, name, (quantity, scale) in zip(pair, names, kinds, strict=True):
         for data_set, look in zip(data_sets, looks, strict=True):
             rising = np.argsort(data_set.frequency, kind="stable")
             frequency, counted = data_set.frequency[rising], data_set.weights[rising] > 0.0
             measured, modelled = (scale * quantity(k)[rising] for k in (data_set.measured, data_set.stiffness(model)))
-            axes.plot(frequency[counted], measured[counted], "o", color=look.color, alpha=0.5, **DOT)
+            axes.plot(frequency[counted], measured[counted], "o", color=look.color, alpha=0.5, **style.DOT)
             axes.plot(frequency, modelled, color=look.color, lw=_LINE)
-        dress(axes, "frequency [Hz]", name)
+        style.dress(axes, "frequency [Hz]", name)
     handles = [Line2D([], [], color=look.color, lw=_LINE) for look in looks]
-    legend(pair[-1], handles, [file_name(data_set.name) for data_set in data_sets], "test")
+    style.legend(pair[-1], handles, [style.file_name(data_set.name) for data_set in data_sets], "test")
 
 
 def points_note(data_sets: Sequence[SweepData]) -> str:
