@@ -151,12 +151,7 @@ def example(*commands: str) -> str:
 
 
 def shared_options(function: F, where: str = "results/<campaign or file>") -> F:
-    """-o, -v, -q, --json, --no-plots, --force, gathered into one `options` argument.
-
-    Args:
-        function: the command.
-        where: results go without -o, for its help.
-    """
+    """-o, -v, -q, --json, --no-plots, --force, gathered into one `options` argument; `where` results go without -o."""
 
     @click.option("-o", "--output", type=_Folder(path_type=Path), help=f"Folder for the results [{where}].")
     @click.option("-v", "--verbose", is_flag=True, help="Say more: steps on the way, all correlations, files.")
@@ -190,10 +185,7 @@ class Task:
     ) -> None:
         """What every command on a campaign does: read, refuse to overwrite, work, tell, write, hold to a limit.
 
-        Args:
-            job: the work.
-            tell: shows what it found, given the campaign's name.
-            last_line: said of it below the files written, given their folder.
+        `tell` is given the campaign's name; `last_line`, said below the files written, their folder.
         """
         from bushfit.campaign.campaign import load_campaign
         from bushfit.fitting.data import Data
@@ -218,9 +210,7 @@ class Task:
 def campaign_options(function: F, soft_l1: str = "points far off pull less, outliers not at all") -> F:
     """CAMPAIGN, --loss, --max-nrmse and the shared options, gathered into one `task` argument.
 
-    Args:
-        function: the command.
-        soft_l1: what the robust loss does in this command, for its help.
+    `soft_l1` says what the robust loss does in this command, for its help.
     """
 
     @click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=click.Path(path_type=Path))

@@ -47,13 +47,10 @@ _PAIRED = re.compile(r'(column|unit)s = \{ (\w+) = "([^"]*)"')
 
 
 def file_options(*keys: str, sweeps: bool = True) -> Callable[[F], F]:
-    """--direction, --column, --unit and an option for each of some keys, gathered into one `stated` argument.
+    """--direction, --column, --unit and an option for each of some keys of a campaign, gathered into one `stated`.
 
-    Args:
-        keys: of [[loops]] and [[sweeps]], as a campaign would have them.
-        sweeps: whether the command takes sweeps, or else resonance tests, beside loops.
+    Beside loops the command takes sweeps, or else resonance tests.
     """
-
     known = tuple(dict.fromkeys((*LOOP_COLUMNS, *(SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS))))
 
     def decorate(function: F) -> F:

@@ -165,43 +165,24 @@ def _exchangeable(place: Path) -> bool:
 
 def _exchanged(ready: Path, place: Path) -> bool:
     """Exchange a folder for one that holds the new files and its own other ones; False where that cannot be done."""
-    whole = ready.with_name("whole")
+    whole, home, count = ready.with_name("whole"), ready.stat(), 0
+
+    def passed_over(folder: str, names: list[str]) -> list[str]:
+        """What of a folder is not linked: stages, and files that are written anew."""
+        nonlocal count
+        count, owned = count + len(names), Path(folder).stat()
+        if count > _MOST_LINKED or (owned.st_uid, owned.st_gid) != (home.st_uid, home.st_gid):
+            raise OSError("too many files, or folders that a copy would give another owner")
+        anew = [name for name in names if (ready / name).exists()] if Path(folder) == place else []
+        return [*anew, *(name for name in names if name.startswith(_STAGE))]
+
     try:
         shutil.copytree(ready, whole, copy_function=os.link)
-        _link_others(place, whole, _MOST_LINKED)
-        _keep_rights(place, whole)
+        shutil.copytree(place, whole, symlinks=True, ignore=passed_over, copy_function=os.link, dirs_exist_ok=True)
         disk.exchange(whole, place)
-    except OSError:  # no links, no exchange, or rights that a copy would lose: moving the files needs none of these
+    except OSError:  # no links, no exchange, or an owner that a copy would lose: moving the files needs none of these
         return False
     return True
-
-
-def _link_others(source: Path, target: Path, left: int) -> int:
-    """Link every file below `source` to the same place below `target`, except where a file stands already.
-
-    Of at most `left` files and folders; says how many more may be linked, and raises OSError where there are more.
-    """
-    for entry in os.scandir(source):
-        left -= 1
-        if left < 0:
-            raise OSError(f"more than {_MOST_LINKED} files")
-        place = target / entry.name
-        if entry.is_dir(follow_symlinks=False):
-            if not entry.name.startswith(_STAGE):
-                place.mkdir()
-                left = _link_others(Path(entry.path), place, left)
-                _keep_rights(Path(entry.path), place)
-        elif not os.path.lexists(place):
-            os.link(entry.path, place, follow_symlinks=False)
-    return left
-
-
-def _keep_rights(source: Path, target: Path) -> None:
-    """Give a folder the owner, the rights and the times of another."""
-    old, new = source.stat(), target.stat()
-    if (old.st_uid, old.st_gid) != (new.st_uid, new.st_gid):
-        os.chown(target, old.st_uid, old.st_gid)
-    shutil.copystat(source, target)
 
 
 def _end_decided(place: Path) -> None:
