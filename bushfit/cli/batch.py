@@ -18,7 +18,6 @@ from bushfit.units import alike, for_people
 
 if TYPE_CHECKING:
     from bushfit.batch.manifest import Command, Settings
-    from bushfit.batch.points import Point
     from bushfit.batch.pool import Pool
     from bushfit.batch.run import Plan, Summary
 
@@ -95,6 +94,7 @@ def command(
     """
     from bushfit.batch.limits import check_judged, read_limits
     from bushfit.batch.manifest import read_manifest
+    from bushfit.batch.points import parse_point
     from bushfit.batch.pool import DaskPool, LocalPool
     from bushfit.batch.run import Plan, check_free, run
     from bushfit.batch.work import Orders
@@ -103,7 +103,8 @@ def command(
     judged_by = read_limits(limits) if limits else None
     if limits and judged_by:
         check_judged(judged_by, limits, read.rows)
-    points = (*read.points, *_points(at), *(judged_by.points if judged_by else ()))
+    with naming_option("--at"):
+        points = (*read.points, *map(parse_point, at), *(judged_by.points if judged_by else ()))
     formats = tuple(kind for kind, wanted in (("csv", tables), ("png", plots and options.plots)) if wanted)
     output = options.folder(read.stem).absolute()
     orders = Orders(output, tuple(dict.fromkeys(points)), formats, resume)
@@ -125,13 +126,6 @@ def _settings(commands: tuple[Command, ...], directions: tuple[str, ...], effect
 
     names = tuple(effect_named(name).name for name in effects)
     return Settings(commands=commands or None, directions=directions or None, effects=names or None)
-
-
-def _points(texts: tuple[str, ...]) -> list[Point]:
-    from bushfit.batch.points import parse_point
-
-    with naming_option("--at"):
-        return [parse_point(text) for text in texts]
 
 
 @contextmanager
@@ -164,7 +158,7 @@ def _progress(options: Options, total: int) -> Iterator[Callable[[str], None]]:
             if not console.is_terminal and (due or now - said >= _SECONDS_A_LINE):
                 said, tenth = now, 10 * done // total
                 text = f"{done} of {total}, {rate:.1f}/s, {(total - done) / rate:.0f} s left"
-                console.print(", ".join(filter(None, (text, failures))), markup=False)
+                options.say(", ".join(filter(None, (text, failures))))
 
         yield advance
 
@@ -182,12 +176,9 @@ def _tell(options: Options, summary: Summary, folder: Path, plan: Plan) -> None:
         console.print(table)
     rate = status.total() / max(summary.seconds, 1e-9)
     kept = f", {summary.kept} of them from before" if summary.kept else ""
-    console.print(
-        f"{status['done']} done{kept}, {status['failed']} failed; {summary.seconds:.1f} s, {rate:.1f} a second",
-        markup=False,
-    )
+    options.say(f"{status['done']} done{kept}, {status['failed']} failed; {summary.seconds:.1f} s, {rate:.1f} a second")
     if plan.limits:
-        console.print("limits: " + ", ".join(f"{count} {word}" for word, count in summary.limits.items()), markup=False)
+        options.say("limits: " + ", ".join(f"{count} {word}" for word, count in summary.limits.items()))
     warn(options, summary.notes)
     for word, names in (
         ("failed", [f"{name}: {' '.join(error.split())}" for name, error in summary.errors]),
@@ -195,8 +186,8 @@ def _tell(options: Options, summary: Summary, folder: Path, plan: Plan) -> None:
         ("conditional pass", [f"{name}: {words}" for name, words in summary.edge]),
     ):
         for name in names[:_MOST_SHOWN]:
-            console.print(f"{word}: {name}", markup=False)
+            options.say(f"{word}: {name}")
         if len(names) > _MOST_SHOWN:
-            console.print(f"... and {len(names) - _MOST_SHOWN} more {word}: see batch.csv", markup=False)
+            options.say(f"... and {len(names) - _MOST_SHOWN} more {word}: see batch.csv")
     written = [*(name for name in (TABLE, PICTURE) if (folder / name).exists()), "bushings/"]
-    console.print(f"wrote {', '.join(written)} to {folder}", markup=False)
+    options.say(f"wrote {', '.join(written)} to {folder}")

@@ -130,10 +130,14 @@ class Options:
         console = Console(stderr=True, quiet=self.quiet, highlight=False, soft_wrap=True)
         return console if console.is_terminal else Console(stderr=True, quiet=self.quiet, soft_wrap=True, width=_WIDTH)
 
+    def say(self, text: str) -> None:
+        """A line as it is, its brackets no markup."""
+        self.console.print(text, markup=False)
+
     def write(self, folder: Path, files: Mapping[str, bytes]) -> None:
         """Write the results, all or none, and say where."""
         write_files(folder, files, force=self.force)
-        self.console.print(f"wrote {', '.join(files)} to {folder}", markup=False)
+        self.say(f"wrote {', '.join(files)} to {folder}")
 
     def require_free(self, folder: Path, names: Sequence[str]) -> None:
         """Refuse before the work rather than after it."""
@@ -199,7 +203,7 @@ class Task:
         tell(options, loaded.name, outcome)
         options.write(folder, outcome.files(options.formats))
         if last_line:
-            options.console.print(last_line(folder, outcome), markup=False)
+            options.say(last_line(folder, outcome))
         options.tell(outcome.document)
         quality = outcome.result.quality
         if self.max_nrmse is not None and quality and quality.nrmse > self.max_nrmse:

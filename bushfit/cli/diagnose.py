@@ -96,11 +96,8 @@ def tell_findings(options: Options, outcome: Diagnosed) -> None:
     for effect in outcome.document["effects"]:
         _tell_effect(options, effect)
     table = new_table("gap, in units of noise (1 is the floor)", "", "before", "after")
-    for words, pair in (
-        ("data fitted", diagnosis.calibration),
-        ("held out", (diagnosis.holdout.before, diagnosis.holdout.after)),
-    ):
-        table.add_row(words, *(f"{value:.2f}" for value in pair))
+    table.add_row("data fitted", *(f"{value:.2f}" for value in diagnosis.calibration))
+    table.add_row("held out", f"{diagnosis.holdout.before:.2f}", f"{diagnosis.holdout.after:.2f}")
     console.print(table)
     for title, regions in (("where", diagnosis.where), ("what remains", diagnosis.remainder)):
         if regions and not (title == "what remains" and diagnosis.remainder == diagnosis.where):

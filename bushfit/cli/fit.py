@@ -90,16 +90,15 @@ def _progress(options: Options) -> Iterator[Callable[[str, int], None]]:
     from rich.progress import Progress
 
     console = options.console
-    if not console.is_terminal:
-        yield lambda name, left: console.print(f"profile of {name}: done, {left} to go", markup=False)
-        return
-    with Progress(console=console, transient=True) as bar:
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("profiles", total=None)
 
         def advance(name: str, left: int) -> None:
             done = bar.tasks[0].completed + 1
             bar.update(task, completed=done, total=done + left, description=f"profile of {name}: done")
-            if not left:
+            if not console.is_terminal:
+                options.say(f"profile of {name}: done, {left} to go")
+            elif not left:
                 bar.stop()
 
         yield advance

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bushfit.cli.common import Options, example, naming_option, option_of, shared_options
-from bushfit.cli.inspect import KEYS, tell_assumed, tell_left_out
+from bushfit.cli.inspect import KEYS, tell_left_out
 from bushfit.cli.raw import direction_error, file_options, options_named
 from bushfit.cli.show import warn
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, typed
@@ -68,7 +68,7 @@ def command(
         _tell(options, one)
     tell_left_out(options, left_out)
     options.write(folder, {target: text.encode()})
-    options.console.print(f"next: bushfit run {typed(folder / target)}", markup=False)
+    options.say(f"next: bushfit run {typed(folder / target)}")
     options.tell({"campaign": text, "files": [one.to_document() for one in seen], "left_out": left_out})
 
 
@@ -168,11 +168,8 @@ def _usable(files: Sequence[Path], stated: Mapping[str, Any], *, is_bushing: boo
 
 def _tell_bushing(options: Options, bushing: Bushing) -> None:
     inner, outer, long = (1e3 * size for size in (2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length))
-    options.console.print(
-        f"{bushing.name}: rubber from {inner:.6g} to {outer:.6g} mm in diameter, {(outer - inner) / 2:.6g} mm thick, "
-        f"{long:.6g} mm long",
-        markup=False,
-    )
+    across = f"from {inner:.6g} to {outer:.6g} mm in diameter, {(outer - inner) / 2:.6g} mm thick"
+    options.say(f"{bushing.name}: rubber {across}, {long:.6g} mm long")
 
 
 def _tell(options: Options, seen: Inspected) -> None:
@@ -181,6 +178,7 @@ def _tell(options: Options, seen: Inspected) -> None:
     wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
     kept = [f"{key}: {value}" for key, value in facts.items() if key in wanted or key.startswith("from ")]
     place = seen.file.parent / seen.label
-    options.console.print(f"{place}: {seen.kind}, {seen.direction}; {'; '.join(kept)}", markup=False)
+    options.say(f"{place}: {seen.kind}, {seen.direction}; {'; '.join(kept)}")
     warn(options, [f"{seen.label}: {sentence}" for sentence in seen.looked.odd])
-    tell_assumed(options, seen)
+    if seen.assumed:
+        options.say(f"  {seen.assumed}")

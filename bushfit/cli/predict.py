@@ -100,7 +100,7 @@ def command(
     for found in outcome.resonances:
         frequency, largest = found.peak
         peak = f"resonance at {frequency:.4g} Hz, |T| {largest:.3g}"
-        options.console.print(f"{found.place} under {mass}, base at {base_acceleration}: {peak}", markup=False)
+        options.say(f"{found.place} under {mass}, base at {base_acceleration}: {peak}")
     tell_tests(options, outcome.tests, outcome.usable)
     warn(options, of_fit)
     options.write(folder, outcome.files_beside(options.formats))

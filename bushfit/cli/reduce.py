@@ -87,7 +87,7 @@ def command(
         output["reduce.png"] = to_png(found.figure())
     options.write(folder, output)
     snippet = f'[[sweeps]]\nfile = "sweep.csv"\n{found.body} = {json.dumps(found.name, ensure_ascii=False)}\n'
-    options.console.print(f"for a campaign in {folder} (elsewhere, with the way there):\n\n{snippet}", markup=False)
+    options.say(f"for a campaign in {folder} (elsewhere, with the way there):\n\n{snippet}")
     document = {found.body: found.name, "points": found.points.to_dict(orient="list"), **found.document}
     options.tell({**document, "warnings": list(found.warnings), "campaign": snippet})
 
@@ -270,8 +270,7 @@ def _tell(options: Options, reduction: Reduction) -> None:
     warn(options, reduction.warnings)
     if options.verbose:
         for skip in reduction.skipped:
-            text = f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s makes no point: {skip.why}"
-            options.console.print(text, markup=False)
+            options.say(f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s makes no point: {skip.why}")
 
 
 def _tell_resonance(options: Options, found: Resonance) -> None:

@@ -71,12 +71,11 @@ def tell_tests(options: Options, tested: Sequence[Misfit], usable: Sequence[Usab
                 table.add_row(name, test.place, str(test.points), *figures, "" if test.fitted else "not fitted")
         options.console.print(table)
     if left := len(tests) - len(worst):
-        options.console.print(f"and {left} tests more, which are met better; -v shows them", markup=False)
+        options.say(f"and {left} tests more, which are met better; -v shows them")
     for place in usable:
         how = "each predicted from other runs" if place.held_out else "as fitted"
         words = f"{number(100 * place.stiffness, 2)} % of stiffness and {number(place.loss_factor, 2)} of loss factor"
-        line = f"{place.place}: usable within {words} (95 % of {place.points} points, {how})"
-        options.console.print(line, markup=False)
+        options.say(f"{place.place}: usable within {words} (95 % of {place.points} points, {how})")
 
 
 def _held(test: Misfit) -> str:
@@ -91,9 +90,9 @@ def _held(test: Misfit) -> str:
 def tell_sources(options: Options, result: Result) -> None:
     """With -v the equation of a model and the files behind it."""
     if options.verbose:
-        options.console.print(result.model.equation(), markup=False)
+        options.say(result.model.equation())
         for source in result.inputs:
-            options.console.print(f"input: {source.file} sha256 {source.sha256[:12]}", markup=False)
+            options.say(f"input: {source.file} sha256 {source.sha256[:12]}")
 
 
 def warn(options: Options, lines: Sequence[str]) -> None:

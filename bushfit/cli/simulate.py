@@ -62,7 +62,7 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
         simulated = simulate(truth, plan)
     files = to_files(simulated)
     folder = options.folder(f"simulated {folder_name(simulated.result.name)}")
-    options.console.print(truth.equation(), markup=False)
+    options.say(truth.equation())
     options.write(folder, files)
     options.tell({"truth": model_document(truth), "files": sorted(files)})
 

@@ -92,7 +92,7 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> F
             ticks = range(1, len(along) + 1)
             axes.set_xticks(ticks, along, rotation=90, fontsize=style.SMALL - 1, family=style.fonts(), parse_math=False)
         elif lowest:
-            axes.set_xlabel("bushing, in the manifest's order", fontsize=style.SMALL, color=style.INK)
+            axes.set_xlabel("bushing, in the manifest's order", **style.WORDS)
         axes.set_xlim(0.5, len(names) + 0.5)
     limits = "Dashed: limits; red: out of them, the worst by name." if any(panel.allowed for panel in drawn) else ""
     beyond = "Triangles: further out than the panel reaches, the furthest by name and value."

@@ -217,7 +217,7 @@ def _label_maps(row: Sequence[Axes], kind: Kind, part: str, drawn: Map, sweeps: 
         axes.set_yticklabels([names[round(tick)] for tick in axes.get_yticks()])
         axes.tick_params(labelleft=axes is row[0], labelbottom=part == "loss")
         if part == "loss":
-            axes.set_xlabel(axis_label(kind.place, kind.axis), fontsize=style.TEXT, color=style.INK)
+            axes.set_xlabel(axis_label(kind.place, kind.axis), **style.NAMES)
     style.name_left(row[0], f"{kind.place}\n{part}", **_LEVEL_NAME)
 
 
@@ -238,14 +238,12 @@ def _draw_scale(figure: SubFigure, maps: Sequence[Axes], edges: Array, colors: S
     every = 1 if edges.size <= _MOST_EDGES else 2
     from_end = np.minimum(np.arange(edges.size), np.arange(edges.size)[::-1])
     numbers = ["" if place % every else f"{edge:g}" for edge, place in zip(edges, from_end, strict=True)]
-    bar.ax.set_xticks(edges, numbers, fontsize=style.SMALL, color=style.INK)
+    bar.ax.set_xticks(edges, numbers, **style.WORDS)
     bar.ax.tick_params(length=2, colors=style.INK)
     bar.outline.set(edgecolor=style.GREY, linewidth=0.6)
-    bar.set_label("measured less model, in units of noise", fontsize=style.TEXT, color=style.INK)
+    bar.set_label("measured less model, in units of noise", **style.NAMES)
     for x, side, words in ((-0.05, "right", "measured\nbelow model"), (1.05, "left", "measured\nabove model")):
-        bar.ax.text(
-            x, 0.5, words, transform=bar.ax.transAxes, ha=side, va="center", fontsize=style.TEXT, color=style.INK
-        )
+        bar.ax.text(x, 0.5, words, transform=bar.ax.transAxes, ha=side, va="center", **style.NAMES)
     middle = (edges[:-1] + edges[1:]) / 2.0
     barred = middle[middle < -_BARRED]
     bar.ax.plot(barred, np.full(barred.size, 0.5), "_", color="white", ms=6, mew=1.1)

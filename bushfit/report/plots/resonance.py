@@ -29,14 +29,7 @@ def resonance_figure(found: Resonance, title: str) -> Figure:
         style.logarithmic(axes, values, "y")
     ratio.plot(found.test.frequency, np.abs(found.test.transmissibility), color=style.GREY, lw=0.7, zorder=1)
     frequency, largest = found.peak
-    ratio.annotate(
-        f"{frequency:.1f} Hz",
-        (frequency, largest),
-        (4, 0),
-        textcoords="offset points",
-        fontsize=style.SMALL,
-        color=style.INK,
-    )
+    ratio.annotate(f"{frequency:.1f} Hz", (frequency, largest), (4, 0), textcoords="offset points", **style.WORDS)
     magnitude, factors = factor * np.abs(found.stiffness), loss_factor(found.stiffness)
     lower = (
         (stiffness, magnitude, magnitude, f"stiffness |K| [{stiffness_unit}]"),
@@ -50,13 +43,11 @@ def resonance_figure(found: Resonance, title: str) -> Figure:
         axes.set_ylim(low, high)
         style.dress(axes, "frequency [Hz]", label)
     style.readable(loss, found.test.frequency)
-    left_out = (
-        f"Where the error of K is beyond {100 * LARGEST_ERROR:g} % there is no point." if found.left_out.size else ""
-    )
+    least = f"Where the error of K is beyond {100 * LARGEST_ERROR:g} % there is no point."
     style.explain(
         figure,
         "Grey line: mass over base acceleration as measured. Points: means of neighbouring rows.",
         "Bars: twice the standard error, large where the mass moves almost as the base does; they may leave the panel.",
-        left_out,
+        least * bool(found.left_out.size),
     )
     return figure

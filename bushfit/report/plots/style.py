@@ -44,6 +44,9 @@ DOT: dict[str, Any] = {"ms": 2.4, "mew": 0}
 INK = "#1a1a1a"
 #: Colour of what explains.
 GREY = "#595959"
+#: How a figure's own words are written: names of axes, and what is smaller.
+NAMES: dict[str, Any] = {"fontsize": TEXT, "color": INK}
+WORDS: dict[str, Any] = {"fontsize": SMALL, "color": INK}
 #: Colour of outliers.
 OUTLIER = "#c1121f"
 #: Resolution of a picture [dots per inch]: sharp in a report, and small enough to be mailed.
@@ -111,7 +114,7 @@ def fonts() -> list[str]:
 
 def dress(axes: Axes, x_label: str, y_label: str) -> None:
     """Give a panel its labels, ticks and a grid behind all that is drawn."""
-    axes.set_xlabel(x_label, fontsize=TEXT, color=INK)
+    axes.set_xlabel(x_label, **NAMES)
     name_left(axes, y_label)
     axes.tick_params(labelsize=SMALL, colors=INK)
     axes.grid(color="#d9d9d9", lw=0.5)
@@ -207,10 +210,10 @@ def name_levels(
     colors = ScalarMappable(BoundaryNorm(edges, len(levels)), ListedColormap([look.color for look in looks]))
     bar = axes.figure.colorbar(colors, ax=axes, aspect=16, pad=0.04, drawedges=False)
     ticks = spread(len(levels), MOST_NAMED)
-    bar.set_ticks(ticks.tolist(), labels=[levels[tick] for tick in ticks], fontsize=SMALL, color=INK)
+    bar.set_ticks(ticks.tolist(), labels=[levels[tick] for tick in ticks], **WORDS)
     bar.ax.tick_params(length=2, colors=INK, which="both")
     bar.minorticks_off()
-    bar.ax.set_title(what, fontsize=SMALL, color=INK)
+    bar.ax.set_title(what, **WORDS)
     bar.outline.set(edgecolor=GREY, linewidth=0.6)
 
 
