@@ -34,7 +34,7 @@ def fit_files(
 
         files |= {"loops.png": to_png(loops_figure(model, loops, title))} if loops else {}
         files |= {"sweeps.png": to_png(sweeps_figure(model, sweeps, title))} if sweeps else {}
-    return files
+    return {name: files[name] for name in artifact_names(("loops", "sweeps"), formats) if name in files}
 
 
 def prediction_files(

@@ -70,7 +70,7 @@ _TITLE_LETTERS = 64
 #: Height of each further line of the title [inch].
 _TITLE_LINE = 0.42 / CM
 #: Letters in a line of a panel's name at its left, as many as the height of a panel holds.
-_LABEL_LETTERS = 26
+_LABEL_LETTERS = 27
 #: Letters in a line of the explanation, as many as the width of a figure holds.
 _NOTE_LETTERS = 112
 #: Fonts that help out for names beyond Latin, Greek and Cyrillic, where they are installed.
