@@ -19,10 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import wraps
-from typing import Any, Literal, TypeVar, cast
-
-import numpy as np
+from typing import Any, Literal
 
 from bushfit.effects.history import Array as Array
 from bushfit.effects.history import History
@@ -34,8 +31,6 @@ Value = Any
 Values = Mapping[str, Value]
 #: Force [N or N m] that answers a displacement history.
 ForceBelow = Callable[[History], Array]
-
-_Face = TypeVar("_Face", bound=Callable[..., Array])
 
 
 @dataclass(frozen=True)
@@ -203,10 +198,12 @@ class Layer(Effect):
     """Wraps the response below it, in both faces alike.
 
     Args:
+        turns: whether it acts in torsion too; else only on motion along a line.
         stiffness: (values, response below, omega [rad/s], amplitude [m or rad], setting) -> complex stiffness above.
         force: (values, force below, displacement history, setting) -> force above [N or N m].
     """
 
+    turns: bool = True
     stiffness: Callable[[Values, StiffnessBelow, Array, Array, Setting], Array]
     force: Callable[[Values, ForceBelow, History, Setting], Array]
 
@@ -216,25 +213,9 @@ def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str,
     return {name: p[name] * factor for name in names if name in p}
 
 
-def along_a_line(face: _Face) -> _Face:
-    """A face of a layer that answers to motion along a line: in torsion the response is the one below."""
-
-    @wraps(face)
-    def answer(p: Values, below: Callable[..., Array], *motion_and_setting: Any) -> Array:
-        *motion, setting = motion_and_setting
-        return below(*motion) if setting.direction.is_rotation else face(p, below, *motion, setting)
-
-    return cast(_Face, answer)
-
-
-def linear_response(transfer: Callable[[Array], Array], history: History) -> Array:
-    """Steady response of a linear system, y_h = H(h omega) x_h for every harmonic h; H(0) must be finite."""
-    return np.fft.irfft(transfer(history.harmonics) * history.spectrum, n=history.value.shape[-1])
-
-
 def linear_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:
     """Steady stress of a linear branch over one cycle: s_h = 2 mu^(h omega) e_h for every harmonic h.
 
     The modulus at omega = 0 must be finite; it multiplies the mean strain.
     """
-    return linear_response(lambda omega: 2.0 * modulus(p, omega, history.amplitude), history)
+    return history.response(lambda omega: 2.0 * modulus(p, omega, history.amplitude))
