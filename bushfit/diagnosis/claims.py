@@ -279,7 +279,7 @@ def _points(data_set: DataSet, mistake: Mistake | None) -> tuple[Place, Array, A
     """Direction, frequency, amplitude, stiffness and relative error of a test's points, (n,) each, as mended."""
     if isinstance(data_set, SweepData):
         sweep, noise = data_set.sweep, np.hypot(data_set.relative_noise, max(data_set.noise.shared))
-        mended = (mistake and mistake.mended_sweep(sweep)) or sweep
+        mended = (mistake and mistake.mended(sweep)) or sweep
     else:
         sweep, noise = (
             Sweep(data_set.name, data_set.direction, data_set.frequency, data_set.amplitude, data_set.measured),

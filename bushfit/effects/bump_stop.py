@@ -33,7 +33,7 @@ EFFECT = Layer(
             meaning="travel until the stop is met, both ways",
             scale="displacement",
         ),
-        Parameter("stiffness", "N/m", (0.0, 1e10), 0.0, 1e5, log=False, meaning="stiffness of the stop"),
+        Parameter("stiffness", "N/m", (0.0, 1e10), 0.0, 1e5, meaning="stiffness of the stop"),
     ),
     source="A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B",
     confirmed_by="loop slowly to the largest amplitude: the force must bend up at the gap",

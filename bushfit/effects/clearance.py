@@ -47,7 +47,7 @@ EFFECT = Layer(
     sentence="Play in the mounting: the bushing is moved less than it seems, most so at the smallest amplitude.",
     equation="first harmonic of the bushing moved by a dead-zoned sine, about K(X - delta) N(delta/X)",
     level=Level.COMPONENT,
-    parameters=(Parameter("delta", "m", (0.0, 1e-2), 0.0, 1e-5, log=False, meaning="play, each way"),),
+    parameters=(Parameter("delta", "m", (0.0, 1e-2), 0.0, 1e-5, meaning="play, each way"),),
     source="A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B",
     confirmed_by="sweep at a third of the smallest amplitude: play takes away most there",
     harmonic_error=1e-3,

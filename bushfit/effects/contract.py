@@ -83,8 +83,8 @@ class Parameter:
     bounds: tuple[float, float]
     neutral: float | None
     typical: float
-    log: bool
     meaning: str
+    log: bool = False
     scale: Literal["period", "frequency", "displacement", "strain"] | None = None
 
     def sized(self, share: float) -> float:

@@ -48,7 +48,7 @@ EFFECT = Layer(
     equation="K - mass omega^2 wr^2/(wr^2 - omega^2 + 2 i damping omega wr), wr = 2 pi frequency",
     level=Level.INSTRUMENT,
     parameters=(
-        Parameter("mass", "kg", (0.0, 100.0), 0.0, 0.05, log=False, meaning="moving mass of the mode"),
+        Parameter("mass", "kg", (0.0, 100.0), 0.0, 0.05, meaning="moving mass of the mode"),
         Parameter(
             "frequency", "Hz", (10.0, 1e4), None, 300.0, log=True, meaning="frequency of the mode", scale="frequency"
         ),

@@ -21,7 +21,7 @@ EFFECT = Layer(
     sentence="The load cell's zero is off: loops sit higher or lower, sweeps show nothing of it.",
     equation="K",
     level=Level.INSTRUMENT,
-    parameters=(Parameter("offset", "N", (-1e5, 1e5), 0.0, 5.0, log=False, meaning="reading at zero force"),),
+    parameters=(Parameter("offset", "N", (-1e5, 1e5), 0.0, 5.0, meaning="reading at zero force"),),
     source="zero error of a force transducer, ISO 376:2011",
     confirmed_by="read the load cell with no bushing mounted",
     turns=False,

@@ -25,7 +25,7 @@ EFFECT = Layer(
     sentence="Moving mass between bushing and load cell: storage stiffness falls with the square of frequency.",
     equation="K - mass omega^2",
     level=Level.INSTRUMENT,
-    parameters=(Parameter("mass", "kg", (0.0, 100.0), 0.0, 0.05, log=False, meaning="moving mass"),),
+    parameters=(Parameter("mass", "kg", (0.0, 100.0), 0.0, 0.05, meaning="moving mass"),),
     source="ISO 10846-2:2008 (inertia between the test object and the force transducer)",
     confirmed_by="add a known mass between bushing and load cell, or run the empty fixture",
     turns=False,

@@ -107,9 +107,7 @@ EFFECT = Layer(
     sentence="The rig gives way in series: the stiffer the bushing, the softer it seems, most so radially.",
     equation="1/K' = 1/K + compliance, K at the amplitude that reaches the bushing",
     level=Level.INSTRUMENT,
-    parameters=(
-        Parameter("compliance", "m/N", (0.0, 1e-5), 0.0, 2e-8, log=False, meaning="give of the rig per force"),
-    ),
+    parameters=(Parameter("compliance", "m/N", (0.0, 1e-5), 0.0, 2e-8, meaning="give of the rig per force"),),
     source="springs in series; ISO 10846-2:2008",
     confirmed_by="put a steel dummy in place of the bushing",
     harmonic_error=2e-3,

@@ -72,7 +72,7 @@ EFFECT = Branch(
     level=Level.MATERIAL,
     parameters=(
         Parameter("m", "Pa*s^alpha", (1.0, 1e9), 0.0, 2e5, log=True, meaning="springpot constant"),
-        Parameter("alpha", "1", (0.02, 1.0), None, 0.25, log=False, meaning="order of the fractional derivative"),
+        Parameter("alpha", "1", (0.02, 1.0), None, 0.25, meaning="order of the fractional derivative"),
     ),
     source="Garcia Tarrago et al. 2007, Eqs. 1-3",
     modulus=modulus,
