@@ -44,12 +44,7 @@ _RIDGE = 1e-12
 
 @dataclass(frozen=True)
 class Claim:
-    """One mistake, made alike in some tests.
-
-    Args:
-        mistake: which.
-        tests: the data sets it was made in, by their place; none for [bushing].
-    """
+    """One mistake, made alike in some data sets, which are told by their place; in none for [bushing]."""
 
     mistake: Mistake
     tests: tuple[int, ...]

@@ -23,9 +23,7 @@ class MenuEntry:
     """A test a lab can do.
 
     Args:
-        words: what to do.
         effort: in units of one more sweep.
-        direction: of the test, None for all.
         frequencies: [Hz], or multiples of the campaign's highest where `beyond`; None for those of the campaign.
         beyond: whether the frequencies count from the campaign's highest.
         amplitudes: relative to the campaign's largest; None for its own.
