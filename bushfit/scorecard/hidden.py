@@ -64,13 +64,10 @@ class Sealed:
     """The truth of a hidden campaign: what is hidden, how large, and how visible.
 
     Args:
-        hidden: names of effects of the library.
         outside: what the library does not have, or "".
         without: effects the library is made to lack.
-        values: true values of every parameter.
         visible: largest misfit of the plain model without noise, relative.
         shared: whether blocks share gain and phase errors.
-        seed: of the campaign.
     """
 
     hidden: tuple[str, ...]
@@ -156,11 +153,7 @@ def _plan(plain: Model, random: Generator, seed: int, directions: Sequence[Direc
 
 
 def _with_hidden(plain: Model, hidden: Sequence[str], plan: SimulateSettings, random: Generator) -> tuple[Model, float]:
-    """The plain model with effects of random visible size, and the least size.
-
-    Raises:
-        _OutOfReachError: an effect cannot have that size.
-    """
+    """The plain model with effects of random visible size, and the least size."""
     model, sizes = plain, []
     for name in hidden:
         wanted = float(np.exp(random.uniform(*np.log(_VISIBLE))))
@@ -236,17 +229,7 @@ def _visible(plain: Model, model: Model, plan: SimulateSettings) -> float:
 def _noise_free_data(model: Model, plan: SimulateSettings) -> list[DataSet]:
     """The plan's tests as the model's own closed form has them: used for the choice of a size, never as data."""
     swept = [(test.direction, *_points(test)) for test in plan.sweeps]
-    sweeps = [
-        Sweep(
-            str(direction),
-            direction,
-            frequency,
-            amplitude,
-            model.stiffness(direction, frequency, amplitude),
-            noise=5e-3,
-        )
-        for direction, frequency, amplitude in swept
-    ]
+    sweeps = [Sweep(str(points[0]), *points, model.stiffness(*points), noise=5e-3) for points in swept]
     phase = np.arange(600) / 200.0
     motions = [(test, test.amplitude * np.sin(2.0 * np.pi * phase)) for test in plan.loops]
     loops = [
