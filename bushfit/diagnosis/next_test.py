@@ -71,11 +71,6 @@ def deciding_test(models: Sequence[Model], data_sets: Sequence[DataSet]) -> str:
     return words if best > 0.0 else ""
 
 
-def confirming_test(name: str) -> str:
-    """The cheapest test that would prove a named effect."""
-    return effect_named(name).confirmed_by
-
-
 def _distance(entry: MenuEntry, models: Sequence[Model], data_sets: Sequence[DataSet]) -> float:
     frequency, amplitude, direction = _points(entry, data_sets)
     if entry.without_rig:
