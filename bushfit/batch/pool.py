@@ -157,10 +157,9 @@ def run(
     """Do work(chunk) for all rows in some order, and yield each row's number and result as it comes.
 
     Args:
-        rows: what to do.
+        rows, pool: what to do, and where.
         work: results of a chunk of rows, in their order; it must bear being asked again.
         give_up: the result of a row that took its worker down time after time, from a sentence on that.
-        pool: where.
 
     Raises:
         BatchError: the workers are gone for good.

@@ -59,8 +59,7 @@ class Summary:
     Args:
         status: rows by done, failed.
         kept: rows taken over from an earlier run.
-        bounded: bushings with a parameter at rest on a bound.
-        bounds: bushings by the parameter at rest.
+        bounded, bounds: bushings with a parameter at rest on a bound, and how many by the parameter.
         limits: bushings by verdict.
         missed: name of each bushing that misses a limit, and what it misses, in words.
         missing: numbers of the rows that miss a limit of a quantity, by its name.
@@ -159,8 +158,7 @@ def run(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Summary:
     """Do every row, then write batch.csv, batch.png and the JUnit report.
 
     Args:
-        plan: the batch.
-        workers: where rows are done.
+        plan, workers: the batch, and where its rows are done.
         progress: called with the status of each row as it comes.
 
     Raises:

@@ -53,8 +53,7 @@ def refits(
     """Fit proposals until they converge or cannot come near the best; with the candidates known already, best first.
 
     Args:
-        evidence: the model without the effects, fitted.
-        proposed: the effects to fit.
+        evidence, proposed: the fitted model without the effects, and the effects to fit.
         known: candidates that need no fit.
         start: values of the model's own parameters to start from, where not its fitted ones.
         held, bounds: parameters that do not move, and limits inside the parameters' own.

@@ -68,12 +68,10 @@ class Parameter:
 
     Args:
         name: ASCII name; base effects use it as it is, added effects as `<effect>.<name>`.
-        unit: SI unit, for files and reports.
         bounds: what a rubber, a bushing or a rig can have.
         neutral: the value at which the effect vanishes; None where another parameter does that.
         typical: a usual distance from the neutral value; the scale on which a fit moves a linear parameter.
         log: whether a fit moves its logarithm (strictly positive parameters).
-        meaning: what it is, in a few words.
         scale: what of the tests its size goes with, so that a search knows where to start: "period",
             "frequency", "displacement" or "strain"; none where `typical` is good for any test.
     """
@@ -112,10 +110,8 @@ class Condition:
     """The operating condition that a modifier may depend on.
 
     Args:
-        setting: the test.
         omega: angular frequency [rad/s].
-        amplitude: of the displacement [m or rad].
-        strain: equivalent strain amplitude [1].
+        amplitude, strain: of the displacement [m or rad], and the equivalent strain amplitude [1].
         stiffness: complex stiffness of the bushing [N/m or N m/rad] by parameter values.
     """
 
@@ -134,13 +130,10 @@ class Effect:
         name: the file's stem; the name in files, reports and options.
         sentence: what it is, for an engineer.
         equation: its first-harmonic form, ASCII.
-        level: where it acts.
-        parameters: its own parameters.
         source: where the law comes from.
         confirmed_by: the cheapest test that would prove it.
         harmonic_error: relative error of the first-harmonic face against the time face; 0 where exact.
-        settles: True where the response changes from cycle to cycle, so that a loop must be followed
-            through all its cycles.
+        settles: whether the response changes from cycle to cycle, so that a loop is followed through all its cycles.
         corrects: the direction, or specimen, whose stiffness formula it scales by a fitted factor; where the effect is
             in a model, that formula's own error needs no warning. None where it scales no formula.
     """

@@ -64,8 +64,7 @@ class Sealed:
     """The truth of a hidden campaign: what is hidden, how large, and how visible.
 
     Args:
-        outside: what the library does not have, or "".
-        without: effects the library is made to lack.
+        outside, without: what the library does not have, or ""; effects that it is made to lack.
         visible: largest misfit of the plain model without noise, relative.
         shared: whether blocks share gain and phase errors.
     """
@@ -93,8 +92,7 @@ def hidden_campaign(
 
     Args:
         seed: of everything random.
-        hidden: effects of the library to hide; none for a clean campaign.
-        outside: one of OUTSIDE, or "".
+        hidden, outside: effects of the library to hide, none for a clean campaign; one of OUTSIDE, or "".
         directions: of the two sweeps.
     """
     random = np.random.default_rng([seed, 7])
