@@ -24,19 +24,19 @@ if TYPE_CHECKING:
 @click.option("--jobs", type=click.IntRange(min=1), default=os.cpu_count() or 1, show_default=True, help="Cores.")
 @click.option(
     "--family",
-    type=click.Choice(["effects", "mistakes"]),
+    type=click.Choice(["effects", "mistakes", "amplitude_sweeps"]),
     default="effects",
     show_default=True,
-    help="What is hidden: effects, or mistakes in the record.",
+    help="What is hidden: effects, mistakes in the record, or nothing, in amplitude sweeps.",
 )
 @partial(shared_options, where="nothing is written")
 def command(campaigns: int, seed: int, jobs: int, family: Family, options: Options) -> None:
     """Judge `diagnose` on hidden campaigns of random bushings, and print how often it is right.
 
     The time-domain rig makes the data: every effect alone, pairs, none, disturbances outside the list, and effects
-    that the library is made to lack; or a mistake in what a file says, and none. The truth is sealed in files that the
-    workflow does not read, and opened afterwards. With -o the campaigns, the sealed truths and scorecard.json stay
-    there.
+    that the library is made to lack; or a mistake in what a file says, and none; or clean amplitude sweeps. The truth
+    is sealed in files that the workflow does not read, and opened afterwards. With -o the campaigns, the sealed truths
+    and scorecard.json stay there.
     """
     from dataclasses import asdict
 

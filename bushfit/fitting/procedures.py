@@ -13,7 +13,7 @@ from bushfit.errors import FitError
 from bushfit.fitting.agreement import misfits, usable
 from bushfit.fitting.assess import Stage, covariance, lack_of_fit, measured_range, misfit, quality
 from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import DataSet, parted, sources
+from bushfit.fitting.data_sets import DataSet, SweepData, parted, sources
 from bushfit.fitting.identify import left_open
 from bushfit.fitting.plausible import implausible, unfitted
 from bushfit.fitting.profile import profile95
@@ -280,5 +280,12 @@ def _at_edge(name: str, end: End, bounds: Bounds) -> str:
 def _assumed(data_sets: Sequence[DataSet]) -> list[str]:
     """What was assumed of the noise because nothing was repeated."""
     _, sweeps = parted(data_sets)
-    noises = {id(sweep.noise): sweep.noise for sweep in sweeps}
-    return [f"noise of the sweeps: {noise.describe()}" for noise in noises.values() if noise.origin == "assumed"]
+    rigs: dict[int, list[SweepData]] = {}
+    for sweep in sweeps:
+        rigs.setdefault(id(sweep.noise), []).append(sweep)
+    return [
+        f"noise of the {' and '.join(dict.fromkeys(str(sweep.direction) for sweep in mine))} sweeps: "
+        f"{mine[0].noise.describe()}"
+        for mine in rigs.values()
+        if mine[0].noise.origin == "assumed"
+    ]

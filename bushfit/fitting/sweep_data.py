@@ -37,6 +37,7 @@ class Line:
     """Mean misfit of one line of a sweep over its repeats: of all that its runs stepped through while they held one.
 
     Args:
+        name: of the sweep.
         direction: of the sweep.
         stepped: what changes along the line; None where frequency and amplitude do.
         frequency: [Hz], (n,).
@@ -45,6 +46,7 @@ class Line:
         noise: standard deviation of the gain and the phase of one of these means, (2,).
     """
 
+    name: str
     direction: Place
     stepped: Stepped | None
     frequency: Array
@@ -59,10 +61,10 @@ class Line:
 
     @property
     def words(self) -> str:
-        """What the line holds, for people: "0.1 mm" or "10 Hz"; "one run" where neither."""
+        """What the line holds, for people: "0.1 mm" or "10 Hz"; the test where neither."""
         if self.stepped == "frequency":
             return shown_amplitude(self.direction, float(self.amplitude[0]))
-        return f"{self.frequency[0]:.4g} Hz" if self.stepped else "one run"
+        return f"{self.frequency[0]:.4g} Hz" if self.stepped else self.name
 
     @cached_property
     def smooth(self) -> Array:
@@ -291,7 +293,8 @@ class SweepData(DataSet):
             of_one = np.square(self.noise.random[self.name, float(held)]) + np.square(self.noise.shared)
             frequency, amplitude = (values[chosen][first] for values in (self.frequency, self.amplitude))
             noise = np.sqrt(of_one / np.median(counts))
-            lines.append(Line(self.direction, self.sweep.stepped, frequency, amplitude, mean / counts, noise))
+            line = Line(self.name, self.direction, self.sweep.stepped, frequency, amplitude, mean / counts, noise)
+            lines.append(line)
         return lines
 
     def contrasts(self) -> Array:

@@ -97,7 +97,7 @@ def hidden_campaign(
     """
     random = np.random.default_rng([seed, 7])
     for _ in range(_TRIES):
-        plain = _bushing(random)
+        plain = random_bushing(random)
         plan = _plan(plain, random, seed, directions)
         with suppress(_OutOfReachError):
             model, visible = _with_hidden(plain, hidden, plan, random)
@@ -111,7 +111,7 @@ def hidden_campaign(
     return measure(clean, plan), sealed
 
 
-def _bushing(random: Generator) -> Model:
+def random_bushing(random: Generator) -> Model:
     """A random bushing and a random filled rubber, elastic, springpot and friction."""
     inner = random.uniform(0.006, 0.022)
     bushing = Bushing("hidden", inner, inner * random.uniform(1.4, 2.3), random.uniform(0.02, 0.07))

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from scipy.stats import binomtest
 
 from bushfit.campaign.campaign import load_campaign
 from bushfit.diagnosis.evidence import Evidence
@@ -28,10 +29,11 @@ from bushfit.fitting.data import Data
 from bushfit.report.folder import write_files
 from bushfit.scorecard.hidden import OUTSIDE, Sealed, hidden_campaign, hideable
 from bushfit.scorecard.mistaken import mistaken_campaign
+from bushfit.scorecard.swept import swept_campaign
 from bushfit.simulation import to_files
 
 #: What is hidden in the campaigns of a card.
-Family = Literal["effects", "mistakes"]
+Family = Literal["effects", "mistakes", "amplitude_sweeps"]
 #: The verdict of the reader, where it does not take a file with a mistake.
 REFUSED = "refused"
 
@@ -47,6 +49,7 @@ _CONFIRMED = 1.1
 _KINDS = {
     "effects": {"single": 0.5, "clean": 0.2, "pair": 0.1, "outside": 0.1, "lacking": 0.1},
     "mistakes": {"mistake": 0.4, "clean": 0.6},
+    "amplitude_sweeps": {"swept": 1.0},
 }
 #: What of |K|, or of a parameter, is off where a mistake in the record matters.
 _MATTERS = 0.02
@@ -79,7 +82,8 @@ class Outcome:
         richer: effects that contain what was named as a limit.
         gain: chi-square that the best single effect takes off, whether it was added or not.
         heldout: gap on held-out data after, in units of noise.
-        covered: per hidden effect that was added: whether the 95 % interval of its amount holds the truth.
+        covered: per hidden effect that was added, or per parameter of a swept campaign: whether the 95 % interval of
+            its amount holds the truth.
         seconds: processor time of the diagnosis, whatever else the machine does.
         matters: of a mistake, whether it leaves more than the tolerance for a plain model, and more than _MATTERS of
             |K| or of a parameter.
@@ -171,6 +175,8 @@ def work(task: Task, folder: Path) -> Outcome:
     try:
         if task.kind == "mistake":
             simulated, sealed = mistaken_campaign(task.seed, task.hidden[0])
+        elif task.kind == "swept":
+            simulated, sealed = swept_campaign(task.seed)
         else:
             simulated, sealed = hidden_campaign(task.seed, task.hidden, task.outside)
         files = to_files(simulated)
@@ -198,7 +204,8 @@ def _failed(task: Task, wrong: Exception) -> Outcome:
 def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) -> Outcome:
     result = diagnosis.result
     added = tuple(f"{name}." for name in task.hidden if name in result.model.effects)
-    intervals = {name: result.interval(name) for name in truth.values if name.startswith(added)} if added else {}
+    asked = [name for name in truth.values if task.kind == "swept" or (added and name.startswith(added))]
+    intervals = {name: result.interval(name) for name in asked}
     covered = [ends[0] <= truth.values[name] <= ends[1] for name, ends in intervals.items() if ends is not None]
     return Outcome(
         task,
@@ -224,7 +231,7 @@ def _matters(before: Evidence, truth: Sealed) -> bool:
 
 @dataclass(frozen=True)
 class Row:
-    """One measure of the card: its figure as text, what it was counted over, and the target."""
+    """One measure of the card: its figure as text, a rate with its 95 % interval; what it counts, and the target."""
 
     measure: str
     figure: str
@@ -238,6 +245,8 @@ def card(outcomes: Sequence[Outcome]) -> list[Row]:
     good = [outcome for outcome in outcomes if not outcome.error]
     if any(outcome.task.kind == "mistake" for outcome in good):
         return _card_of_mistakes(good)
+    if any(outcome.task.kind == "swept" for outcome in good):
+        return _card_of_swept(good)
     kinds = {kind: [outcome for outcome in good if outcome.task.kind == kind] for kind in _KINDS["effects"]}
     single, clean, pair, outside, lacking = kinds.values()
     plain = [outcome for outcome in single if outcome.gain >= PLAIN]
@@ -280,6 +289,17 @@ def _card_of_mistakes(good: Sequence[Outcome]) -> list[Row]:
     ]
 
 
+def _card_of_swept(good: Sequence[Outcome]) -> list[Row]:
+    """Every target of clean amplitude sweeps, measured."""
+    alarm = [outcome.verdict != "consistent" for outcome in good]
+    covered = [hit for outcome in good for hit in outcome.covered]
+    return [
+        _share("false alarm on clean amplitude sweeps", alarm, "<= 1 %", 0.0, 0.01),
+        _share("95 % intervals that hold the true parameter", covered, "93 to 97 %", 0.93, 0.97),
+        _time(good),
+    ]
+
+
 def _time(good: Sequence[Outcome]) -> Row:
     seconds = [outcome.seconds for outcome in good]
     took = f"{np.median(seconds):.1f} s / {max(seconds):.1f} s" if seconds else "no case"
@@ -291,7 +311,9 @@ def _share(measure: str, hits: Sequence[bool], target: str, low: float, high: fl
     if not hits:
         return Row(measure, "no case", 0, target, None)
     share = float(np.mean(hits))
-    return Row(measure, f"{100 * share:.1f} %", len(hits), target, low <= share <= high if target else None)
+    ends = binomtest(sum(hits), len(hits)).proportion_ci()  # exact, after Clopper and Pearson (1934)
+    figure = f"{100 * share:.1f} % ({100 * ends.low:.1f} to {100 * ends.high:.1f})"
+    return Row(measure, figure, len(hits), target, low <= share <= high if target else None)
 
 
 def confusion(outcomes: Sequence[Outcome]) -> dict[str, Counter[str]]:

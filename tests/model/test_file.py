@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bushfit.effects import Level
 from bushfit.errors import ModelError
 from bushfit.model.file import SCHEMAS, from_document, load_result, model_document, to_document
 from bushfit.model.model import FIVE, Model
@@ -76,6 +77,26 @@ def test_a_model_alone_is_a_result(paper_model: Model, tmp_path: Path) -> None:
     assert result.model == paper_model
     assert result.quality is None
     assert result.interval("mu") is None
+
+
+def test_the_radial_factor_of_older_files_is_read(document: dict[str, Any]) -> None:
+    """An effect that was called radial_factor, with an excess over 1, is a stiffness factor of the radial direction."""
+    entry = {"value": 0.05, "unit": "1", "vary": True, "profile95": [0.04, None]}
+    document["effects"].append("radial_factor")
+    document["parameters"]["radial_factor.excess"] = entry
+    document["covariance"] = {"names": ["radial_factor.excess"], "matrix": [[1e-4]], "spread": []}
+    result = from_document(document)
+    assert result.model.values["stiffness_factor.radial"] == pytest.approx(1.05)
+    assert result.covariance.stderr("stiffness_factor.radial") == pytest.approx(0.01)
+    assert result.profile["stiffness_factor.radial"] == (pytest.approx(1.04), None)
+    radial, axial = (
+        abs(
+            result.model.stiffness(direction, 50.0, 1e-4)
+            / result.model.without(Level.COMPONENT).stiffness(direction, 50.0, 1e-4)
+        )
+        for direction in ("radial", "axial")
+    )
+    assert (radial, axial) == (pytest.approx(1.05), pytest.approx(1.0))
 
 
 @pytest.mark.parametrize("schema", ["bushfit/model/3", "bushfit/diagnosis/1", None, 3])

@@ -49,6 +49,8 @@ _STROKE = 14.0
 _THIN = 0.6
 #: A measured point belongs to a predicted level that is as near as this, relative: a rig that misses its set point.
 _SAME = 0.01
+#: Relative error that a file states of a point, from which it is not drawn; chosen: such points hide the others.
+_WORST_DRAWN = 0.05
 #: Least span of the axis of stiffness, relative to the largest: a flat curve shall look flat.
 _LEAST_STIFFNESS_SPAN = 0.04
 #: Least span of the axis of the loss factor [-].
@@ -110,11 +112,11 @@ def prediction_figure(
     height = len(rows) + bool(free)
     figure = new_figure(title, height * ROW)
     grid = figure.subplots(height, 2, squeeze=False)
-    pairs = zip(grid, rows, strict=False)
+    pairs = zip(grid[bool(free) :], rows, strict=True)
     drawn = [draw(pair, prediction.direction, lines, points, *row, rig) for pair, row in pairs]
     laid = any(drawn)
     if free and model:
-        draw_as_it_came(grid[-1], prediction.direction, model, free)
+        draw_as_it_came(grid[0], prediction.direction, model, free)
     banded = np.any(lines.stiffness.high > lines.stiffness.low)
     shade = "; shaded: its 95 % band, where that is wider than the line" if banded else ""
     through = " Thin lines: the same with what belongs to the rig, as the points were measured." if laid and rig else ""
@@ -242,16 +244,25 @@ def draw_as_it_came(pair: Sequence[Axes], place: Place, model: Model, data_sets:
     for axes, (quantity, scale, name) in zip(pair, kinds, strict=True):
         for data_set, look in zip(data_sets, looks, strict=True):
             rising = np.argsort(data_set.frequency, kind="stable")
-            frequency, counted = data_set.frequency[rising], data_set.weights[rising] > 0.0
+            frequency, known = data_set.frequency[rising], _known(data_set)[rising]
             measured, modelled = (scale * quantity(k)[rising] for k in (data_set.measured, data_set.stiffness(model)))
-            axes.plot(frequency[counted], measured[counted], "o", color=look.color, alpha=0.5, **DOT)
+            axes.plot(frequency[known], measured[known], "o", color=look.color, alpha=0.5, **DOT)
             axes.plot(frequency, modelled, color=look.color, lw=_LINE)
         dress(axes, "frequency [Hz]", name)
     handles = [Line2D([], [], color=look.color, lw=_LINE) for look in looks]
     legend(pair[-1], handles, [file_name(data_set.name) for data_set in data_sets], "test")
 
 
+def _known(data_set: SweepData) -> Array:
+    """Whether each point of a sweep carries weight, and is known well enough to be drawn, (n,) bool."""
+    stated = data_set.sweep.relative_error
+    return (data_set.weights > 0.0) & (True if stated is None else stated[data_set.order] < _WORST_DRAWN)
+
+
 def points_note(data_sets: Sequence[SweepData]) -> str:
     """A sentence on what the points of sweeps are."""
     repeated = any(np.unique(data_set.repeat).size > 1 for data_set in data_sets)
-    return f"Points: measured{', mean of the repeats, with bars from the lowest to the highest' if repeated else ''}."
+    hidden = sum(int(np.count_nonzero(~_known(data_set))) for data_set in data_sets if not data_set.sweep.stepped)
+    unsure = f"; {hidden} with a stated error above {100 * _WORST_DRAWN:g} % are not drawn" if hidden else ""
+    bars = ", mean of the repeats, with bars from the lowest to the highest" if repeated else ""
+    return f"Points: measured{bars}{unsure}."

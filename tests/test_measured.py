@@ -1,0 +1,102 @@
+"""Measured rubber, as the README has it: fitted to coupons, predicted for a mount, measured on the mount."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.fitting.data import Data
+from bushfit.fitting.procedures import fit_joint
+from bushfit.model.result import Result
+from bushfit.prediction import predict_resonance
+from bushfit.reading.measurement import loss_factor
+from bushfit.reading.resonance import read_resonance
+from bushfit.reading.table import Table
+from bushfit.reading.words import RESONANCE_COLUMNS
+from bushfit.reduction.resonance import reduce_resonance
+
+GRAVITY = 9.80665
+#: Stated mass by the name of its files, and that of the discs [kg].
+MASSES, DISCS = {"118g": 0.118, "253g": 0.253, "573g": 0.573, "1196g": 1.196}, 0.0148
+LEVELS = {"01g": 0.1, "1g": 1.0}
+
+
+@pytest.fixture(scope="module")
+def campaign(root: Path) -> Campaign:
+    return load_campaign(root / "configs/epdm_70.toml")
+
+
+@pytest.fixture(scope="module")
+def compound(campaign: Campaign) -> Result:
+    return fit_joint(Data.of(campaign), effects=Data.of(campaign).effects, directions=["DMA", "DMA 2"])
+
+
+@pytest.fixture(scope="module")
+def row(root: Path) -> Callable[[str], list[str]]:
+    """The cells of a row of the README's tables, by its first."""
+    text = (root / "README.md").read_text(encoding="utf-8")
+
+    def cells(first: str) -> list[str]:
+        found = re.search(rf"^\| {re.escape(first)} \|(.*)\|$", text, re.MULTILINE)
+        assert found, first
+        return [cell.strip() for cell in found[1].split("|")]
+
+    return cells
+
+
+def test_the_mount_against_its_prediction(
+    campaign: Campaign, compound: Result, row: Callable[[str], list[str]], root: Path
+) -> None:
+    parts = []
+    for sweep in campaign.sweeps:
+        if str(sweep.direction) == "mount":
+            model = compound.model.stiffness(sweep.direction, sweep.frequency, sweep.amplitude_reached)
+            known = sweep.relative_error < 0.05  # type: ignore[operator]
+            ratio, loss = np.abs(sweep.stiffness / model), loss_factor(sweep.stiffness) - loss_factor(model)
+            parts.append(np.stack((sweep.frequency, ratio, loss))[:, known & (sweep.frequency >= 100.0)])
+    frequency, ratio, loss = np.concatenate(parts, axis=1)
+    bands = [(frequency >= low) & (frequency < high) for low, high in ((100, 200), (200, 400), (400, 800), (800, 1200))]
+    stiffness = [f"{np.median(ratio[band]):.2f}" for band in bands]
+    low, high = np.quantile(ratio, (0.05, 0.95))
+    stiffness.append(f"{low:.2f} to {high:.2f}, median {np.median(ratio):.2f}")
+    losses = [f"{np.median(loss[band]):+.3f}" for band in bands]
+    losses.append("{:+.2f} to {:+.2f}".format(*np.quantile(loss, (0.05, 0.95))))
+    print(f"{frequency.size} points\n{stiffness}\n{losses}")
+    assert row("stiffness, measured over predicted") == stiffness
+    assert row("loss factor, measured less predicted") == losses
+
+
+def test_its_resonances(campaign: Campaign, compound: Result, row: Callable[[str], list[str]], root: Path) -> None:
+    mount = next(specimen for specimen in campaign.specimens if specimen.name == "mount")
+    peaks = {}
+    for level, acceleration in LEVELS.items():
+        for name, stated in MASSES.items():
+            file, mass = root / f"data/measured/epdm_70/shaker_{level}_{name}.csv", stated + DISCS
+            found = reduce_resonance(read_resonance(Table.open(file, RESONANCE_COLUMNS), mount), mass)
+            shaken = predict_resonance(compound, mount, mass, acceleration * GRAVITY, None)
+            peaks[level, name] = found.peak[0], shaken.peak[0]
+    small = ["{:.1f} / {:.1f} Hz".format(*peaks["01g", name]) for name in MASSES]
+    lower = [[100.0 * (1.0 - peaks["1g", n][k] / peaks["01g", n][k]) for k in (0, 1)] for n in MASSES]
+    falls = ["{:.1f} / {:.1f} %".format(*pair) for pair in lower]
+    print(small, falls, sep="\n")
+    assert row("at 0.1 g, measured / predicted") == small
+    assert row("lower at 1 g by, measured / predicted") == falls
+
+
+def test_the_reduced_files_are_those_that_reduce_makes(campaign: Campaign, root: Path) -> None:
+    folder = root / "data/measured/epdm_70"
+    for level in LEVELS:
+        for name, stated in MASSES.items():
+            mount = next(specimen for specimen in campaign.specimens if specimen.name == "mount")
+            table = Table.open(folder / f"shaker_{level}_{name}.csv", RESONANCE_COLUMNS)
+            found = reduce_resonance(read_resonance(table, mount), stated + DISCS)
+            kept = pd.read_csv(folder / f"reduced/shaker_{level}_{name}.csv")
+            np.testing.assert_allclose(kept["frequency [Hz]"], found.frequency, rtol=1e-6)
+            np.testing.assert_allclose(kept["stiffness [N/mm]"], 1e-3 * np.abs(found.stiffness), rtol=1e-5)
+            np.testing.assert_allclose(kept["amplitude [mm]"], 1e3 * found.amplitude, rtol=1e-5)
