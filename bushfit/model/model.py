@@ -220,9 +220,10 @@ class Model:
 
     def _layers(self, setting: Setting) -> tuple[Layer, ...]:
         """The layers that act on a test: a coupon whose modulus is measured has no rig and no sleeves around it."""
-        if setting.direction.motion is not STRAINING:
-            return self._structure.layers
-        return tuple(layer for layer in self._structure.layers if layer.corrects)
+        layers, turning = self._structure.layers, setting.direction.is_rotation
+        if setting.direction.motion is STRAINING:
+            return tuple(layer for layer in layers if layer.corrects)
+        return tuple(layer for layer in layers if layer.turns or not turning)
 
     def _stack_stiffness(self, setting: Setting, values: Values) -> Callable[[Array, Array], Array]:
         """The stiffness outside all layers, as a function of omega [rad/s] and amplitude [m or rad]."""
