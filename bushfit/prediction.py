@@ -63,16 +63,12 @@ class Band:
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Dynamic stiffness over operating points, sorted by amplitude, then frequency.
+    """Dynamic stiffness over operating points, sorted by amplitude, then frequency: |K|, K''/K', K' and K''.
 
     Args:
-        direction: direction of motion.
         frequency: [Hz], (n,).
         amplitude: zero-to-peak [m or rad], (n,).
-        stiffness: |K| [N/m or N m/rad].
-        loss_factor: K''/K'.
-        storage_stiffness: K'.
-        loss_stiffness: K''.
+        stiffness, storage_stiffness, loss_stiffness: [N/m or N m/rad].
         warnings: sentences on directions, frequencies and strains that were not fitted.
     """
 
@@ -149,12 +145,7 @@ def predict(
 ) -> Prediction:
     """Dynamic stiffness on a grid, with 95 % bands from the covariance of the fit (delta method).
 
-    Args:
-        result: fitted model.
-        direction: axial, radial or torsion.
-        frequencies: [Hz].
-        amplitudes: zero-to-peak [m or rad].
-        rig: whether the rig's effects are kept, as in the tests.
+    Frequencies are in Hz, amplitudes zero-to-peak in m or rad. With `rig` its effects are kept, as in the tests.
 
     Raises:
         ModelError: a frequency or amplitude that is not positive.
@@ -193,12 +184,9 @@ def predict(
 
 @dataclass(frozen=True, eq=False)
 class PredictedResonance:
-    """A mass on a mount whose base is shaken with a sine of constant acceleration, as the model has it.
+    """A mass [kg] on a mount whose base is shaken with a sine of constant acceleration [m/s^2], as the model has it.
 
     Args:
-        place: what the mass stands on.
-        mass: [kg].
-        base_acceleration: amplitude [m/s^2].
         frequency: [Hz], (n,).
         amplitude: of the mount's deformation, zero-to-peak [m], (n,).
         transmissibility: complex, acceleration of the mass over that of the base [-], (n,).
@@ -223,14 +211,9 @@ class PredictedResonance:
 def predict_resonance(
     result: Result, place: Place, mass: float, base_acceleration: float, frequencies: Sequence[float] | Array | None
 ) -> PredictedResonance:
-    """Transmissibility and amplitude of a mass on the bushing or specimen, where stiffness depends on amplitude itself.
+    """Transmissibility and amplitude of a mass [kg] on the bushing or specimen, whose stiffness depends on amplitude.
 
-    Args:
-        result: fitted model; the rig's effects are left out.
-        place: of translation.
-        mass: that moves [kg].
-        base_acceleration: amplitude of the base [m/s^2].
-        frequencies: [Hz]; None for a decade about the resonance.
+    The base is shaken at an amplitude in m/s^2; without frequencies [Hz] these are a decade about the resonance.
 
     Raises:
         ModelError: a place that does not count displacement and force.

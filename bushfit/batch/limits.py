@@ -13,28 +13,18 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import ConfigDict, Field, ValidationInfo
 
 from bushfit.batch.manifest import Row
 from bushfit.batch.points import At, Point
-from bushfit.batch.quantities import (
-    CHI_SQUARE,
-    LOSS_FACTOR,
-    NRMSE,
-    STIFFNESS,
-    Figures,
-    Quantity,
-    Record,
-    at_point,
-    figures,
-)
+from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, STIFFNESS, Figures, Quantity, Record, at_point, figures
 from bushfit.campaign.parameters import parameter_value
 from bushfit.campaign.schema import Share
 from bushfit.campaign.toml import read_toml
@@ -74,9 +64,8 @@ class Bounds:
     def __post_init__(self) -> None:
         given = [value is not None for value in (self.min, self.max, self.nominal, self.sigma)]
         if not any(given) or (self.nominal is None) != (self.tolerance is None):
-            raise ValueError(
-                CampaignError("these keys make no limit", expected="min, max, nominal with tolerance, or sigma")
-            )
+            expected = "min, max, nominal with tolerance, or sigma"
+            raise ValueError(CampaignError("these keys make no limit", expected=expected))
         if self.min is not None and self.max is not None and self.min >= self.max:
             raise ValueError(CampaignError("these limits hold no value", expected="min below max"))
 
@@ -104,18 +93,16 @@ class Bounds:
 _SIZES = ("min", "max", "nominal")
 
 
-def _in_si(name: str, table: Mapping[str, Any]) -> dict[str, Any]:
+def _parameter(name: str, table: object) -> object:
     """A parameter's table of limits with its sizes in SI."""
-    return {
-        key: parameter_value(f"{name}.{key}", name, value) if key in _SIZES else value for key, value in table.items()
-    }
+    if not isinstance(table, dict):
+        return table
+    sizes = {key: parameter_value(f"{name}.{key}", name, table[key]) for key in _SIZES if key in table}
+    return {**table, **sizes}
 
 
 def _parameters(raw: object, _: ValidationInfo) -> object:
-    """Tables of limits by parameter, sizes in SI."""
-    if not isinstance(raw, dict):
-        return raw
-    return {name: _in_si(name, table) if isinstance(table, dict) else table for name, table in raw.items()}
+    return {name: _parameter(name, table) for name, table in raw.items()} if isinstance(raw, dict) else raw
 
 
 def _stiffness(raw: object, info: ValidationInfo) -> object:
@@ -162,7 +149,6 @@ class Limits:
 
     Args:
         parameters: by name, in the file's units of a campaign's [fit].
-        stiffness, loss_factor: at points.
         nrmse, reduced_chi_square: largest allowed.
         verdicts: of `diagnose` that are allowed; empty for all.
         guard: whether a conditional pass counts as a miss.
@@ -181,15 +167,15 @@ class Limits:
     def __post_init__(self) -> None:
         for name, count in Counter(name for name, _ in self._at_points).items():
             if count > 1:
-                raise ValueError(
-                    CampaignError(f"{count} tables for one point", found=name, hint="put them in one table")
-                )
+                problem = CampaignError(f"{count} tables for one point", found=name, hint="put them in one table")
+                raise ValueError(problem)
 
     @property
     def _at_points(self) -> list[tuple[str, Bounds]]:
         """Limits at points, by the name of the quantity."""
-        stiffness = [(at_point(bounds.at, STIFFNESS).name, bounds) for bounds in self.stiffness]
-        return [*stiffness, *((at_point(bounds.at, LOSS_FACTOR).name, bounds) for bounds in self.loss_factor)]
+        tables: dict[str, Sequence[StiffnessBounds | LossFactorBounds]]
+        tables = {STIFFNESS: self.stiffness, LOSS_FACTOR: self.loss_factor}
+        return [(at_point(bounds.at, what).name, bounds) for what, found in tables.items() for bounds in found]
 
     @property
     def points(self) -> tuple[Point, ...]:
@@ -198,7 +184,7 @@ class Limits:
     @property
     def bounds(self) -> dict[str, Bounds]:
         """By the name of the quantity."""
-        most = {NRMSE.name: self.nrmse, CHI_SQUARE.name: self.reduced_chi_square}
+        most = {quantity.name: getattr(self, key) for key, quantity in OF_FIT.items()}
         of_fit = {name: Bounds(max=limit) for name, limit in most.items() if limit is not None}
         return {**self.parameters, **dict(self._at_points), **of_fit}
 

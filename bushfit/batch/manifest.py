@@ -8,9 +8,9 @@ import io
 import os
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cache
+from functools import cache, partial
 from itertools import chain, count
 from pathlib import Path
 from typing import Annotated, Literal
@@ -21,7 +21,7 @@ from bushfit.batch.points import At, Point
 from bushfit.campaign.naming import folder_name
 from bushfit.campaign.schema import Share
 from bushfit.campaign.toml import read_toml
-from bushfit.effects import effect_named
+from bushfit.effects import Effect, effect_named
 from bushfit.effects.mistakes import candidate_named
 from bushfit.errors import CampaignError
 from bushfit.reading.files import read_utf8
@@ -48,14 +48,10 @@ _PATTERN = re.compile(r"[*?\[]")
 _DELIMITERS = ",;\t"
 
 
-def _effect(raw: object, _: object) -> object:
-    return effect_named(raw).name if isinstance(raw, str) else raw
-
-
-def _candidate(raw: object, _: object) -> object:
-    """An effect, or a mistake in the record with its test behind a colon."""
+def _known(named: Callable[[str], Effect], raw: object, _: object) -> object:
+    """A name of an effect, or of a mistake in the record, that `named` knows."""
     if isinstance(raw, str):
-        candidate_named(raw)
+        named(raw)
     return raw
 
 
@@ -65,8 +61,8 @@ def _words(raw: object) -> object:
 
 
 Words = BeforeValidator(_words)
-Effects = Annotated[tuple[Annotated[str, converted(_effect)], ...], Words]
-Candidates = Annotated[tuple[Annotated[str, converted(_candidate)], ...], Words]
+Effects = Annotated[tuple[Annotated[str, converted(partial(_known, effect_named))], ...], Words]
+Candidates = Annotated[tuple[Annotated[str, converted(partial(_known, candidate_named))], ...], Words]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,15 +146,10 @@ def read_manifest(source: str, given: Settings, *more: str) -> Manifest:
     """
     path, points = Path(source), tuple[Point, ...]()
     if more:
-        listed = (source, *more)
-        if strange := [name for name in listed if Path(name).suffix.lower() != ".toml"]:
-            raise CampaignError(
-                "this is no campaign",
-                file=strange[0],
-                expected="one manifest, or campaign files alone",
-                hint=_OF_TESTS,
-            )
-        stem, base, entries = "batch", Path(), iter([Entry(campaign=name) for name in listed])
+        if strange := [name for name in (source, *more) if Path(name).suffix.lower() != ".toml"]:
+            expected = "one manifest, or campaign files alone"
+            raise CampaignError("this is no campaign", file=strange[0], expected=expected, hint=_OF_TESTS)
+        stem, base, entries = "batch", Path(), iter([Entry(campaign=name) for name in (source, *more)])
     elif _PATTERN.search(source) and not path.exists():
         stem, base, entries = "batch", Path(), _expanded([Entry(campaign=source)], Path(), source)
     elif path.suffix.lower() == ".toml":

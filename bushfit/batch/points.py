@@ -20,10 +20,8 @@ class Point:
     """An operating point at a direction, or at a specimen by its name, which each campaign has to know.
 
     Args:
-        place: direction, or name of the specimen.
         frequency: [Hz].
-        amplitude: zero-to-peak [m or rad], or strain.
-        unit: of the amplitude, SI.
+        amplitude, unit: zero-to-peak [m or rad], or strain, and its SI unit.
     """
 
     place: str

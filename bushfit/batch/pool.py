@@ -24,7 +24,7 @@ from concurrent.futures import (
     wait,
 )
 from itertools import islice
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from bushfit.errors import BatchError
 
@@ -52,22 +52,6 @@ _WORKER_SECONDS = 60.0
 _COUNT_SECONDS = 5.0
 
 
-class Pool(Protocol):
-    """Where chunks are sent."""
-
-    def executor(self) -> Executor:
-        """One that works: a new one where the last is broken."""
-
-    def workers(self) -> int:
-        """How many chunks are worked on at once."""
-
-    def mend(self, cause: BaseException, /) -> None:
-        """A future failed, of that cause. Raises BatchError where it is of no use to try again."""
-
-    def close(self) -> None:
-        """Let go of what is not finished."""
-
-
 class LocalPool:
     """Worker processes of this machine."""
 
@@ -76,6 +60,7 @@ class LocalPool:
         self._executor: Executor | None = None
 
     def executor(self) -> Executor:
+        """One that works: a new one where the last is broken."""
         if self._executor is None:
             # No fork of this process: it has threads. A server forks instead, with all imported already.
             os.environ.update(_HEAP)  # read by the C library of processes to come
@@ -87,12 +72,15 @@ class LocalPool:
         return self._executor
 
     def workers(self) -> int:
+        """How many chunks are worked on at once."""
         return self._jobs
 
     def mend(self, _: BaseException) -> None:
+        """A future failed, of that cause. Raises BatchError where it is of no use to try again."""
         self.close()
 
     def close(self) -> None:
+        """Let go of what is not finished."""
         if self._executor is not None:
             self._executor.shutdown(wait=False, cancel_futures=True)
             self._executor = None
@@ -159,16 +147,19 @@ class DaskPool:
         self._client.close()
 
 
+#: Where chunks are sent.
+Pool = LocalPool | DaskPool
+
+
 def run(
     rows: Sequence[T], work: Callable[[Sequence[T]], Sequence[R]], give_up: Callable[[str], R], pool: Pool
 ) -> Iterator[tuple[int, R]]:
     """Do work(chunk) for all rows in some order, and yield each row's number and result as it comes.
 
     Args:
-        rows: what to do.
+        rows, pool: what to do, and where.
         work: results of a chunk of rows, in their order; it must bear being asked again.
         give_up: the result of a row that took its worker down time after time, from a sentence on that.
-        pool: where.
 
     Raises:
         BatchError: the workers are gone for good.

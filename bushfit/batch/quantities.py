@@ -32,10 +32,9 @@ class Quantity:
         return f"{self.name} [{self.unit}]"
 
 
-#: Root mean square difference of model and tests, relative.
-NRMSE = Quantity("NRMSE", "-")
-#: Mean square residual in units of noise.
-CHI_SQUARE = Quantity("reduced chi-square", "-")
+#: Of the fit, by key of a record: root mean square difference of model and tests, relative, and mean square residual in
+#: units of noise.
+OF_FIT = {"nrmse": Quantity("NRMSE", "-"), "reduced_chi_square": Quantity("reduced chi-square", "-")}
 #: What is told of an operating point: |K| ...
 STIFFNESS = "stiffness"
 #: ... and K''/K'.
@@ -60,7 +59,7 @@ def figures(record: Record) -> Iterator[tuple[str, Figures]]:
     for name, (value, low, high, stderr, _) in record.get("parameters", {}).items():
         if value is not None:
             yield name, (value, low, high, stderr)
-    for quantity, key in ((NRMSE, "nrmse"), (CHI_SQUARE, "reduced_chi_square")):
+    for key, quantity in OF_FIT.items():
         if record.get(key) is not None:
             yield quantity.name, (record[key], None, None, None)
     for point, pair in record.get("points", {}).items():

@@ -20,15 +20,7 @@ from bushfit.batch.junit import Report
 from bushfit.batch.limits import Judge, Judgement, Limits
 from bushfit.batch.manifest import Row
 from bushfit.batch.pool import Pool
-from bushfit.batch.quantities import (
-    CHI_SQUARE,
-    LOSS_FACTOR,
-    NRMSE,
-    STIFFNESS,
-    Quantity,
-    at_point,
-    parameter_quantities,
-)
+from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, STIFFNESS, Quantity, at_point, parameter_quantities
 from bushfit.batch.spool import Spool
 from bushfit.batch.table import Table
 from bushfit.batch.work import Orders, given_up, work
@@ -65,17 +57,13 @@ class Summary:
     """What came of it: what is counted and named row by row, then what is said of the whole batch.
 
     Args:
-        seconds: of the work.
         status: rows by done, failed.
         kept: rows taken over from an earlier run.
-        warned: bushings with warnings.
-        bounded: bushings with a parameter at rest on a bound.
-        bounds: bushings by the parameter at rest.
+        bounded, bounds: bushings with a parameter at rest on a bound, and how many by the parameter.
         limits: bushings by verdict.
         missed: name of each bushing that misses a limit, and what it misses, in words.
         missing: numbers of the rows that miss a limit of a quantity, by its name.
         edge: name of each bushing that passes on condition, and why.
-        errors: name and error of rows that failed.
         scatter: median and robust standard deviation of each quantity, in its unit.
         notes: limits that could not be judged, bushings with warnings, results of earlier batches beside these.
     """
@@ -170,8 +158,7 @@ def run(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Summary:
     """Do every row, then write batch.csv, batch.png and the JUnit report.
 
     Args:
-        plan: the batch.
-        workers: where rows are done.
+        plan, workers: the batch, and where its rows are done.
         progress: called with the status of each row as it comes.
 
     Raises:
@@ -211,7 +198,7 @@ def _report(plan: Plan, spool: Spool, summary: Summary) -> None:
     columns, intervals = spool.columns()
     parameters = parameter_quantities(columns)
     points = [at_point(point, what) for point in plan.orders.points for what in (STIFFNESS, LOSS_FACTOR)]
-    quantities = {quantity.name: quantity for quantity in (*parameters, NRMSE, CHI_SQUARE, *points)}
+    quantities = {quantity.name: quantity for quantity in (*parameters, *OF_FIT.values(), *points)}
     judge = Judge(plan.limits, columns, quantities) if plan.limits else None
     report = Report(plan.title) if plan.junit else None
     aside = plan.orders.output / ledger.ASIDE / TABLE
@@ -240,17 +227,14 @@ def _report(plan: Plan, spool: Spool, summary: Summary) -> None:
 
 def _notes(summary: Summary) -> Iterator[str]:
     """What a user must know of bushings whose numbers are not to be trusted blindly."""
-    if summary.bounded:
-        names = ", ".join(f"{name} of {times}" for name, times in summary.bounds.most_common())
-        yield (
-            f"{summary.bounded} bushing{'s' * (summary.bounded > 1)} with a parameter at rest on a bound of its fit, "
-            f"which the tests do not settle: {names}; see the column on a bound of batch.csv"
-        )
-    if summary.warned:
-        yield (
-            f"{summary.warned} bushing{'s' * (summary.warned > 1)} with warnings of their own: see the column warnings "
-            "of batch.csv"
-        )
+    names = ", ".join(f"{name} of {times}" for name, times in summary.bounds.most_common())
+    unsettled = (
+        f"a parameter at rest on a bound of its fit, which the tests do not settle: {names}; see the column on a"
+    )
+    said = {f"{unsettled} bound": summary.bounded, "warnings of their own: see the column warnings": summary.warned}
+    for words, count in said.items():
+        if count:
+            yield f"{count} bushing{'s' * (count > 1)} with {words} of batch.csv"
 
 
 def _draw(

@@ -9,7 +9,7 @@ from typing import TextIO
 from bushfit.batch.ledger import ROWS, Record
 from bushfit.batch.limits import Judgement
 from bushfit.batch.manifest import Row
-from bushfit.batch.quantities import CHI_SQUARE, NRMSE, Quantity, figures
+from bushfit.batch.quantities import OF_FIT, Quantity, figures
 from bushfit.reading.csvfile import Rows
 
 #: Columns of every batch, before its numbers.
@@ -40,7 +40,7 @@ class Table:
         header = [*_FIRST, *(_JUDGED if limits else ()), *(_FOUND if verdicts else ())]
         self._numbers = [
             *product(parameters, ("", ", std error", ", low", ", high")),
-            *product((NRMSE, CHI_SQUARE), ("",)),
+            *product(OF_FIT.values(), ("",)),
             *product(points, ("", ", low", ", high")),
         ]
         header += [quantity.header + part for quantity, part in self._numbers]
@@ -53,11 +53,8 @@ class Table:
         error = " ".join(record.get("error", "").split())
         cells: list[str | float | None] = [row.name, row.listed, folder, record["status"], error]
         if self._limits:
-            cells += (
-                [str(judged.verdict), *("; ".join(words.values()) for words in (judged.missed, judged.edge))]
-                if judged
-                else [""] * 3
-            )
+            words = ["; ".join(said.values()) for said in (judged.missed, judged.edge)] if judged else ["", ""]
+            cells += [str(judged.verdict) if judged else "", *words]
         if self._verdicts:
             cells += [record.get("verdict", ""), *(", ".join(record.get(k, ())) for k in ("effects", "alternatives"))]
         for quantity, part in self._numbers:

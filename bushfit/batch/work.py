@@ -158,7 +158,7 @@ def _one_by_one(
         files |= diagnosed.files(formats)
     assert result is not None  # the manifest has seen to it that there is a model
     if "predict" in commands:
-        files |= Predict().run(result, campaign).files({TABLES, *formats})
+        files |= Predict().run(result, campaign).files_beside({TABLES, *formats})
     return result, diagnosed
 
 

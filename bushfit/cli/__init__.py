@@ -12,12 +12,13 @@ import click
 from bushfit import __version__
 from bushfit.errors import BushfitError
 
-#: Command, its module and the line that `bushfit --help` shows: no module is loaded before it is needed.
+#: Command, its module (and its name there, if not "command") and the line that `bushfit --help` shows: no module is
+#: loaded before it is needed.
 _COMMANDS = {
     "run": ("run", "The whole chain: fit-static, fit-dynamic, fit, diagnose, predict."),
-    "fit-static": ("fit_static", "Loops -> mu, sigma_fmax, eps_half (elasticity and friction)."),
-    "fit-dynamic": ("fit_dynamic", "Smallest-amplitude sweep -> m, alpha (rate dependence)."),
-    "fit": ("fit", "Loops and sweeps -> all five parameters together: the fit to use."),
+    "fit-static": ("fit.static", "Loops -> mu, sigma_fmax, eps_half (elasticity and friction)."),
+    "fit-dynamic": ("fit.dynamic", "Smallest-amplitude sweep -> m, alpha (rate dependence)."),
+    "fit": ("fit.fit", "Loops and sweeps -> all five parameters together: the fit to use."),
     "predict": ("predict", "Model -> axial and radial stiffness tables and plots."),
     "diagnose": ("diagnose", "Where do model and tests disagree? What is missing? Add it, show the gap shrink."),
     "batch": ("batch", "Many campaigns at once -> one table, limits, a report for CI."),
@@ -47,7 +48,8 @@ class _Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _COMMANDS:
             return None
-        return importlib.import_module(f"bushfit.cli.{_COMMANDS[cmd_name][0]}").command
+        module, _, name = _COMMANDS[cmd_name][0].partition(".")
+        return getattr(importlib.import_module(f"bushfit.cli.{module}"), name or "command")
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):

@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, example, naming_option, place_option, shared_options
+from bushfit.cli.common import Options, example, naming_option, path_option, place_option, shared_options
 from bushfit.cli.show import new_table, warn
 from bushfit.units import alike, for_people
 
 if TYPE_CHECKING:
     from bushfit.batch.manifest import Command, Settings
-    from bushfit.batch.points import Point
     from bushfit.batch.pool import Pool
     from bushfit.batch.run import Plan, Summary
 
@@ -38,11 +37,7 @@ _SECONDS_A_LINE = 10.0
     multiple=True,
     help="What to do with each campaign: fit, diagnose, predict, may be given again; or run, the whole chain [fit].",
 )
-@place_option(
-    "directions",
-    multiple=True,
-    help="Tests to fit, as in bushfit fit.",
-)
+@place_option("directions", multiple=True, help="Tests to fit, as in bushfit fit.")
 @click.option("--effect", "effects", multiple=True, metavar="NAME", help="Add an effect, as in bushfit fit.")
 @click.option(
     "--at",
@@ -50,10 +45,8 @@ _SECONDS_A_LINE = 10.0
     metavar="POINT",
     help='Stiffness and loss factor there, such as "axial 25 Hz 0.1 mm" (zero-to-peak); may be given again.',
 )
-@click.option(
-    "--limits", type=click.Path(path_type=Path), metavar="FILE", help="Judge each bushing by this TOML file (above)."
-)
-@click.option("--junit", type=click.Path(path_type=Path), metavar="FILE", help="Write a JUnit report for CI.")
+@path_option("--limits", metavar="FILE", help="Judge each bushing by this TOML file (above).")
+@path_option("--junit", metavar="FILE", help="Write a JUnit report for CI.")
 @click.option("--jobs", type=click.IntRange(min=1), default=None, help="Worker processes [the cores there are].")
 @click.option(
     "--scheduler",
@@ -101,6 +94,7 @@ def command(
     """
     from bushfit.batch.limits import check_judged, read_limits
     from bushfit.batch.manifest import read_manifest
+    from bushfit.batch.points import parse_point
     from bushfit.batch.pool import DaskPool, LocalPool
     from bushfit.batch.run import Plan, check_free, run
     from bushfit.batch.work import Orders
@@ -109,7 +103,8 @@ def command(
     judged_by = read_limits(limits) if limits else None
     if limits and judged_by:
         check_judged(judged_by, limits, read.rows)
-    points = (*read.points, *_points(at), *(judged_by.points if judged_by else ()))
+    with naming_option("--at"):
+        points = (*read.points, *map(parse_point, at), *(judged_by.points if judged_by else ()))
     formats = tuple(kind for kind, wanted in (("csv", tables), ("png", plots and options.plots)) if wanted)
     output = options.folder(read.stem).absolute()
     orders = Orders(output, tuple(dict.fromkeys(points)), formats, resume)
@@ -133,22 +128,12 @@ def _settings(commands: tuple[Command, ...], directions: tuple[str, ...], effect
     return Settings(commands=commands or None, directions=directions or None, effects=names or None)
 
 
-def _points(texts: tuple[str, ...]) -> list[Point]:
-    from bushfit.batch.points import parse_point
-
-    with naming_option("--at"):
-        return [parse_point(text) for text in texts]
-
-
 @contextmanager
 def _progress(options: Options, total: int) -> Iterator[Callable[[str], None]]:
     """Rate and time left: a bar on a terminal, now and then a line elsewhere."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = options.console
-    if not console.is_terminal:
-        yield _lines(options, total)
-        return
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -157,35 +142,25 @@ def _progress(options: Options, total: int) -> Iterator[Callable[[str], None]]:
         TimeRemainingColumn(),
         TextColumn("{task.fields[failures]}", style="red"),
     )
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("bushings", total=total, rate="", failures="")
-        begin, count = time.monotonic(), Counter[str]()
-
-        def advance(status: str) -> None:
-            count[status] += 1
-            rate = f"{count.total() / max(time.monotonic() - begin, 1e-9):.1f}/s"
-            failures = f"{count['failed']} failed" if count["failed"] else ""
-            bar.update(task, completed=count.total(), rate=rate, failures=failures)
-
-        yield advance
-
-
-def _lines(options: Options, total: int) -> Callable[[str], None]:
     begin = said = time.monotonic()
     tenth, count = 0, Counter[str]()
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("bushings", total=total, rate="", failures="")
 
-    def advance(status: str) -> None:
-        nonlocal said, tenth
-        count[status] += 1
-        done, now = count.total(), time.monotonic()
-        if now - said < _SECONDS_A_LINE and (10 * done // total == tenth or now - begin < _SECONDS_A_LINE):
-            return
-        said, tenth, rate = now, 10 * done // total, done / (now - begin)
-        failures = f", {count['failed']} failed" if count["failed"] else ""
-        text = f"{done} of {total}, {rate:.1f}/s, {(total - done) / rate:.0f} s left{failures}"
-        options.console.print(text, markup=False)
+        def advance(status: str) -> None:
+            nonlocal said, tenth
+            count[status] += 1
+            done, now = count.total(), time.monotonic()
+            rate = done / max(now - begin, 1e-9)
+            failures = f"{count['failed']} failed" if count["failed"] else ""
+            bar.update(task, completed=done, rate=f"{rate:.1f}/s", failures=failures)
+            due = now - begin >= _SECONDS_A_LINE and 10 * done // total != tenth
+            if not console.is_terminal and (due or now - said >= _SECONDS_A_LINE):
+                said, tenth = now, 10 * done // total
+                text = f"{done} of {total}, {rate:.1f}/s, {(total - done) / rate:.0f} s left"
+                options.say(", ".join(filter(None, (text, failures))))
 
-    return advance
+        yield advance
 
 
 def _tell(options: Options, summary: Summary, folder: Path, plan: Plan) -> None:
@@ -201,12 +176,9 @@ def _tell(options: Options, summary: Summary, folder: Path, plan: Plan) -> None:
         console.print(table)
     rate = status.total() / max(summary.seconds, 1e-9)
     kept = f", {summary.kept} of them from before" if summary.kept else ""
-    console.print(
-        f"{status['done']} done{kept}, {status['failed']} failed; {summary.seconds:.1f} s, {rate:.1f} a second",
-        markup=False,
-    )
+    options.say(f"{status['done']} done{kept}, {status['failed']} failed; {summary.seconds:.1f} s, {rate:.1f} a second")
     if plan.limits:
-        console.print("limits: " + ", ".join(f"{count} {word}" for word, count in summary.limits.items()), markup=False)
+        options.say("limits: " + ", ".join(f"{count} {word}" for word, count in summary.limits.items()))
     warn(options, summary.notes)
     for word, names in (
         ("failed", [f"{name}: {' '.join(error.split())}" for name, error in summary.errors]),
@@ -214,8 +186,8 @@ def _tell(options: Options, summary: Summary, folder: Path, plan: Plan) -> None:
         ("conditional pass", [f"{name}: {words}" for name, words in summary.edge]),
     ):
         for name in names[:_MOST_SHOWN]:
-            console.print(f"{word}: {name}", markup=False)
+            options.say(f"{word}: {name}")
         if len(names) > _MOST_SHOWN:
-            console.print(f"... and {len(names) - _MOST_SHOWN} more {word}: see batch.csv", markup=False)
+            options.say(f"... and {len(names) - _MOST_SHOWN} more {word}: see batch.csv")
     written = [*(name for name in (TABLE, PICTURE) if (folder / name).exists()), "bushings/"]
-    console.print(f"wrote {', '.join(written)} to {folder}", markup=False)
+    options.say(f"wrote {', '.join(written)} to {folder}")

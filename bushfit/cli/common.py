@@ -83,6 +83,13 @@ class _Share(click.FloatRange):
 direction_option = partial(click.option, "--direction", cls=_DirectionOption, type=_Direction())
 #: The same of a command that takes specimens by their names, too.
 place_option = partial(click.option, "--direction", cls=_DirectionOption, type=_Place())
+#: Decorator of a command that takes a file.
+path_option = partial(click.option, type=click.Path(path_type=Path))
+
+
+def option_of(key: str) -> str:
+    """The option of a key: --force-sign of force_sign."""
+    return "--" + key.replace("_", "-")
 
 
 @contextmanager
@@ -123,10 +130,14 @@ class Options:
         console = Console(stderr=True, quiet=self.quiet, highlight=False, soft_wrap=True)
         return console if console.is_terminal else Console(stderr=True, quiet=self.quiet, soft_wrap=True, width=_WIDTH)
 
+    def say(self, text: str) -> None:
+        """A line as it is, its brackets no markup."""
+        self.console.print(text, markup=False)
+
     def write(self, folder: Path, files: Mapping[str, bytes]) -> None:
         """Write the results, all or none, and say where."""
         write_files(folder, files, force=self.force)
-        self.console.print(f"wrote {', '.join(files)} to {folder}", markup=False)
+        self.say(f"wrote {', '.join(files)} to {folder}")
 
     def require_free(self, folder: Path, names: Sequence[str]) -> None:
         """Refuse before the work rather than after it."""
@@ -144,12 +155,7 @@ def example(*commands: str) -> str:
 
 
 def shared_options(function: F, where: str = "results/<campaign or file>") -> F:
-    """-o, -v, -q, --json, --no-plots, --force, gathered into one `options` argument.
-
-    Args:
-        function: the command.
-        where: results go without -o, for its help.
-    """
+    """-o, -v, -q, --json, --no-plots, --force, gathered into one `options` argument; `where` results go without -o."""
 
     @click.option("-o", "--output", type=_Folder(path_type=Path), help=f"Folder for the results [{where}].")
     @click.option("-v", "--verbose", is_flag=True, help="Say more: steps on the way, all correlations, files.")
@@ -183,10 +189,7 @@ class Task:
     ) -> None:
         """What every command on a campaign does: read, refuse to overwrite, work, tell, write, hold to a limit.
 
-        Args:
-            job: the work.
-            tell: shows what it found, given the campaign's name.
-            last_line: said of it below the files written, given their folder.
+        `tell` is given the campaign's name; `last_line`, said below the files written, their folder.
         """
         from bushfit.campaign.campaign import load_campaign
         from bushfit.fitting.data import Data
@@ -200,7 +203,7 @@ class Task:
         tell(options, loaded.name, outcome)
         options.write(folder, outcome.files(options.formats))
         if last_line:
-            options.console.print(last_line(folder, outcome), markup=False)
+            options.say(last_line(folder, outcome))
         options.tell(outcome.document)
         quality = outcome.result.quality
         if self.max_nrmse is not None and quality and quality.nrmse > self.max_nrmse:
@@ -211,9 +214,7 @@ class Task:
 def campaign_options(function: F, soft_l1: str = "points far off pull less, outliers not at all") -> F:
     """CAMPAIGN, --loss, --max-nrmse and the shared options, gathered into one `task` argument.
 
-    Args:
-        function: the command.
-        soft_l1: what the robust loss does in this command, for its help.
+    `soft_l1` says what the robust loss does in this command, for its help.
     """
 
     @click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=click.Path(path_type=Path))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, Task, campaign_options, example, naming_option, open_model
+from bushfit.cli.common import Options, Task, campaign_options, example, naming_option, open_model, path_option
 from bushfit.cli.show import new_table, parameter_table, warn
 from bushfit.errors import BushfitError
 from bushfit.units import alike, for_people, quantity
@@ -22,11 +22,7 @@ _COLOURS = {"consistent": "green", "named": "green", "ambiguous": "yellow", "par
 
 
 @click.command("diagnose", epilog=example("bushfit diagnose configs/mystery_mount.toml"))
-@click.option(
-    "--model",
-    type=click.Path(path_type=Path),
-    help="Start from this model's effects [the paper's three]; its values are fitted anew.",
-)
+@path_option("--model", help="Start from this model's effects [the paper's three]; its values are fitted anew.")
 @click.option(
     "--adopt",
     multiple=True,
@@ -100,11 +96,8 @@ def tell_findings(options: Options, outcome: Diagnosed) -> None:
     for effect in outcome.document["effects"]:
         _tell_effect(options, effect)
     table = new_table("gap, in units of noise (1 is the floor)", "", "before", "after")
-    for words, pair in (
-        ("data fitted", diagnosis.calibration),
-        ("held out", (diagnosis.holdout.before, diagnosis.holdout.after)),
-    ):
-        table.add_row(words, *(f"{value:.2f}" for value in pair))
+    table.add_row("data fitted", *(f"{value:.2f}" for value in diagnosis.calibration))
+    table.add_row("held out", f"{diagnosis.holdout.before:.2f}", f"{diagnosis.holdout.after:.2f}")
     console.print(table)
     for title, regions in (("where", diagnosis.where), ("what remains", diagnosis.remainder)):
         if regions and not (title == "what remains" and diagnosis.remainder == diagnosis.where):

@@ -1,14 +1,50 @@
-"""`bushfit fit`: loops and sweeps -> all parameters together."""
+"""`bushfit fit-static`, `fit-dynamic` and `fit`: loops, sweeps, or both together -> parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from pathlib import Path
 
 import click
 
-from bushfit.cli.common import Options, Task, campaign_options, example, place_option
+from bushfit.cli.common import Options, Task, campaign_options, example, open_model, path_option, place_option
 from bushfit.cli.show import tell_fit
+
+
+@click.command("fit-static", epilog=example("bushfit fit-static configs/cmp_15961.toml"))
+@path_option("--dynamic", help="Hold the springpot at m and alpha of this dynamic.json or model.json.")
+@campaign_options
+def static(dynamic: Path | None, task: Task) -> None:
+    """Fit mu, sigma_fmax and eps_half to the hysteresis loops of CAMPAIGN, the springpot held.
+
+    m and alpha come from --dynamic, or from [fit] of the campaign where it gives both. Where they are not known
+    yet the springpot is left out, and a warning says what this does to the result.
+
+    Writes static.json, loops.csv and loops.png.
+    """
+    from bushfit.jobs.fits import FitStatic
+
+    task.perform(FitStatic(open_model(dynamic) if dynamic else None), tell_fit)
+
+
+@click.command("fit-dynamic", epilog=example("bushfit fit-dynamic configs/cmp_15961.toml"))
+@path_option(
+    "--static",
+    help="Hold mu, sigma_fmax and eps_half at those of this static.json [fitted to the loops on the spot].",
+)
+@campaign_options
+def dynamic(static: Path | None, task: Task) -> None:
+    """Fit m and alpha to the smallest-amplitude sweep of CAMPAIGN, the other three held.
+
+    They are held at --static, and their errors are carried over. Without it the loops of CAMPAIGN are fitted first,
+    as fit-static does. [fit] dynamic_amplitudes in the campaign chooses other sweep amplitudes.
+
+    Writes dynamic.json, which `bushfit predict` takes as it is, sweeps.csv and sweeps.png.
+    """
+    from bushfit.jobs.fits import FitDynamic
+
+    task.perform(FitDynamic(open_model(static) if static else None), tell_fit)
 
 
 @click.command(
@@ -30,7 +66,7 @@ from bushfit.cli.show import tell_fit
 )
 @click.option("--profile", is_flag=True, help="Add 95 % intervals by profile likelihood (some seconds).")
 @campaign_options
-def command(directions: tuple[str, ...], effects: tuple[str, ...], profile: bool, task: Task) -> None:
+def fit(directions: tuple[str, ...], effects: tuple[str, ...], profile: bool, task: Task) -> None:
     """Fit all five parameters to the loops and sweeps of CAMPAIGN together.
 
     Writes model.json, and the tables and plots of both: loops.csv, loops.png, sweeps.csv, sweeps.png. Tests in
@@ -54,16 +90,15 @@ def _progress(options: Options) -> Iterator[Callable[[str, int], None]]:
     from rich.progress import Progress
 
     console = options.console
-    if not console.is_terminal:
-        yield lambda name, left: console.print(f"profile of {name}: done, {left} to go", markup=False)
-        return
-    with Progress(console=console, transient=True) as bar:
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("profiles", total=None)
 
         def advance(name: str, left: int) -> None:
             done = bar.tasks[0].completed + 1
             bar.update(task, completed=done, total=done + left, description=f"profile of {name}: done")
-            if not left:
+            if not console.is_terminal:
+                options.say(f"profile of {name}: done, {left} to go")
+            elif not left:
                 bar.stop()
 
         yield advance

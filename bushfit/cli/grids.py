@@ -12,6 +12,21 @@ from bushfit.units import quantity
 _MOST_VALUES = 100_000
 
 
+def positive(text: str | None, option: str, unit: str) -> float | None:
+    """The value of an option in SI, above zero; None where it was not given.
+
+    Raises:
+        UnitError: no value with a unit, or one that is not positive.
+    """
+    if text is None:
+        return None
+    with naming_option(option):
+        value = quantity(text, unit)
+        if not value > 0.0:
+            raise UnitError("this is not positive", found=f'"{text}"', expected="a value above zero")
+    return value
+
+
 def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | None:
     """Values of an option in SI, or None where it was not given.
 

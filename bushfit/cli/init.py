@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, example, naming_option, shared_options
-from bushfit.cli.inspect import KEYS, tell_assumed, tell_left_out
+from bushfit.cli.common import Options, example, naming_option, option_of, shared_options
+from bushfit.cli.inspect import KEYS, tell_left_out
 from bushfit.cli.raw import direction_error, file_options, options_named
 from bushfit.cli.show import warn
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, typed
@@ -17,6 +17,8 @@ from bushfit.errors import BushfitError, CampaignError, MeasurementError, typed
 if TYPE_CHECKING:
     from bushfit.geometry import Bushing
     from bushfit.inspection.record import Inspected
+#: Sides of the rubber whose radius or diameter is asked for.
+_SIDES = ("inner", "outer")
 
 
 @click.command(
@@ -36,15 +38,7 @@ if TYPE_CHECKING:
 @file_options(*KEYS)
 @shared_options
 def command(
-    files: tuple[Path, ...],
-    inner_radius: str | None,
-    inner_diameter: str | None,
-    outer_radius: str | None,
-    outer_diameter: str | None,
-    length: str,
-    name: str | None,
-    stated: Mapping[str, Any],
-    options: Options,
+    files: tuple[Path, ...], name: str | None, stated: Mapping[str, Any], options: Options, **sizes: str | None
 ) -> None:
     """Write a campaign from test files and the geometry of the bushing.
 
@@ -62,12 +56,11 @@ def command(
 
     name = name or (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name
     folder, target = _place(options, name)
-    sizes = (inner_radius, inner_diameter, outer_radius, outer_diameter, length)
-    bushing = _bushing(name, *sizes) if any(sizes) else None
+    bushing = _bushing(name, sizes) if any(sizes.values()) else None
     options.require_free(folder, [target])
     seen, left_out = _usable(files, stated, is_bushing=bushing is not None or "specimen" not in stated)
     if bushing is None and not all(isinstance(one.direction, Specimen) for one in seen):
-        bushing = _bushing(name, *sizes)
+        bushing = _bushing(name, sizes)
     text = campaign_text(name, bushing and bushing[1], seen, folder)
     if bushing:
         _tell_bushing(options, bushing[0])
@@ -75,14 +68,15 @@ def command(
         _tell(options, one)
     tell_left_out(options, left_out)
     options.write(folder, {target: text.encode()})
-    options.console.print(f"next: bushfit run {typed(folder / target)}", markup=False)
+    options.say(f"next: bushfit run {typed(folder / target)}")
     options.tell({"campaign": text, "files": [one.to_document() for one in seen], "left_out": left_out})
 
 
-def _radius(side: str, radius: str | None, diameter: str | None) -> str:
+def _radius(side: str, sizes: Mapping[str, str | None]) -> str:
     """A radius as the campaign has it, from the one of the two options that was given."""
     from bushfit.units import quantity
 
+    radius, diameter = sizes[f"{side}_radius"], sizes[f"{side}_diameter"]
     options = f"--{side}-radius", f"--{side}-diameter"
     if radius is not None and diameter is not None:
         raise click.UsageError(f"'{options[0]}' and '{options[1]}' are one size; give one of them.")
@@ -104,14 +98,7 @@ def _place(options: Options, name: str) -> tuple[Path, str]:
     return options.folder(folder_name(name)), "campaign.toml"
 
 
-def _bushing(
-    name: str,
-    inner_radius: str | None,
-    inner_diameter: str | None,
-    outer_radius: str | None,
-    outer_diameter: str | None,
-    length: str | None,
-) -> tuple[Bushing, dict[str, str]]:
+def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[str, str]]:
     """The bushing of the campaign to be, and the keys of its sizes there.
 
     Errors name the options, diameters where these were given and halved.
@@ -120,15 +107,10 @@ def _bushing(
     from bushfit.geometry import Bushing
     from bushfit.validation import check_tables
 
-    if length is None:
+    if (length := sizes["length"]) is None:
         raise click.UsageError("Missing option '--length'.")
-    table = {
-        "inner_radius": _radius("inner", inner_radius, inner_diameter),
-        "outer_radius": _radius("outer", outer_radius, outer_diameter),
-        "length": length,
-    }
-    given = {"inner_radius": inner_diameter, "outer_radius": outer_diameter}
-    halved = [key for key, diameter in given.items() if diameter]
+    table = {f"{side}_radius": _radius(side, sizes) for side in _SIDES} | {"length": length}
+    halved = [f"{side}_radius" for side in _SIDES if sizes[f"{side}_diameter"]]
     try:
         return Bushing(**vars(check_tables({"name": name, **table}, None, BushingTable))), table
     except BushfitError as error:
@@ -136,7 +118,7 @@ def _bushing(
         if error.place:
             keys = error.place.split(", ")
             names = [key.replace("radius", "diameter") if key in halved else key for key in keys]
-            error.place = ", ".join("--" + name.replace("_", "-") for name in names)
+            error.place = ", ".join(map(option_of, names))
             if set(keys) & set(halved):
                 error.hint = "a diameter given counts by its half; check that inner and outer are not swapped"
         raise
@@ -145,10 +127,7 @@ def _bushing(
 def _usable(files: Sequence[Path], stated: Mapping[str, Any], *, is_bushing: bool) -> tuple[list[Inspected], list[str]]:
     """The loops and sweeps among files, each of a known direction or specimen, and why others are left out.
 
-    Args:
-        files: files and folders.
-        stated: keys of their tables in a campaign that the user states.
-        is_bushing: whether a bushing may have been tested, and not specimens alone.
+    `is_bushing` says whether a bushing may have been tested, and not specimens alone.
 
     Raises:
         MeasurementError: a file that the user names is another, with the way on.
@@ -189,11 +168,8 @@ def _usable(files: Sequence[Path], stated: Mapping[str, Any], *, is_bushing: boo
 
 def _tell_bushing(options: Options, bushing: Bushing) -> None:
     inner, outer, long = (1e3 * size for size in (2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length))
-    options.console.print(
-        f"{bushing.name}: rubber from {inner:.6g} to {outer:.6g} mm in diameter, {(outer - inner) / 2:.6g} mm thick, "
-        f"{long:.6g} mm long",
-        markup=False,
-    )
+    across = f"from {inner:.6g} to {outer:.6g} mm in diameter, {(outer - inner) / 2:.6g} mm thick"
+    options.say(f"{bushing.name}: rubber {across}, {long:.6g} mm long")
 
 
 def _tell(options: Options, seen: Inspected) -> None:
@@ -202,6 +178,7 @@ def _tell(options: Options, seen: Inspected) -> None:
     wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
     kept = [f"{key}: {value}" for key, value in facts.items() if key in wanted or key.startswith("from ")]
     place = seen.file.parent / seen.label
-    options.console.print(f"{place}: {seen.kind}, {seen.direction}; {'; '.join(kept)}", markup=False)
+    options.say(f"{place}: {seen.kind}, {seen.direction}; {'; '.join(kept)}")
     warn(options, [f"{seen.label}: {sentence}" for sentence in seen.looked.odd])
-    tell_assumed(options, seen)
+    if seen.assumed:
+        options.say(f"  {seen.assumed}")

@@ -107,8 +107,9 @@ def tell(options: Options, seen: Inspected) -> None:
         table.add_row(escape(column.header), column.role or "(not needed)", escape(column.unit or ""), *ends)
     console.print(table)
     for label, value in {"written with": written, **seen.looked.facts}.items():
-        console.print(f"  {label}: {value}", markup=False)
-    tell_assumed(options, seen)
+        options.say(f"  {label}: {value}")
+    if seen.assumed:
+        options.say(f"  {seen.assumed}")
     for sentence in seen.looked.odd:
         console.print(f"  [yellow]odd:[/yellow] {escape(sentence)}")
     if not seen.looked.odd:
@@ -118,10 +119,4 @@ def tell(options: Options, seen: Inspected) -> None:
 def tell_left_out(options: Options, left_out: Sequence[str]) -> None:
     """A line for each file or sheet that holds no test."""
     for sentence in left_out:
-        options.console.print(f"left out: {sentence}", markup=False)
-
-
-def tell_assumed(options: Options, seen: Inspected) -> None:
-    """What a file leaves open and was assumed."""
-    if seen.assumed:
-        options.console.print(f"  {seen.assumed}", markup=False)
+        options.say(f"left out: {sentence}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, example, naming_option, open_model, place_option, shared_options
+from bushfit.cli.common import Options, example, open_model, option_of, path_option, place_option, shared_options
 from bushfit.cli.show import new_table, tell_tests, warn
 
 if TYPE_CHECKING:
@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 
 #: Amplitudes of a direction that the terminal shows at most, spread from first to last; the CSV has all.
 _MOST_AMPLITUDES = 8
+#: Options of the grid, and the SI unit of each.
+_GRIDS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
+#: Warnings of the fit that a prediction repeats at most; the model file has all.
+_MOST_OF_FIT = 3
 
 
 @click.command(
@@ -24,14 +28,12 @@ _MOST_AMPLITUDES = 8
     ),
 )
 @click.argument("model", type=click.Path(path_type=Path))
-@click.option(
+@path_option(
     "--campaign",
-    type=click.Path(path_type=Path),
     help="Lay this campaign's sweeps over the plots, set them beside the prediction, and use its [predict] grid.",
 )
-@click.option(
+@path_option(
     "--bushing",
-    type=click.Path(path_type=Path),
     metavar="FILE",
     help="Predict another bushing of the same compound: the [bushing] table of this TOML file.",
 )
@@ -52,13 +54,10 @@ def command(
     campaign: Path | None,
     bushing: Path | None,
     directions: tuple[str, ...],
-    frequencies: str | None,
-    amplitudes: str | None,
-    torsion_amplitudes: str | None,
-    strain_amplitudes: str | None,
     mass: str | None,
     base_acceleration: str | None,
     options: Options,
+    **grids: str | None,
 ) -> None:
     """Dynamic stiffness and loss factor of MODEL (the model.json of run, fit or diagnose, or dynamic.json) over a grid.
 
@@ -75,27 +74,24 @@ def command(
     from bushfit.campaign.campaign import load_bushing, load_campaign
     from bushfit.campaign.naming import folder_name
     from bushfit.campaign.schema import PredictSettings
-    from bushfit.cli.grids import parse_grid
+    from bushfit.cli.grids import parse_grid, positive
     from bushfit.jobs.predict import Predict
     from bushfit.prediction import carried
 
     result, notes = open_model(model), list[str]()
-    of_fit = [f"of the fit: {line}" for line in result.warnings]
+    of_fit = [f"of the fit: {line}" for line in result.warnings[:_MOST_OF_FIT]]
+    if more := len(result.warnings) - len(of_fit):
+        of_fit.append(f"of the fit: {more} more, under warnings in {model}")
     if bushing:
         result, note = carried(result, load_bushing(bushing))
         notes.append(note)
         directions = directions or ("axial", "radial")
     loaded = load_campaign(campaign) if campaign else None
-    job = Predict(
-        PredictSettings(
-            parse_grid(frequencies, "--frequencies", "Hz"),
-            parse_grid(amplitudes, "--amplitudes", "m"),
-            parse_grid(torsion_amplitudes, "--torsion-amplitudes", "rad"),
-            directions or None,
-            parse_grid(strain_amplitudes, "--strain-amplitudes", "1"),
-        ),
-        *_shaken(mass, base_acceleration),
-    )
+    asked = {name: parse_grid(grids[name], option_of(name), unit) for name, unit in _GRIDS.items()}
+    if (mass is None) != (base_acceleration is None):
+        raise click.UsageError("'--mass' and '--base-acceleration' go together.")
+    shaken = positive(mass, "--mass", "kg"), positive(base_acceleration, "--base-acceleration", "m/s^2")
+    job = Predict(PredictSettings(directions=directions or None, **asked), *shaken)
     folder = options.folder(loaded.slug if loaded else folder_name(result.name))
     measured = ["measured.csv"] if loaded and loaded.sweeps else []
     options.require_free(folder, [*job.names(result, loaded, options.formats), *measured])
@@ -104,28 +100,11 @@ def command(
     for found in outcome.resonances:
         frequency, largest = found.peak
         peak = f"resonance at {frequency:.4g} Hz, |T| {largest:.3g}"
-        options.console.print(f"{found.place} under {mass}, base at {base_acceleration}: {peak}", markup=False)
+        options.say(f"{found.place} under {mass}, base at {base_acceleration}: {peak}")
     tell_tests(options, outcome.tests, outcome.usable)
     warn(options, of_fit)
     options.write(folder, outcome.files_beside(options.formats))
     options.tell(outcome.document)
-
-
-def _shaken(mass: str | None, base_acceleration: str | None) -> tuple[float, float] | tuple[()]:
-    """Mass [kg] and acceleration of the base [m/s^2], where they are given."""
-    from bushfit.errors import UnitError
-    from bushfit.units import quantity
-
-    if (mass is None) != (base_acceleration is None):
-        raise click.UsageError("'--mass' and '--base-acceleration' go together.")
-    values = []
-    for option, text, unit in (("--mass", mass, "kg"), ("--base-acceleration", base_acceleration, "m/s^2")):
-        if text is not None:
-            with naming_option(option):
-                values.append(quantity(text, unit))
-                if not values[-1] > 0.0:
-                    raise UnitError("this is not positive", found=text, expected="above zero")
-    return (values[0], values[1]) if values else ()
 
 
 def tell_predictions(options: Options, outcome: Predicted) -> None:

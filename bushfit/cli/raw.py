@@ -11,7 +11,7 @@ from typing import Any, TypeVar, get_args
 
 import click
 
-from bushfit.cli.common import direction_option
+from bushfit.cli.common import direction_option, option_of
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.reading.headers import AmplitudeConvention
 from bushfit.reading.words import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
@@ -27,7 +27,7 @@ _SAME_NAME = {
     "at_amplitude": 'Without a column: "0.1 mm" [found in the name].',
     "at_frequency": 'Without a column: "10 Hz" [found in the name].',
     "temperature": 'Of the test, or of the rows to take: "23 degC".',
-    "specimen": "Name of the specimen, if no bushing [coupon].",
+    "specimen": "Name of the specimen, if no bushing [coupon; bar if in tension].",
     "area": 'Of one rubber block in shear, such as "772 mm^2".',
     "thickness": 'Of one rubber block in shear, such as "6 mm".',
     "elements": "Rubber blocks in parallel [1].",
@@ -47,13 +47,10 @@ _PAIRED = re.compile(r'(column|unit)s = \{ (\w+) = "([^"]*)"')
 
 
 def file_options(*keys: str, sweeps: bool = True) -> Callable[[F], F]:
-    """--direction, --column, --unit and an option for each of some keys, gathered into one `stated` argument.
+    """--direction, --column, --unit and an option for each of some keys of a campaign, gathered into one `stated`.
 
-    Args:
-        keys: of [[loops]] and [[sweeps]], as a campaign would have them.
-        sweeps: whether the command takes sweeps, or else resonance tests, beside loops.
+    Beside loops the command takes sweeps, or else resonance tests.
     """
-
     known = tuple(dict.fromkeys((*LOOP_COLUMNS, *(SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS))))
 
     def decorate(function: F) -> F:
@@ -84,15 +81,9 @@ def _options(keys: Sequence[str], *, sweeps: bool) -> list[Callable[[Any], Any]]
             metavar="ROLE=HEADER",
             help=f'Such as "force=Fz", of files that have this header; may be given again. {roles}.',
         ),
-        click.option(
-            "--unit",
-            "units",
-            multiple=True,
-            metavar="ROLE=UNIT",
-            help='Such as "force=kN"; ROLEs as above.',
-        ),
+        click.option("--unit", "units", multiple=True, metavar="ROLE=UNIT", help='Such as "force=kN"; ROLEs as above.'),
         *(
-            click.option("--" + key.replace("_", "-"), key, type=int if key in _NUMBERS else str, help=_SAME_NAME[key])
+            click.option(option_of(key), key, type=int if key in _NUMBERS else str, help=_SAME_NAME[key])
             for key in keys
         ),
     ]
@@ -107,9 +98,9 @@ def options_named() -> Iterator[None]:
         hint = error.hint or ""
         named = [f'--{kind} "{role}={text}"' for kind, role, text in _PAIRED.findall(hint)]
         keys = _TABLE.sub("", hint)  # in a table, amplitude is a role
-        named += ["--" + key.replace("_", "-") for key in _SAME_NAME if re.search(rf"\b{key} = ", keys)]
+        named += [option_of(key) for key in _SAME_NAME if re.search(rf"\b{key} = ", keys)]
         if error.file is None and error.place in _SAME_NAME:
-            error.place = "--" + error.place.replace("_", "-")
+            error.place = option_of(error.place)
         if named:
             error.hint = f"{hint}; for this command: {', '.join(dict.fromkeys(named))}"
         raise

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from bushfit.cli.common import Options, example, naming_option, shared_options
+from bushfit.cli.common import Options, example, shared_options
+from bushfit.cli.grids import parse_grid, positive
 from bushfit.cli.inspect import FORMAT_KEYS
 from bushfit.cli.raw import direction_error, file_options, options_named
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import BushfitError, MeasurementError
-from bushfit.units import alike, number, quantity
+from bushfit.units import alike, number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,10 +42,7 @@ _LINES_AN_OCTAVE = 3
 )
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @file_options("force_sign", *FORMAT_KEYS, sweeps=False)
-@click.option(
-    "--levels",
-    help='Amplitudes that were asked for, such as "0.1, 0.2 mm" [found].',
-)
+@click.option("--levels", help='Amplitudes that were asked for, such as "0.1, 0.2 mm" [found].')
 @click.option("--cycles", type=click.IntRange(3, 1000), default=3, show_default=True, help="Fewest steady cycles.")
 @click.option("--mass", help='Of a resonance test, such as "0.5 kg".')
 @click.option("--mass-added", help='What moves with it, such as "15 g".')
@@ -89,7 +87,7 @@ def command(
         output["reduce.png"] = to_png(found.figure())
     options.write(folder, output)
     snippet = f'[[sweeps]]\nfile = "sweep.csv"\n{found.body} = {json.dumps(found.name, ensure_ascii=False)}\n'
-    options.console.print(f"for a campaign in {folder} (elsewhere, with the way there):\n\n{snippet}", markup=False)
+    options.say(f"for a campaign in {folder} (elsewhere, with the way there):\n\n{snippet}")
     document = {found.body: found.name, "points": found.points.to_dict(orient="list"), **found.document}
     options.tell({**document, "warnings": list(found.warnings), "campaign": snippet})
 
@@ -112,7 +110,6 @@ class _Found:
 
 def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | None, cycles: int) -> _Found:
     """Raw stepped-sine histories, reduced."""
-    from bushfit.cli.grids import parse_grid
     from bushfit.reduction.steps import reduce
     from bushfit.report.tables import reduced_table
 
@@ -175,7 +172,8 @@ def _resonance(
         error = direction_error(table.file)
         error.hint = f'{error.hint}; or name the specimen that was tested: --specimen "mount"'
         raise error
-    mass, base_acceleration = _mass(table, direction, moving), _positive("base_acceleration", "m/s^2", moving)
+    mass = _mass(table, direction, moving)
+    base_acceleration = positive(moving["base_acceleration"], "--base-acceleration", "m/s^2")
     read_as = direction or Direction.AXIAL  # which translation it is makes no difference to reading
     with options_named():
         reduction = reduce_resonance(read_resonance(table, read_as, base_acceleration), mass)
@@ -201,7 +199,7 @@ def _resonance(
 
 def _mass(table: Table, direction: Direction | None, moving: Mapping[str, str | None]) -> float:
     """The mass that moves [kg]."""
-    mass = _positive("mass", "kg", moving)
+    mass = positive(moving["mass"], "--mass", "kg")
     if direction is not None and direction.is_rotation:
         raise MeasurementError(
             "a mass resists no rotation", file=table.file, found=str(direction), expected="a translation"
@@ -215,19 +213,7 @@ def _mass(table: Table, direction: Direction | None, moving: Mapping[str, str | 
             expected="the mass that moves on the mount",
             hint='state it: --mass "0.5 kg"',
         )
-    return mass + (_positive("mass_added", "kg", moving) or 0.0)
-
-
-def _positive(key: str, unit: str, moving: Mapping[str, str | None]) -> float | None:
-    """The value of an option in SI, above zero; None where it is not given."""
-    option = "--" + key.replace("_", "-")
-    if (text := moving[key]) is None:
-        return None
-    with naming_option(option):
-        value = quantity(text, unit)
-        if value <= 0.0:
-            raise MeasurementError("this is not positive", found=f'"{text}"', expected="a value above zero")
-    return value
+    return mass + (positive(moving["mass_added"], "--mass-added", "kg") or 0.0)
 
 
 def _read(files: Sequence[Path], stated: Mapping[str, Any]) -> list[Loop]:
@@ -284,8 +270,7 @@ def _tell(options: Options, reduction: Reduction) -> None:
     warn(options, reduction.warnings)
     if options.verbose:
         for skip in reduction.skipped:
-            text = f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s makes no point: {skip.why}"
-            options.console.print(text, markup=False)
+            options.say(f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s makes no point: {skip.why}")
 
 
 def _tell_resonance(options: Options, found: Resonance) -> None:

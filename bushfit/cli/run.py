@@ -47,7 +47,7 @@ def tell_run(options: Options, name: str, outcome: Ran) -> None:
     if found:
         tell_verdict(options, name, found)
     else:
-        options.console.print(f"{name}: every parameter is held, so diagnose is passed over", markup=False)
+        options.say(f"{name}: every parameter is held, so diagnose is passed over")
     tell_result(options, f"{name}: {'model with what was added' if outcome.added else 'joint fit'}", result)
     if found and found.diagnosis.verdict != "consistent":
         tell_findings(options, found)
@@ -59,8 +59,7 @@ def tell_run(options: Options, name: str, outcome: Ran) -> None:
     if options.verbose:
         _tell_steps(options, name, outcome)
     two_step = outcome.two_step and _in_a_line(outcome.two_step, outcome.joint.result)
-    line = two_step or f"{outcome.no_two_step}: the two-step procedure is passed over"
-    options.console.print(line, markup=False)
+    options.say(two_step or f"{outcome.no_two_step}: the two-step procedure is passed over")
 
 
 def _which(folder: Path, outcome: Ran) -> str:
@@ -89,7 +88,7 @@ def _tell_range(options: Options, outcome: Ran, measured: Range) -> None:
         ("strains", f"{strains}, which is {', '.join(amplitudes)}"),
         ("directions", ", ".join(measured.directions)),
     ):
-        options.console.print(f"  {label}: {text}", markup=False)
+        options.say(f"  {label}: {text}")
 
 
 def _span(ends: Sequence[float], digits: int) -> str:

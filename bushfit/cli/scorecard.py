@@ -66,10 +66,10 @@ def command(campaigns: int, seed: int, jobs: int, family: Family, options: Optio
     console.print(table)
     for truth, said in confusion(outcomes).items():
         answers = "; ".join(f"{count} x {words}" for words, count in said.most_common())
-        console.print(f"{truth}: {answers}", markup=False)
+        options.say(f"{truth}: {answers}")
     for outcome in outcomes:
         if outcome.error:
-            console.print(f"failed: {outcome.task}: {outcome.error}", markup=False)
+            options.say(f"failed: {outcome.task}: {outcome.error}")
     document = {
         "campaigns": len(chosen),
         "seed": seed,

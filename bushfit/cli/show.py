@@ -62,7 +62,8 @@ def tell_tests(options: Options, tested: Sequence[Misfit], usable: Sequence[Usab
     tests = [test for test in tested if options.verbose or test.held is None]
     worst = sorted(tests, key=lambda test: -test.reduced_chi_square)[: len(tests) if options.verbose else _MOST_TESTS]
     if len(tests) > 1:
-        table = new_table("test by test", "test", "place", "points", "NRMSE [%]", "chi-square", "gain off [%]", "")
+        title = "test by test: NRMSE and gain off [%], chi2 the reduced chi-square"
+        table = new_table(title, "test", "place", "points", "NRMSE", "chi2", "gain", "", names=2)
         for test in tests:
             if test in worst:
                 name = test.test if test.held is None else f"  {_held(test)}"
@@ -70,12 +71,11 @@ def tell_tests(options: Options, tested: Sequence[Misfit], usable: Sequence[Usab
                 table.add_row(name, test.place, str(test.points), *figures, "" if test.fitted else "not fitted")
         options.console.print(table)
     if left := len(tests) - len(worst):
-        options.console.print(f"and {left} tests more, which are met better; -v shows them", markup=False)
+        options.say(f"and {left} tests more, which are met better; -v shows them")
     for place in usable:
         how = "each predicted from other runs" if place.held_out else "as fitted"
         words = f"{number(100 * place.stiffness, 2)} % of stiffness and {number(place.loss_factor, 2)} of loss factor"
-        line = f"{place.place}: usable within {words} (95 % of {place.points} points, {how})"
-        options.console.print(line, markup=False)
+        options.say(f"{place.place}: usable within {words} (95 % of {place.points} points, {how})")
 
 
 def _held(test: Misfit) -> str:
@@ -90,9 +90,9 @@ def _held(test: Misfit) -> str:
 def tell_sources(options: Options, result: Result) -> None:
     """With -v the equation of a model and the files behind it."""
     if options.verbose:
-        options.console.print(result.model.equation(), markup=False)
+        options.say(result.model.equation())
         for source in result.inputs:
-            options.console.print(f"input: {source.file} sha256 {source.sha256[:12]}", markup=False)
+            options.say(f"input: {source.file} sha256 {source.sha256[:12]}")
 
 
 def warn(options: Options, lines: Sequence[str]) -> None:
@@ -103,15 +103,16 @@ def warn(options: Options, lines: Sequence[str]) -> None:
         options.console.print(f"[yellow]warning:[/yellow] {escape(line)}")
 
 
-def new_table(title: str, *columns: str) -> Table:
-    """An empty table: the first column holds names, the others numbers."""
+def new_table(title: str, *columns: str, names: int = 1) -> Table:
+    """An empty table: so many columns hold names, which wrap, the others numbers."""
     from rich import box
     from rich.markup import escape
     from rich.table import Table
 
     table = Table(title=escape(title), title_justify="left", box=box.SIMPLE_HEAD, title_style="bold")
     for place, column in enumerate(columns):
-        table.add_column(escape(column), justify="right" if place else "left", no_wrap=True)
+        number = place >= names
+        table.add_column(escape(column), justify="right" if number else "left", no_wrap=number, overflow="fold")
     return table
 
 

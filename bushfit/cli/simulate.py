@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, example, naming_option, open_model, shared_options
+from bushfit.cli.common import Options, example, naming_option, open_model, option_of, shared_options
 from bushfit.errors import naming
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
         simulated = simulate(truth, plan)
     files = to_files(simulated)
     folder = options.folder(f"simulated {folder_name(simulated.result.name)}")
-    options.console.print(truth.equation(), markup=False)
+    options.say(truth.equation())
     options.write(folder, files)
     options.tell({"truth": model_document(truth), "files": sorted(files)})
 
@@ -85,7 +85,7 @@ def _with_options(plan: SimulateSettings, settings: dict[str, Any]) -> SimulateS
     changes = {name: value for name, value in settings.items() if value is not None}
     for name, given in changes.items():
         if isinstance(given, str):
-            with naming_option("--" + name.replace("_", "-")):
+            with naming_option(option_of(name)):
                 changes[name] = quantity(given, "rad" if name == "phase_error" else "1")
                 if not 0.0 <= changes[name] < 1.0:
                     raise UnitError("impossible size", found=given, expected="0 up to 100 %, or below 1 rad")
@@ -111,8 +111,5 @@ def _with_effect(model: Model, text: str) -> Model:
     unit = next(parameter.unit for parameter in effect.parameters if qualified(effect, parameter) == name)
     with naming_option("--effect"):
         size = float(value) if is_number(value) and unit == "1" else quantity(text.partition("=")[2].strip(), unit)
-    return (
-        model.with_values({name: size})
-        if effect.name in model.effects
-        else model.with_effect(effect.name, {name: size})
-    )
+    values = {name: size}
+    return model.with_values(values) if effect.name in model.effects else model.with_effect(effect.name, values)

@@ -7,9 +7,7 @@ whole gap, and to beat every effect and every fault. Nothing is mended here unle
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -44,12 +42,7 @@ _RIDGE = 1e-12
 
 @dataclass(frozen=True)
 class Claim:
-    """One mistake, made alike in some tests.
-
-    Args:
-        mistake: which.
-        tests: the data sets it was made in, by their place; none for [bushing].
-    """
+    """One mistake, made alike in some data sets, which are told by their place; in none for [bushing]."""
 
     mistake: Mistake
     tests: tuple[int, ...]
@@ -151,26 +144,6 @@ def claims(data: Data, without: Collection[str]) -> list[Claim]:
     return found
 
 
-class _Normal(NamedTuple):
-    """Normal equations at each point of a grid.
-
-    Args:
-        gram: products of the columns, (g, 3, 3).
-        along: products of the columns and what is to be met, (g, 3).
-        total: sum of squares of what is to be met.
-    """
-
-    gram: Array
-    along: Array
-    total: float
-
-    @classmethod
-    def summed(cls, parts: Sequence[_Normal]) -> _Normal:
-        """The equations of several tests together."""
-        gram, along = np.sum([part.gram for part in parts], axis=0), np.sum([part.along for part in parts], axis=0)
-        return cls(gram, along, sum(part.total for part in parts))
-
-
 @dataclass(frozen=True, eq=False)
 class Screen:
     """How well the plain model could meet the tests under each claim, before any fit.
@@ -180,6 +153,8 @@ class Screen:
     """
 
     data: Data
+    _known: dict[tuple[int, str, Bushing | None], Array] = field(default_factory=dict)
+    _responses: dict[tuple[Bushing | None, Place, bytes, bytes], Array] = field(default_factory=dict)
 
     def best(self, found: Sequence[Claim], most: int) -> list[Claim]:
         """The claims under which the tests could agree best, as far as these are worth a fit."""
@@ -193,42 +168,29 @@ class Screen:
         bushing = self.data.campaign.bushing
         if claim and not claim.tests and bushing:
             bushing = claim.mistake.mended_bushing(bushing)
+        every: list[DataSet] = [*self.data.loops, *self.data.sweeps]
+        mistakes = [claim.mistake if claim and place in claim.tests else None for place in range(len(every))]
         try:
-            whole = self._whole(bushing)
-            if claim:
-                mended = [self._part(place, claim.mistake, bushing) for place in claim.tests]
-                plain = [self._part(place, None, bushing) for place in claim.tests]
-                whole = _Normal.summed([whole, *mended, *(_Normal(-g, -a, -t) for g, a, t in plain)])
+            parts = [self._part(place, test, mistakes[place], bushing) for place, test in enumerate(every)]
         except ModelError:  # a shape for which a formula was not checked
             return np.inf
-        scale = np.sqrt(np.einsum("gii->gi", whole.gram)) + 1e-300
-        unit = whole.gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(3)
-        right = whole.along / scale
+        whole = np.sum(parts, axis=0)
+        gram, along, total = whole[:, :3, :3], whole[:, :3, 3], whole[:, 3, 3]
+        scale = np.sqrt(np.einsum("gii->gi", gram)) + 1e-300
+        unit, right = gram / scale[:, :, None] / scale[:, None, :] + _RIDGE * np.eye(3), along / scale
         explained = np.einsum("gi,gi->g", right, np.linalg.solve(unit, right[..., None])[..., 0])
-        return max(_least((whole.total - explained).reshape(_EPS_HALF.size, _ALPHA.size)), 0.0)
+        return max(_least((total - explained).reshape(_EPS_HALF.size, _ALPHA.size)), 0.0)
 
-    def _whole(self, bushing: Bushing | None) -> _Normal:
-        """The normal equations of all tests as they are."""
-        key, count = (-1, "", bushing), len(self.data.loops) + len(self.data.sweeps)
-        if key not in self._known:
-            self._known[key] = _Normal.summed([self._part(place, None, bushing) for place in range(count)])
-        return self._known[key]
-
-    @cached_property
-    def _known(self) -> dict[tuple[int, str, Bushing | None], _Normal]:
-        return {}
-
-    def _part(self, place: int, mistake: Mistake | None, bushing: Bushing | None) -> _Normal:
-        """What a test adds to the normal equations."""
+    def _part(self, place: int, data_set: DataSet, mistake: Mistake | None, bushing: Bushing | None) -> Array:
+        """Products of a test's three columns, and of what they are to meet, at each point of the grid, (g, 4, 4)."""
         key = (place, mistake.name if mistake else "", bushing)
         if key not in self._known:
-            data_set = [*self.data.loops, *self.data.sweeps][place]
             direction, frequency, amplitude, stiffness, error = _points(data_set, mistake)
             columns = self._columns(bushing, direction, frequency, amplitude) / (stiffness * error)
-            columns = np.concatenate((columns.real, columns.imag), axis=-1)
-            wanted = np.concatenate((1.0 / error, np.zeros_like(error)))
-            gram = columns @ columns.transpose(0, 2, 1)
-            self._known[key] = _Normal(gram, columns @ wanted, float(wanted @ wanted))
+            wanted = np.broadcast_to(1.0 / error, (len(columns), 1, error.size))
+            rows = np.concatenate((columns, wanted), axis=1)
+            rows = np.concatenate((rows.real, rows.imag), axis=-1)
+            self._known[key] = rows @ rows.transpose(0, 2, 1)
         return self._known[key]
 
     def _columns(self, bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
@@ -237,10 +199,6 @@ class Screen:
         if key not in self._responses:
             self._responses[key] = _columns(bushing, direction, frequency, amplitude)
         return self._responses[key]
-
-    @cached_property
-    def _responses(self) -> dict[tuple[Bushing | None, Place, bytes, bytes], Array]:
-        return {}
 
 
 def _least(misfit: Array) -> float:
@@ -279,7 +237,7 @@ def _points(data_set: DataSet, mistake: Mistake | None) -> tuple[Place, Array, A
     """Direction, frequency, amplitude, stiffness and relative error of a test's points, (n,) each, as mended."""
     if isinstance(data_set, SweepData):
         sweep, noise = data_set.sweep, np.hypot(data_set.relative_noise, max(data_set.noise.shared))
-        mended = (mistake and mistake.mended_sweep(sweep)) or sweep
+        mended = (mistake and mistake.mended(sweep)) or sweep
     else:
         sweep, noise = (
             Sweep(data_set.name, data_set.direction, data_set.frequency, data_set.amplitude, data_set.measured),

@@ -20,12 +20,7 @@ EVALUATIONS = 40
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """A model fitted to all tests of a campaign.
-
-    Args:
-        solution: where the fit ended.
-        data_sets: the tests.
-    """
+    """Where the fit of a model to all tests of a campaign ended, and the tests."""
 
     solution: Solution
     data_sets: tuple[DataSet, ...]

@@ -29,7 +29,6 @@ class Fault:
     """A suspect, and what speaks against it.
 
     Args:
-        suspect: where.
         columns: free deviations it was given.
         gain: what letting it deviate would take off chi-square.
         price: of those deviations, and of having looked in so many places.
@@ -58,16 +57,10 @@ def faults(evidence: Evidence, level: float) -> tuple[list[Fault], float]:
     groups = [np.array([index[id(column)] for column in suspect.columns]) for suspect in suspects]
     test = ScoreTest(evidence, np.array(list(columns.values())), groups, PATTERN_LEFT)
     looked = Counter(suspect.kind for suspect in suspects)
-    found = [
-        Fault(
-            suspect,
-            size,
-            gain,
-            size * evidence.penalty + 2.0 * float(np.log(max(suspect.looked, looked[suspect.kind]))),
-            float(np.abs(amount).max()),
-        )
-        for suspect, size, gain, amount in zip(suspects, test.sizes, test.gains(), test.amounts(), strict=True)
-    ]
+    places = np.array([max(suspect.looked, looked[suspect.kind]) for suspect in suspects])
+    prices = (np.array(test.sizes) * evidence.penalty + 2.0 * np.log(places)).tolist()
+    largest = [float(np.abs(amount).max()) for amount in test.amounts()]
+    found = list(map(Fault, suspects, test.sizes, test.gains(), prices, largest))
     return found, test.largest_by_chance(level)
 
 
@@ -98,19 +91,17 @@ def _frequencies(evidence: Evidence) -> Iterator[Suspect]:
                 window = slice(first, first + width)
                 if not all(rows.any() for chosen in touched[window] for rows in chosen):
                     continue
-                reached = [
-                    sweep.amplitude[rows]
-                    for chosen in touched[window]
-                    for sweep, rows in zip(scope, chosen, strict=True)
-                ]
-                span = " to ".join(f"{step:.4g}" for step in dict.fromkeys(steps[[first, first + width - 1]].tolist()))
+                pairs = [pair for chosen in touched[window] for pair in zip(scope, chosen, strict=True)]
+                reached = np.concatenate([sweep.amplitude[rows] for sweep, rows in pairs])
+                low, high = steps[[first, first + width - 1]].tolist()
+                span = " to ".join(f"{step:.4g}" for step in dict.fromkeys((low, high)))
                 yield Suspect(
                     f"{span} Hz in {where}, at every amplitude",
                     "frequency",
                     [column for pair in columns[window] for column in pair],
                     scope[0].direction,
-                    (float(steps[first]), float(steps[first + width - 1])),
-                    (float(np.concatenate(reached).min()), float(np.concatenate(reached).max())),
+                    (low, high),
+                    (float(reached.min()), float(reached.max())),
                 )
 
 

@@ -1,8 +1,7 @@
 """Hold-out: does what was added also close the gap where it was not fitted?
 
 A line (an amplitude level, or a frequency where amplitudes are stepped), the top third of the steps, a direction and a
-loop are held out in turn, and predicted from
-the rest.
+loop are held out in turn, and predicted from the rest.
 
 Notes:
     Refitting without a part is one Gauss-Newton step from the full fit, which is exact where the model is linear over

@@ -91,8 +91,7 @@ def _read_sweep(
 
     Args:
         part: storage or loss.
-        lines: of one direction.
-        pieces: smooth misfit along each, (n,).
+        lines, pieces: of one direction, and the smooth misfit along each, (n,).
         touched: numbers of the lines that belong to the region.
         spans: least and largest frequency [Hz] and amplitude [m or rad] of the region.
     """

@@ -30,13 +30,7 @@ Fitted = Callable[[Data, float], Evidence]
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
-    """A claim, and the model fitted to the tests as it would have them.
-
-    Args:
-        claim: what would be so.
-        evidence: the fit.
-        price: of having looked at so many claims.
-    """
+    """A claim, the fit to the tests as it would have them, and the price of having looked at so many claims."""
 
     claim: Claim
     evidence: Evidence
@@ -49,11 +43,6 @@ class Weighed:
 
 def mistaken(search: Search, data: Data, fitted: Fitted) -> Diagnosis | None:
     """The finding where a mistake in the record explains the whole gap; None where none does.
-
-    Args:
-        search: has tried every effect alone.
-        data: the tests as they are.
-        fitted: fits the model as it came to tests.
 
     Notes:
         Two effects cost more by BIC than a claim and the margin by which candidates count as one set, and a claim that
@@ -96,15 +85,9 @@ def _closes(evidence: Evidence, search: Search) -> bool:
 
 def _named(data: Data, claim: Claim, evidence: str, alternatives: Sequence[str]) -> list[Named]:
     """An entry for each test of a claim."""
+    others = tuple(alternatives)
     return [
-        Named(
-            one.mistake.name,
-            evidence,
-            tuple(alternatives),
-            test=one.test(data),
-            sentence=one.words(data),
-            correction=one.corrections(data)[0],
-        )
+        Named(one.mistake.name, evidence, others, (), one.test(data), one.words(data), one.corrections(data)[0])
         for one in claim.each
     ]
 

@@ -23,9 +23,7 @@ class MenuEntry:
     """A test a lab can do.
 
     Args:
-        words: what to do.
         effort: in units of one more sweep.
-        direction: of the test, None for all.
         frequencies: [Hz], or multiples of the campaign's highest where `beyond`; None for those of the campaign.
         beyond: whether the frequencies count from the campaign's highest.
         amplitudes: relative to the campaign's largest; None for its own.
@@ -71,11 +69,6 @@ def deciding_test(models: Sequence[Model], data_sets: Sequence[DataSet]) -> str:
     scored = [(_distance(entry, models, data_sets) / entry.effort, entry.words) for entry in menu]
     best, words = max(scored)
     return words if best > 0.0 else ""
-
-
-def confirming_test(name: str) -> str:
-    """The cheapest test that would prove a named effect."""
-    return effect_named(name).confirmed_by
 
 
 def _distance(entry: MenuEntry, models: Sequence[Model], data_sets: Sequence[DataSet]) -> float:

@@ -32,7 +32,6 @@ class Proposal:
     """What one effect promises before any refit.
 
     Args:
-        name: the effect.
         model: the model with the effect in its best shape and at no amount; an amount that is fitted in its logarithm
             stands where the score suggests.
         score: what it would take off chi-square if everything were linear.

@@ -39,13 +39,10 @@ class Where:
     """One region in which model and measurement disagree.
 
     Args:
-        direction: axial, radial or torsion.
         kind: "sweep" or "loop".
-        frequency: lowest and highest [Hz].
-        amplitude: lowest and highest [m or rad].
+        frequency, amplitude: lowest and highest [Hz], [m or rad].
         component: "storage", "loss" or "force".
         excess: root mean square of the smooth misfit there, in units of its own noise.
-        reading: a sentence.
     """
 
     direction: Place
@@ -62,8 +59,6 @@ class Named:
     """An effect that was added, or that leads a set of look-alikes.
 
     Args:
-        name: the effect.
-        evidence: in words.
         alternatives: effects these tests cannot tell from it.
         richer: effects that contain it as a limit, and whose further parameters these tests do not show.
         test: of a mistake in the record, the test in which it was made; None of what is not made in a test.
@@ -103,19 +98,13 @@ class Diagnosis:
     """The whole finding.
 
     Args:
-        verdict: consistent, named, ambiguous, partly or unexplained.
-        summary: the finding in one or two sentences.
         effects: what was added, or the leaders of ambiguous sets.
         where: regions of disagreement: of the model before where something was added, else of what remains.
         remainder: regions where the model with its additions still disagrees.
-        holdout: gaps on held-out parts, before and after.
         next_test: the measurement that would decide or confirm, or "".
-        candidates: every effect of the library, judged.
         before: the model as it came, refitted to all tests.
         after: the model with what was added; where a mistake in the record is named, fitted to the mended tests.
-        result: the model to use with its uncertainty, ready for `predict`: `after`; `before` where the record is
-            mistaken.
-        notes: what a user must know besides.
+        result: the model to use with its uncertainty: `after`; `before` where the record is mistaken.
     """
 
     verdict: Verdict

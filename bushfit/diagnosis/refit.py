@@ -31,13 +31,9 @@ _CLAIM_HOLDS = 12
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One effect refitted together with everything else.
+    """One effect refitted together with everything else, and what it took off chi-square.
 
-    Args:
-        name: the effect.
-        evidence: the fit at its end, or where it was stopped.
-        gain: what it took off chi-square.
-        left: whether it was stopped before its end, far behind the best.
+    `left` tells that the fit was stopped before its end, far behind the best.
     """
 
     name: str
@@ -57,12 +53,10 @@ def refits(
     """Fit proposals until they converge or cannot come near the best; with the candidates known already, best first.
 
     Args:
-        evidence: the model without the effects, fitted.
-        proposed: the effects to fit, from no amount of each.
+        evidence, proposed: the fitted model without the effects, and the effects to fit.
         known: candidates that need no fit.
         start: values of the model's own parameters to start from, where not its fitted ones.
-        held: parameters that do not move.
-        bounds: limits inside the parameters' own.
+        held, bounds: parameters that do not move, and limits inside the parameters' own.
     """
     fits: dict[str, Descent] = {}
     for proposal in proposed:
@@ -77,26 +71,16 @@ def refits(
             fits[name] = fits[name].stepped()
         least = min(least, *(fits[name].chi_square for name in running))
         running = [name for name in running if can_reach(fits[name], least + EXCLUDED, claimed[name])]
+    ends = {name: Evidence(fit.solution, evidence.data_sets) for name, fit in fits.items()}
     refitted = [
-        Candidate(
-            name,
-            Evidence(fit.solution, evidence.data_sets),
-            evidence.chi_square - fit.chi_square,
-            left=not _ended(fit),
-        )
-        for name, fit in fits.items()
+        Candidate(name, end, evidence.chi_square - end.chi_square, left=not _ended(fits[name]))
+        for name, end in ends.items()
     ]
     return sorted([*known, *refitted], key=lambda candidate: candidate.evidence.bic)
 
 
 def can_reach(fit: Descent, goal: float, claimed: float = np.inf) -> bool:
-    """Whether a fit that goes on may yet bring chi-square below a goal.
-
-    Args:
-        fit: under way.
-        goal: chi-square to come below.
-        claimed: chi-square that its proposal expects; it counts in the first evaluations.
-    """
+    """Whether a fit that goes on may yet bring chi-square below a goal; what its proposal claimed counts at first."""
     if _ended(fit):
         return False
     early = fit.evaluations < _FIRST_EVALUATIONS or (fit.evaluations < _CLAIM_HOLDS and claimed < goal)

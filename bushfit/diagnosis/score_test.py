@@ -4,9 +4,8 @@ Notes:
     A pattern is a group of columns, whitened residuals that are free to move together: a candidate's sensitivity, a
     fault's gain and phase, smooth contrasts. How far the best pattern gets by chance comes from a parametric
     bootstrap: noise is drawn as the campaign has it, in units of a noise that was itself estimated, from a few repeats
-    or a few points, which makes the tails heavier. Only the columns'
-    inner products enter, so thousands of draws cost one small matrix product. The underlying draws depend on their
-    number alone and are kept.
+    or a few points, which makes the tails heavier. Only the columns' inner products enter, so thousands of draws cost
+    one small matrix product. The underlying draws depend on their number alone and are kept.
 """
 
 from __future__ import annotations
@@ -38,7 +37,6 @@ class ScoreTest:
     """Patterns held against the residuals of one fitted model.
 
     Args:
-        evidence: the fitted model.
         columns: whitened residuals that a unit of each amount would make, (c, n).
         groups: indices of the columns of each pattern.
         least: share of a unit column that must be left beside the model's own parameters.

@@ -47,7 +47,6 @@ class Step:
     """One effect that was added, and what came near it.
 
     Args:
-        name: the effect.
         gain: chi-square that it takes off, all others refitted without it.
         rivals: candidates in its place that these tests cannot tell from it.
         richer: candidates that contain it as a limit.
@@ -66,8 +65,7 @@ class Round:
     """A fitted model, what every missing effect promises it, and the best of these refitted.
 
     Args:
-        evidence: the fitted model.
-        proposed: every effect that it lacks, the best score first.
+        proposed: every effect that the model lacks, the best score first.
         tried: the most promising refitted with all parameters, the best by BIC first.
     """
 
@@ -96,10 +94,8 @@ class Search:
     """The search for effects on one campaign.
 
     Args:
-        settings: of the user.
         start: values of the paper's parameters read off the data.
-        held: parameters the campaign holds.
-        bounds: limits the campaign sets.
+        held, bounds: parameters the campaign holds, and limits it sets.
         rounds: per set of added effects the refitted model and what every effect says of it.
     """
 

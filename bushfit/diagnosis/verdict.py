@@ -11,13 +11,13 @@ from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.faults import Fault, faults
 from bushfit.diagnosis.holdout import hold_out
 from bushfit.diagnosis.locate import contrasts, largest_smooth_misfit, locate
-from bushfit.diagnosis.next_test import confirming_test, deciding_test
+from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.propose import Proposal
 from bushfit.diagnosis.record import Diagnosis, Judged, Named, Verdict, Where
 from bushfit.diagnosis.refit import Candidate
 from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.search import SAME, Search, Step
-from bushfit.effects import effect_of
+from bushfit.effects import effect_named, effect_of
 from bushfit.fitting.agreement import misfits, usable
 from bushfit.fitting.assess import Stage, covariance, measured_range, quality
 from bushfit.fitting.data_sets import parted, sources
@@ -152,7 +152,7 @@ def finish(
     """The whole finding, once the verdict stands."""
     base = search.base
     if not next_test and effects:
-        next_test = confirming_test(effects[0].name)
+        next_test = effect_named(effects[0].name).confirmed_by
     where = (*([_fault_where(fault)] if fault else []), *locate(base))
     return Diagnosis(
         verdict,

@@ -29,7 +29,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
         data: the campaign; all directions are used.
         model: where to start; the paper's three branches, and what [fit] adds, unless told. Its effects are kept, its
             values refitted.
-        settings: limits, and effects, or mistakes in the record, to adopt or to leave out.
+        settings: limits, and what to adopt or to leave out.
 
     Raises:
         FitError: no test, or data that cannot support the fit.
@@ -54,14 +54,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
 
 
 class _Begun(NamedTuple):
-    """A model fitted to all tests of a campaign, before anything is added by the search.
-
-    Args:
-        evidence: the fit.
-        start: values of the paper's parameters read off the data.
-        held: parameters the campaign holds.
-        outliers: rows that were left out.
-    """
+    """A model fitted to all tests of a campaign before the search adds anything, and the start of the paper's own."""
 
     evidence: Evidence
     start: dict[str, float]

@@ -5,86 +5,50 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from functools import cache
+from importlib import import_module
 
-from bushfit.effects import (
-    amplitude_rolloff,
-    asymmetry,
-    bump_stop,
-    clearance,
-    coupled_breakdown,
-    delay,
-    elastic,
-    fixture_resonance,
-    force_gain,
-    force_offset,
-    friction,
-    inertia,
-    interface_slip,
-    maxwell,
-    mullins_softening,
-    rate_dependent_friction,
-    rig_compliance,
-    second_friction,
-    self_heating,
-    springpot,
-    stiffness_factor,
-    strain_stiffening,
-    viscous,
-)
-from bushfit.effects.contract import Branch, Effect, Layer, Level, Modifier, Parameter, Setting
-from bushfit.effects.history import History
+from bushfit.effects import stiffness_factor
+from bushfit.effects.contract import Branch as Branch
+from bushfit.effects.contract import Effect as Effect
+from bushfit.effects.contract import Layer as Layer
+from bushfit.effects.contract import Level as Level
+from bushfit.effects.contract import Modifier as Modifier
+from bushfit.effects.contract import Parameter as Parameter
+from bushfit.effects.contract import Setting as Setting
+from bushfit.effects.history import History as History
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction
 
-__all__ = [
-    "BASE",
-    "LIBRARY",
-    "Branch",
-    "Effect",
-    "History",
-    "Layer",
-    "Level",
-    "Modifier",
-    "Parameter",
-    "Setting",
-    "at_places",
-    "effect_named",
-    "effect_of",
-    "is_parameter",
-    "parameter_named",
-    "parameter_names",
-    "qualified",
-]
+#: Files of all effects, the paper's three branches first. Within a level this is the order from the rubber outward.
+_FILES = (
+    "elastic",
+    "springpot",
+    "friction",
+    "viscous",
+    "maxwell",
+    "strain_stiffening",
+    "asymmetry",
+    "second_friction",
+    "mullins_softening",
+    "rate_dependent_friction",
+    "coupled_breakdown",
+    "self_heating",
+    "clearance",
+    "interface_slip",
+    "bump_stop",
+    "stiffness_factor",
+    "rig_compliance",
+    "inertia",
+    "fixture_resonance",
+    "delay",
+    "amplitude_rolloff",
+    "force_gain",
+    "force_offset",
+)
 
-#: Every effect by name, the paper's three branches first. Within a level this is the order from the rubber outward.
-LIBRARY: dict[str, Effect] = {
-    module.EFFECT.name: module.EFFECT
-    for module in (
-        elastic,
-        springpot,
-        friction,
-        viscous,
-        maxwell,
-        strain_stiffening,
-        asymmetry,
-        second_friction,
-        mullins_softening,
-        rate_dependent_friction,
-        coupled_breakdown,
-        self_heating,
-        clearance,
-        interface_slip,
-        bump_stop,
-        stiffness_factor,
-        rig_compliance,
-        inertia,
-        fixture_resonance,
-        delay,
-        amplitude_rolloff,
-        force_gain,
-        force_offset,
-    )
-}
+_EFFECTS: list[Effect] = [import_module(f"{__name__}.{file}").EFFECT for file in _FILES]
+#: Every effect by name, in that order.
+LIBRARY: dict[str, Effect] = {effect.name: effect for effect in _EFFECTS}
 
 #: The paper's model.
 BASE = ("elastic", "springpot", "friction")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from bushfit.effects import LIBRARY, Effect, qualified
@@ -17,36 +18,31 @@ def renewed(page: str) -> str:
     """The text of the page with its tables made from the records, and all else as it was."""
     before, rest = page.split(BEGIN)
     _, after = rest.split(END)
-    tables = (effects_table(), sources_table(), mistakes_table())
-    return before + BEGIN + "\n" + "\n".join(tables) + "\n" + END + after
+    return before + BEGIN + "\n" + "\n".join(_tables()) + "\n" + END + after
 
 
-def effects_table() -> str:
-    """Every effect: what it is, what it does to a sine, and its parameters."""
-    head = "| name | level | kind | what it is | first harmonic | parameters |\n|---|---|---|---|---|---|\n"
-    return head + "".join(
-        f"| {_link(effect)} | {effect.level} | {type(effect).__name__.lower()} | {effect.sentence} "
-        f"| `{effect.equation}` | {_parameters(effect)} |\n"
-        for effect in LIBRARY.values()
+def _tables() -> Iterator[str]:
+    """Effects; where the law of each comes from and what would prove it; mistakes in the record."""
+    library = LIBRARY.values()
+    yield _table(
+        ("name", "level", "kind", "what it is", "first harmonic", "parameters"),
+        ((_link(e), e.level, type(e).__name__.lower(), e.sentence, f"`{e.equation}`", _parameters(e)) for e in library),
+    )
+    yield _table(
+        ("name", "source", "cheapest test that would prove it"), ((_link(e), e.source, e.confirmed_by) for e in library)
+    )
+    yield _table(
+        ("mistake", "what would be so", "true value", "in"),
+        (
+            (f"`{m.name}`", m.sentence.format(files="FILE"), f"`{m.equation}`", " or ".join(m.kinds) or "[bushing]")
+            for m in MISTAKES.values()
+        ),
     )
 
 
-def sources_table() -> str:
-    """Every effect: where its law comes from, and the test that would prove it."""
-    head = "| name | source | cheapest test that would prove it |\n|---|---|---|\n"
-    return head + "".join(
-        f"| {_link(effect)} | {effect.source} | {effect.confirmed_by} |\n" for effect in LIBRARY.values()
-    )
-
-
-def mistakes_table() -> str:
-    """Every mistake in the record: what would be so, the true value by the one stated, and where it can be made."""
-    head = "| mistake | what would be so | true value | in |\n|---|---|---|---|\n"
-    return head + "".join(
-        f"| `{mistake.name}` | {mistake.sentence.format(files='FILE')} | `{mistake.equation}` "
-        f"| {' or '.join(mistake.kinds) or '[bushing]'} |\n"
-        for mistake in MISTAKES.values()
-    )
+def _table(head: tuple[str, ...], rows: Iterable[tuple[object, ...]]) -> str:
+    first, *others = (f"| {' | '.join(map(str, line))} |\n" for line in (head, *rows))
+    return "".join([first, "|---" * len(head), "|\n", *others])
 
 
 def _link(effect: Effect) -> str:

@@ -35,9 +35,7 @@ EFFECT = Layer(
     sentence="The rig falls short of the amplitude asked for at high frequency: stiffness as of a smaller amplitude.",
     equation="K at X (1 - c (f/155 Hz)^2)",
     level=Level.INSTRUMENT,
-    parameters=(
-        Parameter("c", "1", (0.0, 0.9), 0.0, 0.05, log=False, meaning="share of the amplitude lost at 155 Hz"),
-    ),
+    parameters=(Parameter("c", "1", (0.0, 0.9), 0.0, 0.05, meaning="share of the amplitude lost at 155 Hz"),),
     source="second-order low-pass of a servo-hydraulic rig, first term of its series",
     confirmed_by="log the displacement really reached at every frequency",
     stiffness=stiffness,

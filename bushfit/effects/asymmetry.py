@@ -23,9 +23,7 @@ EFFECT = Branch(
     sentence="The bushing is stiffer one way than the other: mean force and even harmonics in loops, none in sweeps.",
     equation="0",
     level=Level.MATERIAL,
-    parameters=(
-        Parameter("c2", "1", (-1e3, 1e3), 0.0, 1.0, log=False, meaning="quadratic stress coefficient over mu"),
-    ),
+    parameters=(Parameter("c2", "1", (-1e3, 1e3), 0.0, 1.0, meaning="quadratic stress coefficient over mu"),),
     source="quadratic term of a power series of the stress; A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations, 1979",
     confirmed_by="repeat the loop with a static offset to either side",
     uses=("mu",),

@@ -2,28 +2,16 @@
 
 from __future__ import annotations
 
-from bushfit.effects.contract import (
-    Array,
-    ForceBelow,
-    Layer,
-    Level,
-    Parameter,
-    Setting,
-    StiffnessBelow,
-    Values,
-    along_a_line,
-)
+from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Values
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
 from bushfit.effects.history import History
 
 
-@along_a_line
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
     """K + k N(gap/X) [N/m], N of `dead_zone.first_harmonic`; exactly K up to the gap, and in torsion."""
     return below(omega, amplitude) + p["stiffness"] * first_harmonic(amplitude, p["gap"])
 
 
-@along_a_line
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
     """F + k (x - gap) above the gap, k (x + gap) below -gap [N]."""
     return below(history) + p["stiffness"] * dead_zone(history.value, p["gap"])
@@ -45,10 +33,11 @@ EFFECT = Layer(
             meaning="travel until the stop is met, both ways",
             scale="displacement",
         ),
-        Parameter("stiffness", "N/m", (0.0, 1e10), 0.0, 1e5, log=False, meaning="stiffness of the stop"),
+        Parameter("stiffness", "N/m", (0.0, 1e10), 0.0, 1e5, meaning="stiffness of the stop"),
     ),
     source="A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B",
     confirmed_by="loop slowly to the largest amplitude: the force must bend up at the gap",
+    turns=False,
     stiffness=stiffness,
     force=force,
 )

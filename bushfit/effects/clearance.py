@@ -4,17 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bushfit.effects.contract import (
-    Array,
-    ForceBelow,
-    Layer,
-    Level,
-    Parameter,
-    Setting,
-    StiffnessBelow,
-    Values,
-    along_a_line,
-)
+from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Values
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
 from bushfit.effects.history import History
 
@@ -25,7 +15,6 @@ SAMPLES = 64
 _FIRST = 2.0 / SAMPLES * np.exp(-2j * np.pi * np.arange(SAMPLES) / SAMPLES)
 
 
-@along_a_line
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
     """K(omega, X - delta) N(delta/X) + what friction makes of the bent waveform [N/m]; 0 within the play.
 
@@ -48,7 +37,6 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     return below(omega, reach) * share + (seen - share * round_) * crossed
 
 
-@along_a_line
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
     """The force of the bushing moved by what exceeds +-delta [N]."""
     return below(history.with_value(dead_zone(history.value, p["delta"])))
@@ -59,10 +47,11 @@ EFFECT = Layer(
     sentence="Play in the mounting: the bushing is moved less than it seems, most so at the smallest amplitude.",
     equation="first harmonic of the bushing moved by a dead-zoned sine, about K(X - delta) N(delta/X)",
     level=Level.COMPONENT,
-    parameters=(Parameter("delta", "m", (0.0, 1e-2), 0.0, 1e-5, log=False, meaning="play, each way"),),
+    parameters=(Parameter("delta", "m", (0.0, 1e-2), 0.0, 1e-5, meaning="play, each way"),),
     source="A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B",
     confirmed_by="sweep at a third of the smallest amplitude: play takes away most there",
     harmonic_error=1e-3,
+    turns=False,
     stiffness=stiffness,
     force=force,
 )

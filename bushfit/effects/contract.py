@@ -19,10 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import wraps
-from typing import Any, Literal, TypeVar, cast
-
-import numpy as np
+from typing import Any, Literal
 
 from bushfit.effects.history import Array as Array
 from bushfit.effects.history import History
@@ -34,8 +31,6 @@ Value = Any
 Values = Mapping[str, Value]
 #: Force [N or N m] that answers a displacement history.
 ForceBelow = Callable[[History], Array]
-
-_Face = TypeVar("_Face", bound=Callable[..., Array])
 
 
 @dataclass(frozen=True)
@@ -73,12 +68,10 @@ class Parameter:
 
     Args:
         name: ASCII name; base effects use it as it is, added effects as `<effect>.<name>`.
-        unit: SI unit, for files and reports.
         bounds: what a rubber, a bushing or a rig can have.
         neutral: the value at which the effect vanishes; None where another parameter does that.
         typical: a usual distance from the neutral value; the scale on which a fit moves a linear parameter.
         log: whether a fit moves its logarithm (strictly positive parameters).
-        meaning: what it is, in a few words.
         scale: what of the tests its size goes with, so that a search knows where to start: "period",
             "frequency", "displacement" or "strain"; none where `typical` is good for any test.
     """
@@ -88,8 +81,8 @@ class Parameter:
     bounds: tuple[float, float]
     neutral: float | None
     typical: float
-    log: bool
     meaning: str
+    log: bool = False
     scale: Literal["period", "frequency", "displacement", "strain"] | None = None
 
     def sized(self, share: float) -> float:
@@ -117,10 +110,8 @@ class Condition:
     """The operating condition that a modifier may depend on.
 
     Args:
-        setting: the test.
         omega: angular frequency [rad/s].
-        amplitude: of the displacement [m or rad].
-        strain: equivalent strain amplitude [1].
+        amplitude, strain: of the displacement [m or rad], and the equivalent strain amplitude [1].
         stiffness: complex stiffness of the bushing [N/m or N m/rad] by parameter values.
     """
 
@@ -139,13 +130,10 @@ class Effect:
         name: the file's stem; the name in files, reports and options.
         sentence: what it is, for an engineer.
         equation: its first-harmonic form, ASCII.
-        level: where it acts.
-        parameters: its own parameters.
         source: where the law comes from.
         confirmed_by: the cheapest test that would prove it.
         harmonic_error: relative error of the first-harmonic face against the time face; 0 where exact.
-        settles: True where the response changes from cycle to cycle, so that a loop must be followed
-            through all its cycles.
+        settles: whether the response changes from cycle to cycle, so that a loop is followed through all its cycles.
         corrects: the direction, or specimen, whose stiffness formula it scales by a fitted factor; where the effect is
             in a model, that formula's own error needs no warning. None where it scales no formula.
     """
@@ -203,10 +191,12 @@ class Layer(Effect):
     """Wraps the response below it, in both faces alike.
 
     Args:
+        turns: whether it acts in torsion too; else only on motion along a line.
         stiffness: (values, response below, omega [rad/s], amplitude [m or rad], setting) -> complex stiffness above.
         force: (values, force below, displacement history, setting) -> force above [N or N m].
     """
 
+    turns: bool = True
     stiffness: Callable[[Values, StiffnessBelow, Array, Array, Setting], Array]
     force: Callable[[Values, ForceBelow, History, Setting], Array]
 
@@ -216,25 +206,9 @@ def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str,
     return {name: p[name] * factor for name in names if name in p}
 
 
-def along_a_line(face: _Face) -> _Face:
-    """A face of a layer that answers to motion along a line: in torsion the response is the one below."""
-
-    @wraps(face)
-    def answer(p: Values, below: Callable[..., Array], *motion_and_setting: Any) -> Array:
-        *motion, setting = motion_and_setting
-        return below(*motion) if setting.direction.is_rotation else face(p, below, *motion, setting)
-
-    return cast(_Face, answer)
-
-
-def linear_response(transfer: Callable[[Array], Array], history: History) -> Array:
-    """Steady response of a linear system, y_h = H(h omega) x_h for every harmonic h; H(0) must be finite."""
-    return np.fft.irfft(transfer(history.harmonics) * history.spectrum, n=history.value.shape[-1])
-
-
 def linear_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:
     """Steady stress of a linear branch over one cycle: s_h = 2 mu^(h omega) e_h for every harmonic h.
 
     The modulus at omega = 0 must be finite; it multiplies the mean strain.
     """
-    return linear_response(lambda omega: 2.0 * modulus(p, omega, history.amplitude), history)
+    return history.response(lambda omega: 2.0 * modulus(p, omega, history.amplitude))

@@ -23,7 +23,7 @@ EFFECT = Modifier(
     sentence="The rate effect shrinks as amplitude breaks the filler down: curves flatten at large amplitude.",
     equation="m (e0/0.01)^(-q)",
     level=Level.MATERIAL,
-    parameters=(Parameter("q", "1", (0.0, 1.0), 0.0, 0.1, log=False, meaning="power of the strain amplitude"),),
+    parameters=(Parameter("q", "1", (0.0, 1.0), 0.0, 0.1, meaning="power of the strain amplitude"),),
     source="rate and amplitude dependence coupled, after A. Lion, C. Kardelky, Int. J. Plasticity 20 (2004) 1313",
     confirmed_by="sweep from 0.05 to 5 Hz at the smallest and the largest amplitude: their slopes must differ",
     adjust=adjust,

@@ -30,7 +30,7 @@ EFFECT = Layer(
     sentence="The force channel lags: the loss factor falls in proportion to frequency, at every amplitude alike.",
     equation="K exp(-i omega tau)",
     level=Level.INSTRUMENT,
-    parameters=(Parameter("tau", "s", (0.0, 1e-2), 0.0, 1e-4, log=False, meaning="time by which the force is late"),),
+    parameters=(Parameter("tau", "s", (0.0, 1e-2), 0.0, 1e-4, meaning="time by which the force is late"),),
     source="shift theorem of the Fourier transform",
     confirmed_by="put a steel dummy in place of the bushing: its loss factor must be zero",
     stiffness=stiffness,

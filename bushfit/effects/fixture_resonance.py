@@ -6,18 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from bushfit.effects.contract import (
-    Array,
-    ForceBelow,
-    Layer,
-    Level,
-    Parameter,
-    Setting,
-    StiffnessBelow,
-    Values,
-    along_a_line,
-    linear_response,
-)
+from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Values
 from bushfit.effects.history import History
 
 
@@ -27,20 +16,18 @@ def fixture(p: Values, omega: Array) -> Array:
     return -p["mass"] * np.asarray(omega) ** 2 / (1.0 - ratio**2 + 2j * p["damping"] * ratio)
 
 
-@along_a_line
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
     """K - M omega^2 wr^2/(wr^2 - omega^2 + 2 i zeta omega wr) [N/m]; does not act in torsion."""
     return below(omega, amplitude) + fixture(p, omega)
 
 
-@along_a_line
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
     """F + the fixture's force y: y'' + 2 zeta wr y' + wr^2 y = wr^2 M x'' [N].
 
     From rest the mode rings for 1/(2 pi zeta frequency) seconds before it has fallen to 37 %.
     """
     if history.periodic:
-        return below(history) + linear_response(partial(fixture, p), history)
+        return below(history) + history.response(partial(fixture, p))
     row_by_row = np.vectorize(_mode, signature="(),(),(n),()->(n)")
     frequency, damping = (np.atleast_1d(p[name])[..., 0] for name in ("frequency", "damping"))
     return below(history) + p["mass"] * row_by_row(2.0 * np.pi * frequency, damping, history.acceleration, history.step)
@@ -61,7 +48,7 @@ EFFECT = Layer(
     equation="K - mass omega^2 wr^2/(wr^2 - omega^2 + 2 i damping omega wr), wr = 2 pi frequency",
     level=Level.INSTRUMENT,
     parameters=(
-        Parameter("mass", "kg", (0.0, 100.0), 0.0, 0.05, log=False, meaning="moving mass of the mode"),
+        Parameter("mass", "kg", (0.0, 100.0), 0.0, 0.05, meaning="moving mass of the mode"),
         Parameter(
             "frequency", "Hz", (10.0, 1e4), None, 300.0, log=True, meaning="frequency of the mode", scale="frequency"
         ),
@@ -69,6 +56,7 @@ EFFECT = Layer(
     ),
     source="D. J. Ewins, Modal Testing, 2nd ed., 2000, ch. 2 (one mode, driven at its base)",
     confirmed_by="tap the fixture, or run it empty to three times the highest frequency",
+    turns=False,
     stiffness=stiffness,
     force=force,
 )

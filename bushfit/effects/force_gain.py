@@ -19,9 +19,7 @@ EFFECT = Layer(
     sentence="The loop's load cell reads another gain than the sweep's: the two tests disagree by one factor.",
     equation="(1 + gain) K in loops",
     level=Level.INSTRUMENT,
-    parameters=(
-        Parameter("gain", "1", (-0.5, 0.5), 0.0, 0.01, log=False, meaning="gain of the loop's chain over the sweep's"),
-    ),
+    parameters=(Parameter("gain", "1", (-0.5, 0.5), 0.0, 0.01, meaning="gain of the loop's chain over the sweep's"),),
     source="sensitivity error of a force transducer, ISO 376:2011",
     confirmed_by="hang a known weight on the load cell in both chains",
     stiffness=response,

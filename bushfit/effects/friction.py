@@ -34,11 +34,7 @@ _SERIES_SLOPE = np.array([(k + 1) * (-1.0) ** (k + 1) / (k + 4.0) for k in range
 def harmonic_shape(x: Array) -> Array:
     """First harmonic h of the steady friction loop at the strain amplitude x = e0/eps_half, complex.
 
-    Args:
-        x: strain amplitude over eps_half, not negative, any shape.
-
-    Returns:
-        h of the same shape: the friction modulus is (A + iB)/(2 e0) = sigma_fmax/eps_half h(x).
+    x is not negative, of any shape; the friction modulus is (A + iB)/(2 e0) = sigma_fmax/eps_half h(x).
 
     Notes:
         h(0) = 1/2, and h -> 0 for large x. Differences of nearly equal terms are rearranged, so that h keeps ten digits
@@ -173,10 +169,9 @@ def _walk(strain: Array, turns: Array, periodic: bool, eps_half: Array) -> tuple
     """u = s_f/sigma_fmax and du/deps_half along histories that turn at the same samples, (..., n).
 
     Args:
-        strain: (..., n); one cycle of a steady state begins at its top and ends with its first sample again.
+        strain, eps_half: (..., n), (..., 1); a steady cycle begins at its top and ends with its first sample again.
         turns: the samples at which all of them turn, (k,).
         periodic: whether they are steady, or start from rest.
-        eps_half: (..., 1).
     """
     zero = np.zeros((*np.broadcast_shapes(strain.shape[:-1], np.shape(eps_half)[:-1]), 1))
     if not periodic:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -55,6 +56,10 @@ class History:
     def spectrum(self) -> Array:
         """numpy.fft.rfft over the samples."""
         return np.fft.rfft(self.value)
+
+    def response(self, transfer: Callable[[Array], Array]) -> Array:
+        """Steady response of a linear system, y_h = H(h omega) x_h for every harmonic h; H(0) must be finite."""
+        return np.fft.irfft(transfer(self.harmonics) * self.spectrum, n=self.value.shape[-1])
 
     @cached_property
     def turning(self) -> Turning:

@@ -32,7 +32,7 @@ EFFECT = Layer(
     sentence="Dry friction at the sleeve's face: extra loss that fades with amplitude, the same at every frequency.",
     equation="K + i 4 force/(pi X)",
     level=Level.COMPONENT,
-    parameters=(Parameter("force", "N", (0.0, 1e5), 0.0, 5.0, log=False, meaning="Coulomb force"),),
+    parameters=(Parameter("force", "N", (0.0, 1e5), 0.0, 5.0, meaning="Coulomb force"),),
     source="Coulomb friction; A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B",
     confirmed_by="store the raw force waveforms: slip makes odd harmonics at the smallest amplitude",
     stiffness=stiffness,

@@ -39,7 +39,7 @@ EFFECT = Branch(
     equation="mu1 i omega tau/(1 + i omega tau)",
     level=Level.MATERIAL,
     parameters=(
-        Parameter("mu1", "Pa", (0.0, 1e8), 0.0, 5e4, log=False, meaning="modulus that relaxes"),
+        Parameter("mu1", "Pa", (0.0, 1e8), 0.0, 5e4, meaning="modulus that relaxes"),
         Parameter("tau", "s", (1e-6, 1e2), None, 2e-3, log=True, meaning="relaxation time", scale="period"),
     ),
     source="Maxwell arm; J. D. Ferry, Viscoelastic Properties of Polymers, 3rd ed., 1980, ch. 3",

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, TypeVar
 
 from bushfit.effects.contract import Effect, Level
 from bushfit.geometry import Bushing, Direction, Motion, Place
 from bushfit.reading.measurement import Complex, Loop, Sweep
+
+_Test = TypeVar("_Test", bound=Loop | Sweep)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,7 +22,7 @@ class Mistake(Effect):
     Args:
         line: what to write into the campaign, or to correct where no key does it.
         sweep_line: the same for a sweep, where it differs.
-        kinds: tests in which it is made; none for one that is made in [bushing].
+        kinds: tests in which it is made, sweeps unless told; none for one that is made in [bushing].
         motion: of the tests in which it is made; None for any.
         displacement, force, time: true value over the one stated.
         stiffness: true complex stiffness by the one stated, (n,) each, for what the three factors cannot say; of a
@@ -34,7 +36,7 @@ class Mistake(Effect):
     source: str = "usage in test laboratories"
     line: str
     sweep_line: str = ""
-    kinds: tuple[Literal["sweep", "loop"], ...]
+    kinds: tuple[Literal["sweep", "loop"], ...] = ("sweep",)
     motion: Motion | None = None
     displacement: float = 1.0
     force: float = 1.0
@@ -43,32 +45,20 @@ class Mistake(Effect):
     doubt: Callable[[Complex], bool] | None = None
     swaps: bool = False
 
-    def mended(self, test: Loop | Sweep) -> Loop | Sweep | None:
+    def mended(self, test: _Test) -> _Test | None:
         """The test as it was measured if this mistake was made in it; None where it cannot have been made."""
-        return self.mended_loop(test) if isinstance(test, Loop) else self.mended_sweep(test)
-
-    def mended_loop(self, loop: Loop) -> Loop | None:
-        """The same of a loop."""
-        if not self.possible(loop):
+        if not self.possible(test):
             return None
+        direction = self._direction(test.direction)
+        if isinstance(test, Loop):
+            motion, force = self.displacement * test.displacement, self.force * test.force
+            return replace(test, direction=direction, time=self.time * test.time, displacement=motion, force=force)
         return replace(
-            loop,
-            direction=self._direction(loop.direction),
-            time=self.time * loop.time,
-            displacement=self.displacement * loop.displacement,
-            force=self.force * loop.force,
-        )
-
-    def mended_sweep(self, sweep: Sweep) -> Sweep | None:
-        """The same of a sweep."""
-        if not self.possible(sweep):
-            return None
-        return replace(
-            sweep,
-            direction=self._direction(sweep.direction),
-            amplitude=self.displacement * sweep.amplitude,
-            reached=None if sweep.reached is None else self.displacement * sweep.reached,
-            stiffness=self.force * (self.stiffness(sweep.stiffness) if self.stiffness else sweep.stiffness),
+            test,
+            direction=direction,
+            amplitude=self.displacement * test.amplitude,
+            reached=None if test.reached is None else self.displacement * test.reached,
+            stiffness=self.force * (self.stiffness(test.stiffness) if self.stiffness else test.stiffness),
         )
 
     def mended_cycle(self, cycle: Sweep) -> Sweep:

@@ -6,7 +6,7 @@ user says so.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -48,14 +48,10 @@ def _much_loss(stiffness: Complex) -> bool:
     return _loss(stiffness) > _MOST_LOSS
 
 
-def _times_loss(factor: float) -> Callable[[Complex], Complex]:
+def _times_loss(factor: float, stiffness: Complex) -> Complex:
     """The same |K|, and the loss factor times a factor."""
-
-    def mend(stiffness: Complex) -> Complex:
-        loss = 1.0 + 1j * factor * stiffness.imag / stiffness.real
-        return np.asarray(np.abs(stiffness) * loss / np.abs(loss))
-
-    return mend
+    loss = 1.0 + 1j * factor * stiffness.imag / stiffness.real
+    return np.asarray(np.abs(stiffness) * loss / np.abs(loss))
 
 
 def _sine(stiffness: Complex) -> Complex:
@@ -94,7 +90,6 @@ MISTAKES: dict[str, Mistake] = {
             sentence="the amplitudes of {files} are peak-to-peak",
             equation="X = stated/2",
             line='amplitude = "peak-to-peak"',
-            kinds=("sweep",),
             displacement=0.5,
         ),
         Mistake(
@@ -102,7 +97,6 @@ MISTAKES: dict[str, Mistake] = {
             sentence="the amplitudes of {files} are zero-to-peak, not peak-to-peak as stated",
             equation="X = 2 stated",
             line='take out amplitude = "peak-to-peak", or what says so in the header',
-            kinds=("sweep",),
             displacement=2.0,
         ),
         Mistake(
@@ -187,7 +181,6 @@ MISTAKES: dict[str, Mistake] = {
             sentence="the stiffness of {files} is in lbf/in, not N/mm",
             equation="K = 0.175 stated",
             line='units = {{ stiffness = "lbf/in" }}, and the same in the header if that states a unit',
-            kinds=("sweep",),
             motion=TRANSLATION,
             force=_POUND_FORCE / _INCH,
         ),
@@ -226,7 +219,6 @@ MISTAKES: dict[str, Mistake] = {
             sentence="the stiffness of {files} is per degree, not per radian",
             equation="K = 57.3 stated",
             line='units = {{ stiffness = "N m/deg" }}, and the same in the header if that states a unit',
-            kinds=("sweep",),
             motion=ROTATION,
             force=_RADIAN,
         ),
@@ -235,7 +227,6 @@ MISTAKES: dict[str, Mistake] = {
             sentence="the stiffness of {files} is per radian, not per degree",
             equation="K = stated/57.3",
             line='units = {{ stiffness = "N m/rad" }}, and the same in the header if that states a unit',
-            kinds=("sweep",),
             motion=ROTATION,
             force=1.0 / _RADIAN,
         ),
@@ -244,7 +235,6 @@ MISTAKES: dict[str, Mistake] = {
             sentence="the phases of {files} are radians, not degrees",
             equation="phase = 57.3 stated",
             line='units = {{ phase = "rad" }}, and the same in the header if that states a unit',
-            kinds=("sweep",),
             stiffness=_turned,
             doubt=_little_loss,
         ),
@@ -253,7 +243,6 @@ MISTAKES: dict[str, Mistake] = {
             sentence="the phases of {files} are 90 deg less the loss angle",
             equation="phase = 90 deg - stated",
             line="write 90 deg less the angle into the column of the phase",
-            kinds=("sweep",),
             stiffness=_complement,
             doubt=_much_loss,
         ),
@@ -262,8 +251,7 @@ MISTAKES: dict[str, Mistake] = {
             sentence="the loss factors of {files} are per cent, not ratios",
             equation="K''/K' = stated/100",
             line='units = {{ loss_factor = "%" }}, and the same in the header if that states a unit',
-            kinds=("sweep",),
-            stiffness=_times_loss(0.01),
+            stiffness=partial(_times_loss, 0.01),
             doubt=_much_loss,
         ),
         Mistake(
@@ -271,8 +259,7 @@ MISTAKES: dict[str, Mistake] = {
             sentence="the loss factors of {files} are ratios, not per cent",
             equation="K''/K' = 100 stated",
             line='units = {{ loss_factor = "1" }}, and [-] in the header if that states a unit',
-            kinds=("sweep",),
-            stiffness=_times_loss(100.0),
+            stiffness=partial(_times_loss, 100.0),
             doubt=_little_loss,
         ),
         Mistake(
@@ -280,7 +267,6 @@ MISTAKES: dict[str, Mistake] = {
             sentence="the loss factors of {files} are K''/|K| (sin delta), not K''/K' (tan delta)",
             equation="K''/|K| = stated",
             line="write tan delta into the column of the loss factor: s/sqrt(1 - s^2) for each s",
-            kinds=("sweep",),
             stiffness=_sine,
         ),
         Mistake(
@@ -289,7 +275,6 @@ MISTAKES: dict[str, Mistake] = {
             equation="K' = stated",
             line="write |K| = K' sqrt(1 + loss factor^2) into the column of the stiffness, or name the columns of "
             'storage and loss stiffness in columns = {{ storage_stiffness = "...", loss_stiffness = "..." }}',
-            kinds=("sweep",),
             stiffness=_magnitude,
         ),
         Mistake(
@@ -297,7 +282,6 @@ MISTAKES: dict[str, Mistake] = {
             sentence="the storage stiffness of {files} is |K|, not K'",
             equation="|K| = stated",
             line="write K' = sqrt(|K|^2 - K''^2) into the column of the storage stiffness",
-            kinds=("sweep",),
             stiffness=_storage,
         ),
         Mistake(
@@ -329,9 +313,6 @@ def candidate_named(name: str) -> Effect:
     """
     mistake = mistake_named(name)
     if mistake is None and SEPARATOR in name:
-        raise ModelError(
-            "unknown mistake",
-            found=name,
-            expected=f"MISTAKE{SEPARATOR}TEST with one of {', '.join(MISTAKES)}",
-        )
+        expected = f"MISTAKE{SEPARATOR}TEST with one of {', '.join(MISTAKES)}"
+        raise ModelError("unknown mistake", found=name, expected=expected)
     return mistake or effect_named(name)

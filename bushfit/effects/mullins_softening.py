@@ -30,7 +30,7 @@ EFFECT = Branch(
     equation="0 once settled",
     level=Level.MATERIAL,
     parameters=(
-        Parameter("share", "1", (0.0, 5.0), 0.0, 0.05, log=False, meaning="extra stiffness at the start over mu"),
+        Parameter("share", "1", (0.0, 5.0), 0.0, 0.05, meaning="extra stiffness at the start over mu"),
         Parameter("cycles", "1", (0.1, 100.0), None, 1.0, log=True, meaning="cycles in which it falls to 37 %"),
     ),
     source="L. Mullins, Rubber Chem. Technol. 42 (1969) 339",

@@ -21,7 +21,7 @@ EFFECT = Modifier(
     sentence="Filler friction grows with frequency, most where friction is most of the stiffness: small amplitudes.",
     equation="sigma_fmax (f/25 Hz)^n",
     level=Level.MATERIAL,
-    parameters=(Parameter("n", "1", (0.0, 1.0), 0.0, 0.05, log=False, meaning="power of the rate"),),
+    parameters=(Parameter("n", "1", (0.0, 1.0), 0.0, 0.05, meaning="power of the rate"),),
     source="power law of rate on the friction stress of Garcia Tarrago et al. 2007, Eq. 5",
     confirmed_by="loop at 0.01, 0.1 and 1 Hz: the width must change with the rate",
     adjust=adjust,

@@ -5,18 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.effects.contract import (
-    Array,
-    ForceBelow,
-    Layer,
-    Level,
-    Parameter,
-    Setting,
-    StiffnessBelow,
-    Value,
-    Values,
-    along_a_line,
-)
+from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
 from bushfit.effects.history import History
 from bushfit.errors import ModelError
 
@@ -33,7 +22,6 @@ _LARGEST_MOTION = 2.0
 _PULSE_AT = 4
 
 
-@along_a_line
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
     """K/(1 + c K) [N/m] with K at the amplitude X/|1 + c K| that reaches the bushing; does not act in torsion."""
     compliance = p["compliance"]
@@ -62,7 +50,6 @@ def _log_share(compliance: Value, below: StiffnessBelow, omega: Array, amplitude
     return new
 
 
-@along_a_line
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
     """Force [N] of the motion x_b = x - c F(x_b) that reaches the bushing.
 
@@ -120,12 +107,11 @@ EFFECT = Layer(
     sentence="The rig gives way in series: the stiffer the bushing, the softer it seems, most so radially.",
     equation="1/K' = 1/K + compliance, K at the amplitude that reaches the bushing",
     level=Level.INSTRUMENT,
-    parameters=(
-        Parameter("compliance", "m/N", (0.0, 1e-5), 0.0, 2e-8, log=False, meaning="give of the rig per force"),
-    ),
+    parameters=(Parameter("compliance", "m/N", (0.0, 1e-5), 0.0, 2e-8, meaning="give of the rig per force"),),
     source="springs in series; ISO 10846-2:2008",
     confirmed_by="put a steel dummy in place of the bushing",
     harmonic_error=2e-3,
+    turns=False,
     stiffness=stiffness,
     force=force,
 )

@@ -11,7 +11,7 @@ EFFECT = Branch(
     equation="(A + iB)/(2 e0) with sigma_fmax and eps_half of its own",
     level=Level.MATERIAL,
     parameters=(
-        Parameter("sigma_fmax", "Pa", (0.0, 1e8), 0.0, 2e3, log=False, meaning="largest stress of this friction"),
+        Parameter("sigma_fmax", "Pa", (0.0, 1e8), 0.0, 2e3, meaning="largest stress of this friction"),
         Parameter(
             "eps_half",
             "1",

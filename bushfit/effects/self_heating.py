@@ -22,7 +22,7 @@ EFFECT = Modifier(
     sentence="The bushing warms itself and softens: stiffness falls where amplitude and frequency are both high.",
     equation="mu, m, sigma_fmax over 1 + beta P, P = pi f X^2 K''",
     level=Level.MATERIAL,
-    parameters=(Parameter("beta", "1/W", (0.0, 10.0), 0.0, 1e-3, log=False, meaning="softening per watt dissipated"),),
+    parameters=(Parameter("beta", "1/W", (0.0, 10.0), 0.0, 1e-3, meaning="softening per watt dissipated"),),
     source="steady heat balance (rise in proportion to the power) and a modulus that falls with temperature",
     confirmed_by="hold one point for 30 s and for 10 min: heating shows as drift",
     adjust=adjust,

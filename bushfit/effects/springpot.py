@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Value, Values, linear_response, linear_stress
+from bushfit.effects.contract import Array, Branch, Level, Parameter, Value, Values, linear_stress
 from bushfit.effects.history import History
 
 #: Step of alpha in differences of the Gruenwald-Letnikov sum [1]: the cube root of rounding, which errs least.
@@ -61,7 +61,7 @@ def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
         by_alpha = p["m"] * (ahead - behind) / (2.0 * _ORDER_STEP)
         return {"m": fractional_derivative(alpha, history.value, step), "alpha": by_alpha}
     slopes = modulus_sensitivities(p, history.harmonics, history.amplitude)
-    both = linear_response(lambda _: 2.0 * np.stack(list(slopes.values())), history)
+    both = history.response(lambda _: 2.0 * np.stack(list(slopes.values())))
     return dict(zip(slopes, both, strict=True))
 
 
@@ -72,7 +72,7 @@ EFFECT = Branch(
     level=Level.MATERIAL,
     parameters=(
         Parameter("m", "Pa*s^alpha", (1.0, 1e9), 0.0, 2e5, log=True, meaning="springpot constant"),
-        Parameter("alpha", "1", (0.02, 1.0), None, 0.25, log=False, meaning="order of the fractional derivative"),
+        Parameter("alpha", "1", (0.02, 1.0), None, 0.25, meaning="order of the fractional derivative"),
     ),
     source="Garcia Tarrago et al. 2007, Eqs. 1-3",
     modulus=modulus,

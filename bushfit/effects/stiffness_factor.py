@@ -33,13 +33,7 @@ def stiffness_factor(place: str) -> Layer:
         level=Level.COMPONENT,
         parameters=(
             Parameter(
-                "factor",
-                "1",
-                (0.6, 1.4),
-                1.0,
-                0.05,
-                log=False,
-                meaning=f"stiffness of {place} over what its dimensions say",
+                "factor", "1", (0.6, 1.4), 1.0, 0.05, meaning=f"stiffness of {place} over what its dimensions say"
             ),
         ),
         source="Eqs. 11, 12 against finite elements: -6 to +20 % by shape, within 1 % where shape is calibrated"

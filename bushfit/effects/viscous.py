@@ -23,7 +23,7 @@ EFFECT = Branch(
     sentence="Plain viscous damping of the rubber: the loss stiffness grows in proportion to frequency.",
     equation="i omega eta",
     level=Level.MATERIAL,
-    parameters=(Parameter("eta", "Pa*s", (0.0, 1e6), 0.0, 100.0, log=False, meaning="viscosity"),),
+    parameters=(Parameter("eta", "Pa*s", (0.0, 1e6), 0.0, 100.0, meaning="viscosity"),),
     source="Kelvin-Voigt model; J. D. Ferry, Viscoelastic Properties of Polymers, 3rd ed., 1980, ch. 1",
     confirmed_by="sweep from 0.05 to 5 Hz: a plain dashpot has nothing left to add there",
     modulus=modulus,

@@ -91,20 +91,14 @@ class LeaveOut:
 
 
 def misfits(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet] = ()) -> tuple[Misfit, ...]:
-    """How well a model meets each test, and each run of those that have several, one after the other.
-
-    Args:
-        model: as fitted.
-        fitted: the tests that it was fitted to.
-        left: other tests.
-    """
+    """How well a model meets each test, and each run of those that have several; `left` are tests not fitted."""
     pairs = [(data_set, True) for data_set in fitted] + [(data_set, False) for data_set in left]
     return tuple(found for data_set, was in pairs for found in _misfits(model, data_set.standing(), was_fitted=was))
 
 
 def _misfits(model: Model, data_set: DataSet, *, was_fitted: bool) -> Iterator[Misfit]:
     """The figures of a test without points of no weight, and of its runs where there are several."""
-    relative, gain = data_set.relative(model), np.abs(_modelled(model, data_set) / data_set.measured) - 1.0
+    relative, gain = data_set.relative(model), np.abs(data_set.noise_free(model).measured / data_set.measured) - 1.0
     squares = np.square(data_set.residual(model)).reshape(data_set.parts, -1).sum(axis=0)
     place, every = str(data_set.direction), np.ones(data_set.frequency.size, dtype=bool)
 
@@ -126,16 +120,13 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
     was not fitted is predicted anyway. Where fewer than half the points of a place are predicted so, all count as the
     fit has them.
 
-    Args:
-        solution: the fit.
-        data_sets: what it was fitted to, with the weights at which it is the least sum of squares.
-        left: other tests.
+    The tests have the weights at which the solution is the least sum of squares; `left` are others.
     """
     free = [i for i, name in enumerate(solution.coordinates.names) if name not in solution.at_bound]
     whole, begin = LeaveOut.of(solution.jacobian[free], solution.residual), 0
     found: dict[str, list[_Off]] = {}
     for data_set in data_sets:
-        modelled, slopes = _modelled(solution.model, data_set), _slopes(solution, data_set)[free]
+        modelled, slopes = data_set.noise_free(solution.model).measured, _slopes(solution, data_set)[free]
         for run in _runs(data_set):
             points = np.broadcast_to(run.points, (data_set.parts, data_set.size // data_set.parts))
             step = whole.step(begin + np.flatnonzero(points))
@@ -161,7 +152,7 @@ def met_within(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet])
 def _add(found: dict[str, list[_Off]], model: Model, data_sets: Sequence[DataSet], *, held_out: bool) -> None:
     """Add to `found`, by place, how far the points of tests are off."""
     for data_set in data_sets:
-        off = _off(_modelled(model, data_set), data_set.measured)
+        off = _off(data_set.noise_free(model).measured, data_set.measured)
         found.setdefault(str(data_set.direction), []).append((off, held_out))
 
 
@@ -180,11 +171,6 @@ def _off(modelled: Array, measured: Array) -> Array:
     return np.abs([np.abs(modelled / measured) - 1.0, loss_factor(modelled) - loss_factor(measured)])
 
 
-def _modelled(model: Model, data_set: DataSet) -> Array:
-    """Complex stiffness of the model at the operating points of a test [N/m, N m/rad or Pa], (n,)."""
-    return data_set.noise_free(model).measured
-
-
 def _slopes(solution: Solution, data_set: DataSet) -> Array:
     """Derivatives of ln K by coordinate at the operating points, (k, n)."""
     model, names = solution.model, solution.coordinates.names
@@ -197,11 +183,10 @@ def _slopes(solution: Solution, data_set: DataSet) -> Array:
 
 def _runs(data_set: DataSet) -> Iterator[_Run]:
     """What was recorded with each value held; a loop, and a sweep that holds nothing, is one run."""
-    stepped = data_set.sweep.stepped if isinstance(data_set, SweepData) else None
-    if not isinstance(data_set, SweepData) or stepped is None:
+    if not isinstance(data_set, SweepData) or data_set.sweep.stepped is None:
         yield _Run(None, None, None, np.ones(data_set.frequency.size, dtype=bool))
         return
-    what: Literal["amplitude", "frequency"] = "amplitude" if stepped == "frequency" else "frequency"
+    what: Literal["amplitude", "frequency"] = "amplitude" if data_set.sweep.stepped == "frequency" else "frequency"
     unit = data_set.direction.motion.displacement_unit if what == "amplitude" else "Hz"
     held = data_set.sweep.held[data_set.order]
     for value in np.unique(held):

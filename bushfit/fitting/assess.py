@@ -34,10 +34,7 @@ class Stage:
 def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = None) -> Covariance:
     """Covariance of all parameters that a procedure estimated, each stage holding what the others found.
 
-    Args:
-        model: with the values found.
-        stages: the fits of the procedure; a joint fit is one stage, with the covariance (J J^T)^-1.
-        held: covariance of parameters that all stages held; they enter as they are.
+    `held` is that of parameters which all stages held.
 
     Returns:
         By parameter value. Where the residuals of a stage exceed its noise, its share is inflated by its reduced
@@ -93,15 +90,9 @@ def linear_errors(slope: Array) -> Array:
 
 
 def _unsure(stages: Sequence[Stage], reactions: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
-    """What each estimated variance of the noise does to the covariance, (k, k) each.
+    """How far the error of each estimated variance moves the covariance, and what it adds by wrong weights, (k, k).
 
-    Args:
-        stages: the fits of a procedure.
-        reactions: of the parameters to the stage's own equations, (k, own), and the stage's basis, (own, n).
-
-    Returns:
-        Per variance, which may act in many data sets: how far the covariance moves with the standard error of the
-        variance, and the covariance that this error adds by giving the data wrong weights.
+    The reactions are those of the parameters to a stage's own equations, (k, own), and the stage's basis, (own, n).
     """
     parts: dict[Hashable, tuple[Array, Array]] = {}
     for stage, (reaction, basis) in zip(stages, reactions, strict=True):
@@ -162,6 +153,5 @@ def misfit(model: Model, data_sets: Sequence[DataSet], parameters: int, advice: 
         return []
     return [
         "the model misses the data by more than their noise "
-        f"(reduced chi-square {number(reduced, 2)}): "
-        f"standard errors are scaled up{advice}"
+        f"(reduced chi-square {number(reduced, 2)}): standard errors are scaled up{advice}"
     ]

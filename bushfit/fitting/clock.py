@@ -7,7 +7,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.fourier import basis, derivative, least_squares, resolved_order, spread_rows
-from bushfit.fitting.loop_outliers import residual_limit
+from bushfit.fitting.loop_harmonics import residual_limit
 from bushfit.fitting.runin import crossings
 from bushfit.reading.measurement import Loop
 
@@ -44,12 +44,9 @@ _REPEATS_SCATTER = 6.0
 
 
 def fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, float]:
-    """Frequency [Hz] and number of cycles of a loop.
+    """Frequency [Hz] and number of cycles of a loop without run-in.
 
-    Args:
-        loop: periodic, without run-in.
-        clock: time of rows that are enough to find the cycles, gross outliers left out [s], (n,).
-        displacement: of the same rows [m or rad], (n,).
+    The clock [s] and the displacement [m or rad], (n,) each, are of rows that are enough to find the cycles.
 
     Raises:
         FitError: the loop does not hold a whole cycle.
@@ -71,17 +68,7 @@ def fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, f
 
 
 def _of_one_cycle(loop: Loop, clock: Array, x: Array, across: Array) -> tuple[float, float]:
-    """Frequency [Hz] and number of cycles of a loop that crosses its middle but once in either sense.
-
-    Args:
-        loop: the whole loop.
-        clock: time since its first row [s], (n,).
-        x: displacement about its middle, (n,).
-        across: when it crosses the middle [s], one or two.
-
-    Raises:
-        FitError: the loop does not hold a whole cycle.
-    """
+    """As `fundamental`, of a loop that crosses its middle but once in either sense, at the times `across` [s]."""
     rows, motion = loop.time.size, loop.displacement
     duration = float(loop.time[-1] - loop.time[0])
     closed = duration * rows / (rows - 1)
@@ -111,15 +98,8 @@ def _of_one_cycle(loop: Loop, clock: Array, x: Array, across: Array) -> tuple[fl
 def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> float | None:
     """Period of a motion whose last rows meet its first, going the same way; None where they do not, or stand still.
 
-    Args:
-        clock: time [s], (n,).
-        x: displacement, (n,).
-        duration: from the first row to the last [s].
-        whole: period where the record is just one cycle [s].
-
-    Notes:
-        Both ends are drawn as straight lines. They tell how far beyond one cycle the record goes, or how short of it
-        it stops; within their error it is the whole record.
+    Both ends are drawn as straight lines. They tell how far beyond one cycle the record goes, or how short of it it
+    stops; within their error it is just one cycle, of the period `whole` [s].
     """
     few = max(3, int(_END * x.size))
     first, first_slope, first_scatter = _line(clock[:few] - clock[0], x[:few])

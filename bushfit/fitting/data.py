@@ -28,14 +28,7 @@ _Kind = TypeVar("_Kind", LoopData, SweepData, DataSet)
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """A campaign made ready to fit: one data set per loop and per sweep, and the user's settings.
-
-    Args:
-        campaign: as read.
-        loops: a data set per loop, in the order of the campaign.
-        sweeps: a data set per sweep, in the order of the campaign.
-        bounds: least and largest value of each parameter that [fit] names; None for none.
-    """
+    """A campaign made ready to fit: one data set per loop and per sweep, and the limits that [fit] gives parameters."""
 
     campaign: Campaign
     loops: tuple[LoopData, ...]
@@ -67,20 +60,13 @@ class Data:
     def some(
         self, tests: Sequence[_Kind], message: str, hint: str, found: str = "no [[loops]] and no [[sweeps]]"
     ) -> Sequence[_Kind]:
-        """Those tests.
-
-        Raises:
-            FitError: there is none.
-        """
+        """Those tests, or a FitError where there is none."""
         if not tests:
             raise FitError(message, file=self.campaign.path, found=found, hint=hint)
         return tests
 
     def without(self, outliers: Sequence[Outlier]) -> Data:
-        """The same data with no weight on these outliers of the sweeps.
-
-        Those of loops have none from the start where `robust`.
-        """
+        """The same data with no weight on these outliers of the sweeps; those of loops have none where `robust`."""
         sweeps = []
         for data_set in self.sweeps:
             rows = [outlier.row - 1 for outlier in outliers if outlier.test == data_set.name]
@@ -94,11 +80,7 @@ class Data:
         return {name: setting.value for name, setting in settings.items() if setting.value is not None}
 
     def start(self, data_sets: Sequence[DataSet], held: Mapping[str, float]) -> dict[str, float]:
-        """Values of the paper's parameters, and of all that the campaign gives, to start a fit of some tests from.
-
-        Raises:
-            FitError: see `start_values`.
-        """
+        """Values of the paper's parameters, and what the campaign gives, to start a fit of some tests from."""
         with naming(self.campaign.path):
             return start_values(self.campaign.bushing, data_sets, {**self.given, **held})
 
@@ -132,17 +114,13 @@ class Data:
             raise FitError(
                 "no test in the directions asked for",
                 file=self.campaign.path,
-                found=", ".join(sorted({str(data_set.direction) for data_set in data_sets})) or "no tests",
+                found=", ".join(sorted({str(data_set.direction) for data_set in data_sets})),
                 expected=", ".join(places),
             )
         return chosen
 
     def static_loops(self) -> list[DataSet]:
-        """The loops `fit-static` uses: the axial ones, else those of the bushing, else all.
-
-        Raises:
-            FitError: there is no loop.
-        """
+        """The loops `fit-static` uses: the axial ones, else those of the bushing, else all."""
         hint = "add a quasi-static loop, or run bushfit fit for the sweeps alone"
         return [*_first(self.some(self.loops, "fit-static needs a loop", hint, "no [[loops]]"))]
 

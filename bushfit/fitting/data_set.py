@@ -221,10 +221,7 @@ class DataSet(ABC):
 
 
 def kept(answer: Callable[..., Array]) -> Callable[..., Array]:
-    """Keeps what a data set answered to the last model: residuals, derivatives and quality ask for the same again.
-
-    What is asked beside the model is a list of names, or values in place of the model's own; of these nothing is kept.
-    """
+    """Keeps what a data set answered to the last model; of values in place of the model's own nothing is kept."""
     place = f"_last_{answer.__name__}"
 
     @wraps(answer)

@@ -7,17 +7,18 @@ from typing import TypeVar
 
 import numpy as np
 
+from bushfit.campaign.schema import Residuals
 from bushfit.fitting.data_set import DataSet
 from bushfit.fitting.drive import drive_of
 from bushfit.fitting.loop_data import LoopData
 from bushfit.fitting.noise import sweep_noise
-from bushfit.fitting.sweep_data import Residuals, SweepData
+from bushfit.fitting.sweep_data import SweepData
 from bushfit.geometry import Specimen
 from bushfit.reading.measurement import Loop, Source, Sweep
 
 Kind = TypeVar("Kind", LoopData, SweepData)
 
-__all__ = ["DataSet", "LoopData", "Residuals", "SweepData", "loop_data", "parted", "sources", "sweep_data"]
+__all__ = ["DataSet", "LoopData", "SweepData", "loop_data", "parted", "sources", "sweep_data"]
 
 
 def loop_data(loops: Sequence[Loop], *, without_outliers: bool = False) -> list[LoopData]:

@@ -18,13 +18,11 @@ from bushfit.effects.history import History, reversals
 from bushfit.errors import FitError
 from bushfit.fitting.clock import fundamental
 from bushfit.fitting.fourier import GRID, basis, least_squares, series
-from bushfit.fitting.loop_harmonics import MOST_ROWS, loop_harmonics
-from bushfit.fitting.loop_outliers import OutlierRows
+from bushfit.fitting.loop_harmonics import MOST_ROWS, OutlierRows, loop_harmonics
+from bushfit.fitting.motion import mean_of_preload, preload, wrong_clock
 from bushfit.fitting.noise import FLOOR
 from bushfit.fitting.phase_bins import phase_bins
-from bushfit.fitting.preload import mean_of_preload, preload
 from bushfit.fitting.runin import steady_part, thinned
-from bushfit.fitting.waveform import wrong_clock
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.cycles import HOLE
 from bushfit.units import number
@@ -57,7 +55,6 @@ class Drive:
     """A loop made ready for the model.
 
     Args:
-        loop: the measured loop.
         frequency: [Hz], found from the displacement.
         cycles: whole and broken cycles in the record.
         from_rest: True where the record begins at rest, False where the loop had settled.
@@ -108,10 +105,9 @@ class Drive:
         return complex(complex(real, imag) / self.coefficients[1])
 
     def history(self, settles: bool) -> History:
-        """The motion as the model wants it, GRID samples a cycle.
+        """One settled cycle, GRID samples long, or the whole record where it begins at rest, or the model `settles`.
 
-        One settled cycle, or the whole record where it begins at rest or the model `settles` over the cycles; in a part
-        after other cycles it has.
+        In a part after other cycles the model has settled.
         """
         return self._settling if settles and not (self.from_rest or self.follows) else self._motion
 
@@ -152,11 +148,7 @@ class Drive:
 def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
     """The cycles of a loop, its displacement cleared of noise, and its force with weights.
 
-    Outliers of either column do not disturb that.
-
-    Args:
-        loop: the measured loop.
-        without_outliers: whether rows whose force is an outlier carry no weight; else they count like any other.
+    Outliers of either column do not disturb that; `without_outliers`, rows whose force is one carry no weight.
 
     Raises:
         FitError: the displacement is not one whole cycle or more of a periodic motion, rows are missing, or the loop
@@ -205,11 +197,7 @@ def _of_the_record(loop: Loop) -> Iterator[str]:
 
 
 def _check_no_hole(loop: Loop, clock: Array, frequency: float) -> None:
-    """Across rows that are missing nothing tells how many turns the motion made, nor so its frequency.
-
-    Raises:
-        FitError: rows are missing over more than a part of a cycle.
-    """
+    """Refuse a hole of more than a part of a cycle: nothing tells how many turns the motion made in it."""
     steps = np.diff(clock)
     widest = int(np.argmax(steps))
     if steps[widest] > HOLE / frequency:
@@ -224,11 +212,7 @@ def _check_no_hole(loop: Loop, clock: Array, frequency: float) -> None:
 
 
 def _check_loses_energy(drive: Drive) -> None:
-    """A bushing loses energy: its force runs ahead of its displacement.
-
-    Raises:
-        FitError: it lags behind, beyond noise and what the delay of a rig makes.
-    """
+    """Refuse a force that lags behind the displacement, beyond noise and what the delay of a rig makes."""
     stiffness = drive.first_harmonic()
     chance = drive.noise * np.sqrt(2.0 / drive.weight.sum()) / abs(drive.coefficients[1])
     if stiffness.imag < -max(_CERTAIN * chance, _NO_LOSS * abs(stiffness)):
@@ -250,15 +234,7 @@ def _without(values: Array, rows: Array) -> Array:
 def _points(
     loop: Loop, frequency: float, cycles: float, unweighted: Array, *, each_cycle: bool
 ) -> tuple[Array, Array, Array]:
-    """Phase [cycles], force and weight of each row of a loop, or of each bin of phase where it is long, (n,) each.
-
-    Args:
-        loop: without run-in.
-        frequency: [Hz].
-        cycles: in the loop.
-        unweighted: rows that carry no weight.
-        each_cycle: whether every cycle has bins of its own.
-    """
+    """Phase [cycles], force and weight of each row of a loop, or of each bin of phase where it is long, (n,) each."""
     clock = loop.time - loop.time[0] if loop.time[0] else loop.time
     if loop.force.size > MOST_ROWS:
         clock, force = _without(clock, unweighted), _without(loop.force, unweighted)
@@ -267,10 +243,7 @@ def _points(
 
 
 def _at_reversal(drive: Drive) -> Array:
-    """Rows within a step of the model's grid from a turning point, (n,).
-
-    Dry friction jumps there, and no grid can tell when.
-    """
+    """Rows within a step of the grid from a turning point, (n,): dry friction jumps there, and no grid tells when."""
     motion, position = drive.history(settles=False).value, drive.phase * GRID
     if drive.from_rest:
         turns = np.flatnonzero(reversals(motion))
@@ -285,13 +258,6 @@ def _from_rest(loop: Loop, frequency: float, half_motion: float, half_force: flo
     """Whether the record begins with nothing moved, no force, and a force that is another a cycle later.
 
     A settled loop may pass the origin too, where its load cell is off zero, but then it passes it every cycle.
-
-    Args:
-        loop: the whole record.
-        frequency: [Hz].
-        half_motion: half of the range of the displacement [m or rad].
-        half_force: half of the range of the force [N or N m].
-        noise: standard deviation of one row's force [N or N m].
     """
     unmoved = abs(loop.displacement[0]) <= _AT_REST * half_motion
     unloaded = abs(loop.force[0]) <= _AT_REST * half_force + _FIRST_ROW * noise

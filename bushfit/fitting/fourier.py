@@ -24,10 +24,7 @@ _GOLDEN = 0.6180339887498949
 
 
 def spread_rows(rows: int, most: int) -> NDArray[np.intp]:
-    """Numbers of rows that stand for all: every one of few, else `most` spread evenly.
-
-    Their step varies, so that it cannot keep time with the cycles.
-    """
+    """Rows that stand for all: every one of few, else `most`, spread by a step that keeps time with no cycle."""
     count = min(rows, most)
     number = np.arange(count)
     return (number if count == rows else (number + number * _GOLDEN % 1.0) * (rows / count)).astype(np.intp)
@@ -46,12 +43,9 @@ def basis(phase: Array, order: int) -> Array:
 
 
 def least_squares(columns: Array, values: Array, weight: Array | None = None) -> Array:
-    """Real coefficients that fit `values`, (n,) or (n, channels), by normal equations.
+    """Real coefficients that fit `values`, (n,) or (n, channels), by normal equations, each row with its weight, (n,).
 
-    Args:
-        columns: of `basis`, (n, k): nearly orthogonal over whole cycles, so that normal equations lose no digits.
-        values: to fit.
-        weight: of each row, (n,); 1 for None.
+    The columns are of `basis`, (n, k): nearly orthogonal over whole cycles, so that normal equations lose no digits.
     """
     weighed = columns.T if weight is None or np.all(weight == 1.0) else columns.T * weight
     return np.linalg.solve(weighed @ columns, weighed @ values)

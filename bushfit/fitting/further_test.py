@@ -42,13 +42,7 @@ _HOPELESS = 10.0
 
 
 def further_test(model: Model, data_sets: Sequence[DataSet], known: Information) -> list[str]:
-    """A sentence on the test that shrinks the worst standard error most, and to what; none where none helps.
-
-    Args:
-        model: the fitted model.
-        data_sets: the tests that there are.
-        known: what they tell.
-    """
+    """A sentence on the test that shrinks the worst standard error most, and to what; none where none helps."""
     before = known.errors()
     worst = int(np.argmax(before))
     bearable = max(_BEARABLE, measured_range(model, data_sets).strain[1])
@@ -140,15 +134,7 @@ def _new_sweeps(
 def _sweep(
     model: Model, sweeps: Sequence[SweepData], like: DataSet, band: tuple[float, float], amplitudes: Sequence[float]
 ) -> SweepData:
-    """A sweep as the model would have it, with the noise of the campaign's sweeps, or that of most rigs.
-
-    Args:
-        model: the fitted model.
-        sweeps: of the campaign.
-        like: a test whose direction is taken where the campaign has no sweeps.
-        band: lowest and highest frequency [Hz].
-        amplitudes: zero-to-peak [m or rad].
-    """
+    """A sweep as the model would have it, as noisy as the campaign's or most rigs', in its direction or `like`'s."""
     frequency, amplitude = (x.ravel() for x in np.meshgrid(np.geomspace(*band, _NEW_FREQUENCIES), amplitudes))
     direction = sweeps[0].direction if sweeps else like.direction
     stiffness = model.stiffness(direction, frequency, amplitude)

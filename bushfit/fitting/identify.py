@@ -1,11 +1,7 @@
-"""What tests leave open, in words.
+"""What tests leave open, in words: parameters, the reason, what is known all the same, and the best further test.
 
-Directions that noise leaves open are named by the parameters in them, with the reason that lies in the tests, the
-combination that is known all the same, and the further test that would help most.
-
-Notes:
-    A direction is an eigenvector of the Fisher information, with parameters scaled by their size; its standard error is
-    one over the root of the eigenvalue, which is a singular value of the Jacobian scaled by noise and size.
+A direction is an eigenvector of the Fisher information, with parameters scaled by their size; its standard error is one
+over the root of the eigenvalue, which is a singular value of the Jacobian scaled by noise and size.
 """
 
 from __future__ import annotations
@@ -53,7 +49,6 @@ class _Combination:
     Args:
         formula: in words of the model.
         value: of the modulus [Pa], from the parameters and omega [rad/s]; analytic, so that it takes complex numbers.
-        names: its parameters.
         open_with: it is of interest where one of these is open.
         remark: what it means.
     """

@@ -42,10 +42,7 @@ class Information:
         return replace(self, matrix=self.matrix + Information.of(model, data_sets, self.names).matrix)
 
     def directions(self) -> tuple[Array, Array]:
-        """Relative standard error of each direction, (k,), and the directions, (k, k) by column.
-
-        A direction is an eigenvector of the information: a combination of parameters whose error is independent.
-        """
+        """Relative standard errors, (k,), of the eigenvectors of the information, and these, (k, k) by column."""
         values, vectors = np.linalg.eigh(self.matrix)
         return 1.0 / np.sqrt(np.maximum(values, np.finfo(float).eps * values.max())), vectors
 

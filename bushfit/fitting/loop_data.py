@@ -51,22 +51,18 @@ class LoopData(DataSet):
 
     @property
     def frequency(self) -> Array:
-        """[Hz], (1,)."""
         return np.array([self.drive.frequency])
 
     @property
     def amplitude(self) -> Array:
-        """Zero-to-peak [m or rad], (1,)."""
         return np.array([self.drive.amplitude])
 
     @cached_property
     def measured(self) -> Array:
-        """Complex stiffness of the loop's fundamental, (1,)."""
         return np.array([self.drive.first_harmonic()])
 
     @property
     def relative_noise(self) -> float:
-        """Standard deviation of one row, relative to half the force range."""
         return self.drive.noise / self.drive.half_range
 
     @kept

@@ -11,9 +11,20 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.fourier import GRID, as_complex, basis, least_squares, resolved_order, series, spread_rows
-from bushfit.fitting.loop_outliers import NO_OUTLIERS, OutlierRows, column_outliers, fit_without_outliers
+from bushfit.fitting.fourier import (
+    GRID,
+    as_complex,
+    basis,
+    first_amplitude,
+    least_squares,
+    resolved_order,
+    series,
+    spread_rows,
+)
+from bushfit.fitting.noise import FLOOR
+from bushfit.fitting.outliers import are_outliers, are_stuck, outlier_limit
 from bushfit.reading.measurement import Loop
+from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 
 #: Rows of a loop that the harmonics are fitted to at most; longer ones are averaged into as many bins of phase.
 MOST_ROWS = 4 * GRID
@@ -32,6 +43,22 @@ _ROWS_PER_UNKNOWN = 4
 _TRIANGLE_RATIO = 1.02
 #: Distance of the third harmonic from a triangle's [noise of a row] that rules a triangle out, without drawing one.
 _NO_TRIANGLE = 3.0
+#: Share of the amplitude, over the number of harmonics, by which these may miss a corner of the motion.
+_CORNER = 0.5
+#: Rounds in which rows are weighted down by their distance; chosen.
+_REWEIGHTINGS = 10
+#: Rounds of leaving outliers out at most; chosen: nearly all records settle in two.
+_MOST_ROUNDS = 10
+
+
+class OutlierRows(NamedTuple):
+    """Outliers of one column: their rows, (k,), and how far each lies off the harmonics, in units of noise, (k,)."""
+
+    rows: Array
+    off: Array
+
+
+NO_OUTLIERS = OutlierRows(np.empty(0, dtype=np.intp), np.empty(0))
 
 
 class LoopHarmonics(NamedTuple):
@@ -55,11 +82,6 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
 
     The noise holds what does not repeat from cycle to cycle and what is too fast for the rubber, but not what changes
     slowly from one cycle to the next, which is settling or drift.
-
-    Args:
-        loop: one cycle or more of a periodic motion.
-        frequency: [Hz].
-        cycles: in the loop.
     """
     chosen = spread_rows(loop.time.size, MOST_ROWS)
     phase = (loop.time[chosen] - loop.time[0]) * frequency
@@ -95,25 +117,13 @@ def _significant(coefficients: Array, noise: float, rows: int) -> Array:
 
 
 def _is_triangle(triangle: Array, coefficients: Array, noise: float, phase: Array, displacement: Array) -> bool:
-    """Whether the rows of a motion agree with a triangle as well as with its own harmonics.
-
-    Args:
-        triangle: complex harmonics of the triangle, mean first.
-        coefficients: the motion's own.
-        noise: of one row about its own harmonics [m or rad].
-        phase: of the rows [cycles], (n,).
-        displacement: of the rows [m or rad], (n,).
-    """
+    """Whether the rows of a motion agree with a triangle as well as, but for noise, with its own harmonics."""
     other = coefficients.size > 3 and abs(coefficients[3] - triangle[3]) >= _NO_TRIANGLE * noise
     return bool(not other and np.std(displacement - series(triangle, phase)) < _TRIANGLE_RATIO * noise)
 
 
 def _triangle(mean: complex, fundamental: complex) -> Array:
-    """Complex harmonics of the triangle of that mean and fundamental, as far as the grid goes.
-
-    Notes:
-        c_k falls as 1/k^2 over the odd k, so slowly that its corners need them all.
-    """
+    """Complex harmonics of a triangle, by mean and fundamental; they fall so slowly that its corners need all."""
     order = np.arange(1, GRID // 2, 2)
     turn = 1j * fundamental / abs(fundamental)
     coefficients = np.zeros(GRID // 2, dtype=complex)
@@ -123,13 +133,7 @@ def _triangle(mean: complex, fundamental: complex) -> Array:
 
 
 def _scatter(phase: Array, residual: Array, freedom: int) -> float:
-    """Standard deviation of the force's residuals less the slow part of each cycle's own.
-
-    Args:
-        phase: of the rows [cycles], (n,).
-        residual: of the force, (n,).
-        freedom: degrees of freedom of these residuals.
-    """
+    """Standard deviation of the force's residuals less the slow part of each cycle's own."""
     number = np.floor(phase).astype(np.intp)
     unknowns = 2 * _SLOW_HARMONICS + 1
     left = residual.copy()
@@ -140,3 +144,59 @@ def _scatter(phase: Array, residual: Array, freedom: int) -> float:
             left[rows] -= slow @ np.linalg.lstsq(slow, left[rows], rcond=None)[0]
             freedom -= unknowns
     return float(np.sqrt(np.sum(np.square(left)) / max(freedom, 1)))
+
+
+def residual_limit(solution: Array, residual: Array, rows: int) -> float:
+    """Distance from its harmonics within which a row is no outlier, in units of the column of so many rows.
+
+    Noise takes part of it, and the corners of a triangle, which these harmonics, (2 order + 1,), round off, the rest.
+    """
+    corner = _CORNER / (solution.size // 2) * first_amplitude(solution)
+    return outlier_limit(rows, 1, np.inf) * _spread(residual) + corner
+
+
+def fit_without_outliers(columns: Array, values: Array, solution: Array) -> tuple[Array, Array]:
+    """Harmonics of a column fitted without its outliers, and which rows are none, (n,).
+
+    Squares let so many harmonics follow a cluster of outliers, as `solution` does. So rows are weighted down by their
+    distance first; then outliers are found and left out in turn until both agree.
+    """
+    inliers, stuck = np.ones(values.size, dtype=bool), are_stuck(values)
+    if _inliers(columns, values, solution, stuck).all():
+        return solution, inliers
+    for _ in range(_REWEIGHTINGS):
+        residual = values - columns @ solution
+        weight = ~stuck / np.sqrt(1.0 + np.square(residual / _noise(solution, residual[~stuck])))
+        solution = least_squares(columns, values, weight)
+    for _ in range(_MOST_ROUNDS):
+        found = _inliers(columns, values, solution, stuck)
+        if np.array_equal(found, inliers) or np.count_nonzero(found) < 2 * solution.size:
+            break
+        inliers, solution = found, least_squares(columns, values, found)
+    return solution, inliers
+
+
+def column_outliers(loop: Loop, frequency: float, column: Array, solution: Array, residual: Array) -> OutlierRows:
+    """Outliers among all rows of a column, whose harmonics and residual are of rows that stand for all."""
+    grid = np.arange(GRID + 1) / GRID
+    cycle = basis(grid, solution.size // 2) @ solution
+    off = column - np.interp((loop.time - loop.time[0]) * frequency % 1.0, grid, cycle)
+    limit = residual_limit(solution, residual, column.size)
+    rows = np.flatnonzero(are_outliers(off, column, limit) | are_stuck(column))
+    return OutlierRows(rows, np.abs(off[rows]) / _noise(solution, residual))
+
+
+def _inliers(columns: Array, values: Array, solution: Array, stuck: Array) -> Array:
+    """Rows that are neither stuck nor far off these harmonics, (n,)."""
+    residual = values - columns @ solution
+    return ~(stuck | are_outliers(residual, values, residual_limit(solution, residual, values.size)))
+
+
+def _noise(solution: Array, residual: Array) -> float:
+    """Noise of one row: the spread of the residuals, and no less than any rig has."""
+    return max(_spread(residual), FLOOR * first_amplitude(solution))
+
+
+def _spread(residual: Array) -> float:
+    """Standard deviation of residuals about zero, which outliers hardly move."""
+    return MEDIAN_TO_SIGMA * float(np.median(np.abs(residual)))

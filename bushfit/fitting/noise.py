@@ -149,9 +149,8 @@ def _stated(sweep: Sweep) -> float | None:
 def _at_nominal(sweep: Sweep) -> Array:
     """ln K of each point as it would be at the amplitude of its level, complex (n,).
 
-    Notes:
-        From the amplitude that was reached it is carried there along a smooth surface over ln f and ln X, which tells
-        how K goes with amplitude; without two levels or more there is none.
+    From the amplitude that was reached it is carried there along a smooth surface over ln f and ln X, which tells how K
+    goes with amplitude; without two levels or more there is none.
     """
     value = np.log(sweep.stiffness)
     off = np.log(sweep.amplitude_reached / sweep.amplitude)
@@ -162,8 +161,8 @@ def _at_nominal(sweep: Sweep) -> Array:
     low, span = np.log(sweep.amplitude).min(), float(np.ptp(np.log(sweep.amplitude)))
 
     def surface(amplitude: Array) -> Array:
-        unit = 2.0 * (np.log(amplitude) - low) / span - 1.0
-        return np.polynomial.legendre.legvander2d(_unit(np.log(sweep.frequency)), unit, degrees)
+        over_range = 2.0 * (np.log(amplitude) - low) / span - 1.0
+        return np.polynomial.legendre.legvander2d(unit(np.log(sweep.frequency)), over_range, degrees)
 
     reached = surface(sweep.amplitude_reached)
     solution = np.linalg.lstsq(reached.astype(complex), value, rcond=None)[0]
@@ -171,10 +170,7 @@ def _at_nominal(sweep: Sweep) -> Array:
 
 
 def _pooled(lines: Mapping[LineKey, _Line], measured: Sequence[_Line]) -> tuple[dict[LineKey, Array], int]:
-    """Variance of gain and phase of each line, (2,), and the degrees of freedom behind it.
-
-    One variance for all where the lines that measure it agree, else each line's own.
-    """
+    """Variance of gain and phase of each line, (2,), one for all where they agree, and its degrees of freedom."""
     alike = _of_equal_noise(measured)
     if not alike:
         return {key: line.variance for key, line in lines.items()}, min(line.freedom for line in lines.values())
@@ -218,10 +214,7 @@ def _line(sweep: Sweep, log_stiffness: Array, held: float) -> _Line:
 
 
 def _without_outliers(difference: Array) -> Array:
-    """Differences of two repeats where both were measured, complex (k,), less single outliers.
-
-    These are faults and no measure of the noise.
-    """
+    """Differences of two repeats where both were measured, complex (k,), less single outliers, which are faults."""
     difference = difference[~np.isnan(difference)]
     if not difference.size:
         return difference
@@ -232,15 +225,12 @@ def _without_outliers(difference: Array) -> Array:
 
 
 def _about_smooth_curve(log_step: Array, log_stiffness: Array) -> _Line:
-    """What one line without repeats tells: its scatter about a smooth curve, outliers left out.
-
-    Of one or two points the scatter is assumed.
-    """
+    """What a line without repeats tells: its scatter about a smooth curve; of one or two points this is assumed."""
     degree = min(_SMOOTH_DEGREE, log_step.size - 2)
     if degree < 1:
         return _Line(np.full((1, 2), ASSUMED_SHARED[0]), 1, np.empty((0, 2)), 1)
     values = _parts(log_stiffness)
-    basis = np.polynomial.legendre.legvander(_unit(log_step), degree)
+    basis = np.polynomial.legendre.legvander(unit(log_step), degree)
     residual = np.abs(values - basis @ _least_absolute(basis, values))
     usual = np.median(np.sort(residual, axis=0)[degree + 1 :], axis=0)  # the curve goes through degree + 1 points
     inliers = np.all(residual <= np.maximum(_OUTLIER * MEDIAN_TO_SIGMA * usual, FLOOR), axis=1)
@@ -253,7 +243,7 @@ def _about_smooth_curve(log_step: Array, log_stiffness: Array) -> _Line:
     return _Line(scatter, len(scatter), np.empty((0, 2)), 1, calmer)
 
 
-def _unit(values: Array) -> Array:
+def unit(values: Array) -> Array:
     """Values spread from -1 to 1, (n,); all -1 where they are one."""
     return 2.0 * (values - values.min()) / max(float(np.ptp(values)), np.finfo(float).tiny) - 1.0
 
@@ -264,13 +254,7 @@ def _complement(basis: Array) -> Array:
 
 
 def _least_absolute(basis: Array, values: Array) -> Array:
-    """Coefficients of a curve, (n, k), with the least sum of distances to gain and phase, (n, 2) -> (k, 2).
-
-    Outliers do not bend it.
-
-    Notes:
-        Least squares, weighted anew by one over the distance.
-    """
+    """Coefficients of a curve, (n, k), with the least sum of distances to gain and phase, (n, 2) -> (k, 2)."""
     root_weight = np.ones((len(values), 1))
     for _ in range(_ROUNDS):
         solution = np.linalg.lstsq(basis * root_weight, values * root_weight, rcond=None)[0]

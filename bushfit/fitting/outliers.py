@@ -6,10 +6,13 @@ puts one row far from the rows beside it. So a misfit, however large, makes no o
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from itertools import pairwise
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import median_filter
-from scipy.special import fdtri
+from scipy.special import chdtri, fdtri
 
 from bushfit.effects.contract import Array
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
@@ -34,15 +37,15 @@ _GROSS = 0.3
 _MOST_GROSS = 0.1
 #: Degrees of freedom of a noise that is as good as known.
 _KNOWN = 1e6
+#: Points of a block that count as neighbours of one where a model was taken off: few, since stiffness that the model
+#: misses bends with frequency.
+_NEAR_NEIGHBOURS = 5
 
 
 def outlier_limit(rows: int, parts: int, freedom: float) -> float:
-    """Distance from the truth, in units of noise, that noise alone reaches in one test of a hundred.
+    """Distance from the truth, in units of noise, that noise alone reaches in one of a hundred tests of so many rows.
 
-    Args:
-        rows: of the test.
-        parts: numbers in a row: 1 for a force, 2 for a complex stiffness.
-        freedom: degrees of freedom behind the noise; infinite where it is known.
+    A row has so many `parts`: 1 for a force, 2 for a complex stiffness. Infinite freedom is a noise that is known.
     """
     return float(np.sqrt(parts * fdtri(parts, min(freedom, _KNOWN), 1.0 - _CHANCE / max(rows, 1))))
 
@@ -55,13 +58,7 @@ def from_neighbours(values: Array, rows: Array, window: int = NEIGHBOURS) -> Arr
 
 
 def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
-    """Whether rows are farther than a limit off a curve and as far off their neighbours, or the channel is stuck, (n,).
-
-    Args:
-        residual: recorded less the curve, (n,).
-        recorded: what was recorded, (n,).
-        limit: in the units of the residual.
-    """
+    """Whether rows lie farther than a limit off a curve, by `residual`, and off neighbours, or are stuck, (n,)."""
     far = np.abs(residual) > limit
     if not far.any():
         return far
@@ -117,3 +114,61 @@ def _run_lengths(mask: Array) -> Array:
     """Length of the run of true entries that each entry belongs to, 0 for false ones, (n,)."""
     edges = np.flatnonzero(np.concatenate(([True], mask[1:] != mask[:-1], [True])))
     return np.where(mask, np.repeat(np.diff(edges), np.diff(edges)), 0)
+
+
+def outlying_points(
+    deviation: Array, apart: Callable[..., Array], starts: Array, points: Array, freedom: float
+) -> Array:
+    """Points that lie farther off the model than noise reaches, and as far off their neighbours, by number, (k,).
+
+    A point that was repeated must stand out from its repeats as well: what all of them do is no fault of one row.
+    Where two repeats or more agree against it that is enough, so that outliers side by side do not hide each other.
+
+    Args:
+        deviation: of each point from the model, gain and phase, complex (n,).
+        apart: length of deviations in units of noise; `shared=False` leaves in what blocks share.
+        starts: index of the first point of each block.
+        points: frequency and amplitude, (2, n); where both agree, points are repeats.
+        freedom: degrees of freedom behind the noise; inf where it is known.
+    """
+    distance = apart(deviation)
+    limit = outlier_limit(deviation.size, 2, freedom) * misfit_scale(distance, 2)
+    far = distance > limit
+    if not far.any():
+        return np.flatnonzero(far)
+    local = _from_neighbours(deviation, starts, _NEAR_NEIGHBOURS)
+    repeats, beside = _from_repeats(local, points)
+    alone = np.minimum(apart(local, shared=False), np.where(repeats > 0, apart(beside, shared=False), np.inf))
+    against = _from_neighbours(_from_repeats(deviation, points)[1], starts, NEIGHBOURS)
+    # the median of n repeats has pi/(2 n) of the variance of one
+    agreed = apart(against, shared=False) / np.sqrt(1.0 + np.pi / 2.0 / np.maximum(repeats, 1))
+    return np.flatnonzero(far & (np.where(repeats > 1, agreed, alone) > limit))
+
+
+def misfit_scale(distance: Array, parts: int) -> float:
+    """Median distance from the model over that which noise alone makes, for points of so many parts; 1 or more."""
+    if not distance.size:
+        return 1.0
+    return max(1.0, float(np.median(distance) / np.sqrt(chdtri(parts, 0.5))))
+
+
+def _from_neighbours(values: Array, starts: Array, window: int) -> Array:
+    """Distance of each point from the median of those around it in its block, complex (n,)."""
+    local = np.zeros_like(values)
+    for first, last in pairwise([*starts.tolist(), values.size]):
+        rows = np.arange(last - first)
+        real, imag = (from_neighbours(part[first:last], rows, window) for part in (values.real, values.imag))
+        local[first:last] = real + 1j * imag
+    return local
+
+
+def _from_repeats(values: Array, points: Array) -> tuple[Array, Array]:
+    """How many other repeats each point has, (n,), and its distance from their median, 0 without any, complex (n,)."""
+    repeats, distance = np.zeros(values.size, dtype=int), np.zeros_like(values)
+    _, place = np.unique(points, axis=1, return_inverse=True)
+    for row, same in enumerate(place == place[:, None]):
+        same[row] = False
+        repeats[row] = np.count_nonzero(same)
+        if repeats[row]:
+            distance[row] = values[row] - np.median(values[same].real) - 1j * np.median(values[same].imag)
+    return repeats, distance

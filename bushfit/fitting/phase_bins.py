@@ -20,14 +20,7 @@ def phase_bins(
     """Mean phase [cycles], mean force and number of rows of each bin that holds rows, (k,) each.
 
     A bin is a GRID-th of a cycle. The first few cycles have bins of their own, and later ones share bins in ever larger
-    groups.
-
-    Args:
-        clock: time since the first row [s], (n,), ascending.
-        force: of each row, (n,).
-        frequency: [Hz].
-        cycles: in the record.
-        each_cycle: whether every cycle has bins of its own.
+    groups, unless `each_cycle` has its own. The clock [s], (n,), rises from the first row.
     """
     group, middle = _groups(int(cycles) + 2, each_cycle=each_cycle)
     edges = np.append(np.arange(int(cycles * GRID) + 1) / (frequency * GRID), np.inf)

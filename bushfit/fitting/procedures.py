@@ -13,7 +13,7 @@ from bushfit.errors import FitError
 from bushfit.fitting.agreement import misfits, usable
 from bushfit.fitting.assess import Stage, covariance, lack_of_fit, measured_range, misfit, quality
 from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import DataSet, SweepData, parted, sources
+from bushfit.fitting.data_sets import DataSet, parted, sources
 from bushfit.fitting.identify import left_open
 from bushfit.fitting.plausible import implausible, unfitted
 from bushfit.fitting.profile import profile95
@@ -34,7 +34,8 @@ _MOST_PASSES = 50
 _LONGEST_STRIDE = 5.0
 #: A filled natural rubber, to say what leaving the springpot out may do: m/mu [s^alpha] and alpha.
 _TYPICAL_SPRINGPOT = (0.18, 0.24)
-#: What is said of a fit that was stopped where chi-square is flat, and of one that was stopped on a slope.
+#: What is said of a fit that was stopped, where chi-square is flat or on a slope.
+_STOPPED = "the fit was stopped after {} evaluations of the model, where {}"
 _FLAT = "chi-square is flat: parameters that stay open could move on, for next to nothing"
 _SLOPE = "it had not come to its end: the parameters are not the best ones"
 #: What to do about a model that does not fit.
@@ -59,7 +60,6 @@ def fit_joint(
     """All parameters of a model together, from loops and sweeps.
 
     Args:
-        data: the campaign.
         effects: the model; the paper's three branches, and what [fit] adds to them, unless told.
         directions: and specimens whose tests to use; see `Data.chosen`.
         profile: called with the name of each parameter when its profile likelihood is done, and how many are left;
@@ -71,9 +71,8 @@ def fit_joint(
     data_sets = data.chosen(directions)
     found = _solve(data, data_sets, data.effects if effects is None else effects, {})
     left: list[DataSet] = [data_set for data_set in (*data.loops, *data.sweeps) if data_set not in data_sets]
-    result = _result(data, [found], notes=unfitted(found.solution.model, left, _NEXT))
-    tests = misfits(found.solution.model, found.data_sets, left)
-    result = replace(result, tests=tests, usable=usable(found.solution, found.minimised, left))
+    result = _result(data, [found], notes=unfitted(found.solution.model, left, _NEXT), left=left)
+    result = replace(result, usable=usable(found.solution, found.minimised, left))
     if profile is None:
         return result
     intervals = profile95(found.solution, found.minimised, result.covariance, data.bounds, profile)
@@ -83,10 +82,8 @@ def fit_joint(
 def fit_static(data: Data, springpot: Result | None = None) -> Result:
     """mu, sigma_fmax and eps_half from the loops, the springpot held (paper, section 4.1).
 
-    Args:
-        data: the campaign.
-        springpot: where m and alpha come from. Without it they are taken from the campaign's [fit] where both
-            have values; failing that the springpot is left out, and a warning says what this does.
+    m and alpha come from the result given, or else from the campaign's [fit] where both have values; failing that the
+    springpot is left out, and a warning says what this does.
 
     Raises:
         FitError: no loop, or data that cannot support the fit.
@@ -199,35 +196,33 @@ def _solve(data: Data, data_sets: Sequence[DataSet], effects: Sequence[str], hel
     return estimate(model, data_sets, names, data.bounds, robust=data.robust)
 
 
-def _result(data: Data, steps: Sequence[Estimate], held: Covariance | None = None, notes: Sequence[str] = ()) -> Result:
+def _result(
+    data: Data,
+    steps: Sequence[Estimate],
+    held: Covariance | None = None,
+    notes: Sequence[str] = (),
+    left: Sequence[DataSet] = (),
+) -> Result:
     """What the steps of a procedure found, the last one's model, with the uncertainty of all of them."""
     model, data_sets = steps[-1].solution.model, [data_set for step in steps for data_set in step.data_sets]
     stages = [Stage(step.solution.coordinates.names, step.weighed) for step in steps if step.solution.coordinates.names]
     fitted = tuple(name for stage in stages for name in stage.names)
     cov = covariance(model, stages, held) if stages else held or Covariance()
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
+    doubts = [*implausible(data.campaign.bushing, data_sets), *_assumed(data_sets)]
+    odd = [note for step in steps for note in cautions(model, step.solution, step.data_sets, data.bounds, cov, _NEXT)]
     return Result(
         model,
         fitted,
         cov,
         quality(model, data_sets, len(fitted)),
         measured_range(model, data_sets),
-        (
-            *notes,
-            *implausible(data.campaign.bushing, data_sets),
-            *_assumed(data_sets),
-            *told(outliers, robust=data.robust),
-            *(
-                line
-                for step in steps
-                for line in cautions(model, step.solution, step.data_sets, data.bounds, cov, _NEXT)
-            ),
-        ),
+        (*notes, *doubts, *told(outliers, robust=data.robust), *odd),
         sources(data_sets),
         outliers,
         at_bound={name: end for step in steps for name, end in step.solution.at_bound.items()},
         specimens=data.campaign.specimens,
-        tests=misfits(model, data_sets),
+        tests=misfits(model, data_sets, left),
     )
 
 
@@ -239,15 +234,14 @@ def cautions(
     covariance: Covariance,
     advice: str = "",
 ) -> list[str]:
-    """What is odd about the loops of a fit, and what its data cannot tell: bounds met, what stays open, and a model
-    that does not fit."""
+    """What is odd about the loops of a fit, and what its data cannot tell: bounds met, what stays open, a misfit."""
     names, at_bound = solution.coordinates.names, solution.at_bound
     notes = [f"{data_set.name}: {note}" for data_set in data_sets for note in data_set.notes]
     if not names:
         return [*notes, _checked(model, data_sets)]
     return [
         *notes,
-        *([_stopped(solution)] if solution.stopped else []),
+        *([_STOPPED.format(solution.evaluations, _FLAT if solution.flat else _SLOPE)] if solution.stopped else []),
         *(_at_edge(name, end, bounds) for name, end in at_bound.items()),
         *left_open(model, data_sets, [name for name in names if name not in at_bound], covariance),
         *misfit(model, data_sets, len(names), advice),
@@ -266,11 +260,6 @@ def _checked(model: Model, data_sets: Sequence[DataSet]) -> str:
     )
 
 
-def _stopped(solution: Solution) -> str:
-    where = _FLAT if solution.flat else _SLOPE
-    return f"the fit was stopped after {solution.evaluations} evaluations of the model, where {where}"
-
-
 def _at_edge(name: str, end: End, bounds: Bounds) -> str:
     if bounds.get(name, (None, None))[end == "max"] is not None:
         return f"{name} rests on the {end} given in [fit]"
@@ -280,12 +269,10 @@ def _at_edge(name: str, end: End, bounds: Bounds) -> str:
 def _assumed(data_sets: Sequence[DataSet]) -> list[str]:
     """What was assumed of the noise because nothing was repeated."""
     _, sweeps = parted(data_sets)
-    rigs: dict[int, list[SweepData]] = {}
-    for sweep in sweeps:
-        rigs.setdefault(id(sweep.noise), []).append(sweep)
+    noises = {id(sweep.noise): sweep.noise for sweep in sweeps}
     return [
-        f"noise of the {' and '.join(dict.fromkeys(str(sweep.direction) for sweep in mine))} sweeps: "
-        f"{mine[0].noise.describe()}"
-        for mine in rigs.values()
-        if mine[0].noise.origin == "assumed"
+        f"noise of the {' and '.join(dict.fromkeys(str(sweep.direction) for sweep in sweeps if sweep.noise is noise))} "
+        f"sweeps: {noise.describe()}"
+        for noise in noises.values()
+        if noise.origin == "assumed"
     ]

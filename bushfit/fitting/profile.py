@@ -44,15 +44,7 @@ Interval = tuple[float | None, float | None]
 
 @dataclass(frozen=True, eq=False)
 class _Profile:
-    """The rise of chi-square by the coordinate of one parameter, the others fitted anew.
-
-    Args:
-        name: the parameter.
-        best: the fit of all parameters.
-        data_sets: the data.
-        bounds: limits inside the parameters' own.
-        known: the fits made so far by coordinate, the best one among them; each new one starts from the nearest.
-    """
+    """The rise of chi-square by the coordinate of one parameter, the others fitted from the nearest `known` fit."""
 
     name: str
     best: Solution
@@ -85,16 +77,7 @@ class _Profile:
         return float(np.sqrt(max(self.fitted(at).chi_square - self.best.chi_square, 0.0)))
 
     def end(self, start: float, bound: float, step: float, allowed: float) -> float | None:
-        """Value at which the root of the rise reaches what is allowed; None where that side is open.
-
-        The search goes from the best value towards the bound in steps, and then looks between the last two.
-
-        Args:
-            start: coordinate of the best value.
-            bound: coordinate of the lower or of the upper bound.
-            step: in coordinates.
-            allowed: root of the rise at the end.
-        """
+        """Value at which the root of the rise, in steps from the best one to the bound, is as allowed, if anywhere."""
         from scipy.optimize import brentq
 
         steps = start + np.copysign(step, bound - start) * np.arange(_MOST_STEPS + 1)
@@ -120,17 +103,12 @@ def profile95(
 ) -> Mapping[str, Interval]:
     """95 % intervals of the fitted parameters by profile likelihood.
 
-    The residuals are in units of a known noise, so the rise of chi-square itself is the measure, 3.84 for 95 %, and
-    not an F-test that takes its scale from the misfit. What the covariance counts beyond that (noise that was itself
+    The residuals are in units of a known noise, so the rise of chi-square itself is the measure, 3.84 for 95 %, and not
+    an F-test that takes its scale from the misfit. What the covariance counts beyond that (noise that was itself
     estimated, a model that misses the data) widens the profile by the same factor as the symmetric interval:
     chi-square may rise to the square of that interval's half width over the linear standard error.
 
-    Args:
-        best: the fit.
-        data_sets: the data.
-        covariance: of the fit.
-        bounds: limits inside the parameters' own.
-        advance: called with the name of each parameter when it is done, and how many are left.
+    `advance` is called with the name of each parameter when it is done, and how many are left.
 
     Returns:
         Lower and upper end by name; None where the data leave that side open up to the bound, or

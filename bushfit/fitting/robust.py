@@ -18,8 +18,8 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.data_set import DataSet
+from bushfit.fitting.outliers import misfit_scale
 from bushfit.fitting.solve import Bounds, Solution, solve
-from bushfit.fitting.sweep_outliers import misfit_scale
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 
@@ -38,7 +38,6 @@ class Estimate:
     """A fit and the data behind it.
 
     Args:
-        solution: where it ended.
         data_sets: the data, outliers without weight where the loss leaves them out.
         minimised: the same with the weights at which the solution is the least sum of squares.
         weighed: the same with the weights that give its covariance.

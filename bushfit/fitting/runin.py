@@ -49,15 +49,7 @@ def crossings(motion: Array) -> tuple[Array, Array, Array]:
 
 
 def steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | None]:
-    """A loop without what comes before and after its steady cycles, and a sentence on what was left out, if anything.
-
-    After a run-in the first cycle still remembers it, and goes too where two more are left.
-
-    Args:
-        loop: the whole record.
-        time: of the rows of `thinned` [s], (n,).
-        motion: displacement of the same rows [m or rad], (n,).
-    """
+    """A loop without what comes before and after its steady cycles, and a sentence on what was left out or None."""
     period = _period(time, motion)
     if period is None or time[-1] - time[0] <= period:
         return loop, None
@@ -93,7 +85,7 @@ def _steady_ends(time: Array, motion: Array, period: float) -> tuple[float, floa
         end = min(other[clock[other] > clock[end - 1] - _EDGE * period], default=end)
     first, last = float(time[start]), float(time[end - 1]) + period
     if before and last - first > _THREE * period:
-        first += period
+        first += period  # after a run-in the first cycle still remembers it
     return first, last, bool(after)
 
 

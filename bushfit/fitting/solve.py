@@ -6,7 +6,7 @@ that every coordinate is of order one and two decades are a step like any other.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, lru_cache
@@ -76,11 +76,8 @@ class Solution:
     """Where a fit ended.
 
     Args:
-        model: the model with the values found.
-        coordinates: of the parameters that were fitted.
         residual: whitened residuals, model less measured, (n,).
         jacobian: their derivatives by coordinate, (k, n).
-        evaluations: of the model.
         at_bound: the parameters that ended at a bound, and at which.
         stopped: whether it was stopped before it had converged.
     """
@@ -106,8 +103,7 @@ class Solution:
 
     @property
     def flat(self) -> bool:
-        """Whether the next step would lower chi-square by no more than chance does, in units of the misfit's
-        variance."""
+        """Whether the next step would lower chi-square, in units of the misfit's variance, no more than chance does."""
         return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
 
 
@@ -136,9 +132,6 @@ def solve(
     """Fit the named parameters by least squares, from the model's own values, the others held; without names all are.
 
     Args:
-        model: where to start.
-        data_sets: the data.
-        names: parameters to move.
         bounds: limits inside the parameters' own; a parameter may come to rest on one.
         evaluations: most evaluations of the model.
         tolerance: relative change of chi-square and of the point at which the fit stops.
@@ -155,20 +148,16 @@ def solve(
     if not names:
         left = residual(model, data_sets)
         return Solution(model, Coordinates((), ()), left, np.empty((0, left.size)), 1, {}, stopped=False)
-    problem = _Problem.of(model, data_sets, names, bounds or {})
     limits = {"max_nfev": evaluations, "ftol": tolerance, "xtol": tolerance, "calc_covar": False}
     try:
         with np.errstate(invalid="ignore", divide="ignore"):  # lmfit takes roots of a covariance nobody asked for
-            fit = problem.levenberg_marquardt(limits) if set(model.effects) <= set(BASE) else None
-            if fit is None or fit.aborted:
-                fit = problem.trust_region(limits)
+            found = _fitted(model, data_sets, names, bounds or {}, limits)
     except ValueError as error:  # lmfit's word for a residual that is not finite
         raise no_finite_response(model) from error
-    found = problem.solution(fit)
     if found.stopped and strict and not found.flat:
         raise FitError(
             "the fit did not converge",
-            found=f"no end after {fit.nfev} evaluations of the model",
+            found=f"no end after {found.evaluations} evaluations of the model",
             hint="hold a parameter with vary = false, or give bounds, in [fit] of the campaign",
         )
     return found
@@ -178,79 +167,44 @@ class _OutOfBoundsError(Exception):
     """A step leaves the bounds."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    """A fit as lmfit asks for it: residuals and their derivatives by lmfit's parameters, which are coordinates.
+def _fitted(
+    model: Model, data_sets: Sequence[DataSet], names: Sequence[str], bounds: Bounds, limits: Mapping[str, Any]
+) -> Solution:
+    """The fit by MINPACK, without bounds, where this is of use; else, or where a step left them, within its bounds."""
+    import lmfit
 
-    Args:
-        data_sets: the data.
-        coordinates: in which the fit moves.
-        start, low, high: where it starts, and its bounds, (k,) each.
-        model_at: the model at a point.
-    """
+    coordinates, start, low, high = starting_point(model, data_sets, names, bounds)
+    inside = _START_INSIDE * (high - low)
+    start = np.clip(start, low + inside, high - inside)
+    ends = list(zip(low.tolist(), high.tolist(), strict=True))
 
-    data_sets: Sequence[DataSet]
-    coordinates: Coordinates
-    start: Array
-    low: Array
-    high: Array
-    model_at: Callable[[tuple[float, ...]], Model]
+    @lru_cache(maxsize=2)  # data sets know again the model they answered last: the best so far, and the one tried
+    def model_at(point: tuple[float, ...]) -> Model:
+        return model.with_values(coordinates.values(point))
 
-    @classmethod
-    def of(cls, model: Model, data_sets: Sequence[DataSet], names: Sequence[str], bounds: Bounds) -> _Problem:
-        coordinates, start, low, high = starting_point(model, data_sets, names, bounds)
-        inside = _START_INSIDE * (high - low)
+    def misfit(parameters: lmfit.Parameters) -> Array:
+        return residual(model_at(_point(parameters)), data_sets)
 
-        @lru_cache(maxsize=2)  # data sets know again the model they answered last: the best so far, and the one tried
-        def model_at(point: tuple[float, ...]) -> Model:
-            return model.with_values(coordinates.values(point))
+    def misfit_inside(parameters: lmfit.Parameters) -> Array:
+        if not all(low <= u.value <= high for u, (low, high) in zip(parameters.values(), ends, strict=True)):
+            raise _OutOfBoundsError
+        return misfit(parameters)
 
-        return cls(data_sets, coordinates, np.clip(start, low + inside, high - inside), low, high, model_at)
+    def slopes(parameters: lmfit.Parameters) -> Array:
+        return jacobian(model_at(_point(parameters)), data_sets, names)
 
-    def levenberg_marquardt(self, limits: Mapping[str, Any]) -> lmfit.minimizer.MinimizerResult | None:
-        """The fit by MINPACK, without bounds; None where a step leaves them or has no finite response."""
-        import lmfit
-
-        ends = list(zip(self.low.tolist(), self.high.tolist(), strict=True))
-
-        def residual_inside(parameters: lmfit.Parameters) -> Array:
-            if not all(low <= u.value <= high for u, (low, high) in zip(parameters.values(), ends, strict=True)):
-                raise _OutOfBoundsError
-            return self._residual(parameters)
-
-        free = list(_lmfit_parameters(self.start).values())  # which lmfit takes as they are, without a copy
+    fit = None
+    if set(model.effects) <= set(BASE):
+        free = list(_lmfit_parameters(start).values())  # which lmfit takes as they are, without a copy
         with suppress(_OutOfBoundsError, ValueError):
-            slopes = {"Dfun": self._jacobian, "col_deriv": True, "gtol": 0.0}
-            return lmfit.minimize(residual_inside, free, "leastsq", **slopes, **limits)
-        return None
-
-    def trust_region(self, limits: Mapping[str, Any]) -> lmfit.minimizer.MinimizerResult:
-        """The fit within its bounds."""
-        import lmfit
-
-        bounded = _lmfit_parameters(self.start, self.low, self.high)
-        slopes = {"jac": lambda parameters: self._jacobian(parameters).T, "x_scale": "jac", "gtol": None}
-        return lmfit.minimize(self._residual, bounded, "least_squares", **slopes, **limits)
-
-    def solution(self, fit: lmfit.minimizer.MinimizerResult) -> Solution:
-        """Where lmfit ended."""
-        end = _point(fit.params)
-        model, names = self.model_at(end), self.coordinates.names
-        return Solution(
-            model,
-            self.coordinates,
-            residual(model, self.data_sets),
-            jacobian(model, self.data_sets, names),
-            int(fit.nfev),
-            at_bound(names, np.array(end), self.low, self.high),
-            bool(fit.aborted),
-        )
-
-    def _residual(self, parameters: lmfit.Parameters) -> Array:
-        return residual(self.model_at(_point(parameters)), self.data_sets)
-
-    def _jacobian(self, parameters: lmfit.Parameters) -> Array:
-        return jacobian(self.model_at(_point(parameters)), self.data_sets, self.coordinates.names)
+            fit = lmfit.minimize(misfit_inside, free, "leastsq", Dfun=slopes, col_deriv=True, gtol=0.0, **limits)
+    if fit is None or fit.aborted:
+        by_row = {"jac": lambda parameters: slopes(parameters).T, "x_scale": "jac", "gtol": None}
+        fit = lmfit.minimize(misfit, _lmfit_parameters(start, low, high), "least_squares", **by_row, **limits)
+    end = _point(fit.params)
+    best, met = model_at(end), at_bound(names, np.array(end), low, high)
+    left, slope = residual(best, data_sets), jacobian(best, data_sets, names)
+    return Solution(best, coordinates, left, slope, int(fit.nfev), met, bool(fit.aborted))
 
 
 def _point(parameters: lmfit.Parameters) -> tuple[float, ...]:
@@ -260,11 +214,7 @@ def _point(parameters: lmfit.Parameters) -> tuple[float, ...]:
 def starting_point(
     model: Model, data_sets: Sequence[DataSet], names: Sequence[str], bounds: Bounds
 ) -> tuple[Coordinates, Array, Array, Array]:
-    """The coordinates of a fit, where in them the model's own values lie, and the lower and upper bounds, (k,) each.
-
-    Raises:
-        FitError: fewer data than parameters.
-    """
+    """Coordinates of a fit, the model's own values in them, and the lower and upper bounds, (k,) each."""
     points = sum(data_set.size for data_set in data_sets)
     if points <= len(names):
         raise FitError("too few points for the fit", found=f"{points} points for {len(names)} parameters")

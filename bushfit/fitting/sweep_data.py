@@ -6,23 +6,22 @@ from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 from scipy.linalg import block_diag
 
+from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import Array, Values
 from bushfit.fitting.data_set import DataSet, Freedoms, Suspect, kept, shown_amplitude
-from bushfit.fitting.noise import FLOOR, SweepNoise
-from bushfit.fitting.sweep_outliers import outlying_points
+from bushfit.fitting.noise import FLOOR, SweepNoise, unit
+from bushfit.fitting.outliers import outlying_points
 from bushfit.fitting.whitening import Whitening
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.model.sensitivity import stiffness_jacobian
 from bushfit.reading.measurement import Stepped, Sweep
-
-Residuals = Literal["complex", "magnitude_loss_factor"]
 
 #: Degree, in the logarithm of what is stepped, of the Legendre polynomials that count as smooth misfit.
 _SMOOTH_DEGREE = 3
@@ -37,9 +36,6 @@ class Line:
     """Mean misfit of one line of a sweep over its repeats: of all that its runs stepped through while they held one.
 
     Args:
-        name: of the sweep.
-        direction: of the sweep.
-        stepped: what changes along the line; None where frequency and amplitude do.
         frequency: [Hz], (n,).
         amplitude: zero-to-peak [m or rad], (n,).
         misfit: measured over model less 1, complex, (n,).
@@ -81,9 +77,6 @@ class SweepData(DataSet):
     (K - K_meas)/K_meas has the gain error in its real and the phase error in its imaginary part.
 
     Args:
-        sweep: as measured.
-        noise: of the campaign's sweeps.
-        residuals: what the residual is made of.
         weight: share of its weight that each point has, (n,) in `order`; all for None.
         part: rows of the sweep that belong to it, (n,) in `order`; all for None.
     """
@@ -110,7 +103,6 @@ class SweepData(DataSet):
 
     @property
     def relative_noise(self) -> float:
-        """Standard deviation of one point, relative to |K|, root mean square over levels."""
         return float(np.sqrt(np.mean(np.square(list(self.noise.random.values())))))
 
     @property
@@ -153,12 +145,10 @@ class SweepData(DataSet):
 
     @cached_property
     def frequency(self) -> Array:
-        """[Hz], (n,)."""
         return self.sweep.frequency[self.order]
 
     @cached_property
     def amplitude(self) -> Array:
-        """Of the level, zero-to-peak [m or rad], (n,)."""
         return self.sweep.amplitude[self.order]
 
     @cached_property
@@ -173,12 +163,10 @@ class SweepData(DataSet):
 
     @cached_property
     def repeat(self) -> Array:
-        """Number of the repeat, (n,)."""
         return self.sweep.repeat[self.order]
 
     @cached_property
     def measured(self) -> Array:
-        """Complex stiffness [N/m or N m/rad], (n,)."""
         return self.sweep.stiffness[self.order]
 
     @cached_property
@@ -204,8 +192,7 @@ class SweepData(DataSet):
         return np.abs(self.stiffness(model) / self.measured - 1.0)[self.weights > 0.0]
 
     def distance(self, model: Model) -> Array:
-        """How far each point lies off the model less what its block shares, in units of noise: one number for gain and
-        phase, their root mean square, (n,)."""
+        """As of `DataSet`, less what its block shares; of gain and phase the root mean square."""
         return self.apart(self.deviation(model)) / np.sqrt(2.0)
 
     def change(self, one: Model, other: Model) -> float:
@@ -336,15 +323,8 @@ class SweepData(DataSet):
         return f"run {self.repeat[point]} of {self.name}, {self.direction}"
 
     def _suspect(self, words: str, kind: str, chosen: Array) -> Suspect:
-        frequency, amplitude = self.frequency[chosen], self.amplitude[chosen]
-        return Suspect(
-            words,
-            kind,
-            self.moved_together(chosen),
-            self.direction,
-            (float(frequency.min()), float(frequency.max())),
-            (float(amplitude.min()), float(amplitude.max())),
-        )
+        ends = [(float(each[chosen].min()), float(each[chosen].max())) for each in (self.frequency, self.amplitude)]
+        return Suspect(words, kind, self.moved_together(chosen), self.direction, ends[0], ends[1])
 
     def moved_together(self, chosen: Array) -> list[Array]:
         """Whitened residuals of some points, (n,) bool, off by one unit of gain, and off by one of phase."""
@@ -352,11 +332,8 @@ class SweepData(DataSet):
 
     def columns(self) -> dict[str, Any]:
         unit, factor = self.direction.display.displacement
-        return {
-            "frequency [Hz]": self.frequency,
-            f"amplitude [{unit}]": self.amplitude * factor,
-            "repeat": self.repeat,
-        }
+        amplitude = self.amplitude * factor
+        return {"frequency [Hz]": self.frequency, f"amplitude [{unit}]": amplitude, "repeat": self.repeat}
 
     def components(self, residual: Array) -> dict[str, Array]:
         storage, loss = np.split(residual, 2)
@@ -366,5 +343,4 @@ class SweepData(DataSet):
 def _polynomials(step: Array) -> Array:
     """Legendre polynomials in the logarithm of steps over their range, (n, degree + 1)."""
     x = np.log(step)
-    unit = 2.0 * (x - x.min()) / max(float(np.ptp(x)), 1e-300) - 1.0
-    return np.polynomial.legendre.legvander(unit, min(_SMOOTH_DEGREE, np.unique(x).size - 1))
+    return np.polynomial.legendre.legvander(unit(x), min(_SMOOTH_DEGREE, np.unique(x).size - 1))

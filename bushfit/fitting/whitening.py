@@ -40,11 +40,7 @@ class Whitening:
         return _flat(self._less_shared(_gain_and_phase(deviation) * self._scale))
 
     def own(self, deviation: Array, *, shared: bool = True) -> Array:
-        """Deviations in units of the random noise alone, complex (n,) -> (2, n).
-
-        Args:
-            shared: whether to take out the likeliest error that the block shares.
-        """
+        """Deviations over the random noise, complex (n,) -> (2, n), with `shared` less the block's likeliest error."""
         parts = _gain_and_phase(deviation)
         if shared:
             mean = np.add.reduceat(parts * self._scale**2, self.starts, axis=-1) / self._block_weight

@@ -51,14 +51,7 @@ def clock(history: Loop) -> str:
 
 
 class Channel(NamedTuple):
-    """A recorded channel.
-
-    Args:
-        name: such as "displacement".
-        unit: in which its values are told.
-        factor: from SI to that unit.
-        values: in SI, (n,).
-    """
+    """A recorded channel: its values in SI, (n,), and the unit in which they are told with the factor to it."""
 
     name: str
     unit: str
@@ -75,7 +68,7 @@ def odd_channels(history: Loop) -> Iterator[str]:
     names, units = history.direction.motion.words, history.direction.display
     motion = Channel(names[0], *units.displacement, history.displacement)
     force = Channel(names[1], *units.force, history.force)
-    yield from _gaps(history.time) if history.timed else _jumps(motion, history.time)
+    yield from _gaps(motion, history.time, timed=history.timed)
     yield from _stuck(motion, force)
     for channel in (motion, force):
         yield from _cut_off(channel)
@@ -87,28 +80,22 @@ def _wide(steps: Floats) -> Flags:
     return steps > max(_GAP_STEPS * np.median(steps), _GAP_WIDEST_STEPS * np.quantile(steps, _WIDEST_QUANTILE))
 
 
-def _gaps(time: Floats) -> Iterator[str]:
-    """A sentence on gaps in a recorded time."""
-    steps = np.diff(time)
+def _gaps(motion: Channel, time: Floats, *, timed: bool) -> Iterator[str]:
+    """A sentence on gaps in a recorded time; in a file without it, only the motion tells of them."""
+    steps = np.diff(time) if timed else np.abs(np.diff(motion.values))
     wide = _wide(steps)
+    if not timed:
+        outliers = lone_outliers(time, motion.values)
+        wide &= (steps > least_prominence(motion.values)) & ~(outliers[1:] | outliers[:-1])
     if wide.any():
         first, count = int(np.argmax(wide)), int(wide.sum())
-        yield (
-            f"{count} gap{'s' * (count > 1)} in time, the first after data row {first + 1}: {steps[first]:.3g} s "
-            f"without a row, else mostly {np.median(steps):.3g} s"
+        what = (
+            f"{steps[first]:.3g} s without a row, else mostly {np.median(steps):.3g} s"
+            if timed
+            else f"the {motion.name} goes from {motion.shown(first)} to {motion.shown(first + 1)} {motion.unit} at once"
         )
-
-
-def _jumps(motion: Channel, time: Floats) -> Iterator[str]:
-    """A sentence on gaps in a file without time, where only the motion tells of them."""
-    steps, outliers = np.abs(np.diff(motion.values)), lone_outliers(time, motion.values)
-    wide = _wide(steps) & (steps > least_prominence(motion.values)) & ~(outliers[1:] | outliers[:-1])
-    if wide.any():
-        first, count = int(np.argmax(wide)), int(wide.sum())
-        yield (
-            f"{count} gap{'s' * (count > 1)} in the motion, the first after data row {first + 1}: the {motion.name} "
-            f"goes from {motion.shown(first)} to {motion.shown(first + 1)} {motion.unit} at once"
-        )
+        where = "time" if timed else "the motion"
+        yield f"{count} gap{'s' * (count > 1)} in {where}, the first after data row {first + 1}: {what}"
 
 
 def _stuck(motion: Channel, force: Channel) -> Iterator[str]:
@@ -116,9 +103,8 @@ def _stuck(motion: Channel, force: Channel) -> Iterator[str]:
     still = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], still.astype(np.int8), [0]))))
     starts, ends = edges[::2], edges[1::2]
-    moved = np.zeros(starts.size)
-    inside = ends < motion.values.size - 1
-    moved[inside] = np.abs(motion.values[ends[inside] + 1] - motion.values[starts[inside]])
+    after = np.minimum(ends + 1, motion.values.size - 1)  # a record may end stuck: then nothing went on
+    moved = np.abs(motion.values[after] - motion.values[starts])
     stuck = (ends - starts + 1 >= _STUCK_ROWS) & (moved > _STUCK_MOTION * np.ptp(motion.values))
     if stuck.any():
         longest = int(np.argmax(np.where(stuck, ends - starts, 0)))

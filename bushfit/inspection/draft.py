@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -19,32 +19,30 @@ _TABLES = {"loop": "loops", "sweep": "sweeps"}
 def campaign_text(name: str, bushing: Mapping[str, str] | None, files: Sequence[Inspected], folder: Path) -> str:
     """The text of a whole campaign file.
 
-    Args:
-        name: of the campaign, and of the bushing.
-        bushing: other keys of [bushing], quantities as texts; None where specimens alone were tested.
-        files: loops and sweeps, each of a specimen or with a direction.
-        folder: where the campaign will lie; its files are named from there.
+    The name is that of the bushing, too, of which `bushing` has the other keys, quantities as texts; None where
+    specimens alone were tested. Loops and sweeps are named from the folder where the campaign will lie.
     """
-    head = [f"name = {toml_value(name)}", *(f"{key} = {toml_value(value)}" for key, value in (bushing or {}).items())]
+    head = _lines({"name": name, **(bushing or {})})
     order = [seen for kind in _TABLES for seen in files if seen.kind == kind]
     tables = [*_specimens(files), *(file_text(seen, folder) for seen in order)]
     return "\n".join([*(["[bushing]"] if bushing else []), *head, "", *tables])
 
 
-def _specimens(files: Sequence[Inspected]) -> list[str]:
+def _specimens(files: Sequence[Inspected]) -> Iterator[str]:
     """The table of each specimen that was tested."""
-    bodies = dict.fromkeys(seen.direction for seen in files if isinstance(seen.direction, Specimen))
-    return [_specimen_text(body) for body in bodies]
+    for body in dict.fromkeys(seen.direction for seen in files if isinstance(seen.direction, Specimen)):
+        keys: dict[str, Any] = {"name": body.name, "kind": body.kind}
+        if body.strain != "engineering":
+            keys["strain"] = body.strain
+        if body.area and body.thickness:
+            keys |= {"area": f"{1e6 * body.area:.12g} mm^2", "thickness": f"{1e3 * body.thickness:.12g} mm"}
+            keys["elements"] = body.elements
+        yield "\n".join(["[[specimens]]", *_lines(keys), ""])
 
 
-def _specimen_text(body: Specimen) -> str:
-    keys: dict[str, Any] = {"name": body.name, "kind": body.kind}
-    if body.strain != "engineering":
-        keys["strain"] = body.strain
-    if body.area and body.thickness:
-        keys |= {"area": f"{1e6 * body.area:.12g} mm^2", "thickness": f"{1e3 * body.thickness:.12g} mm"}
-        keys["elements"] = body.elements
-    return "\n".join(["[[specimens]]", *(f"{key} = {toml_value(value)}" for key, value in keys.items()), ""])
+def _lines(keys: Mapping[str, Any]) -> Iterator[str]:
+    """Keys and their values, a line each."""
+    return (f"{key} = {toml_value(value)}" for key, value in keys.items())
 
 
 def pasted_text(files: Sequence[Inspected]) -> str:
@@ -55,22 +53,19 @@ def pasted_text(files: Sequence[Inspected]) -> str:
 
 
 def file_text(seen: Inspected, folder: Path | None = None) -> str:
-    """The table of one file in a campaign; for a raw history, a comment on what to do first.
+    """The table of one file in a campaign that lies in a folder; for a raw history, a comment on what to do first.
 
-    Args:
-        seen: the file.
-        folder: where the campaign lies; without it the file is named by its full path.
+    Without a folder the file is named by its full path.
     """
     name = _named(seen.file, folder)
     direction = f'"{seen.direction}"' if seen.direction else '"..."  # axial or radial: the file does not say'
     if seen.kind == "history":
-        stated = f" --direction {seen.direction}" if seen.direction else " --direction ..."
-        return f"# {name} is a raw history: bushfit reduce {_quoted(name)}{stated} makes a sweep of it\n"
+        word = f'"{name}"' if " " in name else name
+        stated = seen.direction or "..."
+        return f"# {name} is a raw history: bushfit reduce {word} --direction {stated} makes a sweep of it\n"
     lines = [f"[[{_TABLES[seen.kind]}]]", f"file = {toml_value(name)}"]
-    if not isinstance(seen.direction, Specimen):
-        lines.append(f"direction = {direction}")
-    lines += [f"{key} = {toml_value(value)}" for key, value in seen.entry.items()]
-    return "\n".join(lines) + "\n"
+    lines += [] if isinstance(seen.direction, Specimen) else [f"direction = {direction}"]
+    return "\n".join([*lines, *_lines(seen.entry), ""])
 
 
 def _named(file: Path, folder: Path | None) -> str:
@@ -79,8 +74,3 @@ def _named(file: Path, folder: Path | None) -> str:
         with suppress(ValueError):  # another drive
             return Path(os.path.relpath(file, folder)).as_posix()
     return file.resolve().as_posix()
-
-
-def _quoted(name: str) -> str:
-    """A name as a word of a command line."""
-    return f'"{name}"' if " " in name else name

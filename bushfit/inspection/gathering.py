@@ -22,8 +22,7 @@ class Source:
     """A file, or a sheet of a workbook with several, that holds a test.
 
     Args:
-        file: the file.
-        sheet: the sheet; None for a whole file.
+        file, sheet: the file, and the sheet; None for a whole file.
         is_named: whether the user named this very file, and not its folder.
         stated: keys of [[loops]] and [[sweeps]] that the user states of it.
         beside: what the sheets of its workbook without a test say of all its tests.
@@ -53,11 +52,8 @@ class Gathered(NamedTuple):
 def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> Gathered:
     """The tests among files, the sheets of workbooks, and the files of folders, of which no deeper ones are opened.
 
-    A file that the user names and that is no workbook with several sheets is not opened.
-
-    Args:
-        paths: files and folders.
-        stated: keys of [[loops]] and [[sweeps]] that the user states.
+    A file that the user names and that is no workbook with several sheets is not opened. `stated` are the keys of
+    [[loops]] and [[sweeps]] that the user states.
 
     Raises:
         NoTestError: a folder without a test.
@@ -96,25 +92,12 @@ def stated_of_each(sources: Sequence[Source], stated: Mapping[str, Any]) -> list
     A column that is stated for all, and that only some of them have, is left out for the others.
     """
     columns: Mapping[str, str] = stated.get("columns", {})
-    own = [{**stated, **({"sheet": source.sheet} if source.sheet else {})} for source in sources]
-    has = {
-        role: [_has_column(source.file, role, keys) for source, keys in zip(sources, own, strict=True)]
-        for role in columns
-    }
-    return [
-        replace(
-            source,
-            stated={
-                **keys,
-                "columns": {
-                    role: header
-                    for role, header in columns.items()
-                    if has[role][number] is not False or True not in has[role]
-                },
-            },
-        )
-        for number, (source, keys) in enumerate(zip(sources, own, strict=True))
-    ]
+    own = [{**stated, "columns": columns, **({"sheet": source.sheet} if source.sheet else {})} for source in sources]
+    for role in columns:
+        has = [_has_column(source.file, role, keys) for source, keys in zip(sources, own, strict=True)]
+        for keys in (keys for keys, one in zip(own, has, strict=True) if one is False and True in has):
+            keys["columns"] = {other: header for other, header in keys["columns"].items() if other != role}
+    return [replace(source, stated=keys) for source, keys in zip(sources, own, strict=True)]
 
 
 def _has_column(file: Path, role: str, stated: Mapping[str, Any]) -> bool | None:
@@ -132,9 +115,7 @@ def _in_folder(folder: Path) -> tuple[list[Source], list[str]]:
     """The files of a folder that may hold tests, in order of their names, and why the others do not."""
     files: list[Source] = []
     left_out: list[str] = []
-    for path in sorted(folder.iterdir()):
-        if path.name.startswith((".", "~$")):
-            continue
+    for path in sorted(path for path in folder.iterdir() if not path.name.startswith((".", "~$"))):
         if path.is_file() and path.suffix.lower() in TEST_FILES:
             files.append(Source(path, is_named=False))
         else:

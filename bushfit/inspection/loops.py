@@ -1,4 +1,4 @@
-"""What a hysteresis loop holds: its cycles, sampling, waveform and noise, and what is odd about it."""
+"""What a hysteresis loop or a raw stepped-sine history holds: cycles or steps, sampling, noise, and what is odd."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from bushfit.effects.contract import Array
 from bushfit.effects.mistake import shown
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.drive import Drive, drive_of
-from bushfit.fitting.preload import TOLD_MEAN
-from bushfit.fitting.waveform import waveform
+from bushfit.fitting.motion import TOLD_MEAN, waveform
 from bushfit.geometry import Unit
 from bushfit.inspection.channels import clock, odd_channels
-from bushfit.inspection.labels import wrong_labels
+from bushfit.inspection.outside import wrong_labels
 from bushfit.inspection.record import Looked
 from bushfit.reading.measurement import Loop
 from bushfit.reading.names import Said
 from bushfit.reduction.cycles import least_prominence
+from bushfit.reduction.steps import reduce
 from bushfit.units import alike, for_people, number
 
 #: Standard errors beyond which cycles differ; chosen: noise does not go that far in any of many tests.
@@ -77,6 +77,32 @@ def look_at_loop(loop: Loop, named: Said) -> Looked:
     return Looked(facts, tuple(odd))
 
 
+def look_at_history(history: Loop, named: Said) -> Looked:
+    """Facts and oddities of a history; `named` is what the names of its file and sheet say.
+
+    Raises:
+        MeasurementError: no steady sine in it.
+    """
+    reduction = reduce([history])
+    steps = reduction.steps
+    unit, factor = history.direction.display.displacement
+    levels = sorted({step.level for step in steps})
+    frequencies = sorted({step.nominal_frequency for step in steps})
+    facts = {
+        "steps": f"{len(steps)} with steady cycles, {max(step.repeat for step in steps)} at most at one point",
+        "frequencies": f"{len(frequencies)}, from {frequencies[0]:.4g} to {frequencies[-1]:.4g} Hz",
+        "amplitudes": f"{', '.join(f'{factor * level:.4g}' for level in levels)} {unit} zero-to-peak, as reached",
+        "sampling": f"{clock(history)}, {min(step.rows_per_cycle for step in steps):.3g} rows a cycle at least",
+        "noise": f"{100 * max(step.gain_error for step in steps):.2g} % of |K| at most, a point",
+    }
+    odd = (
+        *wrong_labels(named, history.direction, levels, frequencies),
+        *odd_channels(history),
+        *reduction.warnings,
+    )
+    return Looked(facts, odd)
+
+
 def _crawling(drive: Drive) -> Iterator[str]:
     """A sentence on a loop that takes longer than any laboratory waits, and on what the file may say instead."""
     if drive.frequency * _LONGEST_CYCLE < 1.0:
@@ -86,12 +112,7 @@ def _crawling(drive: Drive) -> Iterator[str]:
 
 
 def look_at_programme(record: Loop, loops: Sequence[Loop], named: Said) -> Looked:
-    """Facts and oddities of a record that holds several loops.
-
-    Args:
-        record: the whole record.
-        loops: its parts, in order.
-        named: what the names of its file and sheet say.
+    """Facts and oddities of a record that holds several loops, in order.
 
     Raises:
         FitError: a part that has no whole cycle, or runs the wrong way round.
@@ -99,11 +120,11 @@ def look_at_programme(record: Loop, loops: Sequence[Loop], named: Said) -> Looke
     drives = [drive_of(loop) for loop in loops]
     unit, factor = record.direction.display.displacement
     amplitudes, frequencies = [drive.amplitude for drive in drives], [drive.frequency for drive in drives]
-    cycles = sorted(drive.cycles for drive in drives)
+    cycles = [drive.cycles for drive in drives]
     used = sum(drive.loop.displacement.size for drive in drives)
     facts = {
-        "programme": f"{len(loops)} loops in one record: {_in_turn([factor * size for size in amplitudes])} {unit} "
-        f"at {_in_turn(frequencies)} Hz, {_span(cycles)} cycles used of each; "
+        "programme": f"{len(loops)} loops in one record: {_told([factor * size for size in amplitudes])} {unit} "
+        f"at {_told(frequencies)} Hz, {_told([min(cycles), max(cycles)], ' to ')} cycles used of each; "
         f"{100 * (1 - used / record.displacement.size):.2g} % of the rows left out",
     }
     odd = [*wrong_labels(named, record.direction, amplitudes, frequencies), *odd_channels(record)]
@@ -119,24 +140,15 @@ def look_at_programme(record: Loop, loops: Sequence[Loop], named: Said) -> Looke
     return Looked(facts, tuple(odd))
 
 
-def _in_turn(values: Sequence[float]) -> str:
+def _told(values: Sequence[float], between: str = ", ") -> str:
     """Values in their order, each told once: "0.2, 0.5, 1"."""
-    return ", ".join(dict.fromkeys(f"{value:.3g}" for value in values))
-
-
-def _span(rising: Sequence[float]) -> str:
-    """The first and the last of some numbers: "4 to 5", or the one that they are."""
-    return " to ".join(dict.fromkeys(f"{value:.3g}" for value in (rising[0], rising[-1])))
+    return between.join(dict.fromkeys(f"{value:.3g}" for value in values))
 
 
 class _EndCycles(NamedTuple):
-    """The cycles at both ends of a loop, k of them.
+    """Force amplitude, mean force and mean motion of the cycles at both ends of a loop, (k,) each.
 
-    Args:
-        amplitude: of the force in each [N or N m], (k,).
-        mean_force: in each [N or N m], (k,).
-        mean_motion: in each [m or rad], (k,).
-        error: noise of the force over the root of the rows of a cycle [N or N m].
+    `error` is the noise of the force over the root of the rows of a cycle [N or N m].
     """
 
     amplitude: Array
@@ -207,10 +219,7 @@ def _changing(drive: Drive) -> Iterator[str]:
 def _cycle(phase: Array, values: Array, order: int) -> tuple[Array, Array, float]:
     """Mean and complex fundamental of each column over one cycle, and the scatter that the fit leaves of the first.
 
-    Args:
-        phase: of the rows [cycles], (n,).
-        values: (n, columns).
-        order: harmonics that are fitted.
+    The phase of the rows is in cycles, (n,), the values (n, columns); `order` is the harmonics that are fitted.
     """
     turns = 2.0 * np.pi * np.outer(phase, np.arange(1, order + 1))
     basis = np.hstack((np.ones((phase.size, 1)), np.cos(turns), -np.sin(turns)))

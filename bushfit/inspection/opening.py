@@ -15,12 +15,12 @@ from bushfit.campaign.campaign import reader_keywords
 from bushfit.campaign.schema import LoopFile, SweepFile
 from bushfit.errors import BushfitError, MeasurementError, naming
 from bushfit.geometry import Direction, Place, Specimen
-from bushfit.inspection.histories import look_at_history
-from bushfit.inspection.loops import look_at_loop, look_at_programme
+from bushfit.inspection.loops import look_at_history, look_at_loop, look_at_programme
 from bushfit.inspection.outside import keys_outside, names_of
 from bushfit.inspection.recognition import direction_of, place_of, recognised
 from bushfit.inspection.record import ColumnSeen, Inspected, Kind, Looked
 from bushfit.inspection.sweeps import look_at_sweep
+from bushfit.reading.layout import DELIMITERS
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import Said
@@ -35,18 +35,13 @@ from bushfit.validation import check_tables
 _QUASI_STATIC = 1.0
 #: The key of a loop whose load cell counts the other way.
 _TURNED = {"force_sign": -1}
-#: Names of delimiters as they are told.
-_DELIMITER_NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "pipe", " ": "blanks"}
 
 
 def inspect(file: Path, stated: Mapping[str, Any], beside: Said | None = None) -> Inspected:
     """Recognise a test file, and say what it holds and what is odd about it.
 
-    Args:
-        file: a loop, a sweep or a raw stepped-sine history.
-        stated: keys of [[loops]] and [[sweeps]] that the user states, as TOML has them; each is used where it fits.
-            So are the sizes of a specimen in shear.
-        beside: what other sheets of its workbook say of all its tests.
+    The user states keys of [[loops]] and [[sweeps]], as TOML has them, and sizes of a specimen in shear; each is used
+    where it fits. `beside` is what other sheets of its workbook say of all its tests.
 
     Raises:
         NoTestError: a file that holds no test.
@@ -92,10 +87,8 @@ def read_history(file: Path, stated: Mapping[str, Any]) -> tuple[Loop, Direction
     """
     table, is_sweep = recognised(file, stated)
     if is_sweep:
-        raise table.error(
+        raise table.header_error(
             "this is a sweep already",
-            line=table.layout.header_line,
-            found=", ".join(table.headers),
             expected="a raw history: time, displacement, force",
             hint="name it in the campaign under [[sweeps]]",
         )
@@ -112,8 +105,7 @@ def _entry(
     known = {field.name for field in fields(schema)} - {"direction"}
     entry = {key: value for key, value in stated.items() if key in known and value not in (None, {})}
     for key in ("columns", "units"):
-        own = {role: text for role, text in entry.pop(key, {}).items() if role in roles}
-        if own:
+        if own := {role: text for role, text in entry.pop(key, {}).items() if role in roles}:
             entry[key] = own
     needless = {"specimen"} | {f"at_{role}" for role in table.roles}
     if "time" in table.roles:
@@ -197,7 +189,7 @@ def _written(table: Table) -> dict[str, str]:
     else:
         written = {
             "encoding": table.source.encoding or "UTF-8",
-            "columns parted by": _DELIMITER_NAMES.get(layout.delimiter, layout.delimiter),
+            "columns parted by": next(name for name, mark in DELIMITERS.items() if mark == layout.delimiter),
             "decimal mark": "comma" if table.numerals.decimal == "," else "point",
             "header": f"line {layout.header_line}",
         }

@@ -1,36 +1,33 @@
-"""What is said of a test outside its columns, by names and the lines above its table, as keys of a campaign."""
+"""What is said of a test outside its columns, by names and the lines above its table: keys of a campaign, and slips."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from bushfit import units
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
 from bushfit.reading.names import Named, Said, named, stated_above
 from bushfit.reading.table import Table
 
 #: Conditions of a test, which a campaign carries on, in words.
-_CONDITIONS = {
-    "temperature": "temperature",
-    "preload": "preload",
-    "date": "date",
-    "operator": "operator",
-    "specimen_number": "specimen",
-}
+_CONDITIONS = {key: key for key in ("temperature", "preload", "date", "operator")} | {"specimen_number": "specimen"}
 #: What a sweep may hold, by the key that states it.
 _HELD = {"at_amplitude": "amplitude", "at_frequency": "frequency"}
 
+#: Relative difference up to which a file contains what its name states; chosen: rigs miss a level by that much.
+_AGREEMENT = 0.03
+#: Values that are listed one by one; chosen: of more a range says enough.
+_MOST_LISTED = 4
+
 
 class Outside(NamedTuple):
-    """What is said of a test outside its columns.
+    """What is said of a test outside its columns: keys of its table in a campaign, and where what was found, by label.
 
-    Args:
-        keys: of its table in a campaign.
-        facts: where what was found, in words, by label.
-        is_counted: whether it is known how an amplitude counts that no column has.
+    `is_counted` tells whether it is known how an amplitude counts that no column has.
     """
 
     keys: dict[str, Any]
@@ -44,9 +41,9 @@ def names_of(file: Path, stated: Mapping[str, Any]) -> Said:
     counting = stated.get("amplitude")
     if counting is None:
         return said
-    frequencies = said.of("Hz")
-    counted = (each if each in frequencies else each._replace(convention=counting) for each in said.quantities)
-    return replace(said, quantities=tuple(counted))
+    held = said.of("Hz")
+    counted = tuple(each if each in held else each._replace(convention=counting) for each in said.quantities)
+    return replace(said, quantities=counted)
 
 
 def keys_outside(
@@ -54,15 +51,8 @@ def keys_outside(
 ) -> Outside:
     """The keys that a test has by what is said outside its columns, and where they were found.
 
-    What is stated goes first, then the table, the names, the lines above the table, and what lies beside it.
-
-    Args:
-        table: of the test.
-        place: of the test, which settles the unit of an amplitude.
-        stated: keys of its table in a campaign that the user states.
-        by_name: what its names say.
-        beside: what is said of all tests of its file.
-        is_sweep: whether frequency and amplitude have to be known.
+    What is stated goes first, then the table, its names (`by_name`), the lines above it, and what is said `beside` it
+    of all tests of its file. Of a sweep, frequency and amplitude have to be known; the place settles its unit.
 
     Raises:
         MeasurementError: a sweep of which nothing says the amplitude, or the frequency.
@@ -77,19 +67,18 @@ def keys_outside(
         if role not in table.roles and key not in stated:
             label, found = _held(table, place, key, sources)
             counted = stated.get("amplitude") or found.convention
-            is_half = role == "amplitude" and counted == "peak-to-peak"
-            keys[key] = _half(found.text) if is_half else found.text
-            words = f"{keys[key]}, half of {found.text}" if is_half else keys[key]
+            keys[key] = words = found.text
+            if role == "amplitude" and counted == "peak-to-peak":
+                number, _, unit = found.text.partition(" ")
+                keys[key] = f"{float(number) / 2.0:g} {unit}"
+                words = f"{keys[key]}, half of {found.text}"
             facts.setdefault(label, []).append(f"{role} {words}")
             is_counted &= role != "amplitude" or counted is not None
     for key, word in _CONDITIONS.items():
-        if key in table.roles or key in stated:
-            continue
-        for label, said in sources.items():
-            if text := getattr(said, key):
-                keys[key] = text
-                facts.setdefault(label, []).append(f"{word} {text}")
-                break
+        label, text = next(((label, text) for label, said in sources.items() if (text := getattr(said, key))), ("", ""))
+        if text and key not in table.roles and key not in stated:
+            keys[key] = text
+            facts.setdefault(label, []).append(f"{word} {text}")
     return Outside(keys, {label: ", ".join(words) for label, words in facts.items()}, is_counted)
 
 
@@ -107,19 +96,48 @@ def _held(table: Table, place: Place, key: str, sources: Mapping[str, Said]) -> 
     raise _unsaid(table, key, usual.get(expected, "1 deg"), None)
 
 
-def _half(text: str) -> str:
-    """Half of a quantity."""
-    number, _, unit = text.partition(" ")
-    return f"{float(number) / 2.0:g} {unit}"
-
-
 def _unsaid(table: Table, key: str, example: str, found: str | None) -> MeasurementError:
     """The error for a sweep without amplitude or frequency, with one that a user may state."""
     role = _HELD[key]
-    return table.error(
+    return table.header_error(
         f"nothing says at which {role} this was tested",
-        line=table.layout.header_line,
         found=found or ", ".join(table.headers),
         expected=f"a column for the {role}, or one number with its unit in the name of the file",
         hint=f'state {key} = "{example}" in the campaign, or name the column: columns = {{ {role} = "..." }}',
     )
+
+
+def wrong_labels(
+    named: Said, direction: Place, amplitudes: Sequence[float], frequencies: Sequence[float]
+) -> Iterator[str]:
+    """A sentence where the name of a file states an amplitude or a frequency that the file does not contain."""
+    unit, factor = direction.display.displacement
+    expected = direction.motion.displacement_unit
+    stated = [(each, _zero_to_peak(each, expected)) for each in named.of(expected)]
+    if stated and not any(_near(value, x) for _, value in stated for x in amplitudes):
+        double = any(_near(value, 2.0 * x) for _, value in stated for x in amplitudes)
+        found = _listed([factor * x for x in amplitudes])
+        yield f"the name says {_or(named.of(expected))}, the amplitude is {found} {unit} zero-to-peak" + (
+            ": the name may count peak-to-peak" if double else ""
+        )
+    said = named.of("Hz")
+    if said and not any(_near(units.quantity(each.text, "Hz"), f) for each in said for f in frequencies):
+        yield f"the name says {_or(said)}, the frequency is {_listed(frequencies)} Hz"
+
+
+def _zero_to_peak(each: Named, expected: str) -> float:
+    """The amplitude that a name states [SI]."""
+    return units.quantity(each.text, expected) / (2.0 if each.convention == "peak-to-peak" else 1.0)
+
+
+def _near(one: float, other: float) -> bool:
+    return abs(one - other) <= _AGREEMENT * other
+
+
+def _or(stated: Sequence[Named]) -> str:
+    return " or ".join(dict.fromkeys(f"{each.text} {each.convention or ''}".rstrip() for each in stated))
+
+
+def _listed(values: Sequence[float]) -> str:
+    texts = list(dict.fromkeys(f"{value:.4g}" for value in values))
+    return ", ".join(texts) if len(texts) <= _MOST_LISTED else f"{texts[0]} to {texts[-1]}"

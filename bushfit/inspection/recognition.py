@@ -11,9 +11,9 @@ from typing import Any
 from bushfit.campaign.schema import SpecimenTable
 from bushfit.errors import BushfitError, NoTestError, typed
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
-from bushfit.reading.directions import direction_of_file
 from bushfit.reading.headers import Vocabulary
 from bushfit.reading.layout import FileFormat
+from bushfit.reading.names import direction_of_file
 from bushfit.reading.resonance import is_resonance
 from bushfit.reading.sweeps import STIFFNESS_PAIRS
 from bushfit.reading.table import Table
@@ -22,18 +22,14 @@ from bushfit.validation import check_tables
 
 #: What an error says besides its problem.
 _PARTS = ("file", "place", "found", "expected", "hint")
-#: The name of a specimen of which no other is stated.
-UNNAMED_SPECIMEN = "coupon"
-#: Headers of a bar in tension: E', |E*|, "tensile strain".
-_TENSILE = re.compile(r"\W*E(?![^\W_])|.*(?:young|tensile|tension|traction|zug)", re.IGNORECASE)
+#: Headers of a bar in tension: E', |E*|, "storage modulus E'", "tensile strain".
+_TENSILE = re.compile(r"(?<![^\W_])E(?![^\W_])|young|tensile|tension|traction|zug", re.IGNORECASE)
 
 
 def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
     """The table of a file, and whether it is a sweep's and not a loop's.
 
-    Args:
-        file: the file.
-        stated: keys of [[loops]] and [[sweeps]] that the user states, as TOML has them; each is used where it fits.
+    The user states keys of [[loops]] and [[sweeps]], as TOML has them; each is used where it fits.
 
     Raises:
         NoTestError: a file that cannot be opened as a table, or whose columns make no test.
@@ -61,10 +57,9 @@ def recognised(file: Path, stated: Mapping[str, Any]) -> tuple[Table, bool]:
         if len(best.roles) <= max(1, len(Vocabulary(usual, {}).roles(best.headers))):
             raise failure
     known = ", ".join(role.replace("_", " ") for role in best.roles)
-    raise best.error(
+    raise best.header_error(
         "the columns do not make a test",
         kind=NoTestError,
-        line=best.layout.header_line,
         found=", ".join(best.headers) + (f" (understood: {known})" if known else ""),
         expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
         hint=f"correct the header, or name the column: --column {_missing(best, is_sweep=is_sweep)}=...",
@@ -89,17 +84,17 @@ def _refuse_resonance(file: Path, stated: Mapping[str, Any]) -> None:
 def place_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Place | None:
     """What a test was made on: a specimen, or the bushing in a direction, as stated or as the file says; else None.
 
-    A modulus is that of a specimen; a stiffness is that of the bushing, unless sizes of a block in shear are stated.
+    A modulus is that of a specimen, a stiffness that of the bushing unless sizes of a block in shear are stated.
 
     Raises:
         MeasurementError: units of torsion where the user states another direction.
         CampaignError, UnitError, ModelError: sizes that make no specimen.
     """
     sizes = {key: stated[key] for key in ("area", "thickness", "elements") if key in stated}
-    body = {"name": stated.get("specimen", UNNAMED_SPECIMEN)}
+    body = {"name": stated.get("specimen", "coupon")}
     if table.motion is STRAINING:
-        if any(_TENSILE.match(column.header) for column in table.roles.values()):
-            body["strain"] = "tension"
+        if any(_TENSILE.search(column.header) for column in table.roles.values()):
+            body = {"name": stated.get("specimen", "bar"), "strain": "tension"}
         return Specimen(**vars(check_tables({**body, "kind": "modulus"}, None, SpecimenTable)))
     if sizes:
         return Specimen(**vars(check_tables({**body, **sizes, "kind": "shear"}, None, SpecimenTable)))
@@ -116,9 +111,8 @@ def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Directi
     if "direction" not in stated:
         return direction_of_file(file, table.headers, turns=turns, sheet=stated.get("sheet"))
     if turns and not Direction(stated["direction"]).is_rotation:
-        raise table.error(
+        raise table.header_error(
             "the units say torsion",
-            line=table.layout.header_line,
             found=f"{', '.join(table.headers)}; stated: {stated['direction']}",
             expected="one direction",
             hint="state --direction torsion, or none",
@@ -133,9 +127,9 @@ def _missing(table: Table, *, is_sweep: bool) -> str | None:
     """
     roles = set(table.roles)
     nearest = max(STIFFNESS_PAIRS, key=lambda pair: len(roles & set(pair)))
-    needed = nearest if is_sweep else ("displacement", "force")
     if is_sweep and not roles & {"frequency", "amplitude"}:
         return "frequency"
+    needed = nearest if is_sweep else ("displacement", "force")
     return next((role for role in needed if role not in roles), None)
 
 

@@ -16,13 +16,9 @@ Kind = Literal["loop", "sweep", "history"]
 
 @dataclass(frozen=True)
 class ColumnSeen:
-    """A column of a file.
+    """A column of a file: its header cell, the role it was taken for, if any, its unit, if it is stated.
 
-    Args:
-        header: its header cell.
-        role: what it was taken for; None where no test needs it.
-        unit: its unit, where it is stated.
-        low, high: the range of its values in that unit, where they were read.
+    `low` and `high` are the range of its values in that unit, where they were read.
     """
 
     header: str
@@ -34,12 +30,7 @@ class ColumnSeen:
 
 @dataclass(frozen=True)
 class Looked:
-    """What the content of a file tells.
-
-    Args:
-        facts: in words, by label.
-        odd: a sentence for each thing that is odd, with its figures.
-    """
+    """What the content of a file tells: facts in words, by label, and a sentence for each thing that is odd."""
 
     facts: Mapping[str, str]
     odd: tuple[str, ...] = ()
@@ -50,14 +41,11 @@ class Inspected:
     """A test file that can be used, with all that an inspection finds.
 
     Args:
-        file: the file.
-        kind: what it holds.
+        file, kind, measured: the file, what it holds, and its content in SI.
         direction: of the test; None where neither file nor options say it.
         written: how the file is written, by label: encoding, delimiter, decimal mark and so on.
-        columns: all columns, in order.
-        looked: facts and oddities.
+        columns, looked: all columns, in order; facts and oddities.
         entry: keys of its table in a campaign besides `file` and `direction`, as TOML has them.
-        measured: its content in SI.
         counted: whether the header of a sweep says how amplitudes are counted.
     """
 
@@ -82,9 +70,9 @@ class Inspected:
         """What was assumed, with the option or key that says otherwise; None where nothing was."""
         said = []
         if isinstance(self.direction, Specimen) and self.direction.kind == "modulus":
-            in_tension = self.direction.strain == "tension"
-            taken = "that of a bar in tension" if in_tension else "the engineering shear strain"
-            other = "engineering" if in_tension else "tension"
+            taken, other = "the engineering shear strain", "tension"
+            if self.direction.strain == "tension":
+                taken, other = "that of a bar in tension", "engineering"
             said.append(f'its strain is taken as {taken}, else strain = "{other}" or "tensor" in [[specimens]]')
         if self.kind == "sweep" and not self.counted and "amplitude" not in self.entry:
             what = "nothing says" if "at_amplitude" in self.entry else "its header does not say"

@@ -11,7 +11,7 @@ from bushfit.effects.contract import Array
 from bushfit.effects.mistake import shown
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.noise import SweepNoise, sweep_noise
-from bushfit.inspection.labels import wrong_labels
+from bushfit.inspection.outside import wrong_labels
 from bushfit.inspection.record import Looked
 from bushfit.reading.measurement import Sweep, loss_factor
 from bushfit.reading.names import Said
@@ -62,11 +62,11 @@ def look_at_sweep(sweep: Sweep, named: Said) -> Looked:
     odd = [
         *wrong_labels(named, sweep.direction, [float(x) for x in levels], [float(x) for x in frequencies]),
         *_copies(sweep, noise),
-        *_missing(sweep, unit, factor),
-        *_outliers(sweep, noise, unit, factor),
-        *_odd_blocks(sweep, unit, factor),
-        *_missed(sweep, unit, factor),
-        *_negative(sweep, unit, factor),
+        *_missing(sweep),
+        *_outliers(sweep, noise),
+        *_odd_blocks(sweep),
+        *_missed(sweep),
+        *_negative(sweep),
         *_doubtful_loss(sweep),
     ]
     return Looked(facts, tuple(odd))
@@ -107,7 +107,7 @@ def _finest(values: Array) -> Array:
     return 10.0 ** (np.floor(np.log10(values)) + 1 - digits)
 
 
-def _missing(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
+def _missing(sweep: Sweep) -> Iterator[str]:
     """A sentence for each block, a repeat of a level, that lacks frequencies which most others have."""
     blocks = np.stack((sweep.amplitude, sweep.repeat.astype(float)), axis=1)
     names, block = np.unique(blocks, axis=0, return_inverse=True)
@@ -119,13 +119,11 @@ def _missing(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
         absent = frequencies[usual & ~has]
         if absent.size and len(names) > 1:
             which = f", repeat {repeat:.0f}," if np.unique(sweep.repeat).size > 1 else ""
-            listed = ", ".join(f"{f:.4g}" for f in absent[:_MOST_LISTED]) + (
-                ", ..." if absent.size > _MOST_LISTED else ""
-            )
-            yield f"{factor * level:.4g} {unit}{which} lacks {listed} Hz, which most others have"
+            listed = ", ".join([*(f"{f:.4g}" for f in absent[:_MOST_LISTED]), *["..."] * (absent.size > _MOST_LISTED)])
+            yield f"{_told(sweep, level)}{which} lacks {listed} Hz, which most others have"
 
 
-def _outliers(sweep: Sweep, noise: SweepNoise, unit: str, factor: float) -> Iterator[str]:
+def _outliers(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
     """A sentence for each of the points that lie far off their repeats at the same frequency and amplitude."""
     off = np.nan_to_num(_from_repeats(sweep))
     for rows in _blocks(sweep):
@@ -135,7 +133,7 @@ def _outliers(sweep: Sweep, noise: SweepNoise, unit: str, factor: float) -> Iter
     far = np.any((np.abs(parts) > _OUTLIER_DEVIATIONS * random) & (np.abs(parts) > _LEAST_OUTLIER), axis=1)
     for row in np.flatnonzero(far)[:_MOST_LISTED]:
         yield (
-            f"data row {row + 1} ({sweep.frequency[row]:.4g} Hz, {factor * sweep.amplitude[row]:.4g} {unit}, repeat "
+            f"data row {row + 1} ({sweep.frequency[row]:.4g} Hz, {_told(sweep, sweep.amplitude[row])}, repeat "
             f"{sweep.repeat[row]}) is {number(100 * np.expm1(parts[row, 0]), 2, '+')} % in |K| and "
             f"{np.degrees(parts[row, 1]):+.2g} deg off its repeats"
         )
@@ -153,11 +151,11 @@ def _from_repeats(sweep: Sweep) -> Array:
 
 
 def _blocks(sweep: Sweep) -> list[Array]:
-    """The rows of each block: a run of the rig over all frequencies at one level, of which repeats are told apart."""
+    """The rows of each block: a repeat of a level over all frequencies."""
     return _groups(sweep.repeat.astype(float), sweep.amplitude)
 
 
-def _odd_blocks(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
+def _odd_blocks(sweep: Sweep) -> Iterator[str]:
     """A sentence for each block that lies apart as a whole, and one on a drift over the repeats."""
     off = _from_repeats(sweep)
     blocks = [rows for rows in _blocks(sweep) if not np.isnan(off[rows]).any()]
@@ -168,7 +166,7 @@ def _odd_blocks(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
     for rows, own in zip(blocks, gain, strict=True):
         if abs(own) > max(_BLOCK_DEVIATIONS * usual, _LEAST_BLOCK_OFFSET):
             yield (
-                f"{factor * sweep.amplitude[rows[0]]:.4g} {unit}, repeat {sweep.repeat[rows[0]]} lies "
+                f"{_told(sweep, sweep.amplitude[rows[0]])}, repeat {sweep.repeat[rows[0]]} lies "
                 f"{number(100 * np.expm1(own), 2, '+')} % off the other repeats as a whole: "
                 "other amplitude, temperature or mounting?"
             )
@@ -183,25 +181,23 @@ def _odd_blocks(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
             )
 
 
-def _missed(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
+def _missed(sweep: Sweep) -> Iterator[str]:
     """A sentence on the point that missed the amplitude of its level by most."""
     off = sweep.amplitude_reached / sweep.amplitude - 1.0
     row = int(np.argmax(np.abs(off)))
     if abs(off[row]) > _MISSED_LEVEL:
-        yield (
-            f"{factor * sweep.amplitude_reached[row]:.4g} {unit} was reached where the level is "
-            f"{factor * sweep.amplitude[row]:.4g} {unit} ({sweep.frequency[row]:.4g} Hz)"
-        )
+        reached, level = _told(sweep, sweep.amplitude_reached[row]), _told(sweep, sweep.amplitude[row])
+        yield f"{reached} was reached where the level is {level} ({sweep.frequency[row]:.4g} Hz)"
 
 
-def _negative(sweep: Sweep, unit: str, factor: float) -> Iterator[str]:
+def _negative(sweep: Sweep) -> Iterator[str]:
     """A sentence on points whose loss factor is below zero."""
     bad = np.flatnonzero(sweep.stiffness.imag < 0.0)
     if bad.size:
         row = int(bad[0])
         yield (
             f"{bad.size} point{'s' * (bad.size > 1)} with a loss factor below zero, the first at "
-            f"{sweep.frequency[row]:.4g} Hz, {factor * sweep.amplitude[row]:.4g} {unit}"
+            f"{sweep.frequency[row]:.4g} Hz, {_told(sweep, sweep.amplitude[row])}"
         )
 
 
@@ -212,6 +208,12 @@ def _doubtful_loss(sweep: Sweep) -> Iterator[str]:
         unless = ", or ".join(mistake.sentence.format(files=shown(sweep)) for mistake in mistakes)
         loss = float(np.median(loss_factor(sweep.stiffness)))
         yield f"the loss factor is {number(loss, 2)} in the median, that of hardly any rubber, unless {unless}"
+
+
+def _told(sweep: Sweep, amplitude: float) -> str:
+    """An amplitude in the units of engineers."""
+    unit, factor = sweep.direction.display.displacement
+    return f"{factor * amplitude:.4g} {unit}"
 
 
 def _groups(*keys: Array) -> list[Array]:

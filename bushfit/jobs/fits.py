@@ -21,14 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """The outcome of a fit.
-
-    Args:
-        stem: of the JSON file.
-        kinds: of test whose tables and plots belong to it: loops, sweeps.
-        data: what was fitted.
-        reports: a title and a result for each step, the last one final.
-    """
+    """The outcome of a fit: `<stem>.json`, tables and plots of some kinds of test, a result a step, the last final."""
 
     stem: str
     kinds: tuple[str, ...]
@@ -118,5 +111,5 @@ def tests_of(campaign: Campaign) -> tuple[str, ...]:
 def files_of_tests(data: Data, result: Result, kinds: Collection[str], formats: Collection[str]) -> dict[str, bytes]:
     """Tables and plots of tests of some kinds beside a model, with the outliers that its fit left out marked."""
     marked, title = data.without(result.outliers), result.model.name if result.model.bushing else data.campaign.name
-    loops = fit_files("loops", result, title, marked.loops if "loops" in kinds else (), formats)
-    return loops | fit_files("sweeps", result, title, marked.sweeps if "sweeps" in kinds else (), formats)
+    loops, sweeps = (getattr(marked, kind) if kind in kinds else () for kind in ("loops", "sweeps"))
+    return fit_files(result, title, loops, sweeps, formats)

@@ -23,18 +23,15 @@ if TYPE_CHECKING:
 
 #: Directions that are predicted where none is asked for: those of the paper.
 _DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
+#: Keys of [predict] that have the amplitudes of each motion.
+_AMPLITUDES = {TRANSLATION: "amplitudes", ROTATION: "torsion_amplitudes", STRAINING: "strain_amplitudes"}
 
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """The outcome of a prediction: one table a place; `measured` is laid over the plots.
+    """The outcome of a prediction: one table a place, and a resonance, where a mass was asked for.
 
-    Args:
-        result: the model.
-        predictions: of each place.
-        measured: sweeps of places that the model can predict.
-        notes: what else a user must know.
-        resonances: of the mass that was asked for, on each place.
+    `measured` are the sweeps of places that the model can predict; `notes`, what else a user must know.
     """
 
     result: Result
@@ -69,10 +66,8 @@ class Predicted:
         """The sweeps whose files the model was fitted to, and the others."""
         files = {source.sha256 for source in self.result.inputs}
         known = [bool(sweep.source and sweep.source.sha256 in files) for sweep in self.measured]
-        fitted, left = (
-            [s for s, old in zip(self.measured, known, strict=True) if old is part] for part in (True, False)
-        )
-        return fitted, left
+        pairs = list(zip(self.measured, known, strict=True))
+        return [sweep for sweep, old in pairs if old], [sweep for sweep, old in pairs if not old]
 
     def files(self, formats: Collection[str]) -> dict[str, bytes]:
         names = resonance_files([found.place for found in self.resonances])
@@ -89,9 +84,7 @@ class Predicted:
 class Predict:
     """Dynamic stiffness over a grid: the one asked for, else the campaign's [predict], else that of its sweeps.
 
-    Args:
-        asked: places and grid.
-        mass, base_acceleration: of a resonance to predict at each place [kg], [m/s^2]; None for none.
+    With a mass [kg] and the acceleration of its base [m/s^2], its resonance at each place, too.
     """
 
     asked: PredictSettings = field(default_factory=PredictSettings)
@@ -101,9 +94,7 @@ class Predict:
     def places(self, result: Result | None, campaign: Campaign | None) -> list[Place]:
         """Those asked for, else the paper's directions where there is a bushing, and all specimens.
 
-        Args:
-            result: the model; None where it is still to be fitted to the campaign.
-            campaign: its tests; None for a model alone.
+        There is no result where it is still to be fitted to the campaign, and no campaign of a model alone.
 
         Raises:
             ModelError: a name that is neither a direction nor a specimen.
@@ -131,12 +122,8 @@ class Predict:
         predictions = []
         for place in self.places(result, campaign):
             frequencies, amplitudes = default_grid(result, place, sweeps)
-            asked = {
-                TRANSLATION: settings.amplitudes,
-                ROTATION: settings.torsion_amplitudes,
-                STRAINING: settings.strain_amplitudes,
-            }[place.motion]
-            predictions.append(predict(result, place, settings.frequencies or frequencies, asked or amplitudes))
+            asked = getattr(settings, _AMPLITUDES[place.motion]) or amplitudes
+            predictions.append(predict(result, place, settings.frequencies or frequencies, asked))
         known = [each for each in sweep_data(sweeps) if result.model.bushing or isinstance(each.direction, Specimen)]
         resonances = [
             predict_resonance(result, place, self.mass, self.base_acceleration, settings.frequencies)

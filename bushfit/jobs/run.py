@@ -27,14 +27,8 @@ if TYPE_CHECKING:
 class Ran:
     """The outcome of the whole chain.
 
-    Args:
-        data: the tests.
-        static: the first step of the paper's procedure; None where there are no loops.
-        two_step: the paper's procedure; None where it was passed over.
-        no_two_step: why it was passed over, or "".
-        joint: all parameters together.
-        diagnosed: what the model lacks; None where no parameter is free.
-        predicted: from the model to use.
+    There is no static fit, the first step of the paper's procedure, without loops, no `two_step` where the procedure
+    was passed over (`no_two_step` says why), and nothing diagnosed where no parameter is free.
     """
 
     data: Data

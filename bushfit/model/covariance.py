@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from scipy.special import stdtrit
@@ -76,9 +77,7 @@ class Covariance:
         sigma = np.sqrt(np.diag(self.matrix))
         pairs = [
             (self.names[i], self.names[j], float(self.matrix[i, j] / (sigma[i] * sigma[j])))
-            for i in range(len(self.names))
-            for j in range(i + 1, len(self.names))
-            if sigma[i] * sigma[j] > 0.0
+            for i, j in combinations(np.flatnonzero(sigma), 2)
         ]
         return sorted(pairs, key=lambda pair: -abs(pair[2]))
 

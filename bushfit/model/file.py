@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib.metadata
 import json
 from collections.abc import Mapping, Set
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, astuple, dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal, NoReturn
@@ -63,10 +63,6 @@ class SpecimenTable:
     thickness_m: Number | None = None
     elements: WholeNumber = 1
 
-    @property
-    def specimen(self) -> Specimen:
-        return Specimen(self.name, self.kind, self.strain, self.area_m2, self.thickness_m, self.elements)
-
 
 @dataclass(frozen=True)
 class ParameterTable:
@@ -80,10 +76,7 @@ class ParameterTable:
 
 @dataclass(frozen=True)
 class CovarianceTable:
-    """covariance: a matrix with a row and a column for each name, and others of its size.
-
-    What makes a matrix no covariance is refused here.
-    """
+    """covariance: a matrix with a row and a column for each name, and others of its size; else it is refused."""
 
     names: tuple[str, ...]
     matrix: Matrix
@@ -166,10 +159,6 @@ def load_result(file: Path) -> Result:
 def from_document(document: object, file: Path | None = None) -> Result:
     """The result that a parsed model file holds.
 
-    Args:
-        document: parsed JSON, such as `to_document` gives.
-        file: where it stands, for errors.
-
     Raises:
         ModelError: another schema, a key that is missing or of the wrong kind, or values that are no model.
     """
@@ -192,14 +181,10 @@ def from_document(document: object, file: Path | None = None) -> Result:
 
 
 def _result(tables: ModelFile) -> Result:
-    """The result of checked tables.
-
-    Raises:
-        ModelError: values that are no model, or a covariance of other parameters.
-    """
+    """The result of checked tables."""
     tube, entries, fit = tables.bushing, tables.parameters, tables.fit
     model = Model(
-        Bushing(tube.name, tube.inner_radius_m, tube.outer_radius_m, tube.length_m, tube.shape) if tube else None,
+        Bushing(*astuple(tube)) if tube else None,
         tables.effects,
         {name: entry.value for name, entry in entries.items()},
     )
@@ -214,7 +199,7 @@ def _result(tables: ModelFile) -> Result:
         outliers=tables.outliers,
         profile={name: entry.profile95 for name, entry in entries.items() if entry.profile95},
         at_bound={name: entry.at_bound for name, entry in entries.items() if entry.at_bound},
-        specimens=tuple(table.specimen for table in tables.specimens),
+        specimens=tuple(Specimen(*astuple(table)) for table in tables.specimens),
         tests=fit.tests if fit else (),
         usable=fit.usable if fit else (),
     )

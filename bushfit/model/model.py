@@ -39,13 +39,7 @@ FIVE = tuple(parameter.name for name in BASE for parameter in effect_named(name)
 
 @dataclass(frozen=True)
 class _Structure:
-    """The effects of a model by kind, and their parameters; the same for all models with these effects.
-
-    Args:
-        records: all effects, from the rubber outward.
-        parameters: by name in files and reports.
-        branches, modifiers, layers: the effects of each kind, in that order.
-    """
+    """The effects of a model by kind, and their parameters; the same for all models with these effects."""
 
     records: tuple[Effect, ...]
     parameters: Mapping[str, Parameter]
@@ -56,11 +50,7 @@ class _Structure:
     @classmethod
     @lru_cache(maxsize=256)
     def of(cls, names: tuple[str, ...]) -> _Structure:
-        """The structure of a model with these effects, in any order; kept, because a fit makes thousands of models.
-
-        Raises:
-            ModelError: an unknown effect, or one named twice.
-        """
+        """The structure of a model with these effects, in any order; kept, because a fit makes thousands of models."""
         doubles = {name for name in names if names.count(name) > 1}
         if doubles:
             raise ModelError("an effect is listed twice", found=", ".join(sorted(doubles)))
@@ -185,7 +175,7 @@ class Model:
         kind: Kind = "sweep",
         values: Values | None = None,
     ) -> Array:
-        """Complex dynamic stiffness of the steady first harmonic.
+        """Complex dynamic stiffness of the steady first harmonic [N/m or N m/rad].
 
         Args:
             direction: of the test, or its name: axial, radial or torsion; or the specimen under test.
@@ -194,9 +184,6 @@ class Model:
             kind: whether a loop or a sweep records it; only effects of the instrument tell them apart.
             values: parameter values in place of the model's own; arrays whose last axis has length 1 add
                 leading axes to the result.
-
-        Returns:
-            [N/m] or [N m/rad].
 
         Notes:
             The rubber has k = G mu^(omega, e0), with G of Eqs. 10, 11, 12 and e0 of Eqs. 7, 8 (Eqs. 6 to 12); the
@@ -223,15 +210,9 @@ class Model:
         kind: Kind = "sweep",
         values: Values | None = None,
     ) -> Array:
-        """Force over a displacement history [N or N m], from rest or on the steady cycle.
+        """Force over a history of displacement [m or rad], from rest or on the steady cycle: (..., n) [N or N m].
 
-        Args:
-            direction: of the test, or its name; or the specimen under test.
-            displacement: [m or rad], (..., n).
-            kind, values: as of `stiffness`.
-
-        Returns:
-            (..., n).
+        The other arguments are as of `stiffness`.
         """
         setting = _setting(self.bushing, direction, kind)
         respond = self._stack_force(setting, self.values if values is None else values, self._layers(setting))
@@ -239,9 +220,10 @@ class Model:
 
     def _layers(self, setting: Setting) -> tuple[Layer, ...]:
         """The layers that act on a test: a coupon whose modulus is measured has no rig and no sleeves around it."""
-        if setting.direction.motion is not STRAINING:
-            return self._structure.layers
-        return tuple(layer for layer in self._structure.layers if layer.corrects)
+        layers, turning = self._structure.layers, setting.direction.is_rotation
+        if setting.direction.motion is STRAINING:
+            return tuple(layer for layer in layers if layer.corrects)
+        return tuple(layer for layer in layers if layer.turns or not turning)
 
     def _stack_stiffness(self, setting: Setting, values: Values) -> Callable[[Array, Array], Array]:
         """The stiffness outside all layers, as a function of omega [rad/s] and amplitude [m or rad]."""
@@ -327,13 +309,7 @@ def _check(name: str, value: float, parameter: Parameter) -> None:
 
 
 def seen_by(effect: Effect, values: Values, base: Values) -> Values:
-    """The values that an effect reads: `base` by their full names, and its own of `values` by their short names.
-
-    Args:
-        effect: who reads.
-        values: of all parameters.
-        base: the same, with the paper's parameters as the modifiers left them.
-    """
+    """The values that an effect reads: `base` by their full names, and its own of `values` by short ones."""
     if effect.name in BASE:
         return base
     return {**base, **{parameter.name: values[qualified(effect, parameter)] for parameter in effect.parameters}}

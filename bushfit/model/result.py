@@ -59,9 +59,7 @@ class Misfit:
     """How well a model meets one test, or one run of it.
 
     Args:
-        test: its name.
         place: direction, or specimen by its name.
-        fitted: whether the model was fitted to it.
         held: what the run holds; None of the whole test.
         value: at which it is held.
         unit: of the value, SI: "m", "rad" or "1" of an amplitude, "Hz".
@@ -107,7 +105,6 @@ class Outlier:
     """A point that lies farther off than noise explains, beside neighbours that do not.
 
     Args:
-        test: name of the loop or sweep.
         file: it came from, as the campaign names it; None for a test that came from no file.
         row: of its data, from 1; header, comments and blank lines do not count.
         column: displacement, force or stiffness.
@@ -131,19 +128,12 @@ class Result:
     """A fitted model, or one given by hand, as the JSON files hold it.
 
     Args:
-        model: bushing, effects and values.
-        fitted: names of the parameters the fit moved.
         covariance: of the fitted parameters, and of held ones whose error is known.
         quality: None where the model was not fitted.
         measured: operating conditions of the tests that were fitted; None where the model was not fitted.
         warnings: what a user must know before using the numbers.
-        inputs: the files behind it.
-        outliers: points that lie farther off than noise explains.
         profile: 95 % intervals by profile likelihood, where they were asked for; None is an open end.
         at_bound: parameters that came to rest on the least or largest value they may have, and on which.
-        specimens: that were tested beside the bushing, or instead of it.
-        tests: how well the model meets each test, and each run of it.
-        usable: within what it meets the measurement, by place.
     """
 
     model: Model
@@ -166,11 +156,7 @@ class Result:
         return self.specimens[0].name if self.specimens and not self.model.bushing else self.model.name
 
     def place(self, name: str) -> Place:
-        """The specimen of this name, or else the direction.
-
-        Raises:
-            ModelError: it is neither.
-        """
+        """The specimen of this name, or else the direction; a ModelError where it is neither."""
         return place_named(name, self.specimens)
 
     def interval(self, name: str) -> tuple[float, float] | None:

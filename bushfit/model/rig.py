@@ -51,18 +51,10 @@ def record(
     """Impose `run_in + cycles` cycles from rest and keep the last `cycles`.
 
     Args:
-        model: what is on the rig, with whatever effects it has.
-        direction: direction of the test.
-        frequency: [Hz].
-        amplitude: zero-to-peak [m or rad].
-        cycles: cycles that are kept.
-        run_in: cycles before them that are not recorded.
-        steps_per_cycle: time steps; the springpot's error falls in proportion to them.
+        frequency, amplitude: [Hz], and zero-to-peak [m or rad].
+        steps_per_cycle: the springpot's error falls in proportion: its Gruenwald-Letnikov sum is of first order.
         waveform: sine or triangle.
         kind: whether a loop or a sweep is recorded; only effects of the instrument tell them apart.
-
-    Notes:
-        The springpot is a Gruenwald-Letnikov sum, which is first order in the time step.
     """
     index = np.arange((run_in + cycles) * steps_per_cycle + 1)
     motion = amplitude * wave(waveform, index / steps_per_cycle)
@@ -74,15 +66,9 @@ def record(
 def imposed(
     model: Model, direction: Place, motion: Array, step: float, frequency: float, *, kind: Kind = "loop"
 ) -> Record:
-    """Impose any motion from rest.
+    """Impose any motion, in even steps of time [s] from rest: displacement [m or rad], (n,).
 
-    Args:
-        model: what is on the rig.
-        direction: direction of the test.
-        motion: displacement in even steps of time [m or rad], (n,).
-        step: of time [s].
-        frequency: of its cycles [Hz], for effects that count them.
-        kind: as of `record`.
+    The frequency of its cycles [Hz] is for effects that count them.
     """
     history = History(motion, step, periodic=False, frequency=frequency)
     force = model.force(direction, history, kind=kind)
@@ -90,16 +76,7 @@ def imposed(
 
 
 def first_harmonic(time: Array, signal: Array, frequency: float) -> complex:
-    """Complex amplitude of a signal at a frequency [Hz], by least squares.
-
-    Args:
-        time: [s], (n,).
-        signal: (n,), of any unit.
-        frequency: [Hz].
-
-    Notes:
-        It is c of signal ~ mean + Re(c exp(i omega t)).
-    """
+    """Complex amplitude c of a signal ~ mean + Re(c exp(i omega t)), (n,), at a frequency [Hz], by least squares."""
     phase = 2.0 * np.pi * frequency * time
     basis = np.stack([np.ones_like(phase), np.cos(phase), -np.sin(phase)], axis=1)
     _, real, imag = np.linalg.lstsq(basis, signal, rcond=None)[0]
@@ -123,13 +100,7 @@ def dynamic_stiffness(
 ) -> Array:
     """Complex dynamic stiffness by stepped sine, one settled cycle per operating point: (n,) [N/m or N m/rad].
 
-    Args:
-        model: what is on the rig.
-        direction: direction of the test.
-        frequency: [Hz], (n,).
-        amplitude: zero-to-peak [m or rad], (n,).
-        run_in: cycles before the one that is evaluated.
-        steps_per_cycle: as of `record`.
+    Frequencies are in Hz, amplitudes zero-to-peak in m or rad, (n,) each.
     """
     points = zip(np.atleast_1d(frequency), np.atleast_1d(amplitude), strict=True)
     return np.array(

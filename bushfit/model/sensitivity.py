@@ -34,13 +34,7 @@ def stiffness_jacobian(
 ) -> Array:
     """Derivatives of the complex dynamic stiffness by parameters: (k, n) [N/m or N m/rad per unit of the parameter].
 
-    Args:
-        model: at whose values they are taken.
-        direction: of the test.
-        frequency: [Hz], (n,).
-        amplitude: zero-to-peak [m or rad], (n,).
-        names: of the k parameters.
-        kind: what records the response.
+    Frequencies are in Hz, amplitudes zero-to-peak in m or rad, (n,) each.
     """
     if not model.only_branches:
         return differences(
@@ -53,20 +47,12 @@ def stiffness_jacobian(
     return model.stiffness_per_modulus(direction) * total
 
 
-def force_jacobian(
-    model: Model, direction: Place, displacement: History, names: Sequence[str], kind: Kind = "loop"
-) -> Array:
-    """Derivatives of the force by parameters along a displacement history: (k, n) [N or N m per unit].
-
-    Args:
-        model: at whose values they are taken.
-        direction: of the test.
-        displacement: [m or rad], (n,).
-        names: of the k parameters.
-        kind: what records the response.
-    """
+def force_jacobian(model: Model, direction: Place, displacement: History, names: Sequence[str]) -> Array:
+    """Derivatives of a loop's force by parameters along a history of displacement: (k, n) [N or N m per unit]."""
     if not model.only_branches:
-        return differences(model, names, lambda values: model.force(direction, displacement, kind=kind, values=values))
+        return differences(
+            model, names, lambda values: model.force(direction, displacement, kind="loop", values=values)
+        )
     per_displacement = model.unit_strain(direction)
     test = (displacement.scaled(per_displacement),)
     total = np.zeros((len(names), displacement.value.shape[-1]))
@@ -99,10 +85,7 @@ def _add(total: Array, model: Model, names: Sequence[str], face: Face, test: tup
 def differences(model: Model, names: Sequence[str], respond: Callable[[Values], Array]) -> Array:
     """Derivatives of any response by parameters, as one-sided differences away from the bounds: (k, n).
 
-    Args:
-        model: at whose values they are taken.
-        names: of the k parameters.
-        respond: gives the response, (..., n), for values with leading axes; it is called once.
+    `respond` gives the response, (..., n), for values with leading axes; it is called once.
     """
     count = len(names)
     stacked: dict[str, Value] = dict(model.values)

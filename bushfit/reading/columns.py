@@ -2,36 +2,96 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import csv
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bushfit.reading.cells import Cells
+from bushfit.errors import MeasurementError
 from bushfit.reading.headers import Column
-from bushfit.reading.layout import fits
+from bushfit.reading.layout import FileFormat, Layout, fits
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, weigh
-from bushfit.reading.source import LARGEST_VALUE
+from bushfit.reading.source import LARGEST_VALUE, RowSource, rows
 
 #: Rows that are taken apart at a time where a library cannot; chosen: their texts fill some MiB.
 _CHUNK_ROWS = 1 << 16
 #: Cells in which the decimal mark has to show for a library to read a file; chosen: those of its first rows.
 _FIRST_CELLS = 1000
 
+#: Characters of what was found that an error quotes; chosen: two lines of a terminal.
+_LONGEST_FOUND = 200
+
 
 @dataclass(frozen=True, eq=False)
-class Columns(Cells):
-    """A table of which the columns are recognised.
+class Columns:
+    """A table as its file has it, a header and rows of cells, and its columns.
 
     Args:
+        file, source: where it lies, and its rows.
+        layout: its header, units row and delimiter.
+        stated: what the user states of the file's format.
         roles: the recognised columns, by what they hold.
     """
 
+    file: Path
+    source: RowSource
+    layout: Layout
+    stated: FileFormat
     roles: Mapping[str, Column]
+
+    @property
+    def headers(self) -> tuple[str, ...]:
+        """The cells of the header."""
+        return self.layout.headers
+
+    def rows(self) -> Iterator[tuple[int, Sequence[str | float]]]:
+        """Line and cells of each row of data.
+
+        Raises:
+            MeasurementError: a line or a quoted cell that is far too long.
+        """
+        try:
+            for line, cells in rows(self.source, self.layout):
+                if any(cell != "" for cell in cells):
+                    yield line, cells
+        except csv.Error as error:
+            raise self.error("the table cannot be read", found=str(error)) from error
+
+    def error(
+        self,
+        problem: str,
+        *,
+        line: int | None = None,
+        column: Column | None = None,
+        found: str | None = None,
+        kind: type[MeasurementError] = MeasurementError,
+        **said: str | None,
+    ) -> MeasurementError:
+        """An error in this table, at a line (from 1) and column where they are known, with what else is `said`."""
+        found = found if found is None or len(found) <= _LONGEST_FOUND else found[:_LONGEST_FOUND] + "..."
+        return kind(problem, file=self.file, place=self.place(line, column), found=found, **said)
+
+    def header_error(self, problem: str, *, found: str | None = None, **said: Any) -> MeasurementError:
+        """An error in the header, of which all cells were found unless `found` says what."""
+        found = ", ".join(self.headers) if found is None else found
+        return self.error(problem, line=self.layout.header_line, found=found, **said)
+
+    def place(self, line: int | None, column: Column | None) -> str | None:
+        """A place in the file in words: its sheet, line and column, as far as there are such."""
+        sheet = self.source.sheet
+        parts = [
+            f'sheet "{sheet}"' if sheet else None,
+            f"{'row' if sheet else 'line'} {line}" if line else None,
+            f'column "{column.header}"' if column else None,
+        ]
+        return ", ".join(part for part in parts if part) or None
 
     @cached_property
     def numerals(self) -> Numerals:
@@ -45,6 +105,7 @@ class Columns(Cells):
         if layout.delimiter == "," and not source.may_have_comma(layout):
             ways = tuple(way for way in ways if "," not in (way.decimal, way.thousands)) or ways
         evidence = weigh(self._texts(), ways)
+        columns = {column.index: column for column in self.roles.values()}
         if evidence.contrary is None and source.may_group(layout, evidence.ways[0].decimal):
             evidence = weigh(self._texts(), ways, all_cells=True)
         if evidence.contrary:
@@ -52,7 +113,7 @@ class Columns(Cells):
             raise self.error(
                 "this number is written in another way than those before it",
                 line=line,
-                column=self._column_at(index),
+                column=columns[index],
                 found=f'"{text}"',
                 expected=f"numbers with a decimal {'comma' if evidence.ways[0].decimal == ',' else 'point'}",
                 hint='write all numbers in one way, or state decimal = "..." and thousands = "..." in the campaign',
@@ -63,7 +124,7 @@ class Columns(Cells):
             raise self.error(
                 "this number can be read in two ways",
                 line=line,
-                column=self._column_at(index),
+                column=columns[index],
                 found=f'"{text}", and no number in the file that settles it',
                 expected=" or ".join(f"{reading:.15g}" for reading in readings),
                 hint='state decimal = "." or decimal = "," in the campaign',
@@ -83,6 +144,17 @@ class Columns(Cells):
             raise self.error("too few rows", found=f"{found}", expected=f"at least {fewest_rows}")
         return values
 
+    def check_positive(self, roles: Sequence[str], wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> None:
+        """Refuse a value that is not positive in one of some columns, as far as there are such among `values`.
+
+        Raises:
+            MeasurementError: there is such a value.
+        """
+        for role in roles:
+            if role in values:
+                problem = f"the {role.replace('_', ' ')} is not positive"
+                self.refuse(values[role] <= 0.0, wanted[role], problem, "a number above zero")
+
     def refuse(
         self, bad: NDArray[np.bool_], column: Column, problem: str, expected: str, hint: str | None = None
     ) -> None:
@@ -100,11 +172,8 @@ class Columns(Cells):
     def _open_ways(self) -> tuple[Numerals, ...]:
         """The ways to write numbers that the user leaves open."""
         decimal, thousands = self.stated.decimal, self.stated.thousands
-        ways = tuple(
-            way
-            for way in ALL_NUMERALS
-            if decimal in (None, way.decimal) and thousands in (None, way.thousands or "none")
-        )
+        fitting = (way for way in ALL_NUMERALS if decimal in (None, way.decimal))
+        ways = tuple(way for way in fitting if thousands in (None, way.thousands or "none"))
         if not ways:
             raise self.error("decimal mark and thousands separator are the same", found=decimal, expected="two signs")
         return ways
@@ -117,9 +186,6 @@ class Columns(Cells):
                 if index < len(cells) and isinstance(cell := cells[index], str):
                     yield (line, index), cell
 
-    def _column_at(self, index: int) -> Column:
-        return next(column for column in self.roles.values() if column.index == index)
-
     def _by_library(self, wanted: Mapping[str, Column]) -> dict[str, Floats] | None:
         """The wanted columns as a library reads them; None where they have to be read row by row.
 
@@ -131,11 +197,9 @@ class Columns(Cells):
         if len(decimals) > 1 or not fits(first, len(self.headers)):
             return None
         numerals = Numerals(decimals.pop())
-        # a library may take a column of TRUE for numbers
-        if not all(
-            isinstance(cell := first[column.index], str) and numerals.allows(cell) for column in wanted.values()
-        ):
-            return None
+        cells = [first[column.index] for column in wanted.values()]
+        if not all(isinstance(cell, str) and numerals.allows(cell) for cell in cells):
+            return None  # a library may take a column of TRUE for numbers
         scales = {column.index: column.scale for column in wanted.values()}
         values = self.source.columns(self.layout, len(first), scales, numerals)
         return None if values is None else {role: values[column.index] for role, column in wanted.items()}

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import codecs
 import re
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -41,12 +42,7 @@ _COMMON_CHINESE = re.compile(rb"(?:[\xa1-\xa3\xb0-\xd7][\xa1-\xfe])+")
 
 
 def to_utf8(data: Bytes, file: Path, stated: str | None = None) -> tuple[Bytes, str]:
-    """A text as UTF-8 without byte order mark, and the encoding it had.
-
-    Args:
-        data: bytes of the file.
-        file: the file, which errors name.
-        stated: the encoding, where the user states it.
+    """A text as UTF-8 without byte order mark, and the encoding it had; errors name `file`.
 
     Raises:
         MeasurementError: no text, or not in the encoding stated.
@@ -95,11 +91,9 @@ def detect(data: bytes) -> str:
     runs = _HIGH_RUN.findall(data)[:_MOST_RUNS]
     chinese = sum(_COMMON_CHINESE.fullmatch(run) is not None for run in runs)
     for encoding in ("gb18030", "cp1252") if 2 * chinese > len(runs) else ("cp1252", "gb18030"):
-        try:
+        with suppress(UnicodeDecodeError):
             data.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-        return encoding
+            return encoding
     return "latin-1"
 
 

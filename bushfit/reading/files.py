@@ -5,10 +5,9 @@ from __future__ import annotations
 import codecs
 import hashlib
 import mmap
-from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from pathlib import Path
-from typing import TypeVar
+from threading import Thread
 
 from bushfit.errors import BushfitError, did_you_mean
 
@@ -24,47 +23,16 @@ _CHUNK_BYTES = 1 << 22
 
 #: The bytes of a file: copied, or where the system keeps those of a large one.
 Bytes = bytes | mmap.mmap
-_AnyBytes = TypeVar("_AnyBytes", bytes, Bytes)
 
 
-def read_bytes(
+def view_bytes(
     file: Path, kind: type[BushfitError], *, largest: int = _LARGEST_BYTES, hint: str = "thin it out"
-) -> bytes:
-    """The bytes of a file, read once.
-
-    Args:
-        file: the file.
-        kind: class of the error to raise.
-        largest: refuse more bytes than this, before reading them.
-        hint: what to do about a file that is too large.
+) -> Bytes:
+    """The bytes of a file; a large one is mapped and not copied.
 
     Raises:
-        kind: the file is missing, no regular file, not readable, empty, or too large.
+        kind: the file is missing, no regular file, not readable, empty, or has more than `largest` bytes (with `hint`).
     """
-    return _checked(file, kind, largest, hint, Path.read_bytes)
-
-
-def view_bytes(file: Path, kind: type[BushfitError]) -> Bytes:
-    """The bytes of a file that may be large, without copying them.
-
-    Raises:
-        kind: the same as of `read_bytes`.
-    """
-    return _checked(file, kind, _LARGEST_BYTES, "thin it out", _view)
-
-
-def _view(file: Path) -> Bytes:
-    """The bytes of a file, mapped where it is large."""
-    with file.open("rb") as stream:
-        if file.stat().st_size < _MAPPED_BYTES:
-            return stream.read()
-        return mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
-
-
-def _checked(
-    file: Path, kind: type[BushfitError], largest: int, hint: str, read: Callable[[Path], _AnyBytes]
-) -> _AnyBytes:
-    """What `read` gives of a file, which has to be there, regular, not too large and not empty."""
     try:
         if not file.exists():
             raise _missing(file, kind)
@@ -74,7 +42,8 @@ def _checked(
         if (size := file.stat().st_size) > largest:
             limit = f"at most {largest} bytes"
             raise kind("the file is too large", file=file, found=f"{size} bytes", expected=limit, hint=hint)
-        data = read(file)
+        with file.open("rb") as stream:
+            data = stream.read() if size < _MAPPED_BYTES else mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
     except OSError as error:
         raise kind("the file cannot be read", file=file, found=error.strerror or str(error)) from error
     if (data[:_HEAD_BYTES].isspace() and data[:].isspace()) or not data:
@@ -87,13 +56,10 @@ def read_utf8(
 ) -> bytes:
     """The bytes of a text file in UTF-8; a byte order mark stays in place.
 
-    Args:
-        file, kind, largest, hint: as of `read_bytes`.
-
     Raises:
-        kind: as `read_bytes`, or the file is not UTF-8 text.
+        kind: as `view_bytes`, or the file is not UTF-8 text.
     """
-    data = read_bytes(file, kind, largest=largest, hint=hint)
+    data = view_bytes(file, kind, largest=largest, hint=hint)[:]
     if (bad := not_utf8(data)) is not None:
         raise kind(
             "the file is not UTF-8 text",
@@ -138,15 +104,13 @@ def line_of(data: bytes, index: int) -> str:
 
 def sha256(data: Bytes) -> Future[str]:
     """SHA-256 of a file's bytes as hexadecimal digits; that of a large file is made meanwhile, in a thread."""
+    future: Future[str] = Future()
+
+    def digest() -> None:
+        future.set_result(hashlib.sha256(data).hexdigest())
+
     if len(data) >= _MAPPED_BYTES:
-        thread = ThreadPoolExecutor(max_workers=1)
-        future = thread.submit(_sha256, data)
-        thread.shutdown(wait=False)
-        return future
-    done: Future[str] = Future()
-    done.set_result(_sha256(data))
-    return done
-
-
-def _sha256(data: Bytes) -> str:
-    return hashlib.sha256(data).hexdigest()
+        Thread(target=digest).start()
+    else:
+        digest()
+    return future

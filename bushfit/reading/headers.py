@@ -72,15 +72,9 @@ _NAME_END = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a file.
+    """A column of a file, by its index from 0: what it holds, its header cell, and its unit as it is stated, if it is.
 
-    Args:
-        role: what it holds, a key of LOOP_COLUMNS or SWEEP_COLUMNS.
-        header: its header cell.
-        index: its place among the columns, from 0.
-        unit: its unit as the file or the user states it; None where neither does.
-        scale: factor from that unit to SI.
-        convention: how it counts amplitudes, where its header or unit says so.
+    `scale` is the factor from that unit to SI, `convention` how it counts amplitudes, where header or unit say so.
     """
 
     role: str

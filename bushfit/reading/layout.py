@@ -56,13 +56,7 @@ class Line(NamedTuple):
 class FileFormat:
     """What a user states of a file's format; None where the file itself settles it.
 
-    Args:
-        encoding: by Python's name, such as "cp1252".
-        delimiter: what parts columns.
-        decimal: decimal mark.
-        thousands: what parts thousands; "none" where nothing does.
-        header_line: line of the header, from 1; in a workbook the row.
-        sheet: sheet of a workbook.
+    The encoding goes by Python's name, such as "cp1252"; `header_line` counts from 1, and in a workbook rows.
     """
 
     encoding: str | None = None
@@ -75,14 +69,12 @@ class FileFormat:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where a table lies in its file.
+    """Where a table lies in its file; lines count from 1.
 
     Args:
         delimiter: what parts the cells; " " for runs of blanks; "" where cells come apart by themselves.
-        headers: header cells in order.
-        header_line: line of the header, from 1.
-        units: cells of the units row, "" where a column has none.
-        units_line: line of the units row; None where there is none.
+        headers, header_line: cells and line of the header.
+        units, units_line: cells of the units row, "" where a column has none, and its line; None where there is none.
     """
 
     delimiter: str
@@ -133,11 +125,7 @@ def find_layout(
     A comment is taken for the header only where no other line names two columns. Where no line at all does, the line
     above the first rows of numbers is taken, or else the first line, so that an error can show it.
 
-    Args:
-        lines: the filled lines at the start of the file.
-        vocabulary: what columns are called.
-        delimiter: what parts the cells, where that is stated; "" for a workbook.
-        header_line: number of the header's line, where that is stated.
+    `delimiter` ("" for a workbook) and the number `header_line` are those that are stated.
     """
     if not lines:
         return Layout(delimiter or ",", (), 1, (), None)
@@ -147,10 +135,8 @@ def find_layout(
     if header_line is not None and not before:
         before = [index for index, line in enumerate(lines) if line.number == header_line]
     for commented in (False, True):
-        found = max(
-            _candidates(lines, before, delimiters, vocabulary, commented), key=lambda entry: entry[0], default=None
-        )
-        if found:
+        candidates = _candidates(lines, before, delimiters, vocabulary, commented)
+        if found := max(candidates, key=lambda entry: entry[0], default=None):
             return _layout(lines, *found[1:])
     return _layout(lines, *_likeliest(lines, before, end, delimiters))
 
@@ -209,10 +195,8 @@ def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> int:
     """Index of the first of three rows of numbers in a row; else the number of lines."""
     inside = [index for index, line in enumerate(lines) if not is_comment(line.content, ";")]
     for start, *others in zip(inside, inside[1:], inside[2:], strict=False):
-        if all(
-            any(_is_row(split(lines[index].content, delimiter)) for delimiter in delimiters)
-            for index in (start, *others)
-        ):
+        three = [lines[index].content for index in (start, *others)]
+        if all(any(_is_row(split(content, delimiter)) for delimiter in delimiters) for content in three):
             return start
     return len(lines)
 
@@ -222,13 +206,13 @@ def _likeliest(
 ) -> tuple[int, str, list[str]]:
     """Index, delimiter and cells of the line that is likeliest meant as the header, where none names the columns.
 
-    That is the last line above the first row of numbers that has as many cells as the row and is no units row; or else
-    the row itself; and where there is no row, the first line.
+    That is the last above the first row of numbers with as many cells, or else that row; without rows, the first line.
     """
     if end == len(lines):
-        content = lines[before[0] if before else 0].content
+        first = next(iter(before), 0)
+        content = lines[first].content
         delimiter = max(delimiters, key=lambda mark: len(split(content, mark)) if mark != " " else 0)
-        return before[0] if before else 0, delimiter, split(content, delimiter)
+        return first, delimiter, split(content, delimiter)
     rows = [(mark, split(lines[end].content, mark)) for mark in delimiters]
     rows = [(mark, cells) for mark, cells in rows if len(cells) > 1 and all(map(is_like_number, cells))] or rows
     for delimiter, row in rows:

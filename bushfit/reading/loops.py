@@ -43,7 +43,7 @@ def read_loop(
 
     Args:
         file: a table with columns time (optional), displacement and force.
-        direction: direction of the test, which settles the units that fit.
+        direction: direction of the test, or its specimen, which settles the headers and units that fit.
         name: of the loop; default the stem of the file.
         listed_as: the file as the campaign names it, for provenance; default its name.
         columns: header of a role (a key of LOOP_COLUMNS), where it is not a usual one.
@@ -54,8 +54,7 @@ def read_loop(
         frequency: cycles per time [Hz], for a file without time; goes with `waveform`.
         waveform: course of the displacement in time.
         noise, weight: of the loop, see `Loop`.
-        temperature: at which it was tested [K], where it is stated.
-        conditions: what else is stated of the test, for provenance.
+        temperature, conditions: at which it was tested [K] and what else is stated of the test, for provenance.
 
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
@@ -66,7 +65,8 @@ def read_loop(
     values = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
     displacement, force, time = values["displacement"], values["force"], values.get("time")
     for role in ("displacement", "force"):
-        _check_changes(table, wanted[role], values[role])
+        if np.ptp(values[role][:_FEWEST_LOOP_ROWS]) == 0.0 == np.ptp(values[role]):
+            raise table.error(f"the {role} never changes", column=wanted[role], expected="a loop")
     _check_sense(table, wanted["force"], displacement, force, force_sign)
     if time is None:
         time = rebuild_time(displacement, rate=rate, frequency=frequency, waveform=waveform)
@@ -82,9 +82,8 @@ def _check_not_swapped(table: Table, direction: Place) -> None:
         "force", direction.motion.displacement_unit
     ):
         displacement, force = (table.roles[role].header for role in ("displacement", "force"))
-        raise table.error(
+        raise table.header_error(
             "displacement and force are swapped",
-            line=table.layout.header_line,
             found=f'"{displacement}" and "{force}"',
             expected="a displacement in units of displacement, and a force in units of force",
             hint="correct the header, or name the columns in the campaign: columns = "
@@ -101,18 +100,9 @@ def _loop_columns(table: Table, direction: Place, force_sign: int, *, has_clock:
     if "time" in table.roles:
         wanted["time"] = table.column("time", "s")
     elif not has_clock:
-        raise table.missing(
-            "time",
-            "s",
-            hint='or state rate = "10 mm/min", or frequency = "0.1 Hz" and waveform = "sine", in the campaign',
-        )
+        hint = 'or state rate = "10 mm/min", or frequency = "0.1 Hz" and waveform = "sine", in the campaign'
+        raise table.missing("time", "s", hint)
     return wanted
-
-
-def _check_changes(table: Table, column: Column, values: Floats) -> None:
-    """Refuse a channel that holds one value throughout."""
-    if np.ptp(values[:_FEWEST_LOOP_ROWS]) == 0.0 == np.ptp(values):
-        raise table.error(f"the {column.role} never changes", column=column, expected="a loop")
 
 
 def _check_sense(table: Table, column: Column, displacement: Floats, force: Floats, force_sign: int) -> None:

@@ -27,13 +27,7 @@ _TURN_PROMINENCE = 0.1
 
 @dataclass(frozen=True)
 class Source:
-    """Where a measurement came from: the provenance of results.
-
-    Args:
-        file: as the campaign names it.
-        sha256: of the file.
-        conditions: what campaign or file state of the test and no fit uses, such as temperature, date and operator.
-    """
+    """The provenance of a measurement: its file as the campaign names it, and conditions of the test no fit uses."""
 
     file: Path
     sha256: str
@@ -54,12 +48,7 @@ def source_of(
 
 @dataclass(frozen=True)
 class Part:
-    """Where a loop stands in a record that holds several, one after the other.
-
-    Args:
-        first_row: row of the record that it begins with, from 0.
-        left_out: a sentence on what of the record around it belongs to no loop; None where all does.
-    """
+    """Where a loop stands in a record of several: its first row, from 0, and a sentence on what of it is left out."""
 
     first_row: int
     left_out: str | None = None
@@ -70,15 +59,13 @@ class Loop:
     """A hysteresis loop, or any other record of time, displacement and force.
 
     Args:
-        name: of the loop.
+        name, source, weight: of the test: its name, the file it came from, and its weight in a fit relative to others.
         direction: of the bushing, or the specimen tested in place of one.
         time: [s], (n,).
         displacement: [m or rad], or strain of a modulus test, (n,).
         force: [N or N m], or stress [Pa], (n,).
         noise: standard deviation of the force relative to its half range, where the campaign states it.
-        source: the file it came from; None where it came from none.
         timed: whether time was recorded; else it was rebuilt from the displacement.
-        weight: of the test in a fit, relative to that of others.
         part: where it stands in a record of several loops; None where the record is one loop.
         softening: by how much its first cycle is stiffer than its last, relative to the last; None where no more than
             noise and the memory of rubber make.
@@ -116,19 +103,16 @@ class Sweep:
     neither is held, as where a mass swings on a mount. What was recorded in one go is a run.
 
     Args:
-        name: of the sweep.
-        direction: of the bushing, or the specimen tested in place of one.
+        name, direction, source, weight: as of `Loop`.
         frequency: [Hz], (n,).
         amplitude: of the level, the same for all its points, zero-to-peak [m or rad, or strain], (n,).
         stiffness: complex [N/m or N m/rad, or Pa], (n,).
         repeat: number of the repeat, (n,); all 1 unless given.
         noise: standard deviation of the real and of the imaginary part relative to |K|, where the campaign states it.
-        source: the file it came from; None where it came from none.
         reached: amplitude that each point really reached [m or rad], (n,); None where it is not known.
         stepped: what changes from point to point of a run; the other is held. None where neither is.
         relative_error: standard deviation of the real and of the imaginary part of each point relative to |K|, (n,),
             where the file states it.
-        weight: of the test in a fit, relative to that of others.
 
     Raises:
         MeasurementError: arrays of different length.
@@ -183,8 +167,7 @@ def rebuild_time(
 
     Args:
         displacement: [m or rad], (n,), any number of strokes, with a range above zero.
-        rate: speed of the displacement [m/s or rad/s]; or else
-        frequency: cycles per time [Hz], with
+        rate, frequency: speed [m/s or rad/s], or else cycles per time [Hz].
         waveform: the course of the displacement in time.
 
     Returns:
@@ -222,10 +205,8 @@ def _stroke_edges(displacement: Floats) -> NDArray[np.intp]:
 
     prominence = _TURN_PROMINENCE * np.ptp(displacement)
     peaks, troughs = (find_peaks(sign * displacement, prominence=prominence)[0] for sign in (1.0, -1.0))
-    turns = np.concatenate([peaks, troughs])
-    is_peak = np.arange(turns.size) < peaks.size
-    order = np.argsort(turns)
-    turns, is_peak = turns[order], is_peak[order]
+    turns = np.sort(np.concatenate([peaks, troughs]))
+    is_peak = np.isin(turns, peaks)
     turns = turns[np.append(is_peak[1:] != is_peak[:-1], True)[: turns.size]]  # equal peaks in a row are one turn
     if turns.size and displacement[turns[0]] == displacement[0]:
         turns = turns[1:]

@@ -7,12 +7,12 @@ import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from functools import reduce
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from bushfit import units
 from bushfit.errors import UnitError
 from bushfit.geometry import Direction
-from bushfit.reading.directions import named_direction
 from bushfit.reading.headers import AmplitudeConvention, Vocabulary, plain, split_convention
 from bushfit.reading.layout import Line
 from bushfit.reading.words import SWEEP_COLUMNS
@@ -69,26 +69,9 @@ _KEYS = {
     "date": ("date", "test date", "Datum", "Prüfdatum", "fecha"),
     "operator": ("operator", "tested by", "Prüfer", "Bediener", "Bearbeiter", "opérateur", "operador"),
     "specimen_number": (
-        *(
-            "specimen number",
-            "specimen no",
-            "specimen",
-            "sample",
-            "sample no",
-            "sample id",
-            "serial number",
-            "serial no",
-        ),
-        *(
-            "Probe",
-            "Probennummer",
-            "Proben-Nr",
-            "Probe Nr",
-            "Prüfling",
-            "Prüflingsnummer",
-            "Seriennummer",
-            "éprouvette",
-        ),
+        *("specimen number", "specimen no", "specimen", "sample", "sample no", "sample id", "serial number"),
+        *("serial no", "Probe", "Probennummer", "Proben-Nr", "Probe Nr", "Prüfling", "Prüflingsnummer"),
+        *("Seriennummer", "éprouvette"),
     ),
 }
 _KEY_OF = {plain(name): key for key, names in _KEYS.items() for name in names}
@@ -101,16 +84,21 @@ _COMMA = re.compile(r"^([+-]?\d+),(?=\d+(?!\d|[.,]\d))")
 #: Characters of the longest value above a table that is taken; chosen: a longer one is a text.
 _LONGEST_VALUE = 60
 
+#: For the starts of words in English, German, French and Spanish, without accents, the direction they name.
+_WORD_STARTS = {
+    **dict.fromkeys(("axial", "axiaux"), Direction.AXIAL),
+    **dict.fromkeys(("radial", "radiaux"), Direction.RADIAL),
+    **dict.fromkeys(("torsi", "tordu", "verdreh", "drehwinkel", "drehmoment"), Direction.TORSION),
+    **dict.fromkeys(("rotation", "rotacion"), Direction.TORSION),
+}
+#: Short for a direction in names; in headers rad is a unit.
+_SHORT = {"ax": Direction.AXIAL, "rad": Direction.RADIAL, "tors": Direction.TORSION, "tor": Direction.TORSION}
+#: A word, without the letters of a unit behind a number.
+_WORD = re.compile(r"(?<![a-z\d.,])(?:[a-z]+)")
+
 
 class Named(NamedTuple):
-    """A quantity as a name has it.
-
-    Args:
-        text: number and unit, such as "0.05 mm".
-        unit: its unit.
-        is_marked: whether a word or sign beside it says that it is the amplitude.
-        convention: how it counts an amplitude, where that is said.
-    """
+    """A quantity such as "0.05 mm" as a name has it; `is_marked` where a word or sign says that it is the amplitude."""
 
     text: str
     unit: str
@@ -120,13 +108,7 @@ class Named(NamedTuple):
 
 @dataclass(frozen=True)
 class Said:
-    """What is said of a test outside its table; empty or None where nothing is.
-
-    Args:
-        quantities: what may be its amplitude or frequency.
-        direction: of the test.
-        temperature, preload, date, operator, specimen_number: as a campaign has them.
-    """
+    """What is said of a test outside its table: `quantities` that may be its amplitude or frequency, and keys."""
 
     quantities: tuple[Named, ...] = ()
     direction: Direction | None = None
@@ -158,11 +140,10 @@ def named(*names: str) -> Said:
 
 
 def _named(name: str) -> Said:
-    date = _DATE.search(name)
-    rest = _DATE.sub(" ", name)
+    date, rest = _DATE.search(name), _DATE.sub(" ", name)
     number = _SPECIMEN_NUMBER.search(rest)
     quantities: list[Named] = []
-    stated: dict[str, str] = {}
+    stated: dict[str, Any] = {"date": date and date[0], "specimen_number": number and number[1]}
     for match in _QUANTITY.finditer(rest):
         word, is_glued = plain(match["word"] or ""), bool(match["word"]) and not match["gap"] and not match["sign"]
         unit, digits = _UNITS[match["unit"].lower()], re.sub("[,p]", ".", match["number"].lower())
@@ -179,15 +160,7 @@ def _named(name: str) -> Said:
                 stated.setdefault("temperature", text)
         elif unit not in ("N", "kN") and float(text.split()[0]) > 0.0:
             quantities += _amplitude_or_frequency(word, match, rest, text, unit, is_glued=is_glued)
-    return Said(
-        tuple(quantities),
-        named_direction([name], short=True),
-        stated.get("temperature"),
-        stated.get("preload"),
-        date[0] if date else None,
-        None,
-        number[1] if number else None,
-    )
+    return Said(tuple(quantities), named_direction([name], short=True), **stated)
 
 
 def _amplitude_or_frequency(
@@ -223,13 +196,13 @@ def _stated(line: Line) -> Said:
         stated: dict[str, Any] = {key: cells[1]} if len(cells[1]) <= _LONGEST_VALUE else {}
         return Said(**stated)
     for value in values:
-        if key == "temperature" and _is_temperature(value):
+        if key == "temperature" and _is(value, "K"):
             return Said(temperature=value)
-        if key == "preload" and (_is_quantity(value, "m") or _is_quantity(value, "N")):
+        if key == "preload" and (_is(value, "m") or _is(value, "N")):
             return Said(preload=value)
         heading = _VOCABULARY.heading(cells[0])
         if heading and heading.role in ("frequency", "amplitude") and not key:
-            found = [unit for unit in ("Hz", "m", "rad", "1") if _is_quantity(value, unit) and value[0].isdigit()]
+            found = [unit for unit in ("Hz", "m", "rad", "1") if _is(value, unit) and value[0].isdigit()]
             if found and (found[0] == "Hz") == (heading.role == "frequency"):
                 return Said((Named(value, value.split()[-1], True, heading.convention),))
     return Said()
@@ -245,17 +218,33 @@ def _cells(line: Line) -> Sequence[str]:
     return [cell.strip(' "') for cell in cells if cell.strip(' "')]
 
 
-def _is_quantity(text: str, expected: str) -> bool:
+def _is(text: str, expected: str) -> bool:
+    """Whether a text is a quantity of the dimension of an SI unit."""
     try:
-        units.quantity(text, expected)
+        units.temperature(text) if expected == "K" else units.quantity(text, expected)
     except UnitError:
         return False
     return True
 
 
-def _is_temperature(text: str) -> bool:
-    try:
-        units.temperature(text)
-    except UnitError:
-        return False
-    return True
+def named_direction(texts: Iterable[str], *, short: bool = False) -> Direction | None:
+    """The one direction that texts, such as headers, name; None where they name none or several.
+
+    With `short`, "ax", "rad" and "tors" count as well, as in names of files.
+    """
+    plain = unicodedata.normalize("NFKD", " ".join(texts)).encode("ascii", "ignore").decode().casefold()
+    found = {named for start, named in _WORD_STARTS.items() if re.search(rf"(?<![a-z]){start}", plain)}
+    if short and not found:
+        found = {_SHORT[word] for word in _WORD.findall(plain) if word in _SHORT}
+    return found.pop() if len(found) == 1 else None
+
+
+def direction_of_file(file: Path, headers: Iterable[str], *, turns: bool, sheet: str | None = None) -> Direction | None:
+    """The direction that the file of a test names; None where it does not say.
+
+    The name of its sheet goes before the file's, and that before the headers. Where the displacement `turns`, in units
+    of angle, it is torsion unless another rotation is named.
+    """
+    named = named_direction([sheet or ""], short=True) or named_direction([file.stem], short=True)
+    named = named or named_direction(headers)
+    return Direction.TORSION if turns and not (named and named.is_rotation) else named

@@ -32,12 +32,7 @@ _UNGROUPED = re.compile(rf"{_SIGN}?\d{{4,}}(?:[.,]\d*)?", re.ASCII)
 
 @dataclass(frozen=True)
 class Numerals:
-    """A way to write numbers.
-
-    Args:
-        decimal: "." or ",".
-        thousands: ",", ".", " " (any blank), "'" or None.
-    """
+    """A way to write numbers: decimal mark, and what parts thousands: ",", ".", " " (any blank), "'" or None."""
 
     decimal: str = "."
     thousands: str | None = None
@@ -76,13 +71,9 @@ Place = tuple[int, int]
 
 @dataclass(frozen=True)
 class Evidence:
-    """What cells tell of the way their numbers are written.
+    """What cells tell of the ways in which all their numbers may be written, the plainest first.
 
-    Args:
-        ways: in which all numbers so far may be written, the plainest first.
-        unclear: place and text of the first cell that has another value in another of these ways; None where the ways
-            agree.
-        contrary: place and text of the first number that is written in none of these ways; None where there is none.
+    `unclear` is place and text of the first that has several values in them, `contrary` of the first written in none.
     """
 
     ways: tuple[Numerals, ...]
@@ -92,11 +83,7 @@ class Evidence:
 
 def is_like_number(text: str) -> bool:
     """Whether a cell is a number in any way to write them."""
-    return (
-        len(text) <= _LONGEST_NUMBER
-        and _LIKE_NUMBER.fullmatch(text) is not None
-        and any(way.allows(text) for way in ALL_NUMERALS)
-    )
+    return _LIKE_NUMBER.fullmatch(text) is not None and any(way.allows(text) for way in ALL_NUMERALS)
 
 
 def weigh(
@@ -109,7 +96,7 @@ def weigh(
     Args:
         cells: place and text of each; texts that are no numbers in any way do not count.
         ways: in which the numbers may be written.
-        all_cells: whether to go on when the decimal mark is settled, to thousands separators and contradictions.
+        all_cells: whether to go on when the decimal mark is settled.
     """
     open_thousands = len({way.thousands for way in ways}) > 1
     unclear, ungrouped = None, False

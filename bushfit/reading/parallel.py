@@ -15,13 +15,8 @@ CHUNK = 1 << 18
 def by_chunks(work: Callable[[slice], _Answer], size: int, chunk: int = CHUNK) -> list[_Answer]:
     """What `work` makes of each chunk of a long array, in order.
 
-    NumPy lets other threads run while it works on a chunk. The chunks, and so the numbers, are the same on any number
-    of cores.
-
-    Args:
-        work: called with the entries of a chunk, in any thread.
-        size: entries of the array.
-        chunk: entries of a chunk.
+    NumPy lets other threads run while it works on a chunk. The chunks of an array of `size` entries, and so the
+    numbers, are the same on any number of cores.
     """
     chunks = [slice(start, min(start + chunk, size)) for start in range(0, size, chunk)]
     if len(chunks) < 2:

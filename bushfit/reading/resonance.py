@@ -16,7 +16,7 @@ from bushfit.reading.table import Table
 from bushfit.reading.words import RESONANCE_COLUMNS
 
 #: The columns that each make a transmissibility, in order of preference; a base acceleration may stand beside them.
-TRANSMISSIBILITY_WAYS = (
+_WAYS = (
     ("transmissibility", "phase"),
     ("transmissibility_real", "transmissibility_imaginary"),
     ("base_acceleration", "mass_acceleration", "base_phase", "mass_phase"),
@@ -27,6 +27,10 @@ TRANSMISSIBILITY_WAYS = (
 _TELLING = {role for role in RESONANCE_COLUMNS if role not in ("frequency", "phase")}
 #: Columns of which every value is above zero.
 _POSITIVE = ("frequency", "base_acceleration", "mass_acceleration", "transmissibility")
+#: SI units by the end of a role; else a role is a ratio.
+_UNITS = {"phase": "rad", "frequency": "Hz"} | dict.fromkeys(
+    ("acceleration", "base_real", "base_imaginary", "mass_real", "mass_imaginary"), "m/s^2"
+)
 #: Rows of the shortest test; chosen: a curve of five values over the frequency, and some scatter about it.
 FEWEST_ROWS = 12
 
@@ -36,12 +40,10 @@ class ResonanceTest:
     """A mass on a mount whose base is shaken with a sine, by frequency.
 
     Args:
-        name: of the test.
-        direction: of the motion, or the specimen in place of a bushing.
+        name, direction, source: as of a `Loop`.
         frequency: [Hz], (n,), rising.
         transmissibility: acceleration of the mass over that of the base, complex [-], (n,).
         base_acceleration: amplitude, zero-to-peak [m/s^2], (n,).
-        source: the file it came from.
     """
 
     name: str
@@ -60,20 +62,14 @@ def is_resonance(table: Table) -> bool:
 def read_resonance(table: Table, direction: Place, base_acceleration: float | None = None) -> ResonanceTest:
     """The resonance test in a table that was opened with RESONANCE_COLUMNS.
 
-    Args:
-        table: with a frequency and the columns of one of TRANSMISSIBILITY_WAYS.
-        direction: of the motion.
-        base_acceleration: amplitude of the base [m/s^2], for a table without one.
+    For a table without the amplitude of the base's acceleration, it is stated [m/s^2].
 
     Raises:
         MeasurementError, UnitError: a column, unit or value that cannot be used.
     """
     wanted = _wanted(table, stated=base_acceleration is not None)
     values = table.read(wanted, fewest_rows=FEWEST_ROWS)
-    for role in _POSITIVE:
-        if role in values:
-            problem = f"the {role.replace('_', ' ')} is not positive"
-            table.refuse(values[role] <= 0.0, wanted[role], problem, "a number above zero")
+    table.check_positive(_POSITIVE, wanted, values)
     ratio, base = _ratio(values, base_acceleration)
     bad = ~(np.isfinite(ratio) & (base > 0.0) & (ratio != 0.0))
     table.refuse(bad, wanted["frequency"], "base or mass stands still here", "two accelerations that are not zero")
@@ -83,19 +79,12 @@ def read_resonance(table: Table, direction: Place, base_acceleration: float | No
 
 
 def _wanted(table: Table, *, stated: bool) -> dict[str, Column]:
-    """The frequency, and the columns of the first of TRANSMISSIBILITY_WAYS that a table has, each with its unit.
-
-    Args:
-        table: the table.
-        stated: whether the user states the acceleration of the base.
-    """
-    way = next((way for way in TRANSMISSIBILITY_WAYS if set(way) <= set(table.roles)), None)
+    """The frequency, and the columns of the first of _WAYS that a table has; the base's acceleration may be stated."""
+    way = next((way for way in _WAYS if set(way) <= set(table.roles)), None)
     if way is None:
-        ways = ", or ".join(" and ".join(way) for way in TRANSMISSIBILITY_WAYS).replace("_", " ")
-        raise table.error(
+        ways = ", or ".join(" and ".join(way) for way in _WAYS).replace("_", " ")
+        raise table.header_error(
             "the columns give no complex transmissibility",
-            line=table.layout.header_line,
-            found=", ".join(table.headers),
             expected=f"frequency, and {ways}",
             hint='correct the header, or name the column: --column "mass_acceleration=..."',
         )
@@ -109,28 +98,19 @@ def _wanted(table: Table, *, stated: bool) -> dict[str, Column]:
             hint="leave --base-acceleration out",
         )
     if not (has_base or stated):
-        raise table.error(
+        raise table.header_error(
             "nothing says how strongly the base was shaken",
-            line=table.layout.header_line,
-            found=", ".join(table.headers),
             expected="a column such as base acceleration [g]",
             hint='state it: --base-acceleration "0.1 g"',
         )
-    beside = ["base_acceleration"] if "base_acceleration" in table.roles else []
-    columns = {role: table.column(role, _unit(role)) for role in dict.fromkeys(("frequency", *way, *beside))}
-    return {role: _zero_to_peak(column) for role, column in columns.items()}
-
-
-def _unit(role: str) -> str:
-    """The SI unit of a role."""
-    if role.endswith("phase"):
-        return "rad"
-    return "Hz" if role == "frequency" else "1" if role.startswith("transmissibility") else "m/s^2"
-
-
-def _zero_to_peak(column: Column) -> Column:
-    """A column that counts peak-to-peak, halved."""
-    return replace(column, scale=0.5 * column.scale) if column.convention == "peak-to-peak" else column
+    roles = dict.fromkeys(("frequency", *way, "base_acceleration"))
+    wanted = {}
+    for role in (role for role in roles if role != "base_acceleration" or role in table.roles):
+        unit = next((unit for end, unit in _UNITS.items() if role.endswith(end)), "1")
+        column = table.column(role, unit)
+        to_peak = 0.5 if column.convention == "peak-to-peak" else 1.0
+        wanted[role] = replace(column, scale=to_peak * column.scale)
+    return wanted
 
 
 def _ratio(values: Mapping[str, Floats], stated: float | None) -> tuple[Complex, Floats]:

@@ -27,13 +27,7 @@ _FEWEST_POINTS = 3
 
 
 class Runs(NamedTuple):
-    """What is stepped in a sweep, and its points as they were meant.
-
-    Args:
-        stepped: what changes within a run; None where neither is held.
-        amplitude: of the level of each point, (n,).
-        repeat: number of the repeat of each point, (n,); of the run where neither is held.
-    """
+    """What is stepped in a sweep, None where neither is held, and level and number of repeat (or run) of its points."""
 
     stepped: Stepped | None
     amplitude: Floats

@@ -13,9 +13,6 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from bushfit.reading.encoding import to_utf8
 from bushfit.reading.files import Bytes
 from bushfit.reading.layout import HEAD_BYTES, MOST_HEAD_LINES, Layout, Line, is_comment, split
 from bushfit.reading.measurement import Floats
@@ -39,28 +36,12 @@ _GROUP_BY_BLANK = re.compile(rb"\d \d{3}(?!\d)")
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """A text as rows of cells, with the line, from 1, that each stands on.
-
-    Args:
-        file: where it lies.
-        data: its bytes in UTF-8.
-        encoding: which they had.
-        sheet: none, unlike a `Sheet`.
-    """
+    """A text as rows of cells, with the line, from 1, that each stands on; `data` is in UTF-8."""
 
     file: Path
     data: Bytes
     encoding: str | None
-    sheet: str | None = None
-
-    @classmethod
-    def open(cls, data: Bytes, file: Path, encoding: str | None) -> Text:
-        """A file's bytes as a text.
-
-        Raises:
-            MeasurementError: no text, or not in the encoding stated.
-        """
-        return cls(file, *to_utf8(data, file, encoding))
+    sheet: None = None
 
     def head(self) -> list[Line]:
         """The filled lines at its start."""
@@ -86,17 +67,10 @@ class Text:
     def columns(
         self, layout: Layout, width: int, scales: Mapping[int, float], numerals: Numerals
     ) -> dict[int, Floats] | None:
-        """The values of columns, times their scale, if the rows are so tidy that pandas reads them.
+        """The values of columns in SI by their index, (n,) each, if the rows are so tidy that pandas reads them.
 
-        Args:
-            layout: where the table lies.
-            width: cells of a row.
-            scales: factors to SI, by the index of the column.
-            numerals: how the numbers are written.
-
-        Returns:
-            Values by the index of the column, each (n,); None where the rows are not tidy, or where a cell holds no
-            number, or one beyond LARGEST_VALUE.
+        `scales` has factors to SI by index, `width` is the cells of a row. None where the rows are not tidy, or where a
+        cell holds no number, or one beyond LARGEST_VALUE.
         """
         frame = self._frame(layout, width, set(scales), numerals)
         if frame is None:
@@ -140,9 +114,7 @@ class Text:
                     index_col=False,
                     decimal=numerals.decimal,
                     # one type for all columns spares pandas a copy
-                    dtype=np.float64
-                    if len(numbers) == width
-                    else {index: np.float64 if index in numbers else str for index in range(width)},
+                    dtype=float if len(numbers) == width else {i: float if i in numbers else str for i in range(width)},
                     na_filter=False,
                     compression=None,
                 )
@@ -187,13 +159,7 @@ def _lines(data: io.BytesIO | io.BufferedReader, after: int) -> Iterator[Line]:
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """A sheet of a workbook as rows of cells; it answers what a `Text` does.
-
-    Args:
-        sheet: its name.
-        content: its rows of texts and numbers, "" where a cell is empty.
-        encoding: none, unlike a `Text`.
-    """
+    """A sheet of a workbook as rows of texts and numbers, "" where a cell is empty; it answers what a `Text` does."""
 
     sheet: str
     content: Sequence[Sequence[str | float]]

@@ -19,7 +19,10 @@ from bushfit.reading.table import Table
 from bushfit.reading.words import OF_MOTION, SWEEP_COLUMNS
 
 #: The pairs of columns that each make a complex stiffness, in order of preference.
-STIFFNESS_PAIRS = (("stiffness", "loss_factor"), ("stiffness", "phase"), ("storage_stiffness", "loss_stiffness"))
+STIFFNESS_PAIRS = (
+    *(("stiffness", "loss_factor"), ("stiffness", "phase"), ("storage_stiffness", "loss_stiffness")),
+    *(("storage_stiffness", "loss_factor"), ("storage_stiffness", "phase")),
+)
 #: Columns of which every value is above zero.
 _POSITIVE = ("frequency", "amplitude", "amplitude_reached", "stiffness", "storage_stiffness", "relative_error")
 #: Rows of the shortest sweep; chosen: fewer show no dependence on frequency or amplitude.
@@ -75,19 +78,13 @@ def read_sweep(
         file: a table with columns frequency, amplitude and one of STIFFNESS_PAIRS, long or wide (see `wide`). More are
             optional: repeat (without it, an operating point that occurs again is a repeat), amplitude reached (where
             the rig missed the amplitude of the level), temperature, and relative error.
-        direction: direction of the test, or its specimen, which settles the headers and units that fit.
-        name: of the sweep; default the stem of the file.
-        listed_as: the file as the campaign names it, for provenance; default its name.
-        columns: header of a role (a key of SWEEP_COLUMNS), where it is not a usual one.
-        units: unit of a role, where the file does not tell it.
-        written: how the file is written, where it does not tell.
+        direction, name, listed_as, columns, units, written: as of `read_loop`, with the roles of SWEEP_COLUMNS.
         amplitude: how file and campaign count amplitudes, where its header does not say so: zero-to-peak unless stated.
             The sweep has them zero-to-peak.
         at_amplitude: of a file without a column for it [m or rad, or strain], counted as `amplitude` has it.
         at_frequency: of a file without a column for it [Hz].
-        noise, weight: of the sweep, see `Sweep`.
+        noise, weight, conditions: as of `read_loop`.
         temperature: at which it was tested [K], where it is stated; of a file with a column for it, the rows near it.
-        conditions: what else is stated of the test, for provenance.
 
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
@@ -101,7 +98,7 @@ def read_sweep(
     if at_amplitude is not None:  # as the file counts
         at["amplitude"] = at_amplitude * stated_strain(direction) * _ZERO_TO_PEAK[amplitude or "zero-to-peak"] / to_peak
     values = table.read(wanted, fewest_rows=_FEWEST_SWEEP_ROWS)
-    _check_positive(table, wanted, values)
+    table.check_positive(_POSITIVE, wanted, values)
     for role, value in at.items():
         values[role] = _stated(table, wanted.get(role), values, value)
     with np.errstate(over="ignore"):
@@ -139,10 +136,8 @@ def _stiffness_pair(table: Table) -> tuple[str, str]:
             return pair
     for role in {role: None for pair in STIFFNESS_PAIRS for role in pair if role in OF_MOTION}:
         table.refuse_other_motion(role)
-    raise table.error(
+    raise table.header_error(
         "no pair of columns gives a complex stiffness",
-        line=table.layout.header_line,
-        found=", ".join(table.headers),
         expected=", or ".join(" and ".join(pair) for pair in STIFFNESS_PAIRS).replace("_", " "),
         hint='correct the header, or name the columns in the campaign: columns = { stiffness = "..." }',
     )
@@ -151,24 +146,17 @@ def _stiffness_pair(table: Table) -> tuple[str, str]:
 def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str], at: Mapping[str, float]) -> dict[str, Column]:
     """The columns of a sweep with their units, in the order in which they are checked.
 
-    Beside those that are needed, which a role that is stated (`at`) is not, the pairs that say the same are read, if
-    their units fit. Of a temperature, the zero is still that of its unit.
+    Roles that are stated (`at`) are not needed; other pairs are read, too, if their units fit. A temperature still
+    counts from the zero of its unit.
     """
     length, stiffness = direction.motion.displacement_unit, direction.motion.stiffness_unit
-    units = dict.fromkeys(SWEEP_COLUMNS, stiffness) | {
-        "frequency": "Hz",
-        "amplitude": length,
-        "amplitude_reached": length,
-        "phase": "rad",
-        "loss_factor": "1",
-        "repeat": "1",
-        "relative_error": "1",
-        "temperature": "K",
-    }
+    units = dict.fromkeys(SWEEP_COLUMNS, "1") | {"frequency": "Hz", "phase": "rad", "temperature": "K"}
+    units |= dict.fromkeys(("amplitude", "amplitude_reached"), length)
+    units |= dict.fromkeys(("stiffness", "storage_stiffness", "loss_stiffness"), stiffness)
     needed = [role for role in ("frequency", "amplitude") if role in table.roles or role not in at]
-    optional = [role for role in ("amplitude_reached", "repeat", "relative_error") if role in table.roles]
     degrees = table.roles.get("temperature")
-    optional += ["temperature"] * (degrees is not None and degrees.unit is not None)
+    optional = [role for role in ("amplitude_reached", "repeat", "relative_error") if role in table.roles]
+    optional += ["temperature"] if degrees and degrees.unit else []
     again = [role for other in STIFFNESS_PAIRS if set(other) <= set(table.roles) for role in other]
     again = [role for role in again if units[role] == "1" or table.agrees(role, units[role])]
     found = {role: table.column(role, units[role], _HINTS.get(role)) for role in (*needed, *pair, *optional, *again)}
@@ -178,25 +166,13 @@ def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str], at: Ma
     return found if degrees is None else {"temperature": degrees, **found}
 
 
-def _check_positive(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> None:
-    """Refuse a column of _POSITIVE with a value that is not."""
-    for role in _POSITIVE:
-        if role in values:
-            table.refuse(
-                values[role] <= 0.0,
-                wanted[role],
-                f"the {role.replace('_', ' ')} is not positive",
-                "a number above zero",
-            )
-
-
 def _check_loss(table: Table, column: Column, loss_factor: Floats) -> None:
     """Refuse a loss that counts the other way throughout, ratios stated in %, and a loss that no bushing has."""
     if np.mean(loss_factor < -_LEAST_LOSS_FACTOR) > _THROUGHOUT:
         raise table.error(
             "the loss counts the other way",
             column=column,
-            found=f"{int(np.count_nonzero(loss_factor < 0.0))} of {loss_factor.size} rows below zero",
+            found=f"{np.count_nonzero(loss_factor < 0.0)} of {loss_factor.size} rows below zero",
             expected="a force that leads the displacement: phase, loss factor and loss stiffness above zero",
             hint="turn the sign of this column in the file",
         )
@@ -253,12 +229,7 @@ def _stated(table: Table, column: Column | None, values: Mapping[str, Floats], s
 def _of_temperature(
     table: Table, values: Mapping[str, Floats], stated: float | None
 ) -> tuple[NDArray[np.intp], float | None]:
-    """The rows of a test, by index, and its temperature [K]: as stated, or else the mean of its column if it has one.
-
-    Raises:
-        MeasurementError: several temperatures of which none is stated, or too few rows near the one that is.
-        UnitError: a column without its unit where it matters.
-    """
+    """The rows of a test, by index, and its temperature [K]: as stated, or else the mean of its column."""
     rows = np.arange(values["frequency"].size)
     if "temperature" not in values:
         return rows, stated
@@ -294,9 +265,8 @@ def _convention(table: Table, column: Column | None, stated: AmplitudeConvention
     if column is None:
         return stated or "zero-to-peak"
     if column.convention and stated and column.convention != stated:
-        raise table.error(
+        raise table.header_error(
             "header and campaign count amplitudes differently",
-            line=table.layout.header_line,
             column=column,
             found=f'{column.convention} in the header, amplitude = "{stated}" in the campaign',
             expected="one convention",
@@ -306,22 +276,27 @@ def _convention(table: Table, column: Column | None, stated: AmplitudeConvention
 
 
 def _complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> tuple[Complex, Floats]:
-    """Complex stiffness and loss factor by one of STIFFNESS_PAIRS, (n,) each; from 90 deg on the latter is nan."""
-    first, second = (values[role] for role in pair)
+    """Complex stiffness and loss factor by one of STIFFNESS_PAIRS, (n,) each."""
+    size, loss = (values[role] for role in pair)
     match pair:
-        case ("stiffness", "loss_factor"):
-            return (first / np.hypot(1.0, second)) * (1.0 + 1j * second), second
+        case (_, "loss_stiffness"):
+            return size + 1j * loss, loss / size
         case ("stiffness", "phase"):
-            return first * np.exp(1j * second), np.where(np.abs(second) < np.pi / 2, np.tan(second), np.nan)
-        case _:
-            return first + 1j * second, second / first
+            return size * np.exp(1j * loss), _tangent(loss)
+    factor = _tangent(loss) if pair[1] == "phase" else loss
+    storage = size / np.hypot(1.0, factor) if pair[0] == "stiffness" else size
+    return storage * (1.0 + 1j * factor), factor
+
+
+def _tangent(phase: Floats) -> Floats:
+    """The loss factor of a phase [rad], (n,); nan from 90 deg on."""
+    return np.where(np.abs(phase) < np.pi / 2, np.tan(phase), np.nan)
 
 
 def _repeats(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> NDArray[np.int64] | None:
     """Number of each row's repeat as its column has it, (n,); None where there is none."""
-    if "repeat" not in values:
+    if (repeat := values.get("repeat")) is None:
         return None
-    repeat = values["repeat"]
     is_count = (repeat == np.round(repeat)) & (repeat >= 0) & (repeat < _MOST_REPEATS)
     table.refuse(~is_count, wanted["repeat"], "this is no repeat number", "a whole number")
     return repeat.astype(np.int64)

@@ -14,6 +14,7 @@ from bushfit import units
 from bushfit.errors import MeasurementError, NoColumnError, UnitError, naming
 from bushfit.geometry import STRAINING, TRANSLATION, Motion
 from bushfit.reading.columns import Columns
+from bushfit.reading.encoding import to_utf8
 from bushfit.reading.files import Bytes, sha256, view_bytes
 from bushfit.reading.headers import Column, Heading, Vocabulary, is_angular, plain, split_convention
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
@@ -34,8 +35,7 @@ class Table(Columns):
 
     Args:
         checksum: SHA-256 of the file, perhaps still under way.
-        names: for each role the headers it usually goes by, whatever the motion.
-        motion: of what was tested.
+        names, motion: for each role the headers it usually goes by, whatever the motion, and that of what was tested.
     """
 
     checksum: Future[str]
@@ -58,8 +58,7 @@ class Table(Columns):
             file: a text in any dialect, or a workbook. Lines of other content may stand above the header, and a row of
                 units below it. A sweep's may be a wide table.
             names: for each role the headers it usually goes by, LOOP_COLUMNS or SWEEP_COLUMNS.
-            columns: for each role that goes by another header, this header.
-            stated_units: for each role of which the file does not tell the unit, this unit.
+            columns, stated_units: header and unit of roles, where it is no usual one, or the file does not tell it.
             stated: what the file does not tell of its format.
             motion: of what was tested, by which a test of strain and modulus goes by other headers.
 
@@ -104,8 +103,6 @@ class Table(Columns):
     def column(self, role: str, expected: str, hint: str | None = None) -> Column:
         """The column of a role, with the factor from its unit to the SI unit `expected`; a ratio needs no unit.
 
-        `hint` is what else may be done where there is no such column.
-
         Raises:
             MeasurementError: no such column.
             UnitError: no unit, an unknown one, or one of another dimension.
@@ -142,10 +139,8 @@ class Table(Columns):
     def missing(self, role: str, expected: str, hint: str | None = None) -> MeasurementError:
         """The error for a role that has no column; `expected` is its SI unit."""
         self.refuse_other_motion(role)
-        return self.error(
+        return self.header_error(
             f"there is no column for the {_label(role)}",
-            line=self.layout.header_line,
-            found=", ".join(self.headers),
             expected=f'a header such as "{_label(role)} [{units.example(expected)}]"',
             hint=f'name the column in the campaign: columns = {{ {role} = "..." }}' + (f", {hint}" if hint else ""),
         )
@@ -153,27 +148,19 @@ class Table(Columns):
     def refuse_other_motion(self, role: str, headers: Sequence[str] | None = None) -> None:
         """Refuse headers that would name a role in a test of the other kind of motion: strain, or displacement.
 
-        Args:
-            role: for which there is no column.
-            headers: that are known to do so; else those of the table that do.
-
         Raises:
-            MeasurementError: there is such a header.
+            MeasurementError: there is such a header in the table, or one of those that are known to be (`headers`).
         """
         kinds = ("displacement and force or stiffness", "strain and modulus")
+        other, (expected, found) = STRAINING, kinds
+        hint = 'write [[specimens]] with a name and kind = "modulus" in the campaign, and specimen = "its name" here'
         if self.motion is STRAINING:
             other, (found, expected) = TRANSLATION, kinds
             hint = 'take specimen out of the campaign, or give it kind = "shear" with its area and thickness'
-        else:
-            other, (expected, found) = STRAINING, kinds
-            hint = (
-                'write [[specimens]] with a name and kind = "modulus" in the campaign, and specimen = "its name" here'
-            )
         words = Vocabulary({role: of_motion(self.names, other)[role]} if role in OF_MOTION else {}, {})
         for header in headers or filter(words.heading, self.headers):
-            raise self.error(
+            raise self.header_error(
                 f"this is a test of {found}",
-                line=self.layout.header_line,
                 found=f'"{header}" for the {_label(role)}',
                 expected=expected,
                 hint=hint,
@@ -182,19 +169,13 @@ class Table(Columns):
     def _check_header(self) -> None:
         """Refuse a header of one cell, or of numbers alone."""
         if len(self.headers) < 2:
-            raise self.error(
+            raise self.header_error(
                 "there is only one column",
-                line=self.layout.header_line,
                 found=self.headers[0] if self.headers else "nothing",
                 expected=f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks",
             )
         if all(is_like_number(cell) for cell in self.headers):
-            raise self.error(
-                "there is no header",
-                line=self.layout.header_line,
-                found=", ".join(self.headers),
-                expected=_EXPECTED_HEADER,
-            )
+            raise self.header_error("there is no header", expected=_EXPECTED_HEADER)
 
     def _recognise(
         self, vocabulary: Vocabulary, columns: Mapping[str, str], stated_units: Mapping[str, str]
@@ -215,9 +196,8 @@ class Table(Columns):
                     roles[role] = roles[role] if angular[1] else column
                     continue
             if role in roles:
-                raise self.error(
+                raise self.header_error(
                     f"more than one column could be the {_label(role)}",
-                    line=self.layout.header_line,
                     found=f"{roles[role].header}, {header}",
                     expected="one",
                     hint=f'choose it in the campaign: columns = {{ {role} = "{header}" }}',
@@ -247,12 +227,10 @@ class Table(Columns):
 
     def _no_column(self, role: str, named: str) -> MeasurementError:
         """The error for a role whose column was named by a header that is not there."""
-        near = next(iter(get_close_matches(named, self.headers, n=1, cutoff=_ALIKE)), None)
-        return self.error(
+        near = next(iter(get_close_matches(named, self.headers, n=1, cutoff=_ALIKE)), "")
+        return self.header_error(
             f'there is no column "{named}"',
             kind=NoColumnError,
-            line=self.layout.header_line,
-            found=", ".join(self.headers),
             expected=f"the header that was named for the {_label(role)}",
             hint=(f'did you mean "{near}"? ' if near else "name one of this file: ")
             + f'columns = {{ {role} = "{near or "..."}" }} in the campaign',
@@ -265,7 +243,7 @@ def _source(data: Bytes, file: Path, stated: FileFormat, is_usable: Callable[[Ro
         return open_sheet(data[:], file, stated.sheet, is_usable)
     if stated.sheet:
         raise MeasurementError("this is no workbook", file=file, found=f'sheet = "{stated.sheet}"', expected="xlsx")
-    return Text.open(data, file, stated.encoding)
+    return Text(file, *to_utf8(data, file, stated.encoding))
 
 
 def _label(role: str) -> str:

@@ -15,13 +15,13 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import accumulate, groupby
 from pathlib import Path
 from typing import NamedTuple
 
 from bushfit import units
 from bushfit.errors import MeasurementError
-from bushfit.reading.headers import AmplitudeConvention, Vocabulary, split_convention
+from bushfit.reading.headers import AmplitudeConvention, Heading, Vocabulary, split_convention
 from bushfit.reading.layout import DELIMITERS, Layout, Line, is_comment, split
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.source import RowSource, Sheet
@@ -91,12 +91,7 @@ def unfolded(
 ) -> tuple[RowSource, Layout] | None:
     """A wide table as a long one, of which the headers are names of roles; None where a file holds no wide table.
 
-    Args:
-        source: the rows of the file.
-        file: which errors name.
-        vocabulary: what columns of a sweep are called.
-        layout: of the file, read as a long table.
-        delimiter: what parts the cells, where that is known.
+    `layout` is that of the file read as a long table, `delimiter` what parts the cells, where that is known.
 
     Raises:
         MeasurementError: blocks that do not belong together, or that do not say what they hold.
@@ -148,7 +143,9 @@ def _series(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: Voca
     said = dict.fromkeys(columns, _Said())
     down, across = _Said(), _Said()
     for distance, cells in enumerate(reversed(headers)):
-        texts = _filled(cells) if distance else cells
+        # an empty cell is merged with the one before it
+        merged: Iterator[str] = accumulate(cells, lambda before, cell: cell or before)
+        texts = list(merged) if distance else cells
         row = {column: _said(texts[column], vocabulary) for column in columns}
         if any(texts[column] and row[column] == _Said() for column in columns):
             break
@@ -171,14 +168,6 @@ def _series(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: Voca
     return [_Series(one, down, [(line, cells[0], cells[c]) for line, cells in data]) for c, one in said.items()]
 
 
-def _filled(cells: Sequence[str]) -> list[str]:
-    """Cells of which an empty one is merged with the one before it."""
-    texts = [""]
-    for cell in cells:
-        texts.append(cell or texts[-1])
-    return texts[1:]
-
-
 def _corner(text: str, vocabulary: Vocabulary) -> list[_Said]:
     """What the cells of a corner say that names one thing or two: "f [Hz]", "f [Hz] \\ A [mm]"; no level."""
     return [one for part in _CORNER.split(text) if not (one := _said(part, vocabulary)).level]
@@ -191,9 +180,7 @@ def _said(text: str, vocabulary: Vocabulary) -> _Said:
         return _Said(level=text)
     heading = vocabulary.heading(text)
     if heading and (heading.unit is None or units.is_unit(heading.unit)):
-        if heading.role in _STEPPED:
-            return _Said(stepped=heading.role, level_unit=heading.unit, convention=heading.convention)
-        return _Said(heading.role, heading.unit)
+        return _named(heading)
     if text and units.is_unit(bare := whole.strip("[]() ")):
         return _Said(unit=bare, convention=convention)
     if not (found := _LEVEL.search(whole)):
@@ -207,35 +194,37 @@ def _said(text: str, vocabulary: Vocabulary) -> _Said:
     if not rest:
         return level
     if heading := vocabulary.heading(rest):
-        if heading.role in _STEPPED:
-            return level.also(_Said(stepped=heading.role, level_unit=heading.unit))
-        return level.also(_Said(heading.role, heading.unit))
+        return level.also(_named(heading)._replace(convention=convention))
     bare = rest.strip("[]() ")
     return level._replace(level_unit=bare, stepped=_stepped_in(bare)) if not unit and _stepped_in(bare) else _Said()
 
 
+def _named(heading: Heading) -> _Said:
+    """What a header says that names a role."""
+    if heading.role in _STEPPED:
+        return _Said(stepped=heading.role, level_unit=heading.unit, convention=heading.convention)
+    return _Said(heading.role, heading.unit)
+
+
 def _stepped_in(unit: str | None) -> str | None:
     """What has a unit: a frequency, or an amplitude."""
-    if not unit:
-        return None
-    if units.agrees(unit, "Hz"):
-        return "frequency"
-    return "amplitude" if any(units.agrees(unit, si) for si in ("m", "rad", "1")) else None
+    roles = {"Hz": "frequency", "m": "amplitude", "rad": "amplitude", "1": "amplitude"}
+    return next((role for si, role in roles.items() if unit and units.agrees(unit, si)), None)
 
 
 def _joined(series: Sequence[_Series], source: RowSource, file: Path, delimiter: str) -> tuple[RowSource, Layout]:
     """The columns of all blocks as one long table: a row for each value down at each level."""
 
-    def error(problem: str, found: str, expected: str) -> MeasurementError:
+    def error(problem: str, expected: str) -> MeasurementError:
         place = f'sheet "{source.sheet}"' if source.sheet else f"line {series[0].points[0][0] - 1}"
         hint = "correct the wide table, or write it as a long one: a row for each frequency and amplitude"
-        return MeasurementError(problem, file=file, place=place, found=found, expected=expected, hint=hint)
+        return MeasurementError(problem, file=file, place=place, found=_told(series), expected=expected, hint=hint)
 
     by_role: dict[str, list[_Series]] = {}
     for one in series:
         if one.said.role is None:
             expected = "a quantity such as K* [N/mm] or tan delta above each block, or in each header"
-            raise error("a block of this wide table does not say what it holds", _told(series), expected)
+            raise error("a block of this wide table does not say what it holds", expected)
         by_role.setdefault(one.said.role, []).append(one)
     for columns in by_role.values():
         columns.sort(key=lambda one: _value(one.said.level))
@@ -243,7 +232,7 @@ def _joined(series: Sequence[_Series], source: RowSource, file: Path, delimiter:
     for other in others:
         if _points(first) != _points(other):
             expected = "the same frequencies and amplitudes in all blocks"
-            raise error("the blocks of this wide table differ", _told(series), expected)
+            raise error("the blocks of this wide table differ", expected)
     down, across = (
         {(said.stepped, said.level_unit, said.convention) for said in sayings}
         for sayings in ((one.down for one in series), (one.said for one in series))
@@ -251,23 +240,21 @@ def _joined(series: Sequence[_Series], source: RowSource, file: Path, delimiter:
     quantities = {(one.said.role, one.said.unit, None): None for one in series}
     if len(down) > 1 or len(across) > 1 or len(quantities) > len(by_role):
         expected = "one unit for each quantity, and levels of one kind"
-        raise error("this wide table counts one thing in two ways", _told(series), expected)
+        raise error("this wide table counts one thing in two ways", expected)
     headers = [
         f"{role}{_COUNTED[convention]}{f' [{unit}]' if unit else ''}".replace("_", " ")
         for role, unit, convention in (*down, *across, *quantities)
     ]
-    rows = [
-        (
-            line,
-            [value, text if _OPEN.fullmatch(text) else _value(text), *(column.points[index][2] for column in columns)],
-        )
-        for columns in zip(*by_role.values(), strict=True)
-        if (text := columns[0].said.level or "")
-        for index, (line, value, _) in enumerate(columns[0].points)
-    ]
-    header_line = min(line for line, _ in rows) - 1
-    sheet = _Unfolded(source.sheet or "", [cells for _, cells in rows], numbers=[line for line, _ in rows])
-    return sheet, Layout(delimiter, tuple(headers), header_line, ("",) * len(headers), None)
+    numbers: list[int] = []
+    rows: list[list[str | float]] = []
+    for beside in zip(*by_role.values(), strict=True):
+        text = beside[0].said.level or ""
+        level = text if _OPEN.fullmatch(text) else _value(text)
+        for points in zip(*(column.points for column in beside), strict=True):
+            numbers.append(points[0][0])
+            rows.append([points[0][1], level, *(cell for _, _, cell in points)])
+    sheet = _Unfolded(source.sheet or "", rows, numbers=numbers)
+    return sheet, Layout(delimiter, tuple(headers), min(numbers) - 1, ("",) * len(headers), None)
 
 
 def _points(columns: Sequence[_Series]) -> list[tuple[float, list[float]]]:

@@ -51,7 +51,7 @@ SWEEP_COLUMNS = {
     "stiffness": (
         *("stiffness", "dynamic stiffness", "stiffness magnitude", "complex stiffness", "kdyn", "cdyn", "|k|", "K*"),
         *("Steifigkeit", "dynamische Steifigkeit", "Federsteifigkeit", "Drehsteifigkeit", "dyn Steifigkeit"),
-        *("Federrate", "dynamische Federrate", "dyn Federrate", "dyn. Federrate", "Federkonstante", "|K*|", "c*"),
+        *("Federrate", "dynamische Federrate", "dyn Federrate", "Federkonstante", "|K*|", "c*"),
         *("Steifigkeit dyn", "Steifigkeit dynamisch", "dyn Federsteifigkeit", "dynamische Federsteifigkeit"),
         *("dyn stiffness", "stiffness dyn", "K abs", "dynamic spring rate", "dynamic rate", "raideur complexe"),
         *("komplexe Steifigkeit", "Betrag der Steifigkeit", "rigidez compleja"),
@@ -59,7 +59,7 @@ SWEEP_COLUMNS = {
         *("rigidez", "rigidez dinámica", "刚度", "动刚度"),
     ),
     "loss_factor": (
-        *("loss factor", "tan delta", "tandelta", "tan d", "eta", "η", "tan δ", "damping factor", "damping"),
+        *("loss factor", "tan delta", "tan d", "eta", "η", "tan δ", "damping factor", "damping"),
         *("Verlustfaktor", "Dämpfung tan d", "Dämpfung tan delta"),
         *("facteur de perte", "facteur de pertes", "facteur d'amortissement"),
         *("factor de pérdida", "factor de pérdidas", "损耗因子"),
@@ -90,9 +90,7 @@ SWEEP_COLUMNS = {
         *("rel Fehler", "relative Standardabweichung", "relative Unsicherheit", "erreur relative"),
         *("incertitude relative", "error relativo", "incertidumbre relativa", "相对误差"),
     ),
-    "repeat": (
-        *("repeat", "repetition", "Wiederholung", "Wdh", "Messung", "répétition", "repetición", "重复"),
-    ),
+    "repeat": ("repeat", "repetition", "Wiederholung", "Wdh", "Messung", "repetición", "重复"),
 }  # fmt: skip
 
 
@@ -110,7 +108,7 @@ _BASE = (
 )
 #: Names of the mass on it.
 _MASS = "mass|output|response|top|Masse|Massen|Antwort|Ausgang|de la masse|masse|de réponse|réponse|de sortie|sortie"
-_ACCELERATION = "acceleration|accel|acc|Beschleunigung|Beschl|accélération"
+_ACCELERATION = "acceleration|accel|acc|Beschleunigung|Beschl"
 _PHASE = "phase|phase angle|Phasenwinkel|déphasage"
 #: For each column of a resonance test (a mass on a mount on a shaker), the headers it goes by.
 RESONANCE_COLUMNS = {
@@ -136,7 +134,7 @@ RESONANCE_COLUMNS = {
     "transmissibility_imaginary": (
         *("transmissibility imaginary", "transmissibility imag", "imaginary transmissibility", "Im T"),
         *("imaginary part of T", "Imaginärteil T", "Imaginärteil Transmissibilität"),
-        *("partie imaginaire transmissibilité",),
+        "partie imaginaire transmissibilité",
     ),
     **{
         f"{role}_{part}": tuple(f"{name} {word}" for name in _said(bodies, _ACCELERATION) for word in words)
@@ -151,7 +149,7 @@ RESONANCE_COLUMNS = {
 _STRAINS = (
     *("strain", "shear strain", "engineering strain", "tensile strain", "compressive strain", "deformation"),
     *("Dehnung", "Scherung", "Scherdehnung", "Verzerrung", "Schubverzerrung", "Gleitung", "Stauchung", "Verformung"),
-    *("déformation", "cisaillement", "glissement", "deformación", "cizalladura", "应变", "剪应变", "剪切应变"),
+    *("cisaillement", "glissement", "deformación", "cizalladura", "应变", "剪应变", "剪切应变"),
     *("gamma", "epsilon", "\u03b3", "\u03b5"),
 )
 #: For each column of a test of strain and modulus, the headers it goes by in place of those above.
@@ -196,10 +194,5 @@ OF_MOTION = (*_STRAINING, "amplitude_reached")
 
 
 def of_motion(names: Mapping[str, Sequence[str]], motion: Motion) -> dict[str, Sequence[str]]:
-    """The headers that columns go by in a test of one kind of motion: G' names a modulus, and no stiffness.
-
-    Args:
-        names: LOOP_COLUMNS or SWEEP_COLUMNS.
-        motion: what is tested; of strain and modulus, strains and moduli stand for displacements and stiffnesses.
-    """
+    """The headers that columns go by in a test of one kind of motion: G' names a modulus, and no stiffness."""
     return {role: _STRAINING.get(role, usual) if motion is STRAINING else usual for role, usual in names.items()}

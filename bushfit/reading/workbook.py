@@ -48,13 +48,7 @@ def is_workbook(data: Bytes) -> bool:
 
 
 def open_sheet(data: bytes, file: Path, name: str | None, is_usable: Callable[[Sheet], bool]) -> Sheet:
-    """The sheet of a workbook that holds the table.
-
-    Args:
-        data: bytes of the file.
-        file: the file, which errors name.
-        name: the sheet, where the user states it; else the only usable one is taken.
-        is_usable: whether a sheet holds such a table.
+    """The sheet of a workbook that holds the table: the one that is stated by its name, or else the only usable one.
 
     Raises:
         MeasurementError: no xlsx workbook, one that is far too large, or no single usable sheet.
@@ -64,12 +58,9 @@ def open_sheet(data: bytes, file: Path, name: str | None, is_usable: Callable[[S
             if name in book.sheet_names:
                 return _sheet(book, name)
             names = book.sheet_names
+        hint = did_you_mean(name, names)
         raise MeasurementError(
-            "there is no such sheet",
-            file=file,
-            found=f'"{name}"',
-            expected=_listed(names),
-            hint=did_you_mean(name, names),
+            "there is no such sheet", file=file, found=f'"{name}"', expected=_listed(names), hint=hint
         )
     visible = _visible(data, file)
     usable = [sheet for sheet in visible if is_usable(sheet)] if len(visible) > 1 else visible
@@ -169,12 +160,8 @@ def _extent(archive: zipfile.ZipFile, part: zipfile.ZipInfo) -> int:
         while chunk := stream.read(_CHUNK_BYTES):
             text = rest + chunk
             last_row = max(last_row, *map(int, _ROW.findall(text)), 0)
-            for column, row in set(_CELL.findall(text)):
-                last_row, last_column = max(last_row, int(row)), max(last_column, _column(column))
+            for letters, row in set(_CELL.findall(text)):
+                column = reduce(lambda number, letter: 26 * number + letter - 64, letters, 0)
+                last_row, last_column = max(last_row, int(row)), max(last_column, column)
             rest = text[-_LONGEST_TAG:]
     return last_row * last_column
-
-
-def _column(letters: bytes) -> int:
-    """Number of a column, from 1, by its letters."""
-    return reduce(lambda number, letter: 26 * number + letter - 64, letters, 0)

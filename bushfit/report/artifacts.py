@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Collection, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,41 +14,27 @@ from bushfit.reading.csvfile import to_csv
 from bushfit.report import tables
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
     from bushfit.diagnosis.record import Diagnosis
     from bushfit.fitting.data_sets import LoopData, SweepData
     from bushfit.geometry import Place
-    from bushfit.model.model import Model
     from bushfit.model.result import Result
     from bushfit.prediction import Prediction
 
 
-#: The table of each kind of test.
-_TABLES: Mapping[str, Callable[[Model, Any], pd.DataFrame]] = {
-    "loops": tables.loops_table,
-    "sweeps": tables.sweeps_table,
-}
-
-
 def fit_files(
-    kind: Literal["loops", "sweeps"],
-    result: Result,
-    title: str,
-    data_sets: Sequence[LoopData] | Sequence[SweepData],
-    formats: Collection[str],
+    result: Result, title: str, loops: Sequence[LoopData], sweeps: Sequence[SweepData], formats: Collection[str]
 ) -> dict[str, bytes]:
-    """`loops.csv` and `loops.png` of a fit, or `sweeps.csv` and `sweeps.png`; nothing where there are no such tests."""
-    files: dict[str, bytes] = {}
-    if data_sets and "csv" in formats:
-        files[f"{kind}.csv"] = to_csv(_TABLES[kind](result.model, data_sets))
-    if data_sets and "png" in formats:
+    """`loops.csv` and `loops.png` of a fit, `sweeps.csv` and `sweeps.png`; nothing where there are no such tests."""
+    model, files = result.model, dict[str, bytes]()
+    if "csv" in formats:
+        files |= {"loops.csv": to_csv(tables.loops_table(model, loops))} if loops else {}
+        files |= {"sweeps.csv": to_csv(tables.sweeps_table(model, sweeps))} if sweeps else {}
+    if "png" in formats:
         from bushfit.report.plots import loops_figure, sweeps_figure, to_png
 
-        draw: Mapping[str, Callable[[Model, Any, str], Figure]] = {"loops": loops_figure, "sweeps": sweeps_figure}
-        files[f"{kind}.png"] = to_png(draw[kind](result.model, data_sets, title))
-    return files
+        files |= {"loops.png": to_png(loops_figure(model, loops, title))} if loops else {}
+        files |= {"sweeps.png": to_png(sweeps_figure(model, sweeps, title))} if sweeps else {}
+    return {name: files[name] for name in artifact_names(("loops", "sweeps"), formats) if name in files}
 
 
 def prediction_files(

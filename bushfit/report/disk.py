@@ -95,11 +95,7 @@ def is_abandoned(folder: Path) -> bool:
 
 @dataclass(frozen=True)
 class Claim:
-    """A folder marked as in use.
-
-    Args:
-        descriptor: the open folder that holds the lock; None where there are no locks.
-    """
+    """A folder marked as in use: the open folder that holds the lock, None where there are no locks."""
 
     descriptor: int | None
 

@@ -86,12 +86,7 @@ def write_files(folder: Path, files: Mapping[str, bytes], *, force: bool) -> Non
     """Write a set of files into a folder: all of them or none, even if this run is killed or another writes there.
 
     The steps stand at the top of this module. Runs that write into one folder take turns, and the last one's files
-    stay. What a killed run left behind is removed by the next.
-
-    Args:
-        folder: made where it does not exist.
-        files: content by file name.
-        force: whether files of these names may be replaced.
+    stay. What a killed run left behind is removed by the next. With `force` files of these names are replaced.
 
     Raises:
         OutputError: the folder cannot be written, or holds results and `force` is False.
@@ -170,51 +165,24 @@ def _exchangeable(place: Path) -> bool:
 
 def _exchanged(ready: Path, place: Path) -> bool:
     """Exchange a folder for one that holds the new files and its own other ones; False where that cannot be done."""
-    whole = ready.with_name("whole")
+    whole, home, count = ready.with_name("whole"), ready.stat(), 0
+
+    def passed_over(folder: str, names: list[str]) -> list[str]:
+        """What of a folder is not linked: stages, and files that are written anew."""
+        nonlocal count
+        count, owned = count + len(names), Path(folder).stat()
+        if count > _MOST_LINKED or (owned.st_uid, owned.st_gid) != (home.st_uid, home.st_gid):
+            raise OSError("too many files, or folders that a copy would give another owner")
+        anew = [name for name in names if (ready / name).exists()] if Path(folder) == place else []
+        return [*anew, *(name for name in names if name.startswith(_STAGE))]
+
     try:
         shutil.copytree(ready, whole, copy_function=os.link)
-        _link_others(place, whole, _MOST_LINKED)
-        _keep_rights(place, whole)
+        shutil.copytree(place, whole, symlinks=True, ignore=passed_over, copy_function=os.link, dirs_exist_ok=True)
         disk.exchange(whole, place)
-    except OSError:  # no links, no exchange, or rights that a copy would lose: moving the files needs none of these
+    except OSError:  # no links, no exchange, or an owner that a copy would lose: moving the files needs none of these
         return False
     return True
-
-
-def _link_others(source: Path, target: Path, left: int) -> int:
-    """Link every file below `source` to the same place below `target`, except where a file stands already.
-
-    Args:
-        source, target: folders of one file system.
-        left: how many files and folders may be linked at most.
-
-    Returns:
-        How many more may be linked.
-
-    Raises:
-        OSError: there are more.
-    """
-    for entry in os.scandir(source):
-        left -= 1
-        if left < 0:
-            raise OSError(f"more than {_MOST_LINKED} files")
-        place = target / entry.name
-        if entry.is_dir(follow_symlinks=False):
-            if not entry.name.startswith(_STAGE):
-                place.mkdir()
-                left = _link_others(Path(entry.path), place, left)
-                _keep_rights(Path(entry.path), place)
-        elif not os.path.lexists(place):
-            os.link(entry.path, place, follow_symlinks=False)
-    return left
-
-
-def _keep_rights(source: Path, target: Path) -> None:
-    """Give a folder the owner, the rights and the times of another."""
-    old, new = source.stat(), target.stat()
-    if (old.st_uid, old.st_gid) != (new.st_uid, new.st_gid):
-        os.chown(target, old.st_uid, old.st_gid)
-    shutil.copystat(source, target)
 
 
 def _end_decided(place: Path) -> None:

@@ -168,34 +168,37 @@ def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+#: Columns of a reduced sweep that tell how each point came about, and what each is of a step.
+_OF_STEPS = {
+    "frequency found [Hz]": "frequency",
+    "displacement distortion [-]": "displacement_distortion",
+    "force distortion [-]": "force_distortion",
+    "cycles used": "cycles",
+    "rows per cycle": "rows_per_cycle",
+    "start [s]": "start",
+    "end [s]": "end",
+    "history": "name",
+}
+
+
 def reduced_table(reduction: Reduction) -> pd.DataFrame:
     """Raw histories reduced to a sweep: what the sweep reader takes, then what tells how good each point is."""
     import pandas as pd
 
     (length, length_factor), _, (stiffness, factor) = reduction.direction.display
-    steps = reduction.steps
-    measured = np.array([step.stiffness for step in steps])
-    loss_factors = loss_factor(measured)
+    steps = pd.DataFrame([vars(step) for step in reduction.steps])
+    magnitude, factors = factor * steps["stiffness"].abs(), loss_factor(steps["stiffness"].to_numpy())
     frame = pd.DataFrame(
         {
-            "frequency [Hz]": [float(f"{step.nominal_frequency:.5g}") for step in steps],
-            f"amplitude [{length}]": [float(f"{length_factor * step.level:.5g}") for step in steps],
-            f"amplitude reached [{length}]": [step.amplitude * length_factor for step in steps],
-            "repeat": [step.repeat for step in steps],
-            f"stiffness [{stiffness}]": np.abs(measured) * factor,
-            "loss factor [-]": loss_factors,
-            f"stiffness std error [{stiffness}]": [step.gain_error * abs(step.stiffness) * factor for step in steps],
-            "loss factor std error [-]": [
-                step.phase_error * (1.0 + eta**2) for step, eta in zip(steps, loss_factors, strict=True)
-            ],
-            "frequency found [Hz]": [step.frequency for step in steps],
-            "displacement distortion [-]": [step.displacement_distortion for step in steps],
-            "force distortion [-]": [step.force_distortion for step in steps],
-            "cycles used": [step.cycles for step in steps],
-            "rows per cycle": [step.rows_per_cycle for step in steps],
-            "start [s]": [step.start for step in steps],
-            "end [s]": [step.end for step in steps],
-            "history": [step.name for step in steps],
+            "frequency [Hz]": [float(f"{frequency:.5g}") for frequency in steps["nominal_frequency"]],
+            f"amplitude [{length}]": [float(f"{length_factor * level:.5g}") for level in steps["level"]],
+            f"amplitude reached [{length}]": steps["amplitude"] * length_factor,
+            "repeat": steps["repeat"],
+            f"stiffness [{stiffness}]": magnitude,
+            "loss factor [-]": factors,
+            f"stiffness std error [{stiffness}]": steps["gain_error"] * magnitude,
+            "loss factor std error [-]": steps["phase_error"] * (1.0 + factors**2),
+            **{header: steps[key] for header, key in _OF_STEPS.items()},
         }
     )
     order = [f"amplitude [{length}]", "repeat", "frequency [Hz]"]

@@ -64,13 +64,9 @@ class Sealed:
     """The truth of a hidden campaign: what is hidden, how large, and how visible.
 
     Args:
-        hidden: names of effects of the library.
-        outside: what the library does not have, or "".
-        without: effects the library is made to lack.
-        values: true values of every parameter.
+        outside, without: what the library does not have, or ""; effects that it is made to lack.
         visible: largest misfit of the plain model without noise, relative.
         shared: whether blocks share gain and phase errors.
-        seed: of the campaign.
     """
 
     hidden: tuple[str, ...]
@@ -96,8 +92,7 @@ def hidden_campaign(
 
     Args:
         seed: of everything random.
-        hidden: effects of the library to hide; none for a clean campaign.
-        outside: one of OUTSIDE, or "".
+        hidden, outside: effects of the library to hide, none for a clean campaign; one of OUTSIDE, or "".
         directions: of the two sweeps.
     """
     random = np.random.default_rng([seed, 7])
@@ -156,11 +151,7 @@ def _plan(plain: Model, random: Generator, seed: int, directions: Sequence[Direc
 
 
 def _with_hidden(plain: Model, hidden: Sequence[str], plan: SimulateSettings, random: Generator) -> tuple[Model, float]:
-    """The plain model with effects of random visible size, and the least size.
-
-    Raises:
-        _OutOfReachError: an effect cannot have that size.
-    """
+    """The plain model with effects of random visible size, and the least size."""
     model, sizes = plain, []
     for name in hidden:
         wanted = float(np.exp(random.uniform(*np.log(_VISIBLE))))
@@ -236,17 +227,7 @@ def _visible(plain: Model, model: Model, plan: SimulateSettings) -> float:
 def _noise_free_data(model: Model, plan: SimulateSettings) -> list[DataSet]:
     """The plan's tests as the model's own closed form has them: used for the choice of a size, never as data."""
     swept = [(test.direction, *_points(test)) for test in plan.sweeps]
-    sweeps = [
-        Sweep(
-            str(direction),
-            direction,
-            frequency,
-            amplitude,
-            model.stiffness(direction, frequency, amplitude),
-            noise=5e-3,
-        )
-        for direction, frequency, amplitude in swept
-    ]
+    sweeps = [Sweep(str(points[0]), *points, model.stiffness(*points), noise=5e-3) for points in swept]
     phase = np.arange(600) / 200.0
     motions = [(test, test.amplitude * np.sin(2.0 * np.pi * phase)) for test in plan.loops]
     loops = [

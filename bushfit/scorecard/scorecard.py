@@ -60,8 +60,6 @@ class Task:
     """One hidden campaign to make and to diagnose.
 
     Args:
-        kind: of the campaign.
-        seed: of its own.
         hidden: effects; of a kind "mistake" the mistake.
         outside: what the library does not have.
         without: effects that the library is made to lack.
@@ -79,9 +77,6 @@ class Outcome:
     """What the workflow said of one campaign, and the truth.
 
     Args:
-        task: what was hidden.
-        sealed: the truth.
-        verdict: of the workflow.
         named: effects it named or that lead a set.
         sets: all members of each set, leader first.
         richer: effects that contain what was named as a limit.
@@ -98,13 +93,13 @@ class Outcome:
     task: Task
     sealed: Sealed | None
     verdict: str
-    named: tuple[str, ...]
-    sets: tuple[tuple[str, ...], ...]
-    richer: tuple[str, ...]
-    gain: float
-    heldout: float
-    covered: tuple[bool, ...]
-    seconds: float
+    named: tuple[str, ...] = ()
+    sets: tuple[tuple[str, ...], ...] = ()
+    richer: tuple[str, ...] = ()
+    gain: float = 0.0
+    heldout: float = 0.0
+    covered: tuple[bool, ...] = ()
+    seconds: float = 0.0
     matters: bool = False
     error: str = ""
 
@@ -196,15 +191,14 @@ def work(task: Task, folder: Path) -> Outcome:
     except MeasurementError as refusal:
         if task.kind != "mistake":
             return _failed(task, refusal)
-        return Outcome(task, sealed, REFUSED, (), (), (), 0.0, 0.0, (), 0.0, matters=True)
+        return Outcome(task, sealed, REFUSED, matters=True)
     except Exception as wrong:  # one campaign that fails is one row of the card, and is shown there
         return _failed(task, wrong)
     return _outcome(task, truth, diagnosis, seconds)
 
 
 def _failed(task: Task, wrong: Exception) -> Outcome:
-    error = f"{type(wrong).__name__}: {wrong}"
-    return Outcome(task, None, "failed", (), (), (), 0.0, 0.0, (), 0.0, error=error)
+    return Outcome(task, None, "failed", error=f"{type(wrong).__name__}: {wrong}")
 
 
 def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) -> Outcome:
@@ -265,14 +259,7 @@ def card(outcomes: Sequence[Outcome]) -> list[Row]:
         ("a single, confident, wrong name", hidden, lambda o: o.single_wrong, "<= 2 %", 0.0, 0.02),
         ("single name where the effect is plain", plain, lambda o: o.exact, ">= 90 %", 0.9, 1.0),
         ("two effects at once, both named", pair, lambda o: o.truth_in_sets, ">= 90 %", 0.9, 1.0),
-        (
-            "outside the list: no confident name",
-            strange,
-            lambda o: o.verdict != "named",
-            ">= 90 %",
-            0.9,
-            1.0,
-        ),
+        ("outside the list: no confident name", strange, lambda o: o.verdict != "named", ">= 90 %", 0.9, 1.0),
         ("  of these a disturbance of the rig", outside, lambda o: o.verdict != "named", "", 0.0, 1.0),
         ("  of these an effect the library lacks", lacking, lambda o: o.verdict != "named", "", 0.0, 1.0),
         ("held-out gap after <= 1.1, where named", named, lambda o: o.heldout <= _CONFIRMED, "all", 1.0, 1.0),
@@ -290,19 +277,14 @@ def _card_of_mistakes(good: Sequence[Outcome]) -> list[Row]:
     made, clean = ([outcome for outcome in good if outcome.task.kind == kind] for kind in _KINDS["mistakes"])
     matters = [outcome for outcome in made if outcome.matters]
     silent = [outcome for outcome in made if not outcome.matters]
-    told, alone, wrong, alarm = (
-        [outcome.mistake_told for outcome in matters],
-        [outcome.mistake_alone for outcome in matters if outcome.verdict != REFUSED],
-        [outcome.single_wrong for outcome in made],
-        [outcome.verdict != "consistent" for outcome in clean],
-    )
+    read = [outcome for outcome in matters if outcome.verdict != REFUSED]
     return [
-        _share("mistake told where it matters", told, ">= 95 %", 0.95, 1.0),
+        _share("mistake told where it matters", [o.mistake_told for o in matters], ">= 95 %", 0.95, 1.0),
         _share("  of these by the reader, which refuses the file", [o.verdict == REFUSED for o in matters], "", 0, 1),
-        _share("  of what can be read: named alone", alone, "", 0.0, 1.0),
+        _share("  of what can be read: named alone", [o.mistake_alone for o in read], "", 0.0, 1.0),
         _share("told where it does not matter or cannot show", [o.mistake_told for o in silent], "", 0.0, 1.0),
-        _share("another mistake or an effect named", wrong, "<= 1 %", 0.0, 0.01),
-        _share("anything named on clean campaigns", alarm, "<= 1 %", 0.0, 0.01),
+        _share("another mistake or an effect named", [o.single_wrong for o in made], "<= 1 %", 0.0, 0.01),
+        _share("anything named on clean campaigns", [o.verdict != "consistent" for o in clean], "<= 1 %", 0.0, 0.01),
         _time(good),
     ]
 

@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bushfit.campaign.campaign import load_campaign
-from bushfit.inspection.draft import toml_value
+from bushfit.campaign.written import toml_value
 
 GEOMETRY = ("--inner-radius", "10 mm", "--outer-radius", "18 mm", "--length", "34 mm")
 FILES = ("loop_axial_1.csv", "sweep_axial.csv", "sweep_radial.csv")
@@ -126,6 +126,17 @@ def test_a_force_that_counts_the_other_way_is_turned_and_said(
     assert "the load cell counts the other way" in done.stderr
     assert "force_sign = -1" in (tmp_path / "x/campaign.toml").read_text(encoding="utf-8")
     assert load_campaign(tmp_path / "x/campaign.toml").loops
+
+
+def test_coupons_alone_make_a_campaign_without_a_bushing(typed: Callable, tmp_path: Path) -> None:
+    for symbol in ("E", "G"):
+        rows = "\n".join(f"{f},{a},{1 + f / 1e3},0.1" for a in (0.1, 1) for f in range(5, 60, 5))
+        text = f"Frequency [Hz],Strain [%],Storage Modulus {symbol}' [MPa],tan delta [-]\n{rows}\n"
+        (tmp_path / f"{symbol}.csv").write_text(text, encoding="utf-8")
+    done = typed("init", tmp_path / "E.csv", tmp_path / "G.csv", "-o", "dma.toml")
+    assert done.returncode == 0, done.stderr
+    specimens = load_campaign(tmp_path / "dma.toml").specimens
+    assert [(one.name, one.strain) for one in specimens] == [("bar", "tension"), ("coupon", "engineering")]
 
 
 @pytest.mark.parametrize(

@@ -66,24 +66,22 @@ def test_the_loss_is_mended_as_it_was_measured(loss: float, magnitude: float) ->
         "storage_for_magnitude": stated(loss, magnitude * np.cos(angle)),
     }
     for name, test in cases.items():
-        mended = MISTAKES[name].mended_sweep(test)
+        mended = MISTAKES[name].mended(test)
         assert mended is not None, name
         assert np.allclose(mended.stiffness, truth, rtol=1e-9), name
     beside = Sweep("swept", Direction.AXIAL, *np.ones((2, 4)), np.abs(truth) + 1j * truth.imag)
-    assert np.allclose(MISTAKES["magnitude_for_storage"].mended_sweep(beside).stiffness, truth)  # type: ignore[union-attr]
+    assert np.allclose(MISTAKES["magnitude_for_storage"].mended(beside).stiffness, truth)  # type: ignore[union-attr]
 
 
 def test_amplitudes_rates_units_and_directions_are_mended() -> None:
-    halved = MISTAKES["peak_to_peak"].mended_sweep(swept(0.1))
-    doubled = MISTAKES["zero_to_peak"].mended_sweep(swept(0.1))
+    halved = MISTAKES["peak_to_peak"].mended(swept(0.1))
+    doubled = MISTAKES["zero_to_peak"].mended(swept(0.1))
     assert halved is not None and doubled is not None  # noqa: PT018
     assert halved.amplitude == pytest.approx(1e-4)
     assert doubled.amplitude == pytest.approx(4e-4)
     assert np.array_equal(halved.stiffness, swept(0.1).stiffness)
     assert MISTAKES["peak_to_peak"].mended(LOOP) is None
-    faster, pounds, inches = (
-        MISTAKES[name].mended_loop(LOOP) for name in ("sixty_times_faster", "pound_force", "inch")
-    )
+    faster, pounds, inches = (MISTAKES[name].mended(LOOP) for name in ("sixty_times_faster", "pound_force", "inch"))
     assert faster is not None and pounds is not None and inches is not None  # noqa: PT018
     assert faster.time == pytest.approx(LOOP.time / 60.0)
     assert pounds.force == pytest.approx(4.4482216 * LOOP.force)

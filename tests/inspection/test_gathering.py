@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -138,9 +139,21 @@ def test_moduli_are_those_of_a_specimen(tmp_path: Path) -> None:
         file.write_text(f"frequency [Hz],{symbol}' [MPa],{symbol}'' [MPa]\n{rows}\n", encoding="utf-8")
         seen = inspect(file, {"specimen": "DMA"} if symbol == "G" else {})
         assert isinstance(seen.direction, Specimen)
-        assert (seen.direction.name, seen.direction.strain) == ("DMA" if symbol == "G" else "coupon", strain)
+        assert (seen.direction.name, seen.direction.strain) == ("DMA" if symbol == "G" else "bar", strain)
         assert seen.entry == {"specimen": seen.direction.name, "at_amplitude": "0.1 %"}
         assert "its strain is taken as" in seen.assumed
+
+
+@pytest.mark.parametrize("header", ["Storage Modulus E' [MPa],tan delta [-]", "E' [MPa],Phase angle [deg]"])
+def test_a_storage_modulus_with_a_loss_is_a_coupons(header: str, tmp_path: Path) -> None:
+    file = tmp_path / "dma.csv"
+    loss = 0.1 if "tan" in header else np.degrees(np.arctan(0.1))
+    rows = "\n".join(f"{f},0.1,{1.2 + f / 1e3},{loss}" for f in range(5, 60, 5))
+    file.write_text(f"Frequency [Hz],Strain [%],{header}\n{rows}\n", encoding="utf-8")
+    seen = inspect(file, {"specimen": "C1"})
+    assert seen.direction == Specimen("C1", "modulus", strain="tension")
+    assert seen.entry == {"specimen": "C1"}
+    np.testing.assert_allclose(seen.measured.stiffness, 1e6 * (1.2 + seen.measured.frequency / 1e3) * (1 + 0.1j))
 
 
 def test_sizes_of_a_block_make_a_specimen_of_it(sweep: Sweep, tmp_path: Path) -> None:

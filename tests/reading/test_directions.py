@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bushfit.geometry import Direction
-from bushfit.reading.directions import direction_of_file, named_direction
+from bushfit.reading.names import direction_of_file, named_direction
 
 
 @pytest.mark.parametrize(

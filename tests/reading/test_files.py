@@ -9,7 +9,7 @@ import pytest
 
 from bushfit.errors import CampaignError, MeasurementError
 from bushfit.geometry import Direction
-from bushfit.reading.files import read_bytes, read_utf8, sha256, view_bytes
+from bushfit.reading.files import read_utf8, sha256, view_bytes
 from bushfit.reading.loops import read_loop
 
 
@@ -25,17 +25,17 @@ def test_what_is_no_file(name: str, words: str, tmp_path: Path) -> None:
 def test_bytes_come_as_they_are_and_the_error_is_of_the_kind_asked_for(tmp_path: Path) -> None:
     file = tmp_path / "x.toml"
     file.write_bytes(b"\xef\xbb\xbfname = 1\r\n")
-    assert read_bytes(file, CampaignError) == read_utf8(file, CampaignError) == b"\xef\xbb\xbfname = 1\r\n"
+    assert view_bytes(file, CampaignError) == read_utf8(file, CampaignError) == b"\xef\xbb\xbfname = 1\r\n"
     with pytest.raises(CampaignError, match="there is no such file"):
-        read_bytes(tmp_path / "y.toml", CampaignError)
+        view_bytes(tmp_path / "y.toml", CampaignError)
 
 
 def test_a_file_of_more_bytes_than_allowed_is_refused_with_what_to_do(tmp_path: Path) -> None:
     file = tmp_path / "x.toml"
     file.write_bytes(b"12345")
-    assert read_bytes(file, CampaignError, largest=5) == b"12345"
+    assert view_bytes(file, CampaignError, largest=5) == b"12345"
     with pytest.raises(CampaignError, match=r"too large[\s\S]*5 bytes[\s\S]*at most 4 bytes[\s\S]*give another"):
-        read_bytes(file, CampaignError, largest=4, hint="give another")
+        view_bytes(file, CampaignError, largest=4, hint="give another")
 
 
 @pytest.mark.parametrize("content", [b"", b" \r\n\t", b" " * 70_000])

@@ -21,6 +21,8 @@ from bushfit.geometry import Specimen
         ("Stiffness [N/mm],Loss-Factor [%]", "{k},{eta_percent}"),
         ("dynamic_stiffness_N/mm,phase_deg", "{k},{phase}"),
         ("storage stiffness [N/mm],loss stiffness [N/mm]", "{real},{imaginary}"),
+        ("K' [N/mm],tan delta", "{real},{eta}"),
+        ("storage stiffness [kN/m],phase [deg]", "{real},{phase}"),
     ],
 )
 def test_sweeps_in_every_pair(columns: str, second: str, tmp_path: Path) -> None:
@@ -260,6 +262,8 @@ def test_what_is_stated_and_the_file_have_to_agree(
     assert all(word in message for word in ["sweep.csv", *words]), message
 
 
+#: A storage stiffness with a phase.
+STORAGE = SWEEP.replace("stiffness [N/mm],loss factor [-]", "storage stiffness [N/mm],phase [deg]")
 BAD_SWEEPS = [
     ("no pair", SWEEP.replace("loss factor [-]", "x"), ["line 1", "no pair", "storage stiffness"]),
     ("frequency unit", SWEEP.replace("[Hz]", "[rad]"), ["line 1", "does not fit", "a frequency"]),
@@ -293,6 +297,7 @@ BAD_SWEEPS = [
         with_line(ALL_PAIRS, 4, ALL_PAIRS.splitlines()[3].replace(",6.", ",9.")),
         ["line 4", "contradict", '"phase [deg]"', '"loss factor [-]"'],
     ),
+    ("phase over 90 of a storage", STORAGE.replace("0.1\n", "91\n"), ["line 2", "a loss factor", "phase in deg"]),
     ("another stiffness", ALL_PAIRS.replace("K' [N/mm]", "K' [kN/mm]"), ["line 2", "contradict", "K' [kN/mm]"]),
     ("repeat", SWEEP.replace("0.1\n", "0.1,1.5\n").replace("[-]", "[-],repeat"), ["line 2", "no repeat", '"1.5"']),
     ("few rows", "\n".join(SWEEP.splitlines()[:3]), ["too few rows", "2", "3"]),

@@ -17,7 +17,7 @@ SEMICOLONS = Layout(";", ("time", "force"), 1, ("", ""), None)
 
 
 def text(content: str) -> Text:
-    return Text.open(content.encode(), FILE, None)
+    return Text(FILE, content.encode(), "utf-8")
 
 
 SOURCES = [

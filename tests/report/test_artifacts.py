@@ -26,16 +26,15 @@ def data(root: Path) -> Data:
 
 @pytest.mark.parametrize("formats", [("csv",), ("png",), ("csv", "png"), ()])
 def test_a_fit_has_the_files_of_the_formats_asked_for(data: Data, paper_model: Model, formats: tuple[str, ...]) -> None:
-    loops = fit_files("loops", Result(paper_model), "mount", data.loops, formats)
-    sweeps = fit_files("sweeps", Result(paper_model), "mount", data.sweeps, formats)
-    assert sorted(loops | sweeps) == sorted(artifact_names(["loops", "sweeps"], formats))
-    assert all(content.startswith(PNG) == name.endswith("png") for name, content in (loops | sweeps).items())
+    files = fit_files(Result(paper_model), "mount", data.loops, data.sweeps, formats)
+    assert sorted(files) == sorted(artifact_names(["loops", "sweeps"], formats))
+    assert all(content.startswith(PNG) == name.endswith("png") for name, content in files.items())
 
 
 def test_without_tests_there_are_no_files(paper_model: Model) -> None:
     formats = ("csv", "png")
     result = Result(paper_model)
-    assert fit_files("loops", result, "", [], formats) == fit_files("sweeps", result, "", [], formats) == {}
+    assert fit_files(result, "", [], [], formats) == {}
 
 
 def test_a_prediction_has_a_table_and_a_plot_a_direction(data: Data, paper_model: Model) -> None:

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from bushfit.effects.contract import Array
 from bushfit.reduction.scatter import scatter
-from bushfit.report.plots.style import CM, DOT, FRAME, GREY, INK, POINT, ROW, SMALL, dress, explain, fonts, new_figure
+from bushfit.report.plots import style
 from bushfit.units import number
 
 #: Colour of limits and of what is out of them.
@@ -33,7 +33,7 @@ _MOST_LETTERS_ALONG = 32
 #: Letters of a name along x for which a figure has room as it is.
 _SHORT_NAME = 16
 #: Height that each further letter of the longest name takes [inch].
-_ALONG_LETTER = 0.12 / CM
+_ALONG_LETTER = 0.12 / style.CM
 #: Most letters of a name within a panel: longer ones are half as wide as the panel.
 _MOST_LETTERS = 24
 #: Width of a letter, as a share of the panel's.
@@ -72,17 +72,14 @@ class Panel:
 def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> Figure:
     """Two columns of panels, the bushings along x in the manifest's order; of more than forty quantities the first.
 
-    Args:
-        panels: the quantities.
-        title: of the batch.
-        names: of all bushings, (n,); they stand along x too where they are few.
+    The names of the bushings, (n,), stand along x too where they are few.
     """
     drawn = panels[:_MOST_PANELS]
     along = [_short(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
     lines = math.ceil(len(drawn) / _COLUMNS)
-    height = ROW * (0.9 + 0.1 * bool(along)) * lines + 0.35 * FRAME
+    height = style.ROW * (0.9 + 0.1 * bool(along)) * lines + 0.35 * style.FRAME
     height += _ALONG_LETTER * max(0, max(map(len, along), default=0) - _SHORT_NAME)
-    figure = new_figure(f"{title}: {len(names)} bushings", height)
+    figure = style.new_figure(f"{title}: {len(names)} bushings", height)
     grid = figure.subplots(lines, _COLUMNS, sharex=True, squeeze=False)
     for axes in grid.flat[len(drawn) :]:
         axes.set_visible(False)
@@ -93,15 +90,15 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> F
         axes.xaxis.set_in_layout(place // _COLUMNS == lines - 1)  # else its labels hang into the empty cell below
         if along:
             ticks = range(1, len(along) + 1)
-            axes.set_xticks(ticks, along, rotation=90, fontsize=SMALL - 1, family=fonts(), parse_math=False)
+            axes.set_xticks(ticks, along, rotation=90, fontsize=style.SMALL - 1, family=style.fonts(), parse_math=False)
         elif lowest:
-            axes.set_xlabel("bushing, in the manifest's order", fontsize=SMALL, color=INK)
+            axes.set_xlabel("bushing, in the manifest's order", **style.WORDS)
         axes.set_xlim(0.5, len(names) + 0.5)
     limits = "Dashed: limits; red: out of them, the worst by name." if any(panel.allowed for panel in drawn) else ""
     beyond = "Triangles: further out than the panel reaches, the furthest by name and value."
     few = len(names) <= _CLOUD and any(panel.intervals is not None for panel in drawn)
     more = f"The first {len(drawn)} of {len(panels)} quantities." * (len(panels) > len(drawn))
-    explain(figure, "Grey line: median of the batch.", "Bars: 95 % intervals." * few, limits, beyond, more)
+    style.explain(figure, "Grey line: median of the batch.", "Bars: 95 % intervals." * few, limits, beyond, more)
     return figure
 
 
@@ -119,23 +116,28 @@ def _draw(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     shown = np.clip(values, low, high)
     bad = np.isin(place, list(panel.missed))
     cloud = values.size > _CLOUD
-    good_style = {**DOT, "ms": 1.6, "alpha": max(0.15, min(1.0, _OPAQUE / values.size))} if cloud else POINT
+    good_style = {**style.DOT, "ms": 1.6, "alpha": max(0.15, min(1.0, _OPAQUE / values.size))} if cloud else style.POINT
     if ends is not None and not cloud:
         axes.vlines(place + 1, *ends, color=np.where(bad, _OUT, _GOOD), lw=0.8, alpha=0.6, zorder=2)
-    for chosen, color, style, order in ((~bad, _GOOD, good_style, 2), (bad, _OUT, POINT if not cloud else DOT, 4)):
+    for chosen, color, look, order in (
+        (~bad, _GOOD, good_style, 2),
+        (bad, _OUT, style.POINT if not cloud else style.DOT, 4),
+    ):
         for marker, which in (("o", shown == values), ("^", shown < values), ("v", shown > values)):
             x, y = place[chosen & which] + 1, shown[chosen & which]
-            axes.plot(x, y, marker, color=color, zorder=order, rasterized=cloud, **(style if marker == "o" else POINT))
-    axes.axhline(float(np.median(values)), color=GREY, lw=0.9, zorder=1)
+            axes.plot(
+                x, y, marker, color=color, zorder=order, rasterized=cloud, **(look if marker == "o" else style.POINT)
+            )
+    axes.axhline(float(np.median(values)), color=style.GREY, lw=0.9, zorder=1)
     for limit in filter(math.isfinite, panel.allowed):
         axes.axhline(limit, color=_OUT, lw=0.9, ls=(0, (5, 2)), zorder=3)
-    dress(axes, "", "")
+    style.dress(axes, "", "")
     margin = 0.08 * (high - low)
     axes.set_ylim(low - margin, high + margin)
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
-    axes.yaxis.get_offset_text().set_fontsize(SMALL)
+    axes.yaxis.get_offset_text().set_fontsize(style.SMALL)
     count = f": {len(panel.missed)} out" if panel.missed else ""
-    axes.set_title(panel.title + count, fontsize=SMALL, loc="left", color=_OUT if count else INK, pad=3)
+    axes.set_title(panel.title + count, fontsize=style.SMALL, loc="left", color=_OUT if count else style.INK, pad=3)
     _name(axes, panel, (low, high), names)
     if cloud:
         _histogram(axes, shown)
@@ -190,9 +192,9 @@ def _name(axes: Axes, panel: Panel, reach: tuple[float, float], names: Sequence[
             ha="center",
             va="center",
             bbox={"facecolor": "white", "alpha": 0.7, "lw": 0, "pad": 0.3},
-            fontsize=SMALL - 1,
-            color=_OUT if k in panel.missed else GREY,
-            family=fonts(),
+            fontsize=style.SMALL - 1,
+            color=_OUT if k in panel.missed else style.GREY,
+            family=style.fonts(),
             parse_math=False,
             zorder=5,
         )

@@ -15,6 +15,7 @@ from bushfit.fitting.data_sets import LoopData, SweepData
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.prediction import Band
+from bushfit.report.plots import style
 from bushfit.report.plots.points import (
     SECTORS,
     Axis,
@@ -29,27 +30,10 @@ from bushfit.report.plots.points import (
     turn,
 )
 from bushfit.report.plots.prediction import FINE, draw, draw_as_it_came, points_note
-from bushfit.report.plots.style import (
-    CM,
-    DOT,
-    INK,
-    ROW,
-    Style,
-    dress,
-    explain,
-    file_name,
-    legend,
-    logarithmic,
-    mark_outliers,
-    new_figure,
-    noise_band,
-    readable,
-    styles,
-)
 from bushfit.units import for_people
 
 #: Height of a panel of residuals [inch].
-_STRIP = 2.6 / CM
+_STRIP = 2.6 / style.CM
 #: Most rows of a loop that are drawn: a panel is some 400 pixels wide, and a loop crosses it several times.
 _MOST_ROWS = 1600
 #: Amplitudes that were stepped over more than this ratio lie on a logarithmic axis: chosen, half a decade.
@@ -67,15 +51,10 @@ def sweeps_figure(model: Model, data_sets: Sequence[SweepData], title: str) -> F
 
     A row of panels per place and kind of sweep; along x lies what is stepped, or the frequency where nothing was held.
     The model keeps the effects of the rig, since sweeps hold them.
-
-    Args:
-        model: the fitted model.
-        data_sets: at least one sweep.
-        title: names the bushing.
     """
     kinds = by_kind(data_sets)
-    figure = new_figure(title, (ROW + _STRIP) * len(kinds))
-    grid = figure.subplots(2 * len(kinds), 2, squeeze=False, height_ratios=[ROW, _STRIP] * len(kinds))
+    figure = style.new_figure(title, (style.ROW + _STRIP) * len(kinds))
+    grid = figure.subplots(2 * len(kinds), 2, squeeze=False, height_ratios=[style.ROW, _STRIP] * len(kinds))
     for (kind, mine), pair, strips in zip(kinds.items(), grid[::2], grid[1::2], strict=True):
         if kind.stepped is None:
             draw_as_it_came(pair, kind.place, model, mine)
@@ -85,7 +64,7 @@ def sweeps_figure(model: Model, data_sets: Sequence[SweepData], title: str) -> F
             draw(pair, kind.place, _model_lines(model, kind.place, points, kind.axis), points, kind.axis, levels)
         _draw_residuals(pair, strips, model, mine, kind)
     outlying = any((data_set.weights == 0.0).any() for data_set in data_sets)
-    explain(figure, "Lines: model.", points_note(data_sets), _RESIDUALS, _OUTLIERS * outlying)
+    style.explain(figure, "Lines: model.", points_note(data_sets), _RESIDUALS, _OUTLIERS * outlying)
     return figure
 
 
@@ -98,35 +77,35 @@ def _draw_residuals(
     for part, (panel, strip, name) in enumerate(zip(pair, strips, ("gain", "phase"), strict=True)):
         residuals = [data_set.shown(model).reshape(2, -1)[part] for data_set in data_sets]
         for look, place, at in _looks(data_sets, kind):
-            marker = DOT | {"color": look.color, "alpha": 0.8}
+            marker = style.DOT | {"color": look.color, "alpha": 0.8}
             strip.plot(x[place][at], residuals[place][at], look.marker, **marker)
         strip.sharex(panel)
-        dress(strip, panel.get_xlabel(), f"{name} residual\n/ noise")
+        style.dress(strip, panel.get_xlabel(), f"{name} residual\n/ noise")
         reach = np.concatenate(x)
         if kind.axis == "amplitude" and reach.max() > _DECADES * reach.min():
-            logarithmic(strip, reach)
+            style.logarithmic(strip, reach)
         else:
-            readable(strip, reach)
+            style.readable(strip, reach)
         panel.tick_params(labelbottom=False)
         panel.set_xlabel("")
-        noise_band(strip)
+        style.noise_band(strip)
         for place, data_set in enumerate(data_sets):
             outlying = data_set.weights == 0.0
-            mark_outliers(strip, x[place][outlying], residuals[place][outlying])
+            style.mark_outliers(strip, x[place][outlying], residuals[place][outlying])
 
 
-def _looks(data_sets: Sequence[SweepData], kind: Kind) -> Iterator[tuple[Style, int, Array]]:
+def _looks(data_sets: Sequence[SweepData], kind: Kind) -> Iterator[tuple[style.Style, int, Array]]:
     """How the points of each level are drawn, or of each test where nothing was held: style, number of the test, which
     of its points."""
     if kind.stepped is None:
-        for place, style in enumerate(styles(len(data_sets), "loop")):
-            yield style._replace(marker="o"), place, data_sets[place].weights > 0.0
+        for place, look in enumerate(style.styles(len(data_sets), "loop")):
+            yield look._replace(marker="o"), place, data_sets[place].weights > 0.0
         return
     held = held_beside(kind.axis)
     levels = np.unique(np.concatenate([getattr(data_set.standing(), held) for data_set in data_sets]))
     for place, data_set in enumerate(data_sets):
-        for style, level in zip(styles(levels.size, held), levels, strict=True):
-            yield style, place, (getattr(data_set, held) == level) & (data_set.weights > 0.0)
+        for look, level in zip(style.styles(levels.size, held), levels, strict=True):
+            yield look, place, (getattr(data_set, held) == level) & (data_set.weights > 0.0)
 
 
 def loops_figure(model: Model, data_sets: Sequence[LoopData], title: str) -> Figure:
@@ -134,21 +113,18 @@ def loops_figure(model: Model, data_sets: Sequence[LoopData], title: str) -> Fig
 
     Of each loop at most 1600 rows, from the first and last two cycles, are drawn. The model keeps the effects of the
     rig, since loops hold them.
-
-    Args:
-        model: the fitted model.
-        data_sets: at least one loop.
-        title: names the bushing.
     """
     directions = by_direction(data_sets)
-    figure = new_figure(title, _LOOPS_HEIGHT * ROW * len(directions))
+    figure = style.new_figure(title, _LOOPS_HEIGHT * style.ROW * len(directions))
     grid = figure.subplots(len(directions), 2, squeeze=False, width_ratios=[1.15, 1.0])
     for (direction, mine), (loop_panel, phase_panel) in zip(directions.items(), grid, strict=True):
         _draw_loops(loop_panel, model, direction, mine)
         _draw_over_phase(phase_panel, model, mine)
-        loops_legend(phase_panel, mine, besides={"model": Line2D([], [], color=INK, lw=0.8)})
+        loops_legend(phase_panel, mine, besides={"model": Line2D([], [], color=style.INK, lw=0.8)})
     note = _OUTLIERS if any(data_set.drive.outliers["force"].rows.size for data_set in data_sets) else ""
-    explain(figure, "Left: measured force over the motion cleared of noise; black: model.", _RESIDUALS, _MEANS, note)
+    style.explain(
+        figure, "Left: measured force over the motion cleared of noise; black: model.", _RESIDUALS, _MEANS, note
+    )
     return figure
 
 
@@ -158,41 +134,35 @@ def _draw_loops(axes: Axes, model: Model, direction: Place, data_sets: Sequence[
     largest = max(float(np.abs(data_set.drive.force).max()) for data_set in data_sets)
     force_unit, factor = for_people(*force_units, largest)
     motion_name, force_name, _ = direction.motion.words
-    dress(axes, f"{motion_name} [{unit}]", f"{direction} {force_name} [{force_unit}]")
-    for data_set, style in zip(data_sets, styles(len(data_sets), "loop"), strict=True):
+    style.dress(axes, f"{motion_name} [{unit}]", f"{direction} {force_name} [{force_unit}]")
+    for data_set, look in zip(data_sets, style.styles(len(data_sets), "loop"), strict=True):
         drive, rows = data_set.drive, _drawn_rows(data_set)
         phase = drive.phase[rows]
         motion, modelled = length * drive.displacement(phase), factor * data_set.force(model)[rows]
         modelled[1:][np.diff(phase) > 0.5] = np.nan  # the cycles between, which are not drawn
-        axes.plot(motion, factor * drive.force[rows], "o", color=style.color, alpha=0.5, **DOT)
-        axes.plot(motion, modelled, color=INK, lw=0.8)
+        axes.plot(motion, factor * drive.force[rows], "o", color=look.color, alpha=0.5, **style.DOT)
+        axes.plot(motion, modelled, color=style.INK, lw=0.8)
     for data_set in data_sets:
         phase, force = outliers(data_set)
-        mark_outliers(axes, length * data_set.drive.displacement(phase), factor * force)
+        style.mark_outliers(axes, length * data_set.drive.displacement(phase), factor * force)
 
 
 def _draw_over_phase(axes: Axes, model: Model, data_sets: Sequence[LoopData]) -> None:
     """Residuals of one direction's loops over the phase of the cycle, and their means."""
-    dress(axes, "phase after the upper turn [deg]", "residual / noise")
-    for data_set, style in zip(data_sets, styles(len(data_sets), "loop"), strict=True):
+    style.dress(axes, "phase after the upper turn [deg]", "residual / noise")
+    for data_set, look in zip(data_sets, style.styles(len(data_sets), "loop"), strict=True):
         rows, residual = _drawn_rows(data_set), data_set.residual(model)
-        axes.plot(turn(data_set)[rows], residual[rows], ".", color=style.color, alpha=0.4, **DOT)
+        axes.plot(turn(data_set)[rows], residual[rows], ".", color=look.color, alpha=0.4, **style.DOT)
         middle, mean, _ = over_sectors(data_set, residual)
-        axes.plot(middle, mean, color=style.color, ls=style.dashes, lw=1.4)
-    noise_band(axes)
+        axes.plot(middle, mean, color=look.color, ls=look.dashes, lw=1.4)
+    style.noise_band(axes)
     axes.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
 
 
 def loops_legend(axes: Axes, data_sets: Sequence[LoopData], **words: Any) -> None:
-    """Name the loops of a panel.
-
-    Args:
-        axes: the panel.
-        data_sets: its loops.
-        words: what else `legend` takes.
-    """
-    handles = [style.handle(False) for style in styles(len(data_sets), "loop")]
-    legend(axes, handles, loop_labels(data_sets), **({"title": "loop"} | words))
+    """Name the loops of a panel; `words` are what else `legend` takes."""
+    handles = [look.handle(False) for look in style.styles(len(data_sets), "loop")]
+    style.legend(axes, handles, loop_labels(data_sets), **({"title": "loop"} | words))
 
 
 def loop_labels(data_sets: Sequence[LoopData]) -> list[str]:
@@ -201,7 +171,9 @@ def loop_labels(data_sets: Sequence[LoopData]) -> list[str]:
     labels = [f"{length * data_set.amplitude[0]:.3g} {unit}, {data_set.frequency[0]:.3g} Hz" for data_set in data_sets]
     if len(set(labels)) == len(labels):
         return labels
-    return [f"{label}\n{file_name(data_set.test.name)}" for label, data_set in zip(labels, data_sets, strict=True)]
+    return [
+        f"{label}\n{style.file_name(data_set.test.name)}" for label, data_set in zip(labels, data_sets, strict=True)
+    ]
 
 
 def _model_lines(model: Model, direction: Place, points: Points, axis: Axis) -> Points:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -19,37 +20,22 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, parted
 from bushfit.geometry import Place
 from bushfit.model.model import Model
+from bushfit.report.plots import style
 from bushfit.report.plots.fits import loop_labels, loops_legend
-from bushfit.report.plots.misfit import Curve, Map, Side, columns, has_holes, replaced, side_of
+from bushfit.report.plots.misfit import Curve, Map, Side, columns, has_holes, side_of
 from bushfit.report.plots.points import SECTORS, Kind, by_direction, by_kind
 from bushfit.report.plots.prediction import axis_label
-from bushfit.report.plots.style import (
-    CM,
-    GREY,
-    INK,
-    MOST_NAMED,
-    SMALL,
-    TEXT,
-    dress,
-    explain,
-    file_name,
-    fonts,
-    logarithmic,
-    new_figure,
-    noise_band,
-    styles,
-)
 
 #: Height of a row of a map [inch].
-_LEVEL = 0.6 / CM
+_LEVEL = 0.6 / style.CM
 #: Least height of a map [inch]: its name needs two lines.
-_LEAST_MAP = 1.7 / CM
+_LEAST_MAP = 1.7 / style.CM
 #: Largest height of a map [inch]: six of them, of three directions, just fill a page.
-_LARGEST_MAP = 4.2 / CM
+_LARGEST_MAP = 4.2 / style.CM
 #: Height of the panels of loops, with their legend [inch].
-_LOOPS = 4.4 / CM
+_LOOPS = 4.4 / style.CM
 #: Height of a line of the loops' legend [inch].
-_LEGEND_LINE = 0.42 / CM
+_LEGEND_LINE = 0.42 / style.CM
 #: Lines of legend for which the panels of loops have room.
 _LEGEND_LINES = 4
 #: Most columns of the loops' legend over the width of a figure.
@@ -59,9 +45,9 @@ _LEGEND_LETTERS = 96
 #: Letters for which the handle of a legend's entry has room.
 _HANDLE_LETTERS = 7
 #: Height of the scale of colours [inch].
-_SCALE = 2.6 / CM
+_SCALE = 2.6 / style.CM
 #: Height of a line of the summary [inch].
-_LINE = 0.42 / CM
+_LINE = 0.42 / style.CM
 #: Where the colour changes, in units of noise: about 1, 2, 5 in each decade.
 _EDGES = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 #: Fewest edges of a scale, so that what lies within the noise never looks like a find.
@@ -88,6 +74,8 @@ _WITHIN = 0.92
 _MOST_LABELS = 10
 #: Letters in a line of the summary, as many as the width of a figure holds.
 _SUMMARY_LETTERS = 92
+#: How the name of a row stands left of its ticks.
+_LEVEL_NAME: dict[str, Any] = {"rotation": 0, "ha": "right", "va": "center", "ma": "center"}
 #: Letters in a line of a column's heading, as many as half the width holds.
 _COLUMN_LETTERS = 40
 
@@ -105,32 +93,22 @@ def gap_figure(
 
     Every value is measured less model, the mean of the repeats or of a sector of the cycle, in units of the noise of
     that mean. All maps share one scale of colours, the loops of a direction one axis. Models that respond alike make
-    one column.
-
-    Args:
-        before: the model as it came.
-        after: the model with what was added.
-        data_sets: the tests of the diagnosis, at least one.
-        title: names the bushing.
-        summary: the finding in a sentence or two.
-        mended: the tests that belong to the model after, where they are others; drawn where they were recorded.
+    one column. `mended` are the tests that belong to the model after, where they are others; they are drawn where
+    they were recorded.
     """
     every_loop, every_sweep = parted(data_sets)
     loops, sweeps = by_direction(every_loop), by_kind(every_sweep)
     later = dict(zip(data_sets, mended or data_sets, strict=True))
-    sides = [
-        side_of(model, name, list(tests.values()), replaced(sweeps, tests), replaced(loops, tests))
-        for (model, name), tests in zip(
-            columns(before, after, later), ({test: test for test in later}, later), strict=False
-        )
-    ]
+    shown = zip(columns(before, after, later), ({test: test for test in later}, later), strict=False)
+    sides = [side_of(model, name, tests, sweeps, loops) for (model, name), tests in shown]
     rows = [(kind, part) for kind in sweeps for part in ("storage", "loss")]
-    heights = [_map_height(sides[0].maps[kind]) for kind, _ in rows]
+    levels = [np.unique(sides[0].maps[kind].points.held).size for kind, _ in rows]
+    heights = [min(max(_LEVEL * count, _LEAST_MAP), _LARGEST_MAP) for count in levels]
     heights += [_loops_height(mine, len(sides)) for mine in loops.values()]
     lines = textwrap.wrap(summary, _SUMMARY_LETTERS)
-    figure = new_figure(title, sum(heights) + _SCALE * bool(rows) + _LINE * (len(lines) + 2))
+    figure = style.new_figure(title, sum(heights) + _SCALE * bool(rows) + _LINE * (len(lines) + 2))
     body: SubFigure = figure.subfigures(1, 1, squeeze=False)[0, 0]
-    body.suptitle("\n".join(lines), fontsize=TEXT, color=INK, family=fonts(), parse_math=False)
+    body.suptitle("\n".join(lines), fontsize=style.TEXT, color=style.INK, family=style.fonts(), parse_math=False)
     grid = body.subplots(len(heights), len(sides), squeeze=False, height_ratios=heights)
     if rows:
         edges, colors = _scale(sides)
@@ -142,19 +120,14 @@ def gap_figure(
     for row, (direction, mine) in zip(grid[len(rows) :], loops.items(), strict=True):
         _draw_loops(row, direction, mine, [side.loops[direction] for side in sides])
     _head(grid[0], sides)
-    explain(figure, *_words(sides[0]))
+    style.explain(figure, *_words(sides[0]))
     return figure
-
-
-def _map_height(drawn: Map) -> float:
-    """Height of a map [inch]."""
-    return float(np.clip(_LEVEL * np.unique(drawn.points.held).size, _LEAST_MAP, _LARGEST_MAP))
 
 
 def _loops_height(data_sets: Sequence[LoopData], sides: int) -> float:
     """Height of the panels of one direction's loops with their legend [inch]."""
     labels = loop_labels(data_sets)
-    entries = min(len(labels), MOST_NAMED + 1)  # one more says how many are not named
+    entries = min(len(labels), style.MOST_NAMED + 1)  # one more says how many are not named
     lines = math.ceil(entries / _legend_columns(labels, sides)) * len(labels[0].splitlines())
     return _LOOPS + _LEGEND_LINE * max(0, lines - _LEGEND_LINES)
 
@@ -205,10 +178,10 @@ def _draw_map(axes: Axes, kind: Kind, drawn: Map, part: str, colors: ScalarMappa
     axes.hlines(np.arange(1, levels.size) - 0.5, low.min(), high.max(), color="white", lw=1.5)
     axes.set(ylim=(-0.5, levels.size - 0.5))
     if even:
-        logarithmic(axes, along)
+        style.logarithmic(axes, along)
     axes.set_xlim(low.min(), high.max())
-    axes.tick_params(labelsize=SMALL, colors=INK)
-    axes.spines[:].set_color(GREY)
+    axes.tick_params(labelsize=style.SMALL, colors=style.INK)
+    axes.spines[:].set_color(style.GREY)
     axes.set_yticks(np.arange(0, levels.size, math.ceil(levels.size / _MOST_LABELS)))
 
 
@@ -239,18 +212,13 @@ def _label_maps(row: Sequence[Axes], kind: Kind, part: str, drawn: Map, sweeps: 
     unit, factor = ("Hz", 1.0) if kind.axis == "amplitude" else kind.place.display.displacement
     names = [f"{factor * level:.3g} {unit}" for level in np.unique(drawn.points.held)]
     if kind.stepped is None and drawn.merged == 1:
-        names = [file_name(sweep.name) for sweep in sweeps]
+        names = [style.file_name(sweep.name) for sweep in sweeps]
     for axes in row:
         axes.set_yticklabels([names[round(tick)] for tick in axes.get_yticks()])
         axes.tick_params(labelleft=axes is row[0], labelbottom=part == "loss")
         if part == "loss":
-            axes.set_xlabel(axis_label(kind.place, kind.axis), fontsize=TEXT, color=INK)
-    _name(row[0], f"{kind.place}\n{part}")
-
-
-def _name(axes: Axes, words: str) -> None:
-    """Write what a row shows left of its ticks."""
-    axes.set_ylabel(words, fontsize=TEXT, color=INK, rotation=0, ha="right", va="center", ma="center")
+            axes.set_xlabel(axis_label(kind.place, kind.axis), **style.NAMES)
+    style.name_left(row[0], f"{kind.place}\n{part}", **_LEVEL_NAME)
 
 
 def _head(row: Sequence[Axes], sides: Sequence[Side]) -> None:
@@ -259,7 +227,9 @@ def _head(row: Sequence[Axes], sides: Sequence[Side]) -> None:
     height = legend.get_window_extent().height * 72.0 / row[0].figure.dpi if legend else 0.0
     for axes, side in zip(row, sides, strict=True):
         lines = [*textwrap.wrap(side.title, _COLUMN_LETTERS * (3 - len(sides))), f"gap {side.gap:.2f} x noise"]
-        axes.set_title("\n".join(lines), fontsize=TEXT, color=INK, weight="bold", pad=height + 7.0, parse_math=False)
+        axes.set_title(
+            "\n".join(lines), fontsize=style.TEXT, color=style.INK, weight="bold", pad=height + 7.0, parse_math=False
+        )
 
 
 def _draw_scale(figure: SubFigure, maps: Sequence[Axes], edges: Array, colors: ScalarMappable) -> None:
@@ -268,12 +238,12 @@ def _draw_scale(figure: SubFigure, maps: Sequence[Axes], edges: Array, colors: S
     every = 1 if edges.size <= _MOST_EDGES else 2
     from_end = np.minimum(np.arange(edges.size), np.arange(edges.size)[::-1])
     numbers = ["" if place % every else f"{edge:g}" for edge, place in zip(edges, from_end, strict=True)]
-    bar.ax.set_xticks(edges, numbers, fontsize=SMALL, color=INK)
-    bar.ax.tick_params(length=2, colors=INK)
-    bar.outline.set(edgecolor=GREY, linewidth=0.6)
-    bar.set_label("measured less model, in units of noise", fontsize=TEXT, color=INK)
+    bar.ax.set_xticks(edges, numbers, **style.WORDS)
+    bar.ax.tick_params(length=2, colors=style.INK)
+    bar.outline.set(edgecolor=style.GREY, linewidth=0.6)
+    bar.set_label("measured less model, in units of noise", **style.NAMES)
     for x, side, words in ((-0.05, "right", "measured\nbelow model"), (1.05, "left", "measured\nabove model")):
-        bar.ax.text(x, 0.5, words, transform=bar.ax.transAxes, ha=side, va="center", fontsize=TEXT, color=INK)
+        bar.ax.text(x, 0.5, words, transform=bar.ax.transAxes, ha=side, va="center", **style.NAMES)
     middle = (edges[:-1] + edges[1:]) / 2.0
     barred = middle[middle < -_BARRED]
     bar.ax.plot(barred, np.full(barred.size, 0.5), "_", color="white", ms=6, mew=1.1)
@@ -285,22 +255,22 @@ def _draw_loops(
     """Draw what is left of one direction's loops over the phase of the cycle, before and after on one scale."""
     furthest = max(float(np.abs(curve.values).max()) for curves in sides for curve in curves)
     for axes, curves in zip(row, sides, strict=True):
-        dress(axes, "phase after the upper turn [deg]", "")
-        for curve, style in zip(curves, styles(len(curves), "loop"), strict=True):
-            axes.plot(curve.phase, curve.values, color=style.color, ls=style.dashes, lw=1.3)
+        style.dress(axes, "phase after the upper turn [deg]", "")
+        for curve, look in zip(curves, style.styles(len(curves), "loop"), strict=True):
+            axes.plot(curve.phase, curve.values, color=look.color, ls=look.dashes, lw=1.3)
         if furthest > _FAR:
             axes.set_yscale("symlog", linthresh=_NEAR, linscale=0.7)
             powers = 10.0 ** np.arange(1, int(np.log10(furthest)) + 1)
             axes.yaxis.set_major_locator(FixedLocator([*-powers[::-1], 0.0, *powers]))
             axes.yaxis.set_minor_locator(NullLocator())
             axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        noise_band(axes)
+        style.noise_band(axes)
         axes.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
     limits = [axes.get_ylim() for axes in row]
     for axes in row:
         axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
         axes.tick_params(labelleft=axes is row[0])
-    _name(row[0], f"{direction}\nloops\n/ noise")
+    style.name_left(row[0], f"{direction}\nloops\n/ noise", **_LEVEL_NAME)
     loops_legend(
         row[0],
         data_sets,
@@ -320,12 +290,9 @@ def _words(side: Side) -> list[str]:
     within = " and ".join(["within 2 (maps)"] * maps + ["in the grey (loops)"] * loops)
     merged = max((drawn.merged for drawn in side.maps.values()), default=1)
     of = [*["its repeats"] * repeated, *[f"up to {merged} neighbouring rows"] * (merged > 1)]
-    usual = all(kind.stepped == "frequency" for kind in side.maps)
-    across = (
-        "frequency across, amplitude"
-        if usual
-        else "across what is stepped (or the frequency), what is held (or the test)"
-    )
+    across = "frequency across, amplitude"
+    if any(kind.stepped != "frequency" for kind in side.maps):
+        across = "across what is stepped (or the frequency), what is held (or the test)"
     return [
         f"Maps: {across} upwards; pale grey: model and measurement agree within the noise. A bar in a cell: 3 and more "
         "below." * maps,

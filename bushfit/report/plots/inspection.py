@@ -12,21 +12,9 @@ from matplotlib.gridspec import SubplotSpec
 from bushfit.effects.contract import Array
 from bushfit.inspection.record import Inspected
 from bushfit.reading.measurement import Floats, Loop, Sweep
+from bushfit.report.plots import style
 from bushfit.report.plots.points import BINS, Kind, held_beside, ranges
 from bushfit.report.plots.prediction import axis_label
-from bushfit.report.plots.style import (
-    CM,
-    GREY,
-    POINT,
-    ROW,
-    dress,
-    explain,
-    file_name,
-    name_levels,
-    new_figure,
-    readable,
-    styles,
-)
 from bushfit.units import for_people
 
 #: Colour of a history.
@@ -34,18 +22,18 @@ _COLOR = "#3b528b"
 #: Most rows of a loop that are drawn over the displacement: more are not told apart.
 _MOST_ROWS = 6000
 #: Height of a row's title [inch].
-_TITLE = 0.7 / CM
+_TITLE = 0.7 / style.CM
 #: Most letters of a file's name in a row's title: what is said of the file follows it on the same line.
 _NAME_LETTERS = 48
 
 
 def inspection_figure(files: Sequence[Inspected]) -> Figure:
     """A row a file: a loop over displacement and over time, a sweep over frequency, a history over time."""
-    figure = new_figure("Test files as they are", (ROW + _TITLE) * len(files))
+    figure = style.new_figure("Test files as they are", (style.ROW + _TITLE) * len(files))
     grid = figure.add_gridspec(len(files), 1)
     for row, seen in enumerate(files):
         place = grid[row, 0]
-        name = file_name(seen.label, _NAME_LETTERS)
+        name = style.file_name(seen.label, _NAME_LETTERS)
         words = f"{seen.kind}, {seen.direction or 'direction unknown'}"
         words += ", force turned" * (seen.entry.get("force_sign") == -1)
         title = f"{name}: {words}" + (f", {len(seen.looked.odd)} odd" if seen.looked.odd else "")
@@ -53,9 +41,9 @@ def inspection_figure(files: Sequence[Inspected]) -> Figure:
             first = _draw_sweep(place, seen.measured)
         elif seen.measured is not None:
             first = _draw_history(figure, place, seen.measured, loop=seen.kind == "loop")
-        first.set_title(title, fontsize=8.5, loc="left", color=GREY)
+        first.set_title(title, fontsize=8.5, loc="left", color=style.GREY)
     if any(isinstance(seen.measured, Sweep) for seen in files):
-        explain(figure, "Sweeps: every point as measured, lines through the means of the repeats.")
+        style.explain(figure, "Sweeps: every point as measured, lines through the means of the repeats.")
     return figure
 
 
@@ -72,7 +60,7 @@ def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bo
         over_time, (motion, load), (f"{names[0]}\n[{length}]", f"{names[1]}\n[{force}]"), strict=True
     ):
         _draw_over_time(axes, history.time, values)
-        dress(axes, "time [s]" if history.timed else "time rebuilt [s]", label)
+        style.dress(axes, "time [s]" if history.timed else "time rebuilt [s]", label)
     figure.align_ylabels(over_time)
     over_time[0].tick_params(labelbottom=False)
     over_time[0].set_xlabel("")
@@ -81,7 +69,7 @@ def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bo
     axes = figure.add_subplot(grid[:, 0])
     step = max(1, -(-history.time.size // _MOST_ROWS))
     axes.plot(motion[::step], load[::step], ".", ms=1.2, mew=0, color=_COLOR, alpha=0.7)
-    dress(axes, f"{names[0]} [{length}]", f"{names[1]} [{force}]")
+    style.dress(axes, f"{names[0]} [{length}]", f"{names[1]} [{force}]")
     return axes
 
 
@@ -104,21 +92,21 @@ def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
     (_, x_factor), (unit, length) = scales[axis], scales[held]
     x, at_level = x_factor * getattr(sweep, axis), sweep.held
     levels = np.unique(at_level)
-    drawn = styles(levels.size, held)
+    drawn = style.styles(levels.size, held)
     kinds = (
         (factor * np.abs(sweep.stiffness), f"|K| [{stiffness}]"),
         (sweep.stiffness.imag / sweep.stiffness.real, "loss factor [-]"),
     )
     for axes, (values, label) in zip(pair, kinds, strict=True):
-        for level, style in zip(levels, drawn, strict=True):
+        for level, look in zip(levels, drawn, strict=True):
             at = at_level == level
-            axes.plot(*_means(x[at], values[at]), color=style.color, ls=style.dashes, lw=0.8)
-            axes.plot(x[at], values[at], style.marker, color=style.color, alpha=0.75, **POINT)
-        dress(axes, axis_label(sweep.direction, axis), label)
-        readable(axes, x)
+            axes.plot(*_means(x[at], values[at]), color=look.color, ls=look.dashes, lw=0.8)
+            axes.plot(x[at], values[at], look.marker, color=look.color, alpha=0.75, **style.POINT)
+        style.dress(axes, axis_label(sweep.direction, axis), label)
+        style.readable(axes, x)
     labels = [f"{length * level:.3g} {unit}" for level in levels]
     if sweep.stepped:
-        name_levels(pair[-1], labels, held, [True] * levels.size)
+        style.name_levels(pair[-1], labels, held, [True] * levels.size)
     return pair[0]
 
 

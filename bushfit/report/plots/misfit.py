@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, TypeVar, cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -12,9 +12,6 @@ from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.report.plots.points import Kind, Repeats, held_beside, over_sectors
-
-_T = TypeVar("_T", SweepData, LoopData)
-_K = TypeVar("_K")
 
 #: Most rows of a map: each is then 1.7 mm high, and its bars and the lines between rows are still seen.
 _MOST_ROWS = 24
@@ -68,26 +65,18 @@ def columns(before: Model, after: Model, later: Mapping[DataSet, DataSet]) -> li
     return [(before, "before"), (after, f"after adding {' and '.join(added)}" if added else "after")]
 
 
-def replaced(tests: Mapping[_K, Sequence[_T]], later: Mapping[DataSet, DataSet]) -> dict[_K, list[_T]]:
-    """The tests as mended, under the directions they were recorded as."""
-    return {kind: [cast(_T, later[test]) for test in mine] for kind, mine in tests.items()}
-
-
 def side_of(
     model: Model,
     name: str,
-    data_sets: Sequence[DataSet],
+    later: Mapping[DataSet, DataSet],
     sweeps: Mapping[Kind, Sequence[SweepData]],
     loops: Mapping[Place, Sequence[LoopData]],
 ) -> Side:
-    """What is drawn of a model against all tests."""
-    gap = float(np.sqrt(np.mean(np.square(np.concatenate([data_set.residual(model) for data_set in data_sets])))))
-    return Side(
-        name,
-        gap,
-        {kind: _map(model, kind, mine) for kind, mine in sweeps.items()},
-        {direction: [_curve(model, data_set) for data_set in mine] for direction, mine in loops.items()},
-    )
+    """What is drawn of a model against all tests, each in place of the one that `later` has it for."""
+    residuals = np.concatenate([data_set.residual(model) for data_set in later.values()])
+    maps = {kind: _map(model, kind, [cast("SweepData", later[test]) for test in each]) for kind, each in sweeps.items()}
+    curves = {place: [_curve(model, cast("LoopData", later[test])) for test in each] for place, each in loops.items()}
+    return Side(name, float(np.sqrt(np.mean(np.square(residuals)))), maps, curves)
 
 
 def _map(model: Model, kind: Kind, data_sets: Sequence[SweepData]) -> Map:

@@ -15,23 +15,8 @@ from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.prediction import Band, Prediction
 from bushfit.reading.measurement import loss_factor
+from bushfit.report.plots import style
 from bushfit.report.plots.points import Axis, Points, held_beside, means
-from bushfit.report.plots.style import (
-    DOT,
-    INK,
-    POINT,
-    ROW,
-    Style,
-    dress,
-    explain,
-    file_name,
-    least_span,
-    legend,
-    name_levels,
-    new_figure,
-    readable,
-    styles,
-)
 from bushfit.report.tables import spread, words
 from bushfit.units import for_people
 
@@ -81,16 +66,13 @@ def prediction_figure(
 ) -> Figure:
     """Magnitude and loss factor over frequency per amplitude, and over amplitude per frequency (Figs. 7 to 9).
 
-    Sweeps that held nothing have a row of their own, if there is a model to meet them.
+    Up to six amplitudes and four frequencies become lines. Sweeps that held nothing have a row of their own.
 
     Args:
-        prediction: its amplitudes (up to six) and frequencies (up to four) become the lines.
         measured: sweeps to lay over; other directions and levels are left out.
-        title: names the bushing.
         curves: the prediction on `fine_grid`, for smooth lines; without it they run straight from point to point.
         rig: the same as these lines, with the rig's effects: drawn thin where points are laid over, which it meets.
-        model: of the prediction.
-        note: what else a reader must know, such as what the prediction leaves out.
+        model: of the prediction, to meet sweeps that held nothing.
     """
     lines = prediction if curves is None else curves
     every = [data_set for data_set in measured if data_set.direction == prediction.direction]
@@ -110,7 +92,7 @@ def prediction_figure(
         levels = known if known.size > 1 else frequencies
         rows.append(("amplitude", _lines(levels, held_by("amplitude"), _MOST_FREQUENCIES)))
     height = len(rows) + bool(free)
-    figure = new_figure(title, height * ROW)
+    figure = style.new_figure(title, height * style.ROW)
     grid = figure.subplots(height, 2, squeeze=False)
     pairs = zip(grid[bool(free) :], rows, strict=True)
     drawn = [draw(pair, prediction.direction, lines, points, *row, rig) for pair, row in pairs]
@@ -122,7 +104,7 @@ def prediction_figure(
     through = " Thin lines: the same with what belongs to the rig, as the points were measured." if laid and rig else ""
     if amplitudes.size > _MOST_AMPLITUDES:
         through += f" Over frequency some of the {amplitudes.size} amplitudes are drawn."
-    explain(figure, f"Lines: model{shade}.{through}", points_note(every) if laid or free else "", note)
+    style.explain(figure, f"Lines: model{shade}.{through}", points_note(every) if laid or free else "", note)
     return figure
 
 
@@ -142,19 +124,10 @@ def draw(
     levels: Array,
     rig: Prediction | None = None,
 ) -> bool:
-    """Draw stiffness left and loss factor right, a line and its points per level.
+    """Draw stiffness left and loss factor right, a line and its points per level, and say whether there were points.
 
-    Args:
-        pair: the two panels.
-        direction: of motion.
-        lines: the model.
-        points: as measured.
-        axis: what lies along x.
-        levels: what is held, (k,): amplitudes [m or rad] or frequencies [Hz].
-        rig: the model with what belongs to the rig, as thin lines where there are points.
-
-    Returns:
-        Whether there were points.
+    `levels` are what is held, (k,): amplitudes [m or rad] or frequencies [Hz]; `rig` is the model with what belongs to
+    the rig, as thin lines where there are points.
     """
     held, units = held_beside(axis), direction.display
     scales = {"frequency": ("Hz", 1.0), "amplitude": units.displacement}
@@ -162,13 +135,10 @@ def draw(
     x, where = scale * getattr(lines, axis), scale * getattr(points, axis)
     marked = _spots(getattr(points, held), levels, (where >= x.min() * (1 - _SAME)) & (where <= x.max() * (1 + _SAME)))
     laid = any(spots.any() for spots in marked)
-    looks = styles(levels.size, held)
-    stiffness_unit, factor = for_people(*units.stiffness, float(lines.stiffness.value.max()))
-    kinds = (
-        ("stiffness", factor, stiffness_label(direction, stiffness_unit)),
-        ("loss_factor", 1.0, f"{direction} loss factor [-]"),
-    )
-    for axes, (kind, factor, name) in zip(pair, kinds, strict=True):
+    looks = style.styles(levels.size, held)
+    stiffness_factor, names = pair_labels(direction, float(lines.stiffness.value.max()))
+    kinds = (("stiffness", stiffness_factor), ("loss_factor", 1.0))
+    for axes, name, (kind, factor) in zip(pair, names, kinds, strict=True):
         line, point = (_scaled(getattr(one, kind), factor) for one in (lines, points))
         for look, level, spots in zip(looks, levels, marked, strict=True):
             at = getattr(lines, held) == level
@@ -177,16 +147,18 @@ def draw(
                 if rig is not None:
                     axes.plot(x[at], factor * getattr(rig, kind).value[at], color=look.color, lw=_THIN)
                 _draw_points(axes, look, where, point, spots)
-        dress(axes, axis_label(direction, axis), name)
-        readable(axes, x)
-        least_span(axes, _LEAST_STIFFNESS_SPAN * line.high.max() if kind == "stiffness" else _LEAST_LOSS_SPAN)
+        style.dress(axes, axis_label(direction, axis), name)
+        style.readable(axes, x)
+        style.least_span(axes, _LEAST_STIFFNESS_SPAN * line.high.max() if kind == "stiffness" else _LEAST_LOSS_SPAN)
     besides = {
-        "bushing": Line2D([], [], color=INK, lw=_LINE),
-        "with the rig": Line2D([], [], color=INK, lw=_THIN, marker="o", **POINT),
+        "bushing": Line2D([], [], color=style.INK, lw=_LINE),
+        "with the rig": Line2D([], [], color=style.INK, lw=_THIN, marker="o", **style.POINT),
     }
     unit, scale = scales[held]
-    names = [f"{scale * level:.3g} {unit}" for level in levels]
-    name_levels(pair[-1], names, held, [bool(spots.any()) for spots in marked], besides if laid and rig else None)
+    called = [f"{scale * level:.3g} {unit}" for level in levels]
+    style.name_levels(
+        pair[-1], called, held, [bool(spots.any()) for spots in marked], besides if laid and rig else None
+    )
     return laid
 
 
@@ -201,23 +173,26 @@ def _scaled(band: Band, factor: float) -> Band:
     return Band(factor * band.value, factor * band.low, factor * band.high)
 
 
-def _draw_line(axes: Axes, look: Style, x: Array, band: Band, at: Array) -> None:
+def _draw_line(axes: Axes, look: style.Style, x: Array, band: Band, at: Array) -> None:
     """A line with its band; a stroke where it has but one point."""
     marker = "_" if at.sum() == 1 else ""
     axes.plot(x[at], band.value[at], color=look.color, ls=look.dashes, lw=_LINE, marker=marker, ms=_STROKE)
     axes.fill_between(x[at], band.low[at], band.high[at], color=look.color, alpha=0.22, lw=0)
 
 
-def _draw_points(axes: Axes, look: Style, x: Array, band: Band, at: Array) -> None:
+def _draw_points(axes: Axes, look: style.Style, x: Array, band: Band, at: Array) -> None:
     """Measured points, with bars from the lowest to the highest repeat."""
     axes.vlines(x[at], band.low[at], band.high[at], color=look.color, lw=0.7, alpha=0.7)
-    axes.plot(x[at], band.value[at], look.marker, color=look.color, **POINT)
+    axes.plot(x[at], band.value[at], look.marker, color=look.color, **style.POINT)
 
 
-def stiffness_label(place: Place, unit: str) -> str:
-    """The label of an axis with the stiffness, or the modulus, of a place."""
+def pair_labels(place: Place, largest: float) -> tuple[float, tuple[str, str]]:
+    """The factor from SI in which stiffness (or modulus) up to `largest` is drawn, and the labels of the panels of
+    stiffness and loss factor of a place."""
+    unit, factor = for_people(*place.display.stiffness, largest)
     resisted = words(place)[2]
-    return f"{place} {resisted}{' |K|' if resisted == 'stiffness' else ''} [{unit}]"
+    magnitude = " |K|" if resisted == "stiffness" else ""
+    return factor, (f"{place} {resisted}{magnitude} [{unit}]", f"{place} loss factor [-]")
 
 
 def axis_label(place: Place, axis: Axis) -> str:
@@ -226,31 +201,20 @@ def axis_label(place: Place, axis: Axis) -> str:
 
 
 def draw_as_it_came(pair: Sequence[Axes], place: Place, model: Model, data_sets: Sequence[SweepData]) -> None:
-    """Draw sweeps that held nothing over the frequency: points as measured, and the model at the same points.
-
-    Args:
-        pair: the panels of stiffness and loss factor.
-        place: of the sweeps.
-        model: its lines meet each point at the amplitude that it reached.
-        data_sets: the sweeps, a colour each.
-    """
-    largest = max(float(np.abs(data_set.measured).max()) for data_set in data_sets)
-    unit, factor = for_people(*place.display.stiffness, largest)
-    looks = styles(len(data_sets), "loop")
-    kinds: tuple[tuple[Callable[[Array], Array], float, str], ...] = (
-        (np.abs, factor, stiffness_label(place, unit)),
-        (loss_factor, 1.0, f"{place} loss factor [-]"),
-    )
-    for axes, (quantity, scale, name) in zip(pair, kinds, strict=True):
+    """Draw sweeps that held nothing over the frequency: points as measured, and the model at the same points."""
+    factor, names = pair_labels(place, max(float(np.abs(data_set.measured).max()) for data_set in data_sets))
+    looks = style.styles(len(data_sets), "loop")
+    kinds: tuple[tuple[Callable[[Array], Array], float], ...] = ((np.abs, factor), (loss_factor, 1.0))
+    for axes, name, (quantity, scale) in zip(pair, names, kinds, strict=True):
         for data_set, look in zip(data_sets, looks, strict=True):
             rising = np.argsort(data_set.frequency, kind="stable")
             frequency, known = data_set.frequency[rising], _known(data_set)[rising]
             measured, modelled = (scale * quantity(k)[rising] for k in (data_set.measured, data_set.stiffness(model)))
-            axes.plot(frequency[known], measured[known], "o", color=look.color, alpha=0.5, **DOT)
+            axes.plot(frequency[known], measured[known], "o", color=look.color, alpha=0.5, **style.DOT)
             axes.plot(frequency, modelled, color=look.color, lw=_LINE)
-        dress(axes, "frequency [Hz]", name)
+        style.dress(axes, "frequency [Hz]", name)
     handles = [Line2D([], [], color=look.color, lw=_LINE) for look in looks]
-    legend(pair[-1], handles, [file_name(data_set.name) for data_set in data_sets], "test")
+    style.legend(pair[-1], handles, [style.file_name(data_set.name) for data_set in data_sets], "test")
 
 
 def _known(data_set: SweepData) -> Array:

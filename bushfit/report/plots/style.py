@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import textwrap
 import warnings
 from collections.abc import Mapping, Sequence
@@ -43,6 +44,9 @@ DOT: dict[str, Any] = {"ms": 2.4, "mew": 0}
 INK = "#1a1a1a"
 #: Colour of what explains.
 GREY = "#595959"
+#: How a figure's own words are written: names of axes, and what is smaller.
+NAMES: dict[str, Any] = {"fontsize": TEXT, "color": INK}
+WORDS: dict[str, Any] = {"fontsize": SMALL, "color": INK}
 #: Colour of outliers.
 OUTLIER = "#c1121f"
 #: Resolution of a picture [dots per inch]: sharp in a report, and small enough to be mailed.
@@ -65,6 +69,8 @@ _LOG_RATIO = 40.0
 _TITLE_LETTERS = 64
 #: Height of each further line of the title [inch].
 _TITLE_LINE = 0.42 / CM
+#: Letters in a line of a panel's name at its left, as many as the height of a panel holds.
+_LABEL_LETTERS = 27
 #: Letters in a line of the explanation, as many as the width of a figure holds.
 _NOTE_LETTERS = 112
 #: Fonts that help out for names beyond Latin, Greek and Cyrillic, where they are installed.
@@ -108,13 +114,20 @@ def fonts() -> list[str]:
 
 def dress(axes: Axes, x_label: str, y_label: str) -> None:
     """Give a panel its labels, ticks and a grid behind all that is drawn."""
-    axes.set_xlabel(x_label, fontsize=TEXT, color=INK)
-    axes.set_ylabel(y_label, fontsize=TEXT, color=INK)
+    axes.set_xlabel(x_label, **NAMES)
+    name_left(axes, y_label)
     axes.tick_params(labelsize=SMALL, colors=INK)
     axes.grid(color="#d9d9d9", lw=0.5)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     axes.yaxis.set_major_formatter(ScalarFormatter(useOffset=False))
+
+
+def name_left(axes: Axes, label: str, **place: Any) -> None:
+    """Write what a panel shows at its left, in several lines where one would be longer than the panel is high."""
+    whole = re.sub(r"\[.*?\]", lambda unit: unit[0].replace(" ", "\u00a0"), label)
+    lines = [part for line in whole.splitlines() for part in textwrap.wrap(line, _LABEL_LETTERS)]
+    axes.set_ylabel("\n".join(lines), fontsize=TEXT, color=INK, family=fonts(), parse_math=False, **place)
 
 
 def readable(axes: Axes, values: Array) -> None:
@@ -165,18 +178,14 @@ def legend(
 ) -> None:
     """Name the lines of a panel; of more than eight name eight, spread from first to last, and say how many more.
 
-    Args:
-        axes: the panel.
-        handles, labels: of all levels.
-        title: of the legend.
-        besides: what is named after the levels, by its label.
-        place: where the legend stands, in matplotlib's words; right of the panel where nothing is said.
+    `besides` are named after the levels, by their labels; `place` says where the legend stands, in matplotlib's words,
+    or else right of the panel.
     """
-    named = spread(len(handles), MOST_NAMED)
-    lines, texts = [handles[place] for place in named], [labels[place] for place in named]
+    named = [(handles[place], labels[place]) for place in spread(len(handles), MOST_NAMED)]
     if left := len(handles) - len(named):
-        lines, texts = [*lines, Line2D([], [], ls="")], [*texts, f"and {left} more"]
-    lines, texts = [*lines, *(besides or {}).values()], [*texts, *(besides or {})]
+        named.append((Line2D([], [], ls=""), f"and {left} more"))
+    named += [(line, text) for text, line in (besides or {}).items()]
+    lines, texts = zip(*named, strict=True)
     axes.legend(lines, texts, fontsize=SMALL, title_fontsize=SMALL, **(_LEGEND | {"title": title} | place))
 
 
@@ -189,12 +198,7 @@ def name_levels(
 ) -> None:
     """Say which line is which level: by a legend, the stiffest on top, or of more than eight by a colour bar.
 
-    Args:
-        axes: the panel.
-        levels: amplitudes or frequencies in words, rising, (k,).
-        what: "amplitude" or "frequency".
-        marked: whether each has points, (k,).
-        besides: what is named after the levels, by its label.
+    `levels` are amplitudes or frequencies in words, rising, (k,); `marked`, whether each has points, (k,).
     """
     looks = styles(len(levels), what)
     if len(levels) <= MOST_NAMED:
@@ -206,10 +210,10 @@ def name_levels(
     colors = ScalarMappable(BoundaryNorm(edges, len(levels)), ListedColormap([look.color for look in looks]))
     bar = axes.figure.colorbar(colors, ax=axes, aspect=16, pad=0.04, drawedges=False)
     ticks = spread(len(levels), MOST_NAMED)
-    bar.set_ticks(ticks.tolist(), labels=[levels[tick] for tick in ticks], fontsize=SMALL, color=INK)
+    bar.set_ticks(ticks.tolist(), labels=[levels[tick] for tick in ticks], **WORDS)
     bar.ax.tick_params(length=2, colors=INK, which="both")
     bar.minorticks_off()
-    bar.ax.set_title(what, fontsize=SMALL, color=INK)
+    bar.ax.set_title(what, **WORDS)
     bar.outline.set(edgecolor=GREY, linewidth=0.6)
 
 

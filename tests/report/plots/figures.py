@@ -48,7 +48,8 @@ def points(axes: Axes) -> list[Any]:
 
 
 def labels(figure: Figure) -> list[str]:
-    return [label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
+    names = [name for axes in figure.axes for name in (axes.get_xlabel(), axes.get_ylabel()) if name]
+    return [" ".join(name.split()) for name in names]
 
 
 def legend(axes: Axes) -> list[str]:

@@ -6,11 +6,13 @@ import matplotlib
 import numpy as np
 import pytest
 from figures import Looped, Swept, predicted
+from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.report.plots import loops_figure, prediction_figure, sweeps_figure, to_png
+from bushfit.report.plots.style import dress
 
 
 def test_same_figure_same_bytes_and_no_trace_of_when_or_with_what(paper_model: Model, swept: Swept) -> None:
@@ -51,3 +53,14 @@ def test_no_text_lies_on_another(paper_model: Model, swept: Swept, looped: Loope
 def overlap(one: Bbox, other: Bbox) -> bool:
     common = Bbox.intersection(one, other)
     return common is not None and common.width > 1.0 and common.height > 1.0
+
+
+def test_the_name_of_a_panel_is_in_lines_no_higher_than_the_panel() -> None:
+    axes = Figure().add_subplot()
+    for label, lines in (
+        ("axial stiffness |K| [N/mm]", ["axial stiffness |K| [N/mm]"]),
+        ("torsion stiffness |K| [N m/deg]", ["torsion stiffness |K|", "[N\u00a0m/deg]"]),
+        ("DMA, second specimen modulus [MPa]", ["DMA, second specimen", "modulus [MPa]"]),
+    ):
+        dress(axes, "", label)
+        assert axes.get_ylabel().splitlines() == lines
