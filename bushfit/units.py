@@ -97,6 +97,7 @@ _EVERYDAY = {
         "radian": {"rad": 1.0, "deg": math.pi / 180.0},
         "second": {"s": 1.0, "ms": 1e-3, "min": 60.0},
         "1 / second": {"Hz": 1.0},
+        "radian / second": {"rad/s": 1.0},
         "kilogram * meter / second ** 2": {"N": 1.0, "kN": 1e3},
         "kilogram * meter ** 2 / second ** 2": {"N*m": 1.0, "N m": 1.0, "Nm": 1.0},
         "kilogram / second ** 2": {"N/m": 1.0, "N/mm": 1e3, "kN/mm": 1e6},
