@@ -27,7 +27,7 @@ _SAME_NAME = {
     "at_amplitude": 'Without a column: "0.1 mm" [found in the name].',
     "at_frequency": 'Without a column: "10 Hz" [found in the name].',
     "temperature": 'Of the test, or of the rows to take: "23 degC".',
-    "specimen": "Name of the specimen, if no bushing [coupon; bar if in tension].",
+    "specimen": "Its name, if no bushing [coupon, or bar in tension].",
     "area": 'Of one rubber block in shear, such as "772 mm^2".',
     "thickness": 'Of one rubber block in shear, such as "6 mm".',
     "elements": "Rubber blocks in parallel [1].",
