@@ -193,6 +193,7 @@ class SweepFile(TestFile):
     Args:
         at_amplitude: of a file without a column for it, with its unit: "0.1 mm", "0.15 %".
         at_frequency: likewise [Hz].
+        stepped: what was stepped while the other was held, where the order of the rows does not tell it.
     """
 
     columns: Annotated[Mapping[str, Text], _roles(SWEEP_COLUMNS)] = field(default_factory=dict)
@@ -200,6 +201,7 @@ class SweepFile(TestFile):
     amplitude: AmplitudeConvention | None = None
     at_amplitude: Text | None = None
     at_frequency: Frequency | None = None
+    stepped: Stepped | None = None
 
 
 @dataclass(frozen=True)

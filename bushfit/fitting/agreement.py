@@ -104,7 +104,7 @@ def _misfits(model: Model, data_set: DataSet, *, was_fitted: bool) -> Iterator[M
 
     def figures(run: _Run, relative: Array, squares: Array, gain: Array) -> Misfit:
         named = data_set.name, place, was_fitted, run.held, run.value, run.unit
-        reduced = float(squares.sum()) / (data_set.parts * relative.size)
+        reduced = float(squares.sum()) / (data_set.parts * relative.size * data_set.test.weight)
         return Misfit(*named, relative.size, float(np.sqrt(np.mean(relative**2))), reduced, float(gain.mean()))
 
     yield figures(_Run(None, None, None, every), relative, squares, gain)

@@ -22,6 +22,9 @@ from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 FLOOR = 1e-4
 #: Errors that a run shares where nothing was repeated, relative gain and phase [rad]; chosen: those of most rigs.
 ASSUMED_SHARED = (5e-3, float(np.radians(0.25)))
+#: Degrees of freedom from which on repeats alone tell what a run shares; chosen: those of three repeats at three levels;
+#: with fewer, 95 % intervals were too narrow.
+_ENOUGH = 6
 #: Probability of unequal variances by chance, below which levels get noise of their own.
 _EQUAL_NOISE_P = 1e-3
 #: Degree, in the logarithm of what is stepped, of the smooth curve that stands in for repeats; chosen: it follows
@@ -133,7 +136,8 @@ def sweep_noise(sweeps: Sequence[Sweep]) -> SweepNoise:
     }
     if repeated:
         shared_freedom = sum(line.repeats - 1 for line in repeated)
-        return SweepNoise(random, _shared(repeated), "repeats", shared_freedom, scatter_freedom)
+        shared = _shared(repeated, shared_freedom)
+        return SweepNoise(random, shared, "repeats", max(shared_freedom, _ENOUGH), scatter_freedom)
     by_campaign = all(sweep.noise is not None for sweep in sweeps)
     shared, origin = ((0.0, 0.0), "stated") if by_campaign else (ASSUMED_SHARED, "assumed")
     return SweepNoise(random, shared, origin, 0, scatter_freedom)
@@ -179,12 +183,16 @@ def _pooled(lines: Mapping[LineKey, _Line], measured: Sequence[_Line]) -> tuple[
     return dict.fromkeys(lines, pooled), sum(freedoms)
 
 
-def _shared(repeated: Sequence[_Line]) -> tuple[float, float]:
-    """Standard deviation of what a run shares in gain and phase, outlying pairs of repeats left out."""
+def _shared(repeated: Sequence[_Line], freedom: int) -> tuple[float, float]:
+    """Standard deviation of what a run shares in gain and phase, outlying pairs of repeats left out.
+
+    Few repeats often show none by chance: what they lack to _ENOUGH degrees of freedom, ASSUMED_SHARED makes up.
+    """
     pairs = np.concatenate([line.shared for line in repeated])
     usual = np.abs(pairs) <= _OUTLYING_PAIR * np.median(np.abs(pairs), axis=0)
     variance = np.where(usual.any(axis=0), np.mean(pairs, axis=0, where=usual), 0.0)
-    return _pair(np.sqrt(np.maximum(variance, 0.0)))
+    measured = min(freedom / _ENOUGH, 1.0)
+    return _pair(np.sqrt(measured * np.maximum(variance, 0.0) + (1.0 - measured) * np.square(ASSUMED_SHARED)))
 
 
 def _pair(values: Array) -> tuple[float, float]:

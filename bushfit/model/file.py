@@ -278,10 +278,11 @@ def _renamed(document: dict[str, Any]) -> dict[str, Any]:
         return document
     text = json.dumps(document).replace(f'"{excess}"', f'"{FACTOR.name}"').replace(f'"{old}"', f'"{FACTOR.name}"')
     renamed = json.loads(text)
-    entry = renamed["parameters"][FACTOR.name]
-    entry["value"] += 1.0
-    if entry.get("profile95"):
-        entry["profile95"] = [None if end is None else 1.0 + end for end in entry["profile95"]]
+    entry = renamed["parameters"].get(FACTOR.name) if isinstance(renamed.get("parameters"), dict) else None
+    if isinstance(entry, dict) and isinstance(entry.get("value"), int | float):
+        entry["value"] += 1.0
+        if isinstance(entry.get("profile95"), list):
+            entry["profile95"] = [None if end is None else 1.0 + end for end in entry["profile95"]]
     return renamed
 
 

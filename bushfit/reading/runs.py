@@ -22,6 +22,11 @@ _LEAST_GAP = 3.0
 _WIDEST_PASS = 0.4
 #: Share of the rows, at least, with the frequency or the level of the row before, where one of them is held.
 _LEAST_HELD = 0.1
+#: The same share from which on the rows stand in the order in which they were recorded.
+_IN_ORDER = 0.4
+#: Values of what is stepped at least, for the order of the rows to tell it; chosen: a table of three amplitudes is
+#: often sorted by frequency.
+_FEWEST_STEPS = 4
 #: Points of a run at least for its levels to be told by their place in it.
 _FEWEST_POINTS = 3
 
@@ -34,26 +39,39 @@ class Runs(NamedTuple):
     repeat: NDArray[np.int64]
 
 
-def runs_of(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | None) -> Runs:
-    """The runs of a sweep, from its points in the order of the file.
+def runs_of(
+    frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | None, stepped: Stepped | None = None
+) -> Runs:
+    """The runs of a sweep, from its points in the order of the file: what its rows keep from one to the next is held.
+
+    Where rows stand in no order, or runs would be of a few points alone, as in a table that was sorted, the count
+    tells: what takes more values is stepped.
 
     Args:
         frequency: [Hz], (n,).
         amplitude: as the file has it, nominal or as reached, (n,).
         repeat: number of the repeat as the file has it, (n,); None where it has none: then what occurs again at a
             frequency and level is a repeat.
+        stepped: what is stepped, where it is stated.
     """
     levels = nominal(amplitude)
     if (levels == amplitude).all():
         levels = _by_rank(frequency, amplitude, repeat)
-    if np.mean((np.diff(frequency) == 0.0) | (np.diff(levels) == 0.0)) < _LEAST_HELD:
+    kept_frequency, kept_level = (float(np.mean(np.diff(values) == 0.0)) for values in (frequency, levels))
+    if max(kept_frequency, kept_level) < _LEAST_HELD:
         passes = repeat if repeat is not None else np.cumsum(np.append(False, np.diff(frequency) < 0.0)) + 1
         if (of_passes := _of_passes(amplitude, _number(passes))) is None:
             return Runs(None, amplitude, passes)
         levels = of_passes
+        kept_frequency, kept_level = 0.0, 1.0
     of_frequency, of_level = (np.unique(values).size for values in (frequency, levels))
     counted = repeat if repeat is not None else _occurrence(frequency, levels)
-    return Runs("amplitude" if of_level > of_frequency else "frequency", levels, counted)
+    if stepped is None:
+        by_order: Stepped = "amplitude" if kept_frequency > kept_level else "frequency"
+        in_order = max(kept_frequency, kept_level) >= _IN_ORDER
+        told = in_order and (of_level if by_order == "amplitude" else of_frequency) >= _FEWEST_STEPS
+        stepped = by_order if told else "amplitude" if of_level > of_frequency else "frequency"
+    return Runs(stepped, levels, counted)
 
 
 def nominal(amplitude: Floats) -> Floats:

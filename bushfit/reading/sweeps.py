@@ -13,7 +13,7 @@ from bushfit import units as si
 from bushfit.geometry import Place, stated_strain
 from bushfit.reading.headers import AmplitudeConvention, Column
 from bushfit.reading.layout import FileFormat
-from bushfit.reading.measurement import Complex, Floats, Sweep, source_of
+from bushfit.reading.measurement import Complex, Floats, Stepped, Sweep, source_of
 from bushfit.reading.runs import runs_of
 from bushfit.reading.table import Table
 from bushfit.reading.words import OF_MOTION, SWEEP_COLUMNS
@@ -67,6 +67,7 @@ def read_sweep(
     amplitude: AmplitudeConvention | None = None,
     at_amplitude: float | None = None,
     at_frequency: float | None = None,
+    stepped: Stepped | None = None,
     noise: float | None = None,
     weight: float = 1.0,
     temperature: float | None = None,
@@ -83,6 +84,7 @@ def read_sweep(
             The sweep has them zero-to-peak.
         at_amplitude: of a file without a column for it [m or rad, or strain], counted as `amplitude` has it.
         at_frequency: of a file without a column for it [Hz].
+        stepped: what was stepped while the other was held, where the order of the rows does not tell it.
         noise, weight, conditions: as of `read_loop`.
         temperature: at which it was tested [K], where it is stated; of a file with a column for it, the rows near it.
 
@@ -109,7 +111,7 @@ def read_sweep(
     rows, temperature = _of_temperature(table, values, temperature)
     frequency, level = values["frequency"][rows], to_peak * values["amplitude"][rows]
     reached = to_peak * values["amplitude_reached"][rows] if "amplitude_reached" in values else None
-    runs = runs_of(frequency, level, None if repeat is None else repeat[rows])
+    runs = runs_of(frequency, level, None if repeat is None else repeat[rows], stepped)
     if reached is None and not np.array_equal(runs.amplitude, level):
         reached = level
     source = source_of(file, listed_as, table.sha256, temperature, conditions)

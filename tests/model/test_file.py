@@ -99,6 +99,13 @@ def test_the_radial_factor_of_older_files_is_read(document: dict[str, Any]) -> N
     assert (radial, axial) == (pytest.approx(1.05), pytest.approx(1.0))
 
 
+def test_an_older_file_with_a_misnamed_factor_is_one_clear_error(document: dict[str, Any]) -> None:
+    document["effects"].append("radial_factor")
+    document["parameters"]["radial_factor.factor"] = {"value": 0.05, "unit": "1", "vary": True}
+    with pytest.raises(ModelError, match=r"stiffness_factor\.radial"):
+        from_document(document)
+
+
 @pytest.mark.parametrize("schema", ["bushfit/model/3", "bushfit/diagnosis/1", None, 3])
 def test_an_unknown_schema_is_refused_by_name(document: dict[str, Any], tmp_path: Path, schema: object) -> None:
     document["schema"] = schema

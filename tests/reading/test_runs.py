@@ -71,3 +71,21 @@ def test_a_frequency_sweep_that_falls_short_by_a_quarter_is_one_run() -> None:
     runs = runs_of(frequency, 0.15 * frequency**-0.03, None)
     assert runs.stepped == "frequency"
     assert np.unique(runs.amplitude).size == 1
+
+
+@pytest.mark.parametrize("stepped", ["frequency", "amplitude"])
+@pytest.mark.parametrize("counts", [(4, 8), (5, 5), (15, 8), (15, 15), (8, 40)], ids=str)
+@pytest.mark.parametrize("repeats", [1, 2])
+def test_the_order_of_the_rows_tells_what_is_stepped(stepped: str, counts: tuple[int, int], repeats: int) -> None:
+    levels, steps = np.geomspace(1e-5, 1e-3, counts[0]), np.geomspace(5.0, 150.0, counts[1])
+    axes = (levels, np.arange(repeats), steps) if stepped == "frequency" else (steps, np.arange(repeats), levels)
+    held, _, step = (axis.ravel() for axis in np.meshgrid(*axes, indexing="ij"))
+    frequency, amplitude = (step, held) if stepped == "frequency" else (held, step)
+    assert runs_of(frequency, amplitude, None).stepped == stepped
+
+
+def test_a_table_of_three_amplitudes_that_was_sorted_by_frequency_steps_the_frequency() -> None:
+    frequency, amplitude = (axis.ravel() for axis in np.meshgrid(np.arange(5.0, 156.0, 10.0), [1e-4, 2e-4, 5e-4]))
+    order = np.lexsort((amplitude, frequency))
+    assert runs_of(frequency[order], amplitude[order], None).stepped == "frequency"
+    assert runs_of(frequency[order], amplitude[order], None, "amplitude").stepped == "amplitude"
