@@ -17,7 +17,7 @@ from bushfit.diagnosis.record import Diagnosis, Judged, Named, Verdict, Where
 from bushfit.diagnosis.refit import Candidate
 from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.search import SAME, Search, Step
-from bushfit.effects import effect_named, effect_of
+from bushfit.effects import effect_named, effect_of, qualified
 from bushfit.fitting.agreement import misfits, usable
 from bushfit.fitting.assess import Stage, covariance, measured_range, quality
 from bushfit.fitting.data_sets import parted, sources
@@ -61,6 +61,9 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
         words = f"{' and '.join(step.name for step in steps)}, or a fault of the measurement: {fault.suspect.words}"
         return finish(search, "ambiguous", f"these tests cannot tell {words}", base, leaders, fault=fault)
     names = [_named(step) for step in steps]
+    if beyond := _at_bound(final, steps):
+        words = f"{_closing(names)} the gap only with {beyond} at the edge of what is possible"
+        return finish(search, "unexplained", words, base, ())
     held = hold_out(base, final)
     if not held.passed:
         words = f"{_closing(names)} the gap only where fitted, so the name is taken back"
@@ -74,6 +77,12 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
         words = f"{_closing(names)} part of the gap; {remainder.words}"
         return finish(search, "partly", words, final, names, fault=remainder.fault)
     return finish(search, "unexplained", remainder.words, base, (), fault=remainder.fault)
+
+
+def _at_bound(final: Evidence, steps: Sequence[Step]) -> str | None:
+    """The amount of an added effect that came to rest on a bound: what is missing is then another thing."""
+    amounts = {qualified(effect, effect.amount) for effect in map(effect_named, (step.name for step in steps))}
+    return next((name for name in final.solution.at_bound if name in amounts), None)
 
 
 def _ambiguous(search: Search, final: Evidence, steps: Sequence[Step], names: Sequence[Named]) -> Diagnosis:

@@ -24,7 +24,7 @@ class Mistake(Effect):
         sweep_line: the same for a sweep, where it differs.
         kinds: tests in which it is made, sweeps unless told; none for one that is made in [bushing].
         motion: of the tests in which it is made; None for any.
-        displacement, force, time: true value over the one stated.
+        displacement, force, time: true value over the one stated; `displacement` of the radii, where it is made there.
         stiffness: true complex stiffness by the one stated, (n,) each, for what the three factors cannot say; of a
             sweep only.
         doubt: whether a complex stiffness as stated leaves room for the mistake; None for always.
@@ -82,8 +82,9 @@ class Mistake(Effect):
         return (other_direction(place) if self.swaps else None) or place
 
     def mended_bushing(self, bushing: Bushing) -> Bushing:
-        """The bushing whose radii were stated as diameters."""
-        return replace(bushing, inner_radius=bushing.inner_radius / 2.0, outer_radius=bushing.outer_radius / 2.0)
+        """The bushing as it is, if the mistake was made in its radii."""
+        inner, outer = (self.displacement * radius for radius in (bushing.inner_radius, bushing.outer_radius))
+        return replace(bushing, inner_radius=inner, outer_radius=outer)
 
     def corrected(self, test: Loop | Sweep | None) -> str:
         """What to write into the campaign for a test, or to correct in its file; None stands for the bushing."""

@@ -290,6 +290,15 @@ MISTAKES: dict[str, Mistake] = {
             equation="a, b = stated/2",
             line="[bushing]: half of what stands at inner_radius and at outer_radius",
             kinds=(),
+            displacement=0.5,
+        ),
+        Mistake(
+            name="radii_halved",
+            sentence="the radii in [bushing] were halved as if they were diameters",
+            equation="a, b = 2 stated",
+            line="[bushing]: twice what stands at inner_radius and at outer_radius",
+            kinds=(),
+            displacement=2.0,
         ),
     )
 }

@@ -48,7 +48,8 @@ def mistaken_campaign(seed: int, name: str) -> tuple[Simulated, Sealed]:
     if not mistake.kinds:
         bushing = clean.truth.bushing
         assert bushing is not None  # hidden campaigns have one
-        stated = replace(bushing, inner_radius=2.0 * bushing.inner_radius, outer_radius=2.0 * bushing.outer_radius)
+        share = 1.0 / mistake.displacement
+        stated = replace(bushing, inner_radius=share * bushing.inner_radius, outer_radius=share * bushing.outer_radius)
         truth = replace(clean.truth, bushing=stated)
         return replace(clean, truth=truth), replace(sealed, hidden=(name,))
     tests = _chosen(mistake, [*clean.loops, *clean.sweeps], random)

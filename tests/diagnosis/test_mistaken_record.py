@@ -31,10 +31,13 @@ def on_loops(change: Callable[[Loop], Loop], *numbers: int) -> Callable[[Campaig
     return lambda c: replace(c, loops=tuple(change(x) if i in numbers else x for i, x in enumerate(c.loops)))
 
 
-def in_diameters(c: Campaign) -> Campaign:
-    assert c.bushing is not None
-    wide = Bushing(c.bushing.name, 2.0 * c.bushing.inner_radius, 2.0 * c.bushing.outer_radius, c.bushing.length)
-    return replace(c, bushing=wide)
+def of_radii(share: float) -> Callable[[Campaign], Campaign]:
+    def stated(c: Campaign) -> Campaign:
+        assert c.bushing is not None
+        radii = (share * radius for radius in (c.bushing.inner_radius, c.bushing.outer_radius))
+        return replace(c, bushing=Bushing(c.bushing.name, *radii, c.bushing.length))
+
+    return stated
 
 
 MADE: dict[str, Callable[[Campaign], Campaign]] = {
@@ -50,7 +53,8 @@ MADE: dict[str, Callable[[Campaign], Campaign]] = {
         lambda s: replace(s, stiffness=np.abs(s.stiffness) * np.exp(1j * np.radians(np.angle(s.stiffness)))), 0
     ),
     "other_direction:sweep_radial": on_sweeps(lambda s: replace(s, direction=Direction.AXIAL), 1),
-    "diameters": in_diameters,
+    "diameters": of_radii(2.0),
+    "radii_halved": of_radii(0.5),
 }
 
 
