@@ -13,6 +13,7 @@ from bushfit.campaign.naming import folder_name
 from bushfit.campaign.places import place_tested
 from bushfit.campaign.schema import CampaignFile, FitSettings, LoopFile, PredictSettings, SimulateSettings, SweepFile
 from bushfit.campaign.toml import read_toml
+from bushfit.effects.stiffness_factor import FAMILY
 from bushfit.errors import CampaignError, naming, typed
 from bushfit.geometry import Bushing, Specimen, place_named
 from bushfit.reading.layout import FileFormat
@@ -82,6 +83,7 @@ def load_campaign(path: str | Path) -> Campaign:
         with naming(place="predict.directions"):
             for name in content.predict.directions or ():
                 place_named(name, specimens)
+        _check_factors(content, specimens)
     return Campaign(
         content.name or (bushing or specimens[0]).name,
         path,
@@ -122,6 +124,16 @@ def _check_bodies(bushing: Bushing | None, specimens: Sequence[Specimen]) -> Non
         raise CampaignError("nothing is said of what was tested", expected=expected)
     if doubles := {name for name in names if names.count(name) > 1}:
         raise CampaignError("two specimens have one name", place="[[specimens]]", found=", ".join(sorted(doubles)))
+
+
+def _check_factors(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
+    """Raise a ModelError where a stiffness factor is of a place that the campaign does not have."""
+    simulated = content.simulate.effects if content.simulate else {}
+    own = [f"{effect}.{name}" for effect, table in simulated.items() for name in table]
+    for name in (*content.fit.effects, *content.fit.parameters, *own):
+        if name.startswith(f"{FAMILY}."):
+            with naming(place=name):
+                place_named(name.removeprefix(f"{FAMILY}."), specimens)
 
 
 def refuse_tests(paths: Sequence[Path]) -> None:

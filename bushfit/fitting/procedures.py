@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bushfit.effects import BASE
+from bushfit.effects import BASE, effect_named
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.agreement import misfits, usable
@@ -19,6 +19,7 @@ from bushfit.fitting.plausible import implausible, unfitted
 from bushfit.fitting.profile import profile95
 from bushfit.fitting.robust import Estimate, estimate, told
 from bushfit.fitting.solve import Bounds, Coordinates, Solution
+from bushfit.geometry import place_named
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import End, Result
@@ -68,6 +69,9 @@ def fit_joint(
     Raises:
         FitError: no test in those directions, or data that cannot support the fit.
     """
+    for effect in map(effect_named, effects or ()):
+        if effect.corrects:
+            place_named(effect.corrects, data.campaign.specimens)
     data_sets = data.chosen(directions)
     found = _solve(data, data_sets, data.effects if effects is None else effects, {})
     left: list[DataSet] = [data_set for data_set in (*data.loops, *data.sweeps) if data_set not in data_sets]
