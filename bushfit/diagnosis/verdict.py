@@ -21,6 +21,7 @@ from bushfit.effects import effect_named, effect_of, qualified
 from bushfit.fitting.agreement import misfits, usable
 from bushfit.fitting.assess import Stage, covariance, measured_range, quality
 from bushfit.fitting.data_sets import parted, sources
+from bushfit.fitting.plausible import apart_in_temperature
 from bushfit.fitting.procedures import cautions
 from bushfit.fitting.solve import Bounds
 from bushfit.model.result import Result
@@ -224,7 +225,10 @@ def _result(evidence: Evidence, bounds: Bounds) -> Result:
         cov,
         quality(model, evidence.data_sets, len(moving)),
         measured_range(model, evidence.data_sets),
-        tuple(cautions(model, evidence.solution, evidence.data_sets, bounds, cov)),
+        (
+            *apart_in_temperature(evidence.data_sets),
+            *cautions(model, evidence.solution, evidence.data_sets, bounds, cov),
+        ),
         sources(evidence.data_sets),
         at_bound=evidence.solution.at_bound,
         tests=misfits(model, evidence.data_sets),

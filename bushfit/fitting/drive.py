@@ -18,7 +18,7 @@ from bushfit.effects.history import History, reversals
 from bushfit.errors import FitError
 from bushfit.fitting.clock import fundamental
 from bushfit.fitting.fourier import GRID, basis, least_squares, series
-from bushfit.fitting.loop_harmonics import MOST_ROWS, OutlierRows, loop_harmonics
+from bushfit.fitting.loop_harmonics import MOST_ROWS, LoopHarmonics, OutlierRows, loop_harmonics
 from bushfit.fitting.motion import mean_of_preload, preload, wrong_clock
 from bushfit.fitting.noise import FLOOR
 from bushfit.fitting.phase_bins import phase_bins
@@ -30,8 +30,11 @@ from bushfit.units import number
 #: Distance from a turning point up to which rows carry no weight [steps of the grid]: one step, and the half by which
 #: the point may lie beside its sample.
 _JUMP = 1.5
-#: Share of the half range up to which both first displacement and first force count as a start from rest.
+#: Share of the half range by which first displacement and first force may be off where rest is, for a start from rest.
 _AT_REST = 0.02
+#: Share of the change of the force over the first cycle by which the first force may be off the mean besides; chosen:
+#: the virgin curve moves the mean by up to 0.3 of it, and a settled loop hardly changes.
+_VIRGIN = 0.5
 #: Standard deviations of the noise by which the first force may be off zero besides.
 _FIRST_ROW = 3.0
 #: Share of a cycle at its start that is held against the same a cycle later.
@@ -64,9 +67,9 @@ class Drive:
         noise: standard deviation of one row's force [N or N m].
         coefficients: complex harmonics of the displacement, mean first.
         half_range: half of the range of the measured force, outliers aside [N or N m].
-        datum: mean of the measured force where the motion lies off zero, the force is a preload's, or other cycles
-            went before in the record; else None. Whether a sensor's zero, a preload or the memory of rubber put it
-            there is not known, so such a loop counts from its own middle.
+        datum: mean of the measured force where the motion lies off zero or starts from rest off zero, the force is a
+            preload's, or other cycles went before in the record; else None. Whether a sensor's zero, a preload or the
+            memory of rubber put it there is not known, so such a loop counts from its own middle.
         notes: sentences on what of the record was left out, and on a time that does not go with its rows.
         outliers: by column, rows of the loop that are faults of the record, and how far they lie off [noise].
         first_row: row of the whole record that the loop begins with.
@@ -131,7 +134,11 @@ class Drive:
 
     def from_datum(self, response: Array) -> Array:
         """A response over `history`, less its mean where the loop counts from its own middle."""
-        return response if self.datum is None else response - response.mean(axis=-1, keepdims=True)
+        if self.datum is None:
+            return response
+        if not self.from_rest:
+            return response - response.mean(axis=-1, keepdims=True)
+        return response - np.average(self.at_rows(response), axis=-1, weights=self.weight)[..., None]
 
     def at_rows(self, response: Array) -> Array:
         """A response over `history`, (..., samples), linearly interpolated at the rows, (..., n)."""
@@ -165,7 +172,8 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
     half_motion = float(np.ptp(series(found.motion, np.arange(GRID) / GRID))) / 2.0
     half_force = float(np.ptp(_without(loop.force, outliers))) / 2.0
     noise = loop.noise * half_force if loop.noise is not None else found.force_noise
-    from_rest = first_row == 0 and _from_rest(loop, frequency, half_motion, half_force, noise)
+    rests = _rests(loop, found, half_motion, half_force, noise, _change(loop, frequency, noise, half_force))
+    from_rest = first_row == 0 and any(rests)
     unweighted = outliers if without_outliers else outliers[:0]
     drive = Drive(
         loop,
@@ -182,7 +190,9 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
     )
     drive = replace(drive, weight=np.where(_at_reversal(drive), 0.0, drive.weight))
     _check_loses_energy(drive)
-    if not from_rest:
+    if from_rest and not rests[0]:
+        drive = replace(drive, datum=float(np.average(drive.force, weights=drive.weight)))
+    elif not from_rest:
         unknown = drive.follows or abs(found.motion[0]) > _CENTRED * half_motion
         drive = replace(drive, datum=found.force_mean if unknown else mean_of_preload(drive))
     return replace(drive, notes=(*drive.notes, *preload(drive)))
@@ -254,18 +264,28 @@ def _at_reversal(drive: Drive) -> Array:
     return np.minimum(position - turns[after - 1], turns[after] - position) < _JUMP
 
 
-def _from_rest(loop: Loop, frequency: float, half_motion: float, half_force: float, noise: float) -> bool:
-    """Whether the record begins with nothing moved, no force, and a force that is another a cycle later.
+def _rests(
+    loop: Loop, found: LoopHarmonics, half_motion: float, half_force: float, noise: float, change: float
+) -> tuple[bool, bool]:
+    """Whether the record begins at rest with nothing moved and no force, and whether at its mean, about a preload.
 
-    A settled loop may pass the origin too, where its load cell is off zero, but then it passes it every cycle.
+    A settled loop may pass the origin too, where its load cell is off zero, but then it passes it every cycle: `change`
+    is the certain one of its force over the first.
     """
-    unmoved = abs(loop.displacement[0]) <= _AT_REST * half_motion
-    unloaded = abs(loop.force[0]) <= _AT_REST * half_force + _FIRST_ROW * noise
+    off_mean = abs(loop.displacement[0] - found.motion[0].real), abs(loop.force[0] - found.force_mean)
+    near, chance = _AT_REST * half_force, _FIRST_ROW * noise
+    unmoved, unloaded = abs(loop.displacement[0]) <= _AT_REST * half_motion, abs(loop.force[0]) <= near + chance
+    in_middle = off_mean[0] <= _AT_REST * half_motion and off_mean[1] <= max(near, _VIRGIN * change) + chance
+    is_first = loop.part is None or loop.part.first_row == 0
+    return bool(change and unmoved and unloaded), bool(change and in_middle and is_first)
+
+
+def _change(loop: Loop, frequency: float, noise: float, half_force: float) -> float:
+    """By how much the force at the start is another a cycle later [N or N m]; 0 where that may be chance."""
     end = np.searchsorted(loop.time, loop.time[0] + 2.0 / frequency)
     clock, force = loop.time[:end] - loop.time[0], loop.force[:end]
-    first = clock[: np.searchsorted(clock, _START / frequency)]
-    change = np.interp(first + 1.0 / frequency, clock, force) - force[: first.size]
+    known = np.searchsorted(clock, clock[-1] - 1.0 / frequency, side="right")  # a cycle later
+    first = clock[: max(min(int(np.searchsorted(clock, _START / frequency)), int(known)), 1)]
+    change = abs(float(np.median(np.interp(first + 1.0 / frequency, clock, force) - force[: first.size])))
     chance = _CERTAIN * noise * np.sqrt(2.0 / first.size)
-    return bool(
-        unmoved and unloaded and abs(np.median(change)) > max(_MEDIAN_OVER_MEAN * chance, _SETTLES * half_force)
-    )
+    return change if change > max(_MEDIAN_OVER_MEAN * chance, _SETTLES * half_force) else 0.0

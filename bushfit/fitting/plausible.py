@@ -1,4 +1,4 @@
-"""Sentences on tests that no rubber could have given, and on tests that were left out of a fit and are missed by it."""
+"""Sentences on tests that no rubber could have given, or not at one temperature, and on tests that a fit left out."""
 
 from __future__ import annotations
 
@@ -18,6 +18,9 @@ _SOFTEST = 5e4
 _HARDEST = 1e8
 #: Modulus of the fastest and smallest test over that of the slowest and largest, at most, for any rubber.
 _MOST_STIFFENING = 20.0
+#: [K] Range of temperatures that the tests of one fit may have; chosen: filled rubber softens by up to 1 % a kelvin,
+#: and a test chamber keeps its temperature within less.
+_ONE_TEMPERATURE = 3.0
 _CHECK = "check the units of displacement and force, and the dimensions of what was tested"
 
 
@@ -33,6 +36,20 @@ def implausible(bushing: Bushing | None, data_sets: Sequence[DataSet]) -> list[s
         return [f"{hardest} shows {number(ratio, 2)} times the modulus of {softest}, which no rubber does: {_CHECK}"]
     said = f"a shear modulus of {modulus(moduli[hardest], 3)} is that of no rubber: {_CHECK}"
     return [] if _SOFTEST < moduli[hardest] < _HARDEST else [said]
+
+
+def apart_in_temperature(data_sets: Sequence[DataSet]) -> list[str]:
+    """A sentence on tests whose temperatures, where they are known, lie too far apart for one model."""
+    sources = [(data_set.name, data_set.source.conditions) for data_set in data_sets if data_set.source]
+    known = sorted((float(told["temperature_degC"]), name) for name, told in sources if "temperature_degC" in told)
+    if not known or known[-1][0] - known[0][0] <= _ONE_TEMPERATURE:
+        return []
+    (low, coldest), (high, warmest) = known[0], known[-1]
+    return [
+        f"{warmest} was tested at {number(high, 3)} degC and {coldest} at {number(low, 3)} degC, "
+        f"{number(high - low, 3)} degC apart: the model knows no temperature, and an effect that is named may be that "
+        "of temperature; fit the tests of each temperature by themselves"
+    ]
 
 
 def unfitted(model: Model, data_sets: Sequence[DataSet], advice: str) -> list[str]:

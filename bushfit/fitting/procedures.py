@@ -15,7 +15,7 @@ from bushfit.fitting.assess import Stage, covariance, lack_of_fit, measured_rang
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, parted, sources
 from bushfit.fitting.identify import left_open
-from bushfit.fitting.plausible import implausible, unfitted
+from bushfit.fitting.plausible import apart_in_temperature, implausible, unfitted
 from bushfit.fitting.profile import profile95
 from bushfit.fitting.robust import Estimate, estimate, told
 from bushfit.fitting.solve import Bounds, Coordinates, Solution
@@ -213,7 +213,8 @@ def _result(
     fitted = tuple(name for stage in stages for name in stage.names)
     cov = covariance(model, stages, held) if stages else held or Covariance()
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
-    doubts = [*implausible(data.campaign.bushing, data_sets), *_assumed(data_sets)]
+    of_tests = (*implausible(data.campaign.bushing, data_sets), *apart_in_temperature(data_sets))
+    doubts = [*of_tests, *_assumed(data_sets)]
     odd = [note for step in steps for note in cautions(model, step.solution, step.data_sets, data.bounds, cov, _NEXT)]
     return Result(
         model,

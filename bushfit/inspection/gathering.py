@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from bushfit.campaign.campaign import TEST_FILES
 from bushfit.errors import BushfitError, NoColumnError, NoTestError
 from bushfit.inspection.opening import inspect
+from bushfit.inspection.outside import temperatures_of
 from bushfit.inspection.recognition import open_table, recognised
 from bushfit.inspection.record import Inspected
 from bushfit.reading.names import Said, stated_above
@@ -89,7 +90,8 @@ def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> Gathered:
 def stated_of_each(sources: Sequence[Source], stated: Mapping[str, Any]) -> list[Source]:
     """Sources with what the user states of each.
 
-    A column that is stated for all, and that only some of them have, is left out for the others.
+    A column that is stated for all, and that only some of them have, is left out for the others; so is a temperature
+    that is to choose rows, one of several in a file, for files that have no column for it.
     """
     columns: Mapping[str, str] = stated.get("columns", {})
     own = [{**stated, "columns": columns, **({"sheet": source.sheet} if source.sheet else {})} for source in sources]
@@ -97,7 +99,19 @@ def stated_of_each(sources: Sequence[Source], stated: Mapping[str, Any]) -> list
         has = [_has_column(source.file, role, keys) for source, keys in zip(sources, own, strict=True)]
         for keys in (keys for keys, one in zip(own, has, strict=True) if one is False and True in has):
             keys["columns"] = {other: header for other, header in keys["columns"].items() if other != role}
+    if stated.get("temperature") and len(sources) > 1:
+        counts = [_temperatures(source.file, keys) for source, keys in zip(sources, own, strict=True)]
+        for keys in (keys for keys, count in zip(own, counts, strict=True) if count == 0 and 2 in counts):
+            keys["temperature"] = None
     return [replace(source, stated=keys) for source, keys in zip(sources, own, strict=True)]
+
+
+def _temperatures(file: Path, stated: Mapping[str, Any]) -> int | None:
+    """See `temperatures_of`; None where it cannot be told."""
+    try:
+        return temperatures_of(recognised(file, stated)[0])
+    except BushfitError:  # which the inspection of the file tells
+        return None
 
 
 def _has_column(file: Path, role: str, stated: Mapping[str, Any]) -> bool | None:

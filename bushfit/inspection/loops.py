@@ -69,7 +69,7 @@ def look_at_loop(loop: Loop, named: Said) -> Looked:
         *_changing(drive),
         *_crawling(drive),
     ]
-    if _OFF_ZERO * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and not drive.from_rest:
+    if _OFF_ZERO * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and drive.datum is not None:
         odd.append(
             f"the motion is off zero by {number(to_length * mean_motion, 3)} {length}, "
             f"{number(100 * mean_motion / half_motion, 2)} % of its amplitude: the loop counts from its own middle"

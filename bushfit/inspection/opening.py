@@ -16,7 +16,7 @@ from bushfit.campaign.schema import LoopFile, SweepFile
 from bushfit.errors import BushfitError, MeasurementError, naming
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.inspection.loops import look_at_history, look_at_loop, look_at_programme
-from bushfit.inspection.outside import keys_outside, names_of
+from bushfit.inspection.outside import keys_outside, names_of, temperatures_of
 from bushfit.inspection.recognition import direction_of, place_of, recognised
 from bushfit.inspection.record import ColumnSeen, Inspected, Kind, Looked
 from bushfit.inspection.sweeps import look_at_sweep
@@ -24,7 +24,7 @@ from bushfit.reading.layout import DELIMITERS
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import Said
-from bushfit.reading.sweeps import ONE_TEST, STIFFNESS_PAIRS, read_sweep
+from bushfit.reading.sweeps import STIFFNESS_PAIRS, read_sweep
 from bushfit.reading.table import Table
 from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reduction.programme import programme
@@ -110,9 +110,7 @@ def _entry(
     needless = {"specimen"} | {f"at_{role}" for role in table.roles}
     if "time" in table.roles:
         needless |= {"rate", "frequency", "waveform"}
-    if column := table.roles.get("temperature"):
-        found = table.read({"temperature": column}, fewest_rows=1)["temperature"]
-        needless |= {"temperature"} if np.ptp(found) <= ONE_TEST else set()
+    needless |= {"temperature"} if "temperature" in entry and temperatures_of(table) == 1 else set()
     entry = {key: value for key, value in entry.items() if key not in needless}
     return {**({"specimen": place.name} if isinstance(place, Specimen) else {}), **entry}
 

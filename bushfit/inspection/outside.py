@@ -7,10 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from bushfit import units
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
 from bushfit.reading.names import Named, Said, named, stated_above
+from bushfit.reading.sweeps import ONE_TEST
 from bushfit.reading.table import Table
 
 #: Conditions of a test, which a campaign carries on, in words.
@@ -33,6 +36,14 @@ class Outside(NamedTuple):
     keys: dict[str, Any]
     facts: dict[str, str]
     is_counted: bool
+
+
+def temperatures_of(table: Table) -> int:
+    """How many temperatures the rows of a table were tested at: 0 without a column for it, 1, or 2 for several."""
+    if (column := table.roles.get("temperature")) is None:
+        return 0
+    found = table.read({"temperature": column}, fewest_rows=1)["temperature"]
+    return 1 if np.ptp(found) <= ONE_TEST else 2
 
 
 def names_of(file: Path, stated: Mapping[str, Any]) -> Said:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.diagnosis.workflow import diagnose
 from bushfit.fitting.data import Data
-from bushfit.fitting.procedures import fit_joint
+from bushfit.fitting.procedures import fit_joint, fit_two_step
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
-from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.measurement import Loop, Source, Sweep
 
 BAND = (5.0, 15.0, 45.0, 100.0, 155.0)
 
@@ -62,6 +64,23 @@ def test_kilonewtons_taken_for_newtons_are_told(campaign: Campaign) -> None:
     print(told)
     assert told.startswith(f"{campaign.loops[0].name} shows ")
     assert f"times the modulus of {axial[0].name}, which no rubber does: check the units" in told
+
+
+@pytest.mark.parametrize(("warm", "told"), [(25.9, 0), (60.0, 1)])
+def test_tests_at_other_temperatures_are_told_by_fit_and_diagnose(campaign: Campaign, warm: float, told: int) -> None:
+    (loop,), (sweep,) = campaign.loops, without(campaign, Direction.RADIAL)
+    cold, hot = (Source(Path(f"{degrees}.csv"), "", {"temperature_degC": degrees}) for degrees in (23.0, warm))
+    mixed = replace(campaign, loops=(replace(loop, source=cold),), sweeps=(replace(sweep, source=hot),))
+    data = Data.of(mixed)
+    results = fit_joint(data), fit_two_step(data).result, diagnose(data).result
+    for result in results:
+        lines = [line for line in result.warnings if "degC" in line]
+        assert len(lines) == told
+        if told:
+            print(lines[0])
+            assert lines[0].startswith(
+                f"{sweep.name} was tested at 60 degC and {loop.name} at 23 degC, 37 degC apart: "
+            )
 
 
 def test_a_modulus_of_no_rubber_is_told(campaign: Campaign) -> None:

@@ -181,6 +181,14 @@ def test_a_temperature_is_stated_for_files_with_several(tmp_path: Path) -> None:
     assert entries == {"axial_several": {"temperature": "25 degC"}, "axial_one": {}}
     with pytest.raises(BushfitError, match=r"several temperatures(.|\n)*temperature = "):
         inspect(tmp_path / "axial_several.csv", {})
+    plain = [head.rpartition(",")[0], *(row.rpartition(",")[0] for row in rows[:11])]
+    (tmp_path / "radial_none.csv").write_text("\n".join(plain) + "\n", encoding="utf-8")
+    sources, _ = gather([tmp_path], {"temperature": "25 degC"})
+    entries |= {"radial_none": {}}  # the temperature chooses rows of another file, and tells nothing of this one
+    assert {source.file.stem: source.inspect().entry for source in sources} == entries
+    (tmp_path / "axial_several.csv").unlink()
+    sources, _ = gather([tmp_path], {"temperature": "25 degC"})
+    assert sources[1].inspect().entry == {"temperature": "25 degC"}
 
 
 def test_a_resonance_test_is_left_out_with_the_way_on(sweep: Sweep, root: Path, tmp_path: Path) -> None:
