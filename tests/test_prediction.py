@@ -17,7 +17,15 @@ from bushfit.geometry import Bushing, Direction, Shape, Specimen
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Range, Result
-from bushfit.prediction import PAPER_AMPLITUDES, PAPER_FREQUENCIES, carried, caveats, default_grid, predict
+from bushfit.prediction import (
+    PAPER_AMPLITUDES,
+    PAPER_FREQUENCIES,
+    carried,
+    caveats,
+    default_grid,
+    predict,
+    predict_resonance,
+)
 from bushfit.reading.measurement import Sweep
 from bushfit.report.tables import prediction_table
 from bushfit.simulation import measure, undisturbed
@@ -145,6 +153,19 @@ def test_extrapolation_is_said(result: Result) -> None:
     assert len(far.warnings) == 1
     assert "predicted at strains of 31 %, but fitted at " in far.warnings[0]
     assert len(predict(result, Direction.AXIAL, [0.01], [1e-6]).warnings) == 2
+
+
+def test_a_resonance_says_what_its_peak_extrapolates(result: Result) -> None:
+    """Frequencies and strains near the peak count, not those far from it; so does a place that was not fitted."""
+    inside = predict_resonance(result, Direction.AXIAL, 3.0, 20.0, None)
+    assert inside.frequency[-1] > 155.0, "beyond what was fitted, but far from the peak"
+    assert inside.peak[0] == pytest.approx(75.0, rel=0.2)
+    assert inside.warnings == ()
+    fast, low = predict_resonance(result, Direction.AXIAL, 0.2, 0.1, None).warnings
+    assert fast.startswith("axial, resonance of 0.2 kg: predicted at frequencies of ")
+    assert low.startswith("axial, resonance of 0.2 kg: predicted at strains of ")
+    fitted, *_ = predict_resonance(result, Direction.RADIAL, 3.0, 20.0, None).warnings
+    assert fitted.startswith("radial: not fitted")
 
 
 def test_a_model_given_by_hand_has_no_bands_and_says_so(paper_model: Model) -> None:
