@@ -19,6 +19,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_jacobian
 from bushfit.reading.measurement import Sweep
+from bushfit.reading.runs import nominal
 from bushfit.reduction.resonance import response
 from bushfit.units import number
 
@@ -88,13 +89,14 @@ class Prediction:
 def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ()) -> tuple[Array, Array]:
     """Frequencies [Hz] and amplitudes [m or rad] to predict at where none are asked for, rising.
 
-    They are those of the sweeps at this place, so that prediction and measurement stand side by side; of amplitudes
-    that were stepped, and of what swings free, at most ten over their range. Without any sweep they are the paper's as
-    far as they lie in the measured range, or an even grid over that range where fewer than two do.
+    They are those of the sweeps at this place, so that prediction and measurement stand side by side, a level that
+    several sweeps reached more or less counting once; of amplitudes that were stepped, and of what swings free, at most
+    ten over their range. Without any sweep they are the paper's as far as they lie in the measured range, or an even
+    grid over that range where fewer than two do.
     """
     mine = [sweep for sweep in sweeps if sweep.direction == direction]
     if mine:
-        return _measured(mine, "frequency"), _measured(mine, "amplitude")
+        return _measured(mine, "frequency"), _measured(_levelled(mine), "amplitude")
     amplitudes = np.array(_AMPLITUDES_OF[direction.motion])
     frequencies = np.array(PAPER_FREQUENCIES)
     if result.measured is None:
@@ -111,6 +113,16 @@ def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ())
     if reached.size < 2:
         reached = _even(least, most, _AMPLITUDES)
     return inside, reached
+
+
+def _levelled(sweeps: Sequence[Sweep]) -> list[Sweep]:
+    """Sweeps of one place in which amplitudes of one level, as each sweep has it, are the same."""
+    held = [sweep for sweep in sweeps if sweep.stepped]
+    points = np.hstack([np.empty((2, 0)), *(np.stack((sweep.amplitude, sweep.frequency)) for sweep in held)])
+    amplitude = np.unique(points, axis=1)[0]  # each point once, however often it was repeated
+    level = dict(zip(amplitude, nominal(amplitude), strict=True))
+    changed = (replace(sweep, amplitude=np.array([level[each] for each in sweep.amplitude])) for sweep in held)
+    return [*changed, *(sweep for sweep in sweeps if not sweep.stepped)]
 
 
 def _measured(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitude"]) -> Array:

@@ -272,6 +272,18 @@ def test_default_grid_is_that_of_the_sweeps_in_the_direction_where_there_are_any
     assert tuple(default_grid(result, Direction.AXIAL, [sweep])[1]) == PAPER_AMPLITUDES
 
 
+def test_default_grid_has_the_levels_that_several_files_share(result: Result) -> None:
+    """One file a frequency, each of which reached its seven levels a little differently."""
+    levels = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0]) * 1e-3
+    files = [
+        Sweep(str(f), Direction.AXIAL, np.full(7, f), levels * miss, np.full(7, 1e6 + 1e5j), stepped="amplitude")
+        for f, miss in ((1.0, 0.985), (10.0, 1.0), (50.0, 1.02))
+    ]
+    frequencies, amplitudes = default_grid(result, Direction.AXIAL, files)
+    assert frequencies.tolist() == [1.0, 10.0, 50.0]
+    assert amplitudes.tolist() == levels.tolist()
+
+
 def test_default_grid_of_what_was_taken_as_it_came(result: Result) -> None:
     """Amplitudes that were stepped, and all of a resonance test, at ten values at most; what was held as it is."""
     frequency, amplitude = (axis.ravel() for axis in np.meshgrid([10.0, 40.0], np.geomspace(2e-5, 1e-3, 15)))
