@@ -68,6 +68,8 @@ def _which(folder: Path, outcome: Ran) -> str:
     if outcome.diagnosed and outcome.added:
         found = ", ".join(effect.label for effect in outcome.diagnosed.diagnosis.effects)
         which = f"with {found}; joint.json is without"
+    elif outcome.diagnosed and outcome.diagnosed.diagnosis.changed:  # a mistake in the record is named
+        which = "the joint fit to the tests as they are: put the record right first, then run again"
     return f"the model to use: {folder / 'model.json'}, {which}"
 
 
