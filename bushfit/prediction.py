@@ -19,6 +19,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_jacobian
 from bushfit.reading.measurement import Sweep
+from bushfit.reading.runs import nominal
 from bushfit.reduction.resonance import response
 from bushfit.units import number
 
@@ -44,6 +45,9 @@ _SMALL_STRAIN = 1e-4
 _DECADE = (0.2, 4.0)
 #: Frequencies there; chosen: 0.5 % apart, which is as near as tests tell a peak.
 _RESONANCE_POINTS = 600
+#: Transmissibility from which a point counts as near the peak; chosen: about 0.6 to 1.3 of the peak's frequency, where
+#: the mount decides how far the mass moves.
+_NEAR_PEAK = 1.5
 #: Frequencies of a grid where the paper's were not measured.
 _FREQUENCIES = 9
 #: Amplitudes of a grid where the paper's were not measured.
@@ -85,13 +89,14 @@ class Prediction:
 def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ()) -> tuple[Array, Array]:
     """Frequencies [Hz] and amplitudes [m or rad] to predict at where none are asked for, rising.
 
-    They are those of the sweeps at this place, so that prediction and measurement stand side by side; of amplitudes
-    that were stepped, and of what swings free, at most ten over their range. Without any sweep they are the paper's as
-    far as they lie in the measured range, or an even grid over that range where fewer than two do.
+    They are those of the sweeps at this place, so that prediction and measurement stand side by side, a level that
+    several sweeps reached more or less counting once; of amplitudes that were stepped, and of what swings free, at most
+    ten over their range. Without any sweep they are the paper's as far as they lie in the measured range, or an even
+    grid over that range where fewer than two do.
     """
     mine = [sweep for sweep in sweeps if sweep.direction == direction]
     if mine:
-        return _measured(mine, "frequency"), _measured(mine, "amplitude")
+        return _measured(mine, "frequency"), _measured(_levelled(mine), "amplitude")
     amplitudes = np.array(_AMPLITUDES_OF[direction.motion])
     frequencies = np.array(PAPER_FREQUENCIES)
     if result.measured is None:
@@ -108,6 +113,16 @@ def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ())
     if reached.size < 2:
         reached = _even(least, most, _AMPLITUDES)
     return inside, reached
+
+
+def _levelled(sweeps: Sequence[Sweep]) -> list[Sweep]:
+    """Sweeps of one place in which amplitudes of one level, as each sweep has it, are the same."""
+    held = [sweep for sweep in sweeps if sweep.stepped]
+    points = np.hstack([np.empty((2, 0)), *(np.stack((sweep.amplitude, sweep.frequency)) for sweep in held)])
+    amplitude = np.unique(points, axis=1)[0]  # each point once, however often it was repeated
+    level = dict(zip(amplitude, nominal(amplitude), strict=True))
+    changed = (replace(sweep, amplitude=np.array([level[each] for each in sweep.amplitude])) for sweep in held)
+    return [*changed, *(sweep for sweep in sweeps if not sweep.stepped)]
 
 
 def _measured(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitude"]) -> Array:
@@ -191,6 +206,7 @@ class PredictedResonance:
         amplitude: of the mount's deformation, zero-to-peak [m], (n,).
         transmissibility: complex, acceleration of the mass over that of the base [-], (n,).
         stiffness: complex, of the mount at that frequency and amplitude [N/m], (n,).
+        warnings: sentences on a place, and on frequencies and strains near the peak, that were not fitted.
     """
 
     place: Place
@@ -200,6 +216,7 @@ class PredictedResonance:
     amplitude: Array
     transmissibility: Array
     stiffness: Array
+    warnings: tuple[str, ...]
 
     @property
     def peak(self) -> tuple[float, float]:
@@ -229,7 +246,10 @@ def predict_resonance(
     base = base_acceleration / (2.0 * np.pi * frequency) ** 2
     amplitude, ratio = response(lambda reached: model.stiffness(place, frequency, reached), mass, frequency, base)
     stiffness = model.stiffness(place, frequency, amplitude)
-    return PredictedResonance(place, mass, base_acceleration, frequency, amplitude, ratio, stiffness)
+    near = np.abs(ratio) >= min(_NEAR_PEAK, float(np.abs(ratio).max()))
+    what = f"{place}, resonance of {number(mass, 3)} kg"
+    warnings = (*_unfitted(result, place), *_extrapolations(result, place, frequency[near], amplitude[near], what))
+    return PredictedResonance(place, mass, base_acceleration, frequency, amplitude, ratio, stiffness, warnings)
 
 
 def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
@@ -313,18 +333,21 @@ def _radial_error(bushing: Bushing) -> str:
     return f'{off}, by which shape = "calibrated" goes'
 
 
-def _extrapolations(result: Result, direction: Place, frequency: Array, amplitude: Array) -> Iterator[str]:
-    """A warning for the frequencies and one for the strains where they leave what was fitted."""
+def _extrapolations(
+    result: Result, direction: Place, frequency: Array, amplitude: Array, what: str | None = None
+) -> Iterator[str]:
+    """A warning for the frequencies and one for the strains of what is predicted where they leave what was fitted."""
     if result.measured is None:
         return
     axes = (
         ("frequencies", "Hz", frequency, result.measured.frequency),
         ("strains", "%", amplitude * result.model.unit_strain(direction), result.measured.strain),
     )
-    for what, unit, asked, (low, high) in axes:
+    for axis, unit, asked, (low, high) in axes:
         if asked.min() < low * (1 - _MARGIN) or asked.max() > high * (1 + _MARGIN):
             here, there = _span(asked.min(), asked.max(), unit), _span(low, high, unit)
-            yield f"{direction}: predicted at {what} of {here}, but fitted at {there} only: extrapolated beyond"
+            said = f"predicted at {axis} of {here}, but fitted at {there} only: extrapolated beyond"
+            yield f"{what or direction}: {said}"
 
 
 def _span(low: float, high: float, unit: str) -> str:

@@ -17,7 +17,15 @@ from bushfit.geometry import Bushing, Direction, Shape, Specimen
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Range, Result
-from bushfit.prediction import PAPER_AMPLITUDES, PAPER_FREQUENCIES, carried, caveats, default_grid, predict
+from bushfit.prediction import (
+    PAPER_AMPLITUDES,
+    PAPER_FREQUENCIES,
+    carried,
+    caveats,
+    default_grid,
+    predict,
+    predict_resonance,
+)
 from bushfit.reading.measurement import Sweep
 from bushfit.report.tables import prediction_table
 from bushfit.simulation import measure, undisturbed
@@ -147,6 +155,19 @@ def test_extrapolation_is_said(result: Result) -> None:
     assert len(predict(result, Direction.AXIAL, [0.01], [1e-6]).warnings) == 2
 
 
+def test_a_resonance_says_what_its_peak_extrapolates(result: Result) -> None:
+    """Frequencies and strains near the peak count, not those far from it; so does a place that was not fitted."""
+    inside = predict_resonance(result, Direction.AXIAL, 3.0, 20.0, None)
+    assert inside.frequency[-1] > 155.0, "beyond what was fitted, but far from the peak"
+    assert inside.peak[0] == pytest.approx(75.0, rel=0.2)
+    assert inside.warnings == ()
+    fast, low = predict_resonance(result, Direction.AXIAL, 0.2, 0.1, None).warnings
+    assert fast.startswith("axial, resonance of 0.2 kg: predicted at frequencies of ")
+    assert low.startswith("axial, resonance of 0.2 kg: predicted at strains of ")
+    fitted, *_ = predict_resonance(result, Direction.RADIAL, 3.0, 20.0, None).warnings
+    assert fitted.startswith("radial: not fitted")
+
+
 def test_a_model_given_by_hand_has_no_bands_and_says_so(paper_model: Model) -> None:
     prediction = predict(Result(paper_model), Direction.RADIAL, FREQUENCIES, AMPLITUDES)
     assert np.array_equal(prediction.stiffness.low, prediction.stiffness.high)
@@ -249,6 +270,18 @@ def test_default_grid_is_that_of_the_sweeps_in_the_direction_where_there_are_any
     assert frequencies.tolist() == [1.0, 20.0, 80.0], "two that miss the same set point are one"
     assert amplitudes.tolist() == [2e-4, 4e-4, 1e-3]
     assert tuple(default_grid(result, Direction.AXIAL, [sweep])[1]) == PAPER_AMPLITUDES
+
+
+def test_default_grid_has_the_levels_that_several_files_share(result: Result) -> None:
+    """One file a frequency, each of which reached its seven levels a little differently."""
+    levels = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0]) * 1e-3
+    files = [
+        Sweep(str(f), Direction.AXIAL, np.full(7, f), levels * miss, np.full(7, 1e6 + 1e5j), stepped="amplitude")
+        for f, miss in ((1.0, 0.985), (10.0, 1.0), (50.0, 1.02))
+    ]
+    frequencies, amplitudes = default_grid(result, Direction.AXIAL, files)
+    assert frequencies.tolist() == [1.0, 10.0, 50.0]
+    assert amplitudes.tolist() == levels.tolist()
 
 
 def test_default_grid_of_what_was_taken_as_it_came(result: Result) -> None:

@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 
 #: Standard errors up to which two fits are said to agree.
 _AGREED = 2
+#: Standard errors up to which a difference is counted; chosen: beyond, they disagree, by however many.
+_COUNTED = 10.0
+#: Standard error over that of the joint fit from which a parameter is not determined at all; chosen.
+_OPEN = 100.0
 
 
 @click.command("run", epilog=example("bushfit run configs/cmp_15961.toml"))
@@ -58,7 +62,7 @@ def tell_run(options: Options, name: str, outcome: Ran) -> None:
     tell_predictions(options, outcome.predicted)
     if options.verbose:
         _tell_steps(options, name, outcome)
-    two_step = outcome.two_step and _in_a_line(outcome.two_step, outcome.joint.result)
+    two_step = outcome.two_step and two_step_line(outcome.two_step, outcome.joint.result)
     options.say(two_step or f"{outcome.no_two_step}: the two-step procedure is passed over")
 
 
@@ -68,6 +72,8 @@ def _which(folder: Path, outcome: Ran) -> str:
     if outcome.diagnosed and outcome.added:
         found = ", ".join(effect.label for effect in outcome.diagnosed.diagnosis.effects)
         which = f"with {found}; joint.json is without"
+    elif outcome.diagnosed and outcome.diagnosed.diagnosis.changed:  # a mistake in the record is named
+        which = "the joint fit to the tests as they are: put the record right first, then run again"
     return f"the model to use: {folder / 'model.json'}, {which}"
 
 
@@ -95,24 +101,31 @@ def _span(ends: Sequence[float], digits: int) -> str:
     return " to ".join(dict.fromkeys(number(end, digits) for end in ends))
 
 
-def _in_a_line(two_step: TwoStep, joint: Result) -> str:
-    """What the paper's procedure found, beside the joint fit."""
+def two_step_line(two_step: TwoStep, joint: Result) -> str:
+    """What the paper's procedure found, beside the joint fit, in a line; on a bound, errors count for nothing."""
     found = two_step.result
     errors = {name: (found.covariance.stderr(name), joint.covariance.stderr(name)) for name in joint.fitted}
     known = {name: (error, least) for name, (error, least) in errors.items() if error and least}
     off = {n: abs(found.model.values[n] - joint.model.values[n]) / error for n, (error, _) in known.items()}
     ratio = {name: error / least for name, (error, least) in known.items()}
-    parts = [f"{len(two_step.passes)} passes"]
-    if off:
+    passes = len(two_step.passes)
+    parts = [f"{passes} pass{'es' * (passes > 1)}"]
+    if found.at_bound:
+        parts.append(f"came to rest on a bound: {', '.join(found.at_bound)}")
+    elif off:
         far, unsure = (max(sizes, key=sizes.__getitem__) for sizes in (off, ratio))
-        count = math.ceil(round(off[far], 1))
+        count = max(1, math.ceil(round(off[far], 1)))
         parts.append(
             f"agrees with the joint fit within {count} standard error{'s' * (count > 1)}"
             if count <= _AGREED
             else f"{far} is {off[far]:.1f} standard errors off the joint fit"
+            if off[far] <= _COUNTED
+            else f"does not agree with the joint fit: {far} is farthest off"
         )
         times = number(ratio[unsure], 2)
-        if float(times) > 1.0:
+        if float(times) > _OPEN:
+            parts.append(f"{unsure} not determined at all")
+        elif float(times) > 1.0:
             parts.append(f"{unsure} {times} times less certain than there")
     return f"two-step procedure (the paper's): {', '.join(parts)} (static.json, dynamic.json; -v shows it)"
 

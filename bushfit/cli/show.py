@@ -71,7 +71,9 @@ def tell_tests(options: Options, tested: Sequence[Misfit], usable: Sequence[Usab
                 table.add_row(name, test.place, str(test.points), *figures, "" if test.fitted else "not fitted")
         options.console.print(table)
     if left := len(tests) - len(worst):
-        options.say(f"and {left} tests more, which are met better; -v shows them")
+        options.say(
+            f"and {left} more {'test, which is' if left == 1 else 'tests, which are'} met better; -v shows them"
+        )
     for place in usable:
         how = "each predicted from other runs" if place.held_out else "as fitted"
         words = f"{number(100 * place.stiffness, 2)} % of stiffness and {number(place.loss_factor, 2)} of loss factor"

@@ -102,8 +102,8 @@ def _told(search: Search, data: Data, one: Weighed, behind: Sequence[Weighed]) -
     if behind:
         next_best = f"{' + '.join(behind[0].claim.labels(data))}, {number(behind[0].bic - one.bic, 3)} behind by BIC"
         evidence += f"; next best of the record {next_best}"
-    adopt = " ".join(f"--adopt {name}" for name in one.claim.labels(data))
-    advice = f"if the records of the tests bear it out, {'; '.join(one.claim.corrections(data))} (or {adopt})"
+    command = " ".join(["bushfit diagnose CAMPAIGN", *(f"--adopt {name}" for name in one.claim.labels(data))])
+    advice = f"if the records of the tests bear it out, {'; '.join(one.claim.corrections(data))} (or {command})"
     if_so = f"agree if {one.claim.words(data)}"
     names = _named(data, one.claim, evidence, ())
     diagnosis = finish(search, "named", f"these tests {if_so}", search.base, names, next_test=advice)

@@ -122,7 +122,7 @@ def _new_sweeps(
         (f"a sweep to {2.0 * fast:.3g} Hz", (fast, 2.0 * fast), (small, large)),
         (f"a sweep down to {slow / 10.0:.3g} Hz", (slow / 10.0, slow), (small, large)),
     ]
-    within = f"a sweep from {low:.3g} to {high:.3g} Hz at"
+    within = f"a sweep from {low:.3g} to {high:.3g} Hz at" if low < high else f"a sweep at {low:.3g} Hz and"
     for words, ends, amplitudes in (
         *(beyond if sweeps else ()),
         (f"{within} a tenth and all of the largest amplitude", band, (0.1 * large, large)),

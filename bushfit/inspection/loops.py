@@ -15,7 +15,7 @@ from bushfit.fitting.motion import TOLD_MEAN, waveform
 from bushfit.geometry import Unit
 from bushfit.inspection.channels import clock, odd_channels
 from bushfit.inspection.outside import wrong_labels
-from bushfit.inspection.record import Looked
+from bushfit.inspection.record import Looked, told_frequencies
 from bushfit.reading.measurement import Loop
 from bushfit.reading.names import Said
 from bushfit.reduction.cycles import least_prominence
@@ -90,7 +90,7 @@ def look_at_history(history: Loop, named: Said) -> Looked:
     frequencies = sorted({step.nominal_frequency for step in steps})
     facts = {
         "steps": f"{len(steps)} with steady cycles, {max(step.repeat for step in steps)} at most at one point",
-        "frequencies": f"{len(frequencies)}, from {frequencies[0]:.4g} to {frequencies[-1]:.4g} Hz",
+        "frequencies": told_frequencies(frequencies),
         "amplitudes": f"{', '.join(f'{factor * level:.4g}' for level in levels)} {unit} zero-to-peak, as reached",
         "sampling": f"{clock(history)}, {min(step.rows_per_cycle for step in steps):.3g} rows a cycle at least",
         "noise": f"{100 * max(step.gain_error for step in steps):.2g} % of |K| at most, a point",

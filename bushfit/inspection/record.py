@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from bushfit.effects.contract import Array
 from bushfit.geometry import Place, Specimen
 from bushfit.reading.measurement import Loop, Sweep
 
 #: A hysteresis loop, a sweep, or the raw history of a stepped sine.
 Kind = Literal["loop", "sweep", "history"]
+
+
+def told_frequencies(frequencies: Sequence[float] | Array) -> str:
+    """How many frequencies there are, and between which they lie: "16, from 5 to 155 Hz"; [Hz], rising, (n,)."""
+    low, high = (f"{end:.4g}" for end in (frequencies[0], frequencies[-1]))
+    return f"{len(frequencies)}, {f'at {low}' if low == high else f'from {low} to {high}'} Hz"
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from bushfit.effects.mistake import shown
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.inspection.outside import wrong_labels
-from bushfit.inspection.record import Looked
+from bushfit.inspection.record import Looked, told_frequencies
 from bushfit.reading.measurement import Sweep, loss_factor
 from bushfit.reading.names import Said
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
@@ -53,7 +53,7 @@ def look_at_sweep(sweep: Sweep, named: Said) -> Looked:
     repeats = np.unique(sweep.repeat)
     noise = sweep_noise([sweep])
     facts = {
-        "frequencies": f"{frequencies.size}, from {frequencies[0]:.4g} to {frequencies[-1]:.4g} Hz",
+        "frequencies": told_frequencies(frequencies),
         "amplitudes": f"{', '.join(f'{factor * level:.4g}' for level in levels[:_MOST_LEVELS])}"
         f"{', ...' if levels.size > _MOST_LEVELS else ''} {unit} zero-to-peak",
         "repeats": f"{repeats.size}",

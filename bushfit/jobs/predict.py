@@ -48,8 +48,9 @@ class Predicted:
 
     @property
     def warnings(self) -> list[str]:
-        """Of the carried model, of each place, then of all."""
-        return [*self.notes, *(line for p in self.predictions for line in p.warnings), *caveats(self.result)]
+        """Of the carried model, of each place, its resonance, then of all; each once."""
+        of_each = [found.warnings for found in self.predictions] + [found.warnings for found in self.resonances]
+        return list(dict.fromkeys([*self.notes, *(line for lines in of_each for line in lines), *caveats(self.result)]))
 
     @cached_property
     def tests(self) -> tuple[Misfit, ...]:

@@ -76,7 +76,12 @@ def test_the_line_in_the_campaign_puts_it_right(bushfit: Run, work: Path) -> Non
 def test_run_uses_the_tests_as_they_are_and_warns(bushfit: Run, work: Path) -> None:
     done = bushfit("run", CAMPAIGN, "-o", "ran", "--no-plots")
     assert done.returncode == 0, done.stderr
-    assert "sweep_axial.csv are peak-to-peak" in " ".join(done.stderr.split())
+    said = " ".join(done.stderr.split())
+    assert "sweep_axial.csv are peak-to-peak" in said
+    assert f"(or bushfit diagnose CAMPAIGN --adopt {LABEL})" in said, "run takes no --adopt"
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith("the model to use: ")
+    assert last.endswith("fit to the tests as they are: put the record right first, then run again")
     model = json.loads((work / "ran/model.json").read_text())
     assert model["effects"] == ["elastic", "springpot", "friction"]
     assert any("fitted to the tests as they are" in warning for warning in model["warnings"])

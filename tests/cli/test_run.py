@@ -5,8 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
+import pytest
 from commandline import Done, call
+
+from bushfit.cli.run import two_step_line
+from bushfit.fitting.procedures import TwoStep
+from bushfit.model.covariance import Covariance
+from bushfit.model.model import Model
+from bushfit.model.result import Result
 
 Run = Callable[..., Done]
 CAMPAIGN = "configs/cmp_15961.toml"
@@ -44,6 +52,28 @@ def test_run_shows_the_result_first_and_the_steps_in_a_line(bushfit: Run, tmp_pa
     assert places == sorted(places)
     for word in ("pass by pass", "what the two-step procedure costs", "springpot was left out", "held out"):
         assert word not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("error", "off", "bound", "said"),
+    [
+        (0.3, 0.0, {}, "agrees with the joint fit within 1 standard error, mu 30 times less certain than there ("),
+        (1e8, 0.0, {}, "agrees with the joint fit within 1 standard error, mu not determined at all ("),
+        (0.01, 0.98, {}, "does not agree with the joint fit: mu is farthest off ("),
+        (1e8, 0.5, {"mu": "min"}, "1 pass, came to rest on a bound: mu ("),
+    ],
+)
+def test_the_line_on_two_steps_counts_no_meaningless_errors(
+    paper_model: Model, error: float, off: float, bound: dict[str, str], said: str
+) -> None:
+    mu = 1e6
+
+    def fitted(share: float, values: dict[str, float], **more: object) -> Result:
+        covariance = Covariance(("mu",), np.array([[(share * mu) ** 2]]))
+        return Result(paper_model.with_values(values), ("mu",), covariance, **more)  # type: ignore[arg-type]
+
+    two_step = TwoStep(({},), fitted(error, {"mu": (1.0 + off) * mu}, at_bound=bound))
+    assert said in two_step_line(two_step, fitted(0.01, {"mu": mu}))
 
 
 def test_run_with_an_effect_shows_what_diagnose_shows(root: Path, tmp_path: Path) -> None:

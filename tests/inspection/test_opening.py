@@ -67,6 +67,12 @@ def test_practice_campaigns_raise_only_what_is_there(root: Path) -> None:
     assert len(said) <= 2
 
 
+def test_one_frequency_is_told_as_one(tmp_path: Path) -> None:
+    rows = "".join(f"10,{amplitude},{900 - 50 * n},0.1\n" for n, amplitude in enumerate((0.1, 0.2, 0.5)))
+    (tmp_path / "axial.csv").write_text(f"frequency [Hz],amplitude [mm],stiffness [N/mm],loss factor [-]\n{rows}")
+    assert inspect(tmp_path / "axial.csv", {}).looked.facts["frequencies"] == "1, at 10 Hz"
+
+
 def test_a_history_points_to_reduce(root: Path) -> None:
     seen = inspect(root / "data/cmp_15961_raw/stepped_sine_axial.csv", {})
     assert seen.kind == "history"

@@ -56,6 +56,13 @@ def test_a_dynamic_fit_makes_its_own_static_one_or_says_what_it_needs(campaign: 
         FitDynamic().run(Data.of(replace(campaign, loops=())))
 
 
+def test_warnings_of_a_resonance_are_those_of_the_prediction(campaign: Campaign) -> None:
+    result = Fit().run(Data.of(campaign)).result
+    warnings = Predict(mass=0.2, base_acceleration=0.1).run(result, campaign).document["warnings"]
+    assert any(line.startswith("axial, resonance of 0.2 kg: predicted at strains") for line in warnings)
+    assert len(set(warnings)) == len(warnings)
+
+
 def test_a_campaign_has_the_kinds_of_test_that_it_lists(campaign: Campaign) -> None:
     assert fits.tests_of(campaign) == ("loops", "sweeps")
     assert fits.tests_of(replace(campaign, loops=())) == ("sweeps",)

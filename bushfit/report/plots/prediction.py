@@ -15,6 +15,7 @@ from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.prediction import Band, Prediction
 from bushfit.reading.measurement import loss_factor
+from bushfit.reading.runs import nominal
 from bushfit.report.plots import style
 from bushfit.report.plots.points import Axis, Points, held_beside, means
 from bushfit.report.tables import spread, words
@@ -32,7 +33,8 @@ _LINE = 1.3
 _STROKE = 14.0
 #: Width of a line with the rig's effects [point].
 _THIN = 0.6
-#: A measured point belongs to a predicted level that is as near as this, relative: a rig that misses its set point.
+#: A measured point belongs to a predicted level if it, or the level it shares with other tests, is as near as this,
+#: relative: a rig that misses its set point.
 _SAME = 0.01
 #: Relative error that a file states of a point, from which it is not drawn; chosen: such points hide the others.
 _WORST_DRAWN = 0.05
@@ -133,7 +135,9 @@ def draw(
     scales = {"frequency": ("Hz", 1.0), "amplitude": units.displacement}
     _, scale = scales[axis]
     x, where = scale * getattr(lines, axis), scale * getattr(points, axis)
-    marked = _spots(getattr(points, held), levels, (where >= x.min() * (1 - _SAME)) & (where <= x.max() * (1 + _SAME)))
+    ends = x.min() * (1 - _SAME), x.max() * (1 + _SAME)
+    inside = [(ends[0] <= own) & (own <= ends[1]) for own in (where, nominal(where))]
+    marked = _spots(getattr(points, held), levels, np.any(inside, axis=0))
     laid = any(spots.any() for spots in marked)
     looks = style.styles(levels.size, held)
     stiffness_factor, names = pair_labels(direction, float(lines.stiffness.value.max()))
@@ -163,8 +167,12 @@ def draw(
 
 
 def _spots(held: Array, levels: Array, inside: Array) -> list[Array]:
-    """Whether each point is near a level and nearest to it, an (n,) per level; only those that are inside count."""
-    off = np.abs(held[:, None] / levels - 1.0)
+    """Whether each point is near a level and nearest to it, an (n,) per level; only those that are inside count.
+
+    A point that is near none goes by what it shares with other points.
+    """
+    alone = np.abs(held[:, None] / levels - 1.0).min(axis=1) > _SAME
+    off = np.abs(np.where(alone, nominal(held), held)[:, None] / levels - 1.0)
     nearest = off == np.min(off, axis=1, keepdims=True)
     return list((inside[:, None] & nearest & (off <= _SAME)).T)
 

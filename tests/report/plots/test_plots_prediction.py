@@ -9,10 +9,12 @@ import pytest
 from figures import AMPLITUDES, FREQUENCIES, TORSION, Looped, Swept, fitted, labels, legend, lines, points, predicted
 from matplotlib.figure import Figure
 
+from bushfit.fitting.data_sets import sweep_data
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
-from bushfit.model.result import Range
-from bushfit.prediction import predict
+from bushfit.model.result import Range, Result
+from bushfit.prediction import default_grid, predict
+from bushfit.reading.measurement import Sweep
 from bushfit.report.artifacts import prediction_files
 from bushfit.report.plots import loops_figure, prediction_figure, to_png
 
@@ -53,6 +55,21 @@ def test_points_are_means_of_repeats_of_the_same_level_and_direction(paper_model
     assert drawn.get_ydata()[FREQUENCIES == 55.0][0] == pytest.approx(middle, rel=1e-12)
     radial = predicted(paper_model, Direction.TORSION, amplitudes=TORSION)[0]
     assert "measured" not in prediction_figure(radial, sweeps, "").get_supxlabel()
+
+
+def test_points_of_a_level_that_each_file_reached_a_little_differently_are_all_drawn(paper_model: Model) -> None:
+    levels = np.array([0.02, 0.05, 0.1, 0.2, 0.5, 1.0]) * 1e-3
+    files = [
+        Sweep(
+            f"{f:g} Hz", Direction.AXIAL, np.full(6, f), at, paper_model.stiffness("axial", f, at), stepped="amplitude"
+        )
+        for f, at in ((1.0, 0.98 * levels), (10.0, levels), (50.0, 1.02 * levels))
+    ]
+    prediction = predict(
+        Result(paper_model), Direction.AXIAL, *default_grid(Result(paper_model), Direction.AXIAL, files)
+    )
+    for axes in prediction_figure(prediction, sweep_data(files), "").axes:
+        assert sum(len(line.get_xdata()) for line in points(axes)) == 18
 
 
 def test_points_lie_on_lines_with_the_rig_and_the_bushing_stands_apart(
