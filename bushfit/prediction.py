@@ -266,7 +266,8 @@ def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
     said += f"; left out, because they belong to {result.name} or its rig: {left}" if left else ""
     measured = result.measured
     if measured:
-        measured = replace(measured, directions=tuple(name for name in measured.directions if name in names))
+        of_specimens = tuple(name for name in measured.directions if name in names)
+        measured = replace(measured, directions=of_specimens or (result.name,))
     there = [name for name in result.covariance.names if name in model.values]
     fitted = tuple(name for name in result.fitted if name in model.values)
     covariance = result.covariance.restricted(there)
@@ -293,9 +294,20 @@ def rig_effects(result: Result) -> list[str]:
 
 
 def _unfitted(result: Result, direction: Place) -> Iterator[str]:
-    """Warnings where a direction was not fitted: its band lacks the error of the formula that leads there."""
+    """Warnings where a direction was not fitted: its band lacks the error of the formula that leads there.
+
+    Where the radial direction was fitted by a formula that is off, the parameters carry its error.
+    """
     fitted = result.measured.directions if result.measured else ()
-    if not fitted or str(direction) in fitted:
+    if not fitted:
+        return
+    if str(direction) in fitted:
+        shape = result.model.bushing
+        corrected = any(effect_named(name).corrects == Direction.RADIAL for name in result.model.effects)
+        if direction is Direction.RADIAL and shape and shape.shape == "paper" and not corrected:
+            formula = f"the paper's formula, {_radial_error(shape)}"
+            yield f"{direction}: fitted with {formula}; the parameters carry that error"
+            yield from _compressible(result, shape)
         return
     of_bushing = direction is Direction.AXIAL and not set(Direction).isdisjoint(fitted)
     if not (of_bushing or direction in (Direction.RADIAL, Direction.TORSION)):
@@ -315,11 +327,16 @@ def _unfitted(result: Result, direction: Place) -> Iterator[str]:
         return
     band = f"its band holds the scatter of the {' and '.join(fitted)} tests, not" if result.fitted else "no band holds"
     yield f"{direction}: not fitted; {band} the error of the {formula} formula, {compared}"
-    if radially and bushing and bushing.correction:
-        lowering = bushing.correction.lowering(result.model.values.get("mu", 0.0))
-        if lowering > _NOTED_LOWERING:
-            lower = f"would lower the radial stiffness of this shape by {number(100.0 * lowering, 2)} %"
-            yield f"{direction}: the rubber counts as incompressible; a bulk modulus of 2 GPa {lower}"
+    if radially and bushing:
+        yield from _compressible(result, bushing)
+
+
+def _compressible(result: Result, bushing: Bushing) -> Iterator[str]:
+    """A warning where a bulk modulus of 2 GPa would change the radial stiffness."""
+    lowering = bushing.correction.lowering(result.model.values.get("mu", 0.0)) if bushing.correction else 0.0
+    if lowering > _NOTED_LOWERING:
+        lower = f"would lower the radial stiffness of this shape by {number(100.0 * lowering, 2)} %"
+        yield f"{Direction.RADIAL}: the rubber counts as incompressible; a bulk modulus of 2 GPa {lower}"
 
 
 def _radial_error(bushing: Bushing) -> str:
