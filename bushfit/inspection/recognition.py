@@ -93,7 +93,7 @@ def place_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Place | Non
     sizes = {key: stated[key] for key in ("area", "thickness", "elements") if key in stated}
     body = {"name": stated.get("specimen", "coupon")}
     if table.motion is STRAINING:
-        if any(_TENSILE.search(column.header) for column in table.roles.values()):
+        if any(map(_TENSILE.search, table.layout.written or [column.header for column in table.roles.values()])):
             body = {"name": stated.get("specimen", "bar"), "strain": "tension"}
         return Specimen(**vars(check_tables({**body, "kind": "modulus"}, None, SpecimenTable)))
     if sizes:
@@ -109,7 +109,7 @@ def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Directi
     """
     turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
     if "direction" not in stated:
-        return direction_of_file(file, table.headers, turns=turns, sheet=stated.get("sheet"))
+        return direction_of_file(file, table.layout.written or table.headers, turns=turns, sheet=stated.get("sheet"))
     if turns and not Direction(stated["direction"]).is_rotation:
         raise table.header_error(
             "the units say torsion",
