@@ -52,13 +52,14 @@ def command(
     Writes campaign.toml, which names the files as seen from its folder; -o may name it: -o my_bushing.toml.
     """
     from bushfit.geometry import Specimen
-    from bushfit.inspection.draft import campaign_text
+    from bushfit.inspection.draft import campaign_text, named_apart
 
     name = name or (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name
     folder, target = _place(options, name)
     bushing = _bushing(name, sizes) if any(sizes.values()) else None
     options.require_free(folder, [target])
     seen, left_out = _usable(files, stated, is_bushing=bushing is not None or "specimen" not in stated)
+    seen = named_apart(seen)
     if bushing is None and not all(isinstance(one.direction, Specimen) for one in seen):
         bushing = _bushing(name, sizes)
     text = campaign_text(name, bushing and bushing[1], seen, folder)
