@@ -22,6 +22,8 @@ from bushfit.validation import check_tables
 
 #: What an error says besides its problem.
 _PARTS = ("file", "place", "found", "expected", "hint")
+#: Sizes of a block in shear, as [[specimens]] has them.
+BLOCK_KEYS = ("area", "thickness", "elements")
 #: Headers of a bar in tension: E', |E*|, "storage modulus E'", "tensile strain".
 _TENSILE = re.compile(r"(?<![^\W_])E(?![^\W_])|young|tensile|tension|traction|zug", re.IGNORECASE)
 
@@ -90,7 +92,7 @@ def place_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Place | Non
         MeasurementError: units of torsion where the user states another direction.
         CampaignError, UnitError, ModelError: sizes that make no specimen.
     """
-    sizes = {key: stated[key] for key in ("area", "thickness", "elements") if key in stated}
+    sizes = {key: stated[key] for key in BLOCK_KEYS if key in stated}
     body = {"name": stated.get("specimen", "coupon")}
     if table.motion is STRAINING:
         if any(map(_TENSILE.search, table.layout.written or [column.header for column in table.roles.values()])):

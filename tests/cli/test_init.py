@@ -106,6 +106,15 @@ def test_what_only_the_user_knows_is_asked_for_and_written(typed: Callable, test
     assert load_campaign(tmp_path / "x/campaign.toml").loops[0].time[-1] > 1.0
 
 
+def test_a_file_that_names_a_direction_is_no_block_in_shear(typed: Callable, tests: list[Path], tmp_path: Path) -> None:
+    (tmp_path / "mount.csv").write_bytes(tests[1].read_bytes())
+    block = ("--area", "900 mm^2", "--thickness", "6 mm", "--elements", "2", "--specimen", "mount")
+    done = typed("init", tests[1], "mount.csv", *GEOMETRY, *block, "-o", "x")
+    assert done.returncode == 0, done.stderr
+    campaign = load_campaign(tmp_path / "x/campaign.toml")
+    assert [str(sweep.direction) for sweep in campaign.sweeps] == ["axial", "mount"]
+
+
 def test_amplitudes_that_may_be_counted_otherwise_are_said(typed: Callable, tests: list[Path], tmp_path: Path) -> None:
     done = typed("init", tests[1], *GEOMETRY, "-o", "x")
     assert "taken zero-to-peak, else --amplitude peak-to-peak" in done.stderr
