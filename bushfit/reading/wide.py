@@ -28,6 +28,8 @@ from bushfit.reading.source import RowSource, Sheet
 
 #: The two roles of which one runs down and the other across.
 _STEPPED = ("frequency", "amplitude")
+#: The two in the plural.
+_PLURAL = {"frequency": "frequencies", "amplitude": "amplitudes"}
 #: Rows above a block that may be its header; chosen: a title, levels, quantities, and units.
 _MOST_HEADER_ROWS = 4
 #: A number in a header, with what names it before ("A = 0.1") and what may be its unit after it.
@@ -283,6 +285,7 @@ def _told(series: Sequence[_Series]) -> str:
     """The columns of a wide table in words: what each holds, at which level, over how many rows."""
     counted = Counter((one.said.role, one.said.unit, one.said.stepped, len(one.points)) for one in series)
     return "; ".join(
-        f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of {count} {stepped}s, {n} rows"
+        f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of "
+        f"{count} {_PLURAL[stepped or 'amplitude']}, {n} rows"
         for (role, unit, stepped, n), count in counted.items()
     )
