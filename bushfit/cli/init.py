@@ -52,13 +52,14 @@ def command(
     Writes campaign.toml, which names the files as seen from its folder; -o may name it: -o my_bushing.toml.
     """
     from bushfit.geometry import Specimen
-    from bushfit.inspection.draft import campaign_text
+    from bushfit.inspection.draft import campaign_text, named_apart
 
     name = name or (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name
     folder, target = _place(options, name)
     bushing = _bushing(name, sizes) if any(sizes.values()) else None
     options.require_free(folder, [target])
-    seen, left_out = _usable(files, stated, is_bushing=bushing is not None or "specimen" not in stated)
+    seen, left_out = _usable(files, stated, is_sized=bushing is not None)
+    seen = named_apart(seen)
     if bushing is None and not all(isinstance(one.direction, Specimen) for one in seen):
         bushing = _bushing(name, sizes)
     text = campaign_text(name, bushing and bushing[1], seen, folder)
@@ -124,16 +125,18 @@ def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[
         raise
 
 
-def _usable(files: Sequence[Path], stated: Mapping[str, Any], *, is_bushing: bool) -> tuple[list[Inspected], list[str]]:
+def _usable(files: Sequence[Path], stated: Mapping[str, Any], *, is_sized: bool) -> tuple[list[Inspected], list[str]]:
     """The loops and sweeps among files, each of a known direction or specimen, and why others are left out.
 
-    `is_bushing` says whether a bushing may have been tested, and not specimens alone.
+    `is_sized` says whether sizes of a bushing are given: then a file that names a direction is a test of it, and no
+    block in shear.
 
     Raises:
         MeasurementError: a file that the user names is another, with the way on.
     """
     from bushfit.geometry import Specimen
     from bushfit.inspection.gathering import gather
+    from bushfit.inspection.recognition import BLOCK_KEYS
 
     sources, left_out = gather(files, stated)
     places = [(source.file.resolve(), source.sheet) for source in sources]
@@ -144,7 +147,10 @@ def _usable(files: Sequence[Path], stated: Mapping[str, Any], *, is_bushing: boo
     for source in sources:
         with options_named():
             one = source.inspect()
-        if not (is_bushing or isinstance(one.direction, Specimen)):
+            if is_sized and isinstance(one.direction, Specimen) and one.direction.kind == "shear":
+                named = source.without(*BLOCK_KEYS, "direction").inspect().direction
+                one = source.without(*BLOCK_KEYS).inspect() if named else one
+        if not (is_sized or "specimen" not in stated or isinstance(one.direction, Specimen)):
             raise click.UsageError(
                 "These are tests of a stiffness: of a specimen in shear, which needs --area and --thickness, or of a "
                 "bushing, which needs --inner-radius, --outer-radius and --length."

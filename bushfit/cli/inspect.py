@@ -56,7 +56,7 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     of the first file's name.
     """
     from bushfit.campaign.naming import folder_name
-    from bushfit.inspection.draft import pasted_text
+    from bushfit.inspection.draft import named_apart, pasted_text
     from bushfit.inspection.gathering import gather
 
     folder = options.folder(folder_name(files[0].stem))
@@ -76,6 +76,7 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
             failed.append(error)
         else:
             tell(options, seen[-1])
+    seen = named_apart(seen)
     text = pasted_text(seen)
     if not options.as_json:
         click.echo(text, nl=False)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +28,22 @@ def campaign_text(name: str, bushing: Mapping[str, str] | None, files: Sequence[
     order = [seen for kind in _TABLES for seen in files if seen.kind == kind]
     tables = [*_specimens(files), *(file_text(seen, folder) for seen in order)]
     return "\n".join([*(["[bushing]"] if bushing else []), *head, "", *tables])
+
+
+def named_apart(files: Sequence[Inspected]) -> list[Inspected]:
+    """Files that were inspected, with specimens that differ under names that differ: coupon, coupon_2 and so on."""
+    apart: dict[Specimen, Specimen] = {}
+    for body in (seen.direction for seen in files):
+        if isinstance(body, Specimen) and body not in apart:
+            taken = {other.name for other in apart.values()}
+            names = chain([body.name], (f"{body.name}_{number}" for number in count(2)))
+            apart[body] = replace(body, name=next(name for name in names if name not in taken))
+    return [
+        replace(seen, direction=body, entry={**seen.entry, "specimen": body.name})
+        if isinstance(seen.direction, Specimen) and (body := apart[seen.direction])
+        else seen
+        for seen in files
+    ]
 
 
 def _specimens(files: Sequence[Inspected]) -> Iterator[str]:

@@ -38,6 +38,10 @@ class Source:
     def __str__(self) -> str:
         return f"{self.file}, sheet {self.sheet}" if self.sheet else str(self.file)
 
+    def without(self, *keys: str) -> Source:
+        """The same of which some keys are not stated."""
+        return replace(self, stated={key: value for key, value in (self.stated or {}).items() if key not in keys})
+
     def inspect(self) -> Inspected:
         """See `opening.inspect`."""
         return inspect(self.file, self.stated or {}, self.beside)

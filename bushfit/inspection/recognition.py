@@ -22,6 +22,8 @@ from bushfit.validation import check_tables
 
 #: What an error says besides its problem.
 _PARTS = ("file", "place", "found", "expected", "hint")
+#: Sizes of a block in shear, as [[specimens]] has them.
+BLOCK_KEYS = ("area", "thickness", "elements")
 #: Headers of a bar in tension: E', |E*|, "storage modulus E'", "tensile strain".
 _TENSILE = re.compile(r"(?<![^\W_])E(?![^\W_])|young|tensile|tension|traction|zug", re.IGNORECASE)
 
@@ -90,10 +92,10 @@ def place_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Place | Non
         MeasurementError: units of torsion where the user states another direction.
         CampaignError, UnitError, ModelError: sizes that make no specimen.
     """
-    sizes = {key: stated[key] for key in ("area", "thickness", "elements") if key in stated}
+    sizes = {key: stated[key] for key in BLOCK_KEYS if key in stated}
     body = {"name": stated.get("specimen", "coupon")}
     if table.motion is STRAINING:
-        if any(_TENSILE.search(column.header) for column in table.roles.values()):
+        if any(map(_TENSILE.search, table.layout.written or [column.header for column in table.roles.values()])):
             body = {"name": stated.get("specimen", "bar"), "strain": "tension"}
         return Specimen(**vars(check_tables({**body, "kind": "modulus"}, None, SpecimenTable)))
     if sizes:
@@ -109,7 +111,7 @@ def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Directi
     """
     turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
     if "direction" not in stated:
-        return direction_of_file(file, table.headers, turns=turns, sheet=stated.get("sheet"))
+        return direction_of_file(file, table.layout.written or table.headers, turns=turns, sheet=stated.get("sheet"))
     if turns and not Direction(stated["direction"]).is_rotation:
         raise table.header_error(
             "the units say torsion",

@@ -38,6 +38,8 @@ _MISSED_LEVEL = 0.03
 _COPIED_P = 1e-4
 #: Probability at the least that two phases are equal; chosen: some files have them in few digits.
 _SAME_PHASE_P = 0.05
+#: Step in ln X from one level to the next below which they may be repeats of one; chosen: nobody sets finer levels.
+_LEAST_STEP = 0.02
 #: Share of the blocks of which one has to have a frequency for the others to lack it.
 _USUAL = 0.5
 #: Points or frequencies that are told one by one; chosen: they make a sentence.
@@ -62,6 +64,7 @@ def look_at_sweep(sweep: Sweep, named: Said) -> Looked:
     odd = [
         *wrong_labels(named, sweep.direction, [float(x) for x in levels], [float(x) for x in frequencies]),
         *_copies(sweep, noise),
+        *_untold_repeats(sweep),
         *_missing(sweep),
         *_outliers(sweep, noise),
         *_odd_blocks(sweep),
@@ -105,6 +108,22 @@ def _finest(values: Array) -> Array:
     """The value of one in the last digit of each value, if all have as many digits as the longest, (n,)."""
     digits = max(len(f"{value:.8e}".partition("e")[0].replace(".", "").rstrip("0")) for value in values)
     return 10.0 ** (np.floor(np.log10(values)) + 1 - digits)
+
+
+def _untold_repeats(sweep: Sweep) -> Iterator[str]:
+    """A sentence where amplitudes of one frequency lie too close for levels, and no passes tell them for repeats."""
+    passes, of_frequency = np.unique(sweep.repeat).size, sweep.frequency.size / np.unique(sweep.frequency).size
+    steps = [
+        (float(sweep.frequency[rows[0]]), float(np.diff(np.log(levels)).min()))
+        for rows in _groups(sweep.frequency)
+        if (levels := np.unique(sweep.amplitude[rows])).size > 1
+    ]
+    frequency, least = min(steps, key=lambda step: step[1], default=(0.0, np.inf))
+    if least < _LEAST_STEP and round(of_frequency) != passes:
+        yield (
+            f"two amplitudes at {frequency:.4g} Hz lie {number(100 * np.expm1(least), 2)} % apart and count as two "
+            "levels: if they are repeats, a column repeat with their numbers tells so"
+        )
 
 
 def _missing(sweep: Sweep) -> Iterator[str]:

@@ -26,8 +26,8 @@ _TWO_PRIMES = re.compile(r"(?<![^\W_])([A-Za-z])\"")
 _ASIDES = re.compile(r"\b(?:axial|radial|torsional|measured|actual|gemessen|mesure|medido|ist)\b")
 #: For the roles that the symbol f may stand for, units by which it stands for the other one.
 _UNITS_NOT_F = {"force": ("Hz",), "frequency": ("N", "N m")}
-#: Units by which the symbol A stands for an amplitude, and not for an area.
-_UNITS_OF_A = ("m", "rad")
+#: Units by which a symbol stands for its role: A for an amplitude and not for an area, K for a stiffness.
+_UNITS_OF = {"a": ("m", "rad"), "k": ("N/m", "N*m/rad")}
 #: Names of an amplitude that count it peak-to-peak by themselves. "range" alone and "Schwingungsweite" are not among
 #: them, because some call the amplitude so.
 _PEAK_TO_PEAK_NAMES = {
@@ -144,7 +144,7 @@ class Vocabulary:
                 is_unit = units.is_unit if role != "temperature" else units.kelvin
                 if role is None or not (certain or is_unit(unit or "")):
                     continue
-                if candidate == "a" and not any(units.agrees(unit or "", si) for si in _UNITS_OF_A):
+                if candidate in _UNITS_OF and not any(units.agrees(unit or "", si) for si in _UNITS_OF[candidate]):
                     continue
                 if not (candidate == "f" and unit and any(units.agrees(unit, si) for si in _UNITS_NOT_F[role])):
                     return Heading(role, unit, counted)

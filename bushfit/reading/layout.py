@@ -75,6 +75,7 @@ class Layout:
         delimiter: what parts the cells; " " for runs of blanks; "" where cells come apart by themselves.
         headers, header_line: cells and line of the header.
         units, units_line: cells of the units row, "" where a column has none, and its line; None where there is none.
+        written: cells of the header of a wide table that name a quantity, of which `headers` are those of the long one.
     """
 
     delimiter: str
@@ -82,6 +83,7 @@ class Layout:
     header_line: int
     units: tuple[str, ...]
     units_line: int | None
+    written: tuple[str, ...] = ()
 
     @property
     def lines_before_data(self) -> int:

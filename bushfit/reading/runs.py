@@ -55,6 +55,8 @@ def runs_of(
         stepped: what is stepped, where it is stated.
     """
     levels = nominal(amplitude)
+    if (levels == amplitude).all() and repeat is None:
+        levels = _by_frequency(frequency, amplitude)
     if (levels == amplitude).all():
         levels = _by_rank(frequency, amplitude, repeat)
     kept_frequency, kept_level = (float(np.mean(np.diff(values) == 0.0)) for values in (frequency, levels))
@@ -88,6 +90,23 @@ def nominal(amplitude: Floats) -> Floats:
         if span <= _WIDEST_LEVEL and between >= _LEAST_GAP * span and np.median(np.bincount(group)) > 1:
             return _middle(amplitude, group[place])
     return amplitude
+
+
+def _by_frequency(frequency: Floats, amplitude: Floats) -> Floats:
+    """The level of each amplitude, (n,), where every frequency has as many levels, each of as many points.
+
+    Their order in the file does not count. Amplitudes keep their own values where a level reaches into the next.
+    """
+    rank = np.empty(amplitude.size, dtype=np.intp)
+    shapes = set()
+    for one in np.unique(frequency):
+        rows = np.flatnonzero(frequency == one)
+        levels, rank[rows], counts = np.unique(nominal(amplitude[rows]), return_inverse=True, return_counts=True)
+        shapes.add((levels.size, counts.min(), counts.max()))
+        if len(shapes) > 1 or counts.min() != counts.max() or counts.max() < 2 or levels.size < _FEWEST_POINTS:
+            return amplitude
+    table = np.sort(amplitude[np.argsort(rank)].reshape(rank.max() + 1, -1), axis=1)
+    return _middle(amplitude, rank) if (table[:-1, -1] < table[1:, 0]).all() else amplitude
 
 
 def _by_rank(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | None) -> Floats:

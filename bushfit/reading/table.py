@@ -182,7 +182,7 @@ class Table(Columns):
     ) -> dict[str, Column]:
         """The columns by role, each with its unit; `columns` and `stated_units` as of `open`."""
         roles: dict[str, Column] = {}
-        for index, header in enumerate(self.headers):
+        for index, header in sorted(enumerate(self.headers), key=lambda one: _is_k(one[1])):
             heading = vocabulary.heading(header)
             if heading is None:
                 continue
@@ -194,6 +194,10 @@ class Table(Columns):
                 angular = [is_angular(one.header, one.unit or "") for one in (roles[role], column)]
                 if angular[0] != angular[1]:
                     roles[role] = roles[role] if angular[1] else column
+                    continue
+            if _is_k(header) and role not in columns:
+                known = role in roles and not _is_k(roles[role].header)  # K* says more than K
+                if known or not any(units.agrees(column.unit or "", si) for si in ("N/m", "N*m/rad")):
                     continue
             if role in roles:
                 raise self.header_error(
@@ -244,6 +248,11 @@ def _source(data: Bytes, file: Path, stated: FileFormat, is_usable: Callable[[Ro
     if stated.sheet:
         raise MeasurementError("this is no workbook", file=file, found=f'sheet = "{stated.sheet}"', expected="xlsx")
     return Text(file, *to_utf8(data, file, stated.encoding))
+
+
+def _is_k(header: str) -> bool:
+    """Whether a header is the symbol K alone, with or without a unit."""
+    return plain(units.split_header(header)[0]) == "k"
 
 
 def _label(role: str) -> str:

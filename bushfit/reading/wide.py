@@ -14,7 +14,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate, groupby
 from pathlib import Path
 from typing import NamedTuple
@@ -28,6 +28,8 @@ from bushfit.reading.source import RowSource, Sheet
 
 #: The two roles of which one runs down and the other across.
 _STEPPED = ("frequency", "amplitude")
+#: The two in the plural.
+_PLURAL = {"frequency": "frequencies", "amplitude": "amplitudes"}
 #: Rows above a block that may be its header; chosen: a title, levels, quantities, and units.
 _MOST_HEADER_ROWS = 4
 #: A number in a header, with what names it before ("A = 0.1") and what may be its unit after it.
@@ -104,8 +106,11 @@ def unfolded(
         rows: list[_Row] = [
             (number, [*split(content, mark)] if isinstance(content, str) else [*content]) for number, content in lines
         ]
-        if series := [one for block in _blocks(rows, vocabulary) for one in _series(*block, vocabulary)]:
-            return _joined(series, source, file, mark)
+        blocks = list(_blocks(rows, vocabulary))
+        if series := [one for block in blocks for one in _series(*block, vocabulary)]:
+            long, joined = _joined(series, source, file, mark)
+            cells = (cell for headers, _ in blocks for row in headers for cell in row)
+            return long, replace(joined, written=tuple(cell for cell in cells if _names_role(cell, vocabulary)))
     return None
 
 
@@ -173,13 +178,19 @@ def _corner(text: str, vocabulary: Vocabulary) -> list[_Said]:
     return [one for part in _CORNER.split(text) if not (one := _said(part, vocabulary)).level]
 
 
+def _names_role(text: str, vocabulary: Vocabulary) -> bool:
+    """Whether a header cell names what is measured, or one of frequency and amplitude."""
+    return any(one.role or one.stepped for one in (_said(part, vocabulary) for part in _CORNER.split(text)))
+
+
 def _said(text: str, vocabulary: Vocabulary) -> _Said:
     """What a header cell says; nothing where a part of it is not understood."""
     whole, convention = split_convention(text.replace("_", " "))
     if is_like_number(text):
         return _Said(level=text)
     heading = vocabulary.heading(text)
-    if heading and (heading.unit is None or units.is_unit(heading.unit)):
+    glued = _LEVEL.fullmatch((heading and heading.unit) or "")  # "tan delta 1 %" is at a level, and no unit of 1 %
+    if heading and not (glued and _stepped_in(glued["unit"])) and units.is_unit(heading.unit or "1"):
         return _named(heading)
     if text and units.is_unit(bare := whole.strip("[]() ")):
         return _Said(unit=bare, convention=convention)
@@ -274,6 +285,7 @@ def _told(series: Sequence[_Series]) -> str:
     """The columns of a wide table in words: what each holds, at which level, over how many rows."""
     counted = Counter((one.said.role, one.said.unit, one.said.stepped, len(one.points)) for one in series)
     return "; ".join(
-        f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of {count} {stepped}s, {n} rows"
+        f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of "
+        f"{count} {_PLURAL[stepped or 'amplitude']}, {n} rows"
         for (role, unit, stepped, n), count in counted.items()
     )

@@ -51,7 +51,7 @@ SWEEP_COLUMNS = {
     "stiffness": (
         *("stiffness", "dynamic stiffness", "stiffness magnitude", "complex stiffness", "kdyn", "cdyn", "|k|", "K*"),
         *("Steifigkeit", "dynamische Steifigkeit", "Federsteifigkeit", "Drehsteifigkeit", "dyn Steifigkeit"),
-        *("Federrate", "dynamische Federrate", "dyn Federrate", "Federkonstante", "|K*|", "c*"),
+        *("Federrate", "dynamische Federrate", "dyn Federrate", "Federkonstante", "|K*|", "c*", "K"),
         *("Steifigkeit dyn", "Steifigkeit dynamisch", "dyn Federsteifigkeit", "dynamische Federsteifigkeit"),
         *("dyn stiffness", "stiffness dyn", "K abs", "dynamic spring rate", "dynamic rate", "raideur complexe"),
         *("komplexe Steifigkeit", "Betrag der Steifigkeit", "rigidez compleja"),

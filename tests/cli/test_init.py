@@ -106,6 +106,15 @@ def test_what_only_the_user_knows_is_asked_for_and_written(typed: Callable, test
     assert load_campaign(tmp_path / "x/campaign.toml").loops[0].time[-1] > 1.0
 
 
+def test_a_file_that_names_a_direction_is_no_block_in_shear(typed: Callable, tests: list[Path], tmp_path: Path) -> None:
+    (tmp_path / "mount.csv").write_bytes(tests[1].read_bytes())
+    block = ("--area", "900 mm^2", "--thickness", "6 mm", "--elements", "2", "--specimen", "mount")
+    done = typed("init", tests[1], "mount.csv", *GEOMETRY, *block, "-o", "x")
+    assert done.returncode == 0, done.stderr
+    campaign = load_campaign(tmp_path / "x/campaign.toml")
+    assert [str(sweep.direction) for sweep in campaign.sweeps] == ["axial", "mount"]
+
+
 def test_amplitudes_that_may_be_counted_otherwise_are_said(typed: Callable, tests: list[Path], tmp_path: Path) -> None:
     done = typed("init", tests[1], *GEOMETRY, "-o", "x")
     assert "taken zero-to-peak, else --amplitude peak-to-peak" in done.stderr
@@ -133,10 +142,14 @@ def test_coupons_alone_make_a_campaign_without_a_bushing(typed: Callable, tmp_pa
         rows = "\n".join(f"{f},{a},{1 + f / 1e3},0.1" for a in (0.1, 1) for f in range(5, 60, 5))
         text = f"Frequency [Hz],Strain [%],Storage Modulus {symbol}' [MPa],tan delta [-]\n{rows}\n"
         (tmp_path / f"{symbol}.csv").write_text(text, encoding="utf-8")
-    done = typed("init", tmp_path / "E.csv", tmp_path / "G.csv", "-o", "dma.toml")
-    assert done.returncode == 0, done.stderr
-    specimens = load_campaign(tmp_path / "dma.toml").specimens
-    assert [(one.name, one.strain) for one in specimens] == [("bar", "tension"), ("coupon", "engineering")]
+    for options, names in (((), ("bar", "coupon")), (("--specimen", "DMA"), ("DMA", "DMA_2"))):
+        done = typed("init", tmp_path / "E.csv", tmp_path / "G.csv", *options, "-o", f"{names[0]}.toml")
+        assert done.returncode == 0, done.stderr
+        campaign = load_campaign(tmp_path / f"{names[0]}.toml")
+        assert [(one.name, one.strain) for one in campaign.specimens] == list(
+            zip(names, ("tension", "engineering"), strict=True)
+        )
+        assert [sweep.direction for sweep in campaign.sweeps] == list(campaign.specimens)
 
 
 @pytest.mark.parametrize(

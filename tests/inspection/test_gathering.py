@@ -156,6 +156,16 @@ def test_a_storage_modulus_with_a_loss_is_a_coupons(header: str, tmp_path: Path)
     np.testing.assert_allclose(seen.measured.stiffness, 1e6 * (1.2 + seen.measured.frequency / 1e3) * (1 + 0.1j))
 
 
+@pytest.mark.parametrize("heads", ["E* 0.1 % [MPa],E* 1 % [MPa]", "|E*| 0.1% [MPa],|E*| 1% [MPa]"])
+def test_a_wide_table_of_a_bar_in_tension_is_one(heads: str, tmp_path: Path) -> None:
+    rows = "\n".join(f"{f},{6 + f / 1e3},{4 + f / 1e3},0.1,0.2" for f in range(5, 60, 5))
+    text = f"Frequency [Hz],{heads},tan delta 0.1 %,tan delta 1 %\n{rows}\n"
+    (tmp_path / "wide.csv").write_text(text, encoding="utf-8")
+    (tmp_path / "shear.csv").write_text(text.replace("E*", "G*"), encoding="utf-8")
+    strains = [inspect(tmp_path / name, {}).direction.strain for name in ("wide.csv", "shear.csv")]
+    assert strains == ["tension", "engineering"]
+
+
 def test_sizes_of_a_block_make_a_specimen_of_it(sweep: Sweep, tmp_path: Path) -> None:
     raw_sweep_table(sweep).to_csv(tmp_path / "x.csv", index=False)
     sizes = {"specimen": "mount", "area": "772 mm^2", "thickness": "6 mm", "elements": 2}

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from looking import look, without
 
+from bushfit.inspection.opening import inspect
+from bushfit.reading.csvfile import raw_sweep_table
 from bushfit.reading.measurement import Sweep
 
 
@@ -64,3 +66,15 @@ def test_each_fault_of_a_sweep_is_told(sweep: Sweep, tmp_path: Path, fault: str)
     odd = look(tmp_path, spoil(sweep)).looked.odd
     print("; ".join(odd))
     assert any(said in sentence for sentence in odd)
+
+
+@pytest.mark.parametrize("order", ["by amplitude", "shuffled"])
+def test_repeats_that_nothing_tells_are_asked_for(sweep: Sweep, tmp_path: Path, order: str) -> None:
+    """A repeat lost and levels missed by up to 12 %: no rule groups them."""
+    table = raw_sweep_table(sweep).drop(columns="repeat").iloc[1:]
+    table["amplitude [mm]"] *= 1.0 + 0.12 * np.random.default_rng(1).uniform(-1.0, 1.0, len(table))
+    by_amplitude = table.sort_values(["frequency [Hz]", "amplitude [mm]"])
+    table = by_amplitude if order == "by amplitude" else table.sample(frac=1.0, random_state=1)
+    table.to_csv(tmp_path / "axial.csv", index=False)
+    odd = inspect(tmp_path / "axial.csv", {}).looked.odd
+    assert any("if they are repeats, a column repeat with their numbers tells so" in sentence for sentence in odd)

@@ -35,6 +35,22 @@ def test_amplitude_sweeps_as_reached_have_their_levels_back(
     assert np.allclose(runs.amplitude, meant, rtol=scatter + 1e-12)
 
 
+@pytest.mark.parametrize("order", ["by amplitude", "shuffled"])
+def test_repeats_in_any_order_have_their_levels_back(order: str) -> None:
+    """Levels that miss by less than 4 % at each frequency, and by more over all of them."""
+    frequency, reached, meant, _ = swept(AMPLITUDES, FREQUENCIES, 3, 0.035, 7)
+    reached = reached * np.where(frequency == 80.0, 0.95, 1.0)
+    rows = np.lexsort((reached, frequency))
+    rows = rows if order == "by amplitude" else np.random.default_rng(1).permutation(rows)
+    runs = runs_of(frequency[rows], reached[rows], None)
+    assert runs.stepped == "amplitude"
+    assert np.unique(runs.amplitude).size == AMPLITUDES.size
+    assert np.allclose(runs.amplitude, meant[rows], rtol=0.05)
+    assert np.bincount(runs.repeat).tolist() == [0, 45, 45, 45]
+    of_uneven = runs_of(frequency[rows][1:], reached[rows][1:], None)
+    assert np.array_equal(of_uneven.amplitude, reached[rows][1:])
+
+
 def test_a_frequency_sweep_that_misses_its_levels_holds_them_all_the_same() -> None:
     random = np.random.default_rng(1)
     amplitude, frequency = (x.ravel() for x in np.meshgrid([1e-4, 2e-4, 5e-4], np.arange(5.0, 156.0, 10.0)[::1]))

@@ -11,7 +11,7 @@ from texts import LOOP, LOOP_ROWS, loop_from
 from bushfit.errors import MeasurementError, NoColumnError, UnitError
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.table import Table
-from bushfit.reading.words import LOOP_COLUMNS
+from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 
 
 def opened(text: str, folder: Path, **stated: object) -> Table:
@@ -51,6 +51,25 @@ def test_whether_a_column_agrees_with_a_unit(tmp_path: Path) -> None:
     assert table.agrees("force", "N")
     assert not table.agrees("force", "m")
     assert not table.agrees("time", "s")
+
+
+@pytest.mark.parametrize(
+    ("header", "index"),
+    [
+        ("f [Hz],A [mm],K [N/mm],tan d", 2),
+        ("f [Hz],A [mm],Stiffness K [N/mm],tan d", 2),
+        ("f,A,K,tan d\nHz,mm,N/mm,-", 2),
+        ("f [Hz],K [N/mm],A [mm],K* [N/mm],tan d", 3),
+        ("f [Hz],A [mm],K,tan d", None),
+        ("f [Hz],A [mm],K [degC],tan d", None),
+    ],
+)
+def test_the_symbol_of_a_stiffness_is_one_by_its_unit(header: str, index: int | None, tmp_path: Path) -> None:
+    file = tmp_path / "sweep.csv"
+    row = ",".join(["1.5"] * (header.partition("\n")[0].count(",") + 1))
+    file.write_text("\n".join([header, *[row] * 3]))
+    column = Table.open(file, SWEEP_COLUMNS).roles.get("stiffness")
+    assert (column and column.index) == index
 
 
 def test_too_few_rows_are_counted(tmp_path: Path) -> None:

@@ -156,6 +156,10 @@ SPOILED = {
         ["K* [N/mm]", *block(stiffness), "", "tan d", *(line.rpartition(";")[0] for line in block(loss))],
         ["the blocks of this wide table differ", "loss factor of 2 amplitudes"],
     ),
+    "a turned block that is narrower": (
+        ["K* [N/mm]", *turned(stiffness), "", "tan d", *(line.rpartition(";")[0] for line in turned(loss))],
+        ["the blocks of this wide table differ", "frequencies, 3 rows"],
+    ),
     "other amplitudes": (
         ["K* [N/mm]", *block(stiffness), "", "tan d", *block(loss, ["0,05 mm", "0,1 mm", "0,6 mm"])],
         ["the blocks of this wide table differ"],
