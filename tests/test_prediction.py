@@ -198,8 +198,8 @@ TORSION_FORMULA = "not the error of the torsion formula, which was not compared 
         (
             "radial",
             "axial radial",
-            "radial: fitted with the paper's formula, for this shape +4.9 % in stiffness and +36 % in strain against finite "
-            'elements, by which shape = "calibrated" goes; the parameters carry that error',
+            "radial: fitted with the paper's formula, for this shape +4.9 % in stiffness and +36 % in strain against "
+            'finite elements, by which shape = "calibrated" goes; the parameters carry that error',
         ),
         ("axial", "axial", None),
         ("radial", "", None),
@@ -208,7 +208,7 @@ TORSION_FORMULA = "not the error of the torsion formula, which was not compared 
 def test_a_band_that_lacks_the_error_of_a_formula_says_so(
     result: Result, direction: str, fitted: str, said: str | None
 ) -> None:
-    """And keeps silent where another was fitted by its exact formula, or where an older file does not say which were."""
+    """And keeps silent where another was fitted by its exact formula, or where an older file does not say."""
     reach = Range((0.1, 155.0), (1e-6, 1.0), tuple(Direction(name) for name in fitted.split()))
     found = predict(replace(result, measured=reach), Direction(direction), [5.0], [1e-4])
     assert found.warnings == ((said,) if said else ())
