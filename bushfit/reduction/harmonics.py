@@ -17,9 +17,6 @@ from bushfit.reading.measurement import Complex, Floats
 _HARMONICS = 15
 #: Harmonics in the fits that search for the frequency; chosen: the strongest ones.
 _FREQUENCY_HARMONICS = 3
-#: Share of half the rows of a cycle below which harmonics are fitted; chosen: at the half (Nyquist) rows cannot tell a
-#: harmonic's phase, and a frequency found a little off does not hide that.
-_BELOW_NYQUIST = 0.98
 #: Condition number of the scaled normal equations up to which rows tell harmonics apart; chosen: errors grow tenfold.
 _WORST_CONDITION = 100.0
 #: Terms of the drift: mean, slope and curvature.
@@ -81,14 +78,13 @@ class HarmonicFit:
     @classmethod
     def _solved(cls, time: Floats, values: Floats, count: int, frequency: float, order: int) -> HarmonicFit:
         """The fit over `count` cycles about time 0, with `order` harmonics or fewer, at a frequency that is given."""
-        per_cycle = (time.size - 1) / (float(time[-1] - time[0]) * frequency)
-        below_nyquist = int(np.ceil(_BELOW_NYQUIST * per_cycle / 2.0)) - 1
-        size = _DRIFT_TERMS + 2 * max(1, min(order, (time.size - _DRIFT_TERMS) // 4, below_nyquist))
+        size = _DRIFT_TERMS + 2 * max(1, min(order, (time.size - _DRIFT_TERMS) // 4))
         gram, moments = np.zeros((size, size)), np.zeros((size, 2))
         for rows, basis in _bases(time, frequency, size):
             gram += basis @ basis.T
             moments += basis @ values[:, rows].T
         scale = 1.0 / np.sqrt(np.diag(gram))
+        scale[_DRIFT_TERMS:] = np.sqrt(2.0 / time.size)  # by its own norm, a wave all but zero at the rows would pass
         unit = gram * np.outer(scale, scale)
         while size > _DRIFT_TERMS + 2 and np.linalg.cond(unit[:size, :size]) > _WORST_CONDITION:
             size -= 2
