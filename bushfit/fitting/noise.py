@@ -22,9 +22,9 @@ from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 FLOOR = 1e-4
 #: Errors that a run shares where nothing was repeated, relative gain and phase [rad]; chosen: those of most rigs.
 ASSUMED_SHARED = (5e-3, float(np.radians(0.25)))
-#: Degrees of freedom from which on repeats alone tell what a run shares; chosen: those of three repeats at three
+#: Degrees of freedom from which on repeats alone tell what a run shares; chosen: those of three repeats at two
 #: levels; with fewer, 95 % intervals were too narrow.
-_ENOUGH = 6
+_ENOUGH = 4
 #: Probability of unequal variances by chance, below which levels get noise of their own.
 _EQUAL_NOISE_P = 1e-3
 #: Degree, in the logarithm of what is stepped, of the smooth curve that stands in for repeats; chosen: it follows
