@@ -95,6 +95,11 @@ class Mistake(Effect):
         return f"[[{kind}]] of {shown(test)}: {line.format(direction=other)}"
 
 
+def told(mistake: Mistake, test: Loop | Sweep) -> str:
+    """A mistake in one test, and the line for the campaign that puts it right, in words."""
+    return f"{mistake.sentence.format(files=shown(test))} (then, in the campaign: {mistake.corrected(test)})"
+
+
 def shown(test: Loop | Sweep) -> str:
     """The file of a test, or its name where it came from none."""
     return test.source.file.name if test.source else test.name

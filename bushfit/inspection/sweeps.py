@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import linregress, poisson
 
 from bushfit.effects.contract import Array
-from bushfit.effects.mistake import shown
+from bushfit.effects.mistake import told
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.inspection.outside import wrong_labels
@@ -216,7 +216,7 @@ def _negative(sweep: Sweep) -> Iterator[str]:
         row = int(bad[0])
         yield (
             f"{bad.size} point{'s' * (bad.size > 1)} with a loss factor below zero, the first at "
-            f"{sweep.frequency[row]:.4g} Hz, {_told(sweep, sweep.amplitude[row])}"
+            f"{sweep.frequency[row]:.4g} Hz, {_told(sweep, sweep.amplitude[row])}: is the force channel late?"
         )
 
 
@@ -224,7 +224,7 @@ def _doubtful_loss(sweep: Sweep) -> Iterator[str]:
     """A sentence on a loss that hardly any filled rubber has, and on what the file may say instead."""
     mistakes = [mistake for mistake in MISTAKES.values() if mistake.doubt and mistake.possible(sweep)]
     if mistakes:
-        unless = ", or ".join(mistake.sentence.format(files=shown(sweep)) for mistake in mistakes)
+        unless = ", or ".join(told(mistake, sweep) for mistake in mistakes)
         loss = float(np.median(loss_factor(sweep.stiffness)))
         yield f"the loss factor is {number(loss, 2)} in the median, that of hardly any rubber, unless {unless}"
 

@@ -192,7 +192,7 @@ def _check_loss(table: Table, column: Column, loss_factor: Floats) -> None:
         column,
         "no bushing has this loss",
         f"a loss factor (loss over storage stiffness) from {_LOWEST_LOSS_FACTOR:g} to {_HIGHEST_LOSS_FACTOR:g}",
-        "check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]",
+        "check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]; or is it 90 deg less the loss?",
     )
 
 

@@ -47,15 +47,15 @@ SWEEP_FAULTS: dict[str, tuple[Callable[[Sweep], Sweep], str]] = {
     ),
     "loss below zero": (
         lambda x: spoiled(x, x.frequency == 155.0, np.exp(-0.4j)),
-        "9 points with a loss factor below zero, the first at 155 Hz, 0.1 mm",
+        "9 points with a loss factor below zero, the first at 155 Hz, 0.1 mm: is the force channel late?",
     ),
     "radians read as degrees": (
         lambda x: replace(x, stiffness=np.abs(x.stiffness) * np.exp(1j * np.radians(np.angle(x.stiffness)))),
-        "unless the phases of axial.csv are radians, not degrees, or the loss factors of axial.csv are ratios",
+        "unless the phases of axial.csv are radians, not degrees (then, in the campaign: [[sweeps]] of axial.csv: ",
     ),
     "90 deg less the phase": (
         lambda x: replace(x, stiffness=1j * np.conj(x.stiffness * np.exp(0.2j))),
-        "unless the phases of axial.csv are 90 deg less the loss angle, or the loss factors of axial.csv are per cent",
+        "unless the phases of axial.csv are 90 deg less the loss angle (then, in the campaign: [[sweeps]] of axial.csv: ",
     ),
 }
 
