@@ -51,11 +51,11 @@ SWEEP_FAULTS: dict[str, tuple[Callable[[Sweep], Sweep], str]] = {
     ),
     "radians read as degrees": (
         lambda x: replace(x, stiffness=np.abs(x.stiffness) * np.exp(1j * np.radians(np.angle(x.stiffness)))),
-        "unless the phases of axial.csv are radians, not degrees (then, in the campaign: [[sweeps]] of axial.csv: ",
+        "unless the phases of axial.csv are radians, not degrees (then, in the campaign: [[sweeps]] of axial",
     ),
     "90 deg less the phase": (
         lambda x: replace(x, stiffness=1j * np.conj(x.stiffness * np.exp(0.2j))),
-        "unless the phases of axial.csv are 90 deg less the loss angle (then, in the campaign: [[sweeps]] of axial.csv: ",
+        "unless the phases of axial.csv are 90 deg less the loss angle (then, in the campaign: [[sweeps]] of axial",
     ),
 }
 
