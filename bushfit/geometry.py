@@ -15,6 +15,10 @@ from bushfit.shape import NO_CORRECTION, Correction, radial_correction
 
 #: Which radial formulas a bushing goes by: the paper's as they are, or corrected by finite elements.
 Shape = Literal["paper", "calibrated"]
+#: What the tests of a specimen give: strain and modulus, or displacement and force of blocks in shear.
+SpecimenKind = Literal["modulus", "shear"]
+#: What strain the files of a modulus test state.
+StatedStrain = Literal["engineering", "tensor", "tension"]
 
 
 class Unit(NamedTuple):
@@ -181,8 +185,8 @@ class Specimen:
     """
 
     name: str
-    kind: Literal["modulus", "shear"]
-    strain: Literal["engineering", "tensor", "tension"] = "engineering"
+    kind: SpecimenKind
+    strain: StatedStrain = "engineering"
     area: float | None = None
     thickness: float | None = None
     elements: int = 1

@@ -13,7 +13,7 @@ from bushfit.campaign.parameters import effect_values, parameter_settings, param
 from bushfit.campaign.places import KEYS, with_places
 from bushfit.effects import is_parameter, parameter_names
 from bushfit.errors import CampaignError
-from bushfit.geometry import TRANSLATION, Direction, Place, Shape, Specimen
+from bushfit.geometry import TRANSLATION, Direction, Place, Shape, Specimen, SpecimenKind, StatedStrain
 from bushfit.reading.headers import AmplitudeConvention
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Stepped, Waveform
@@ -125,8 +125,8 @@ class SpecimenTable:
     """[[specimens]]: another body of the same compound, and what its tests give. See geometry.Specimen."""
 
     name: Name
-    kind: Literal["modulus", "shear"]
-    strain: Literal["engineering", "tensor", "tension"] = "engineering"
+    kind: SpecimenKind
+    strain: StatedStrain = "engineering"
     area: Annotated[float, _si("m^2"), Field(gt=0)] | None = None
     thickness: Length | None = None
     elements: Count = 1

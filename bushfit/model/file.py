@@ -11,14 +11,14 @@ from collections.abc import Mapping, Set
 from dataclasses import asdict, astuple, dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
 from bushfit import __version__
 from bushfit.effects.stiffness_factor import EFFECT as FACTOR
 from bushfit.errors import ModelError, naming
-from bushfit.geometry import Bushing, Shape, Specimen
+from bushfit.geometry import Bushing, Shape, Specimen, SpecimenKind, StatedStrain
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import End, Misfit, Outlier, Quality, Range, Result, Usable
@@ -57,8 +57,8 @@ class SpecimenTable:
     """specimens: other bodies of the compound; see geometry.Specimen."""
 
     name: Name
-    kind: Literal["modulus", "shear"]
-    strain: Literal["engineering", "tensor", "tension"] = "engineering"
+    kind: SpecimenKind
+    strain: StatedStrain = "engineering"
     area_m2: Number | None = None
     thickness_m: Number | None = None
     elements: WholeNumber = 1

@@ -105,8 +105,7 @@ def _by_frequency(frequency: Floats, amplitude: Floats) -> Floats:
         shapes.add((levels.size, counts.min(), counts.max()))
         if len(shapes) > 1 or counts.min() != counts.max() or counts.max() < 2 or levels.size < _FEWEST_POINTS:
             return amplitude
-    table = np.sort(amplitude[np.argsort(rank)].reshape(rank.max() + 1, -1), axis=1)
-    return _middle(amplitude, rank) if (table[:-1, -1] < table[1:, 0]).all() else amplitude
+    return _where_apart(amplitude, rank)
 
 
 def _by_rank(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | None) -> Floats:
@@ -122,8 +121,13 @@ def _by_rank(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | N
     order = np.lexsort((amplitude, run))
     rank = np.empty(order.size, dtype=np.intp)
     rank[order] = np.tile(np.arange(counts.max()), order.size // counts.max())
-    table = np.sort(amplitude[order].reshape(-1, counts.max()), axis=0)
-    return _middle(amplitude, rank) if (table[-1, :-1] < table[0, 1:]).all() else amplitude
+    return _where_apart(amplitude, rank)
+
+
+def _where_apart(amplitude: Floats, rank: NDArray[np.intp]) -> Floats:
+    """The median of the points of each rank, (n,), all of as many; no change where one reaches into the next."""
+    levels = np.sort(amplitude[np.argsort(rank)].reshape(rank.max() + 1, -1), axis=1)
+    return _middle(amplitude, rank) if (levels[:-1, -1] < levels[1:, 0]).all() else amplitude
 
 
 def _of_passes(amplitude: Floats, passes: NDArray[np.intp]) -> Floats | None:
