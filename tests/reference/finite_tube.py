@@ -7,7 +7,7 @@ Displacement and pressure are unknowns of their own (quadratic and linear, Taylo
 does not lock. The mesh is graded towards the corners where a free end meets a sleeve: there the strain is infinite.
 
 Lengths are in outer radii, moduli in shear moduli. `python tests/reference/finite_tube.py` prints the mesh's
-convergence and the coefficients of `bushfit.shape`, fitted anew (a few minutes).
+convergence and the coefficients of `bushfit.geometry.shape`, fitted anew (a few minutes).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from skfem.helpers import grad
 
 from bushfit.effects.friction import harmonic_shape
 from bushfit.geometry import Bushing, Direction
-from bushfit.shape import INCOMPRESSIBLE, RADIUS_RATIO_RANGE, SLENDERNESS_RANGE, coordinates
+from bushfit.geometry.shape import INCOMPRESSIBLE, RADIUS_RATIO_RANGE, SLENDERNESS_RANGE, coordinates
 
 Array = NDArray[np.float64]
 

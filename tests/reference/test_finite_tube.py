@@ -11,7 +11,7 @@ from agreement import Agree, digits
 from finite_tube import Solution, corrections, solve_tube
 
 from bushfit.geometry import Bushing, Direction
-from bushfit.shape import INCOMPRESSIBLE, RADIUS_RATIO_RANGE, SLENDERNESS_RANGE
+from bushfit.geometry.shape import INCOMPRESSIBLE, RADIUS_RATIO_RANGE, SLENDERNESS_RANGE
 
 #: Angles of a quarter circle, and radii, at which the closed form is taken.
 _ANGLES, _RADII = 64, 200

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from bushfit.campaign.schema import BushingTable
 from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Direction
+from bushfit.geometry.shape import RADIUS_RATIO_RANGE, SLENDERNESS_RANGE, Correction, radial_correction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.shape import RADIUS_RATIO_RANGE, SLENDERNESS_RANGE, Correction, radial_correction
 from bushfit.validation import check_tables
 
 radius_ratios = st.floats(*RADIUS_RATIO_RANGE)

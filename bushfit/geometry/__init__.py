@@ -9,9 +9,9 @@ from enum import StrEnum
 from functools import cached_property
 from typing import Literal, NamedTuple
 
-from bushfit import tube
 from bushfit.errors import ModelError
-from bushfit.shape import NO_CORRECTION, Correction, radial_correction
+from bushfit.geometry import tube
+from bushfit.geometry.shape import NO_CORRECTION, Correction, radial_correction
 
 #: Which radial formulas a bushing goes by: the paper's as they are, or corrected by finite elements.
 Shape = Literal["paper", "calibrated"]
