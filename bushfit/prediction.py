@@ -1,42 +1,35 @@
 """Dynamic stiffness with 95 % bands at any frequency and amplitude, of the bushing as the car will have it.
 
-Material and component effects are kept, instrument effects are left out: the car does not have the rig's faults.
+Material and component effects are kept, instrument effects are left out: the car does not have the rig's faults. What
+may be either's, an effect with a twin that these tests cannot tell from it, gives two readings; the bands span both.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from functools import partial
+from itertools import combinations
+from typing import Any
 
 import numpy as np
 
 from bushfit.effects import Level, effect_named
-from bushfit.effects.contract import Array
+from bushfit.effects.contract import Array, Circumstances
 from bushfit.errors import ModelError
-from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Bushing, Direction, Place, Specimen
+from bushfit.fitting.data_sets import SweepData
+from bushfit.geometry import TRANSLATION, Bushing, Direction, Place
+from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_jacobian
-from bushfit.reading.measurement import Sweep
 from bushfit.reading.runs import nominal
 from bushfit.reduction.resonance import response
 from bushfit.units import number
 
-#: Frequencies of the paper's tables [Hz].
-PAPER_FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
-#: Amplitudes of the paper's tables [m].
-PAPER_AMPLITUDES = (1e-4, 2e-4, 5e-4)
-#: Amplitudes of each kind of motion where none were measured: those of torsion [rad], which the paper did not measure,
-#: and of the material's strain [1] are chosen so that strains are like the paper's.
-_AMPLITUDES_OF = {
-    TRANSLATION: PAPER_AMPLITUDES,
-    ROTATION: tuple(float(np.radians(x)) for x in (0.5, 1.0, 2.0)),
-    STRAINING: (0.01, 0.02, 0.05),
-}
 #: Beyond the fitted range by more than this, relative to its end, a prediction is an extrapolation: rigs miss their
 #: set points by less.
-_MARGIN = 0.01
+MARGIN = 0.01
 #: Share by which a finite bulk modulus lowers the radial stiffness, from which that is said: that of the other errors.
 _NOTED_LOWERING = 0.01
 #: Strain at which the resonance of a mass is looked for first; chosen: small for any rubber.
@@ -48,12 +41,10 @@ _RESONANCE_POINTS = 600
 #: Transmissibility from which a point counts as near the peak; chosen: about 0.6 to 1.3 of the peak's frequency, where
 #: the mount decides how far the mass moves.
 _NEAR_PEAK = 1.5
-#: Frequencies of a grid where the paper's were not measured.
-_FREQUENCIES = 9
-#: Amplitudes of a grid where the paper's were not measured.
-_AMPLITUDES = 3
-#: Values of a grid at most of what was stepped through as it came: tables stay readable, and lines smooth.
-_MOST_STEPS = 10
+
+
+#: What is predicted, each with its band.
+_BANDS = ("stiffness", "loss_factor", "storage_stiffness", "loss_stiffness")
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +64,11 @@ class Prediction:
         frequency: [Hz], (n,).
         amplitude: zero-to-peak [m or rad], (n,).
         stiffness, storage_stiffness, loss_stiffness: [N/m or N m/rad].
-        warnings: sentences on directions, frequencies and strains that were not fitted.
+        warnings: sentences on directions, frequencies and strains that were not fitted, on what differs from the
+            measurement because it is left out, and on what may be the rig's.
+        if_rigs: the same if what is unresolved is the rig's, which all bands here then span; None where nothing is.
+        measured: complex, of the sweeps at these points, mean of the repeats, nan where there is none [N/m or N m/rad],
+            (n,); None where no sweeps are known.
     """
 
     direction: Place
@@ -83,71 +78,9 @@ class Prediction:
     loss_factor: Band
     storage_stiffness: Band
     loss_stiffness: Band
-    warnings: tuple[str, ...]
-
-
-def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ()) -> tuple[Array, Array]:
-    """Frequencies [Hz] and amplitudes [m or rad] to predict at where none are asked for, rising.
-
-    They are those of the sweeps at this place, so that prediction and measurement stand side by side, a level that
-    several sweeps reached more or less counting once; of amplitudes that were stepped, and of what swings free, at most
-    ten over their range. Without any sweep they are the paper's as far as they lie in the measured range, or an even
-    grid over that range where fewer than two do.
-    """
-    mine = [sweep for sweep in sweeps if sweep.direction == direction]
-    if mine:
-        return _measured(mine, "frequency"), _measured(_levelled(mine), "amplitude")
-    amplitudes = np.array(_AMPLITUDES_OF[direction.motion])
-    frequencies = np.array(PAPER_FREQUENCIES)
-    if result.measured is None:
-        return frequencies, amplitudes
-    low, high = result.measured.frequency
-    inside = frequencies[(frequencies >= low * (1 - _MARGIN)) & (frequencies <= high * (1 + _MARGIN))]
-    if inside.size < 2:
-        inside = _distinct(np.geomspace(low, high, _FREQUENCIES))
-    if direction.is_rotation:
-        return inside, amplitudes
-    per_displacement = result.model.unit_strain(direction if isinstance(direction, Specimen) else Direction.AXIAL)
-    least, most = (strain / per_displacement for strain in result.measured.strain)
-    reached = amplitudes[(amplitudes >= least * (1 - _MARGIN)) & (amplitudes <= most * (1 + _MARGIN))]
-    if reached.size < 2:
-        reached = _even(least, most, _AMPLITUDES)
-    return inside, reached
-
-
-def _levelled(sweeps: Sequence[Sweep]) -> list[Sweep]:
-    """Sweeps of one place in which amplitudes of one level, as each sweep has it, are the same."""
-    held = [sweep for sweep in sweeps if sweep.stepped]
-    points = np.hstack([np.empty((2, 0)), *(np.stack((sweep.amplitude, sweep.frequency)) for sweep in held)])
-    amplitude = np.unique(points, axis=1)[0]  # each point once, however often it was repeated
-    level = dict(zip(amplitude, nominal(amplitude), strict=True))
-    changed = (replace(sweep, amplitude=np.array([level[each] for each in sweep.amplitude])) for sweep in held)
-    return [*changed, *(sweep for sweep in sweeps if not sweep.stepped)]
-
-
-def _measured(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitude"]) -> Array:
-    """The values of some sweeps, rising; in place of many that were taken as they came, some that span them."""
-    parts: tuple[list[Array], list[Array]] = [], []
-    for sweep in sweeps:
-        as_it_came = sweep.stepped is None or sweep.stepped == axis == "amplitude"
-        parts[as_it_came].append(getattr(sweep, axis))
-    planned, came = (_distinct(np.concatenate([np.empty(0), *part])) for part in parts)
-    spanned = came if came.size <= _MOST_STEPS else _even(came[0], came[-1], _MOST_STEPS)
-    return _distinct(np.concatenate([planned, spanned]))
-
-
-def _even(least: float, most: float, count: int) -> Array:
-    """So many values of three digits, in equal ratios from the least to the most."""
-    return _distinct(np.array([float(f"{x:.3g}") for x in np.geomspace(least, most, count)]))
-
-
-def _distinct(values: Array) -> Array:
-    """The values, rising, each further above the last than a rig that misses its set point would be."""
-    kept: list[float] = []
-    for value in np.unique(values):
-        if not kept or value > kept[-1] * (1.0 + _MARGIN):
-            kept.append(float(value))
-    return np.array(kept)
+    warnings: tuple[str, ...] = ()
+    if_rigs: Prediction | None = None
+    measured: Array | None = None
 
 
 def predict(
@@ -157,10 +90,14 @@ def predict(
     amplitudes: Sequence[float] | Array,
     *,
     rig: bool = False,
+    sweeps: Sequence[SweepData] | None = None,
+    temperature: float | None = None,
 ) -> Prediction:
     """Dynamic stiffness on a grid, with 95 % bands from the covariance of the fit (delta method).
 
-    Frequencies are in Hz, amplitudes zero-to-peak in m or rad. With `rig` its effects are kept, as in the tests.
+    Frequencies are in Hz, amplitudes zero-to-peak in m or rad. With `rig` its effects are kept, as in the tests;
+    `sweeps` are what was measured, to stand beside. A temperature [K] is for a model with an effect of it, which
+    stands at its reference otherwise.
 
     Raises:
         ModelError: a frequency or amplitude that is not positive.
@@ -168,19 +105,50 @@ def predict(
     for name, given in (("frequency", frequencies), ("amplitude", amplitudes)):
         if not (np.size(given) and np.all(np.isfinite(given)) and np.min(given) > 0):
             raise ModelError(f"impossible {name} to predict at", found=str(np.asarray(given)), expected="above zero")
-    model = result.model if rig else result.model.without(Level.INSTRUMENT)
     amplitude, frequency = (
         axis.ravel() for axis in np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
     )
-    stiffness = model.stiffness(direction, frequency, amplitude)
+    models = [result.model] if rig else _readings(result)
+    first, *others = (_predicted(result, model, direction, frequency, amplitude, temperature) for model in models)
+    measured = None if sweeps is None else _measured(direction, frequency, amplitude, sweeps)
+    found = replace(first, if_rigs=others[-1] if others else None, measured=measured)
+    every = (first, *others)
+    bands: dict[str, Any] = {name: _spanned([getattr(each, name) for each in every]) for name in _BANDS}
+    told = (
+        *_unfitted(result, direction),
+        *_extrapolations(result, direction, frequency, amplitude),
+        *_circumstances(models[0], temperature),
+    )
+    return replace(found, **bands, warnings=(*told, *([] if rig else _left_out(result, found))))
+
+
+def _readings(result: Result) -> list[Model]:
+    """The models that the car may have: without the rig's effects, and of those that are unresolved with all first,
+    with none last."""
+    bare = result.model.without(Level.INSTRUMENT)
+    count = range(len(result.unresolved) + 1)
+    return [bare.without(*left) for size in count for left in combinations(result.unresolved, size)]
+
+
+def _predicted(
+    result: Result, model: Model, direction: Place, frequency: Array, amplitude: Array, temperature: float | None
+) -> Prediction:
+    """The prediction of one model at operating points, each (n,), with the uncertainty of the fit."""
+    under = Circumstances(temperature)
+    stiffness = model.stiffness(direction, frequency, amplitude, under=under)
     names = [name for name in result.covariance.names if name in model.values]
     covariance = result.covariance.restricted(names)
     slopes = (
-        stiffness_jacobian(model, direction, frequency, amplitude, names) if names else np.zeros((0, *stiffness.shape))
+        stiffness_jacobian(model, direction, frequency, amplitude, names, under=under)
+        if names
+        else np.zeros((0, *stiffness.shape))
     )
 
+    open_to, beyond = _open_to(model, direction, frequency, amplitude, stiffness)
+    count, slopes = len(names), np.concatenate((slopes, open_to))
+
     def band(value: Array, slope: Array) -> Band:
-        half = covariance.half_width(slope)
+        half = np.hypot(beyond * covariance.half_width(slope[:count]), Z95 * np.linalg.norm(slope[count:], axis=0))
         return Band(value, value - half, value + half)
 
     relative = slopes / stiffness
@@ -193,8 +161,58 @@ def predict(
         loss_factor=band(loss_factor, (1.0 + loss_factor**2) * relative.imag),
         storage_stiffness=band(stiffness.real, slopes.real),
         loss_stiffness=band(stiffness.imag, slopes.imag),
-        warnings=(*_unfitted(result, direction), *_extrapolations(result, direction, frequency, amplitude)),
     )
+
+
+def _open_to(
+    model: Model, direction: Place, frequency: Array, amplitude: Array, stiffness: Array
+) -> tuple[Array, Array]:
+    """What a standard deviation of each part of what has no name does to the stiffness, (0 or 2, n), and the share of
+    the parameters' errors that counts beside it, (n,): among its nodes it mends what bent them."""
+    if model.unnamed is None:
+        return np.zeros((0, frequency.size)), np.ones(frequency.size)
+    share, off, stands = model.unnamed.at(model.setting(direction), 2.0 * np.pi * frequency, amplitude)
+    return np.array([[1.0], [1.0j]]) * off * stiffness / (1.0 + share), np.sqrt(1.0 - np.square(stands))
+
+
+def _spanned(bands: Sequence[Band]) -> Band:
+    """The first band, from the least to the largest of all."""
+    low, high = (np.array([getattr(band, end) for band in bands]) for end in ("low", "high"))
+    return Band(bands[0].value, low.min(axis=0), high.max(axis=0))
+
+
+def _measured(direction: Place, frequency: Array, amplitude: Array, sweeps: Sequence[SweepData]) -> Array:
+    """Complex stiffness measured at operating points, each (n,): the mean of the repeats, nan where there is none."""
+    mine = [sweep.standing() for sweep in sweeps if sweep.direction == direction]
+    f, x, stiffness = (
+        np.concatenate([np.empty(0), *(getattr(sweep, name) for sweep in mine)])
+        for name in ("frequency", "amplitude", "measured")
+    )
+    far = np.minimum(*(np.abs(reached / amplitude[:, None] - 1.0) for reached in (x, nominal(x))))
+    near = (np.abs(f / frequency[:, None] - 1.0) <= MARGIN) & (far <= MARGIN)
+    count = near.sum(axis=1)
+    return np.where(count > 0, near @ stiffness / np.maximum(count, 1), np.nan)
+
+
+def _left_out(result: Result, found: Prediction) -> Iterator[str]:
+    """By how much the prediction differs from the measurement for want of the rig, and if what is unresolved is its."""
+    place, stiffness = found.direction, found.stiffness.value
+    rig, measured = rig_effects(result), found.measured
+    if rig and measured is not None and not np.isnan(measured).all():
+        off = _range(stiffness / np.abs(measured))
+        yield f"{place}: without {' and '.join(rig)} the predicted stiffness is {off} against what was measured"
+    if found.if_rigs:
+        for name in result.unresolved:
+            twins = " or ".join(effect_named(name).twins)
+            yield f"{name} is taken as the bushing's, but these tests cannot tell it from {twins}"
+        off = _range(found.if_rigs.stiffness.value / stiffness)
+        yield f"{place}: stiffness {off} if {' and '.join(result.unresolved)} is the rig's; low and high span both"
+
+
+def _range(ratio: Array) -> str:
+    """How far ratios are off 1, in words: "+1.2 to +3.4 %"."""
+    ends = [number(100.0 * end - 100.0, 2, "+") for end in (np.nanmin(ratio), np.nanmax(ratio))]
+    return f"{' to '.join(dict.fromkeys(ends))} %"
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +224,9 @@ class PredictedResonance:
         amplitude: of the mount's deformation, zero-to-peak [m], (n,).
         transmissibility: complex, acceleration of the mass over that of the base [-], (n,).
         stiffness: complex, of the mount at that frequency and amplitude [N/m], (n,).
-        warnings: sentences on a place, and on frequencies and strains near the peak, that were not fitted.
+        warnings: sentences on a place, and on frequencies and strains near the peak, that were not fitted, and on what
+            may be the rig's.
+        if_rigs: the same at these frequencies if what is unresolved is the rig's; None where nothing is.
     """
 
     place: Place
@@ -216,7 +236,8 @@ class PredictedResonance:
     amplitude: Array
     transmissibility: Array
     stiffness: Array
-    warnings: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+    if_rigs: PredictedResonance | None = None
 
     @property
     def peak(self) -> tuple[float, float]:
@@ -226,7 +247,13 @@ class PredictedResonance:
 
 
 def predict_resonance(
-    result: Result, place: Place, mass: float, base_acceleration: float, frequencies: Sequence[float] | Array | None
+    result: Result,
+    place: Place,
+    mass: float,
+    base_acceleration: float,
+    frequencies: Sequence[float] | Array | None,
+    *,
+    temperature: float | None = None,
 ) -> PredictedResonance:
     """Transmissibility and amplitude of a mass [kg] on the bushing or specimen, whose stiffness depends on amplitude.
 
@@ -237,41 +264,29 @@ def predict_resonance(
     """
     if place.motion is not TRANSLATION:
         raise ModelError("no mass stands on this", found=str(place), expected="a direction or mount with a stiffness")
-    model = result.model.without(Level.INSTRUMENT)
+    bushings, *others = _readings(result)
+    under = Circumstances(temperature)
     if frequencies is None:
-        small = model.stiffness(place, 1.0, _SMALL_STRAIN / model.unit_strain(place))
+        small = bushings.stiffness(place, 1.0, _SMALL_STRAIN / bushings.unit_strain(place), under=under)
         about = float(np.sqrt(np.abs(small) / mass)) / (2.0 * np.pi)
         frequencies = about * np.geomspace(_DECADE[0], _DECADE[1], _RESONANCE_POINTS)
     frequency = np.asarray(frequencies, dtype=float)
     base = base_acceleration / (2.0 * np.pi * frequency) ** 2
-    amplitude, ratio = response(lambda reached: model.stiffness(place, frequency, reached), mass, frequency, base)
-    stiffness = model.stiffness(place, frequency, amplitude)
-    near = np.abs(ratio) >= min(_NEAR_PEAK, float(np.abs(ratio).max()))
+
+    def shaken(model: Model) -> PredictedResonance:
+        stiffness_at = partial(model.stiffness, place, frequency, under=under)
+        amplitude, ratio = response(stiffness_at, mass, frequency, base)
+        stiffness = stiffness_at(amplitude)
+        return PredictedResonance(place, mass, base_acceleration, frequency, amplitude, ratio, stiffness)
+
+    found, if_rigs = shaken(bushings), shaken(others[-1]) if others else None
+    near = np.abs(found.transmissibility) >= min(_NEAR_PEAK, found.peak[1])
     what = f"{place}, resonance of {number(mass, 3)} kg"
-    warnings = (*_unfitted(result, place), *_extrapolations(result, place, frequency[near], amplitude[near], what))
-    return PredictedResonance(place, mass, base_acceleration, frequency, amplitude, ratio, stiffness, warnings)
-
-
-def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
-    """The compound of a fitted model in another bushing, and a sentence on what stayed behind.
-
-    What belongs to the material is kept, and the factors of specimens of it.
-    """
-    names = [specimen.name for specimen in result.specimens]
-    records = result.model.records
-    kept = [effect.name for effect in records if effect.level is Level.MATERIAL or effect.corrects in names]
-    model = Model.started(bushing, kept, result.model.values)
-    left = ", ".join(effect.name for effect in records if effect.name not in kept)
-    said = f"{bushing.name}: the compound of {result.name}, of which no bushing of this shape was tested"
-    said += f"; left out, because they belong to {result.name} or its rig: {left}" if left else ""
-    measured = result.measured
-    if measured:
-        of_specimens = tuple(name for name in measured.directions if name in names)
-        measured = replace(measured, directions=of_specimens or (result.name,))
-    there = [name for name in result.covariance.names if name in model.values]
-    fitted = tuple(name for name in result.fitted if name in model.values)
-    covariance = result.covariance.restricted(there)
-    return Result(model, fitted, covariance, None, measured, inputs=result.inputs, specimens=result.specimens), said
+    told = [*_unfitted(result, place), *_extrapolations(result, place, frequency[near], found.amplitude[near], what)]
+    if if_rigs:
+        there, largest = (number(each, 4) for each in if_rigs.peak)
+        told.append(f"{what}: at {there} Hz, |T| {largest}, if {' and '.join(result.unresolved)} is the rig's")
+    return replace(found, warnings=tuple(told), if_rigs=if_rigs)
 
 
 def caveats(result: Result) -> list[str]:
@@ -279,6 +294,15 @@ def caveats(result: Result) -> list[str]:
     lines = []
     if "springpot" not in result.model.effects:
         lines.append("the model has no springpot: its stiffness does not depend on frequency")
+    if unnamed := result.model.unnamed:
+        lines.append(
+            "what has no name is corrected as it was measured, by no law: outside the measured range the correction "
+            f"fades, and the band opens by up to {number(100.0 * Z95 * unnamed.beyond, 2)} % either way"
+        )
+        lines.append(
+            "what has no name counts as the bushing's, but these tests cannot tell it from the rig's: if it is the "
+            f"rig's, the car lacks the correction, up to {number(100.0 * unnamed.largest, 2)} % of |K|"
+        )
     if result.measured is None:
         lines.append("the model was not fitted here: no uncertainty, and no fitted range to compare with")
     if rig := rig_effects(result):
@@ -301,17 +325,17 @@ def _unfitted(result: Result, direction: Place) -> Iterator[str]:
     fitted = result.measured.directions if result.measured else ()
     if not fitted:
         return
+    corrected = {effect.corrects for effect in result.model.without(Level.INSTRUMENT).records}
     if str(direction) in fitted:
         shape = result.model.bushing
-        corrected = any(effect_named(name).corrects == Direction.RADIAL for name in result.model.effects)
-        if direction is Direction.RADIAL and shape and shape.shape == "paper" and not corrected:
+        if direction is Direction.RADIAL and shape and shape.shape == "paper" and direction not in corrected:
             formula = f"the paper's formula, {_radial_error(shape)}"
             yield f"{direction}: fitted with {formula}; the parameters carry that error"
             yield from _compressible(result, shape)
         return
     of_bushing = direction is Direction.AXIAL and not set(Direction).isdisjoint(fitted)
     if not (of_bushing or direction in (Direction.RADIAL, Direction.TORSION)):
-        if not any(effect_named(name).corrects == str(direction) for name in result.model.effects):
+        if str(direction) not in corrected:
             tests = " and ".join(fitted)
             yield (
                 f"{direction}: not fitted; its band holds the scatter of the {tests} tests, not by how much two bodies "
@@ -323,7 +347,7 @@ def _unfitted(result: Result, direction: Place) -> Iterator[str]:
     bushing = result.model.bushing
     if radially and bushing:
         formula, compared = Direction.RADIAL, _radial_error(bushing)
-    if any(effect_named(name).corrects == formula for name in result.model.effects):
+    if formula in corrected:
         return
     band = f"its band holds the scatter of the {' and '.join(fitted)} tests, not" if result.fitted else "no band holds"
     yield f"{direction}: not fitted; {band} the error of the {formula} formula, {compared}"
@@ -350,6 +374,12 @@ def _radial_error(bushing: Bushing) -> str:
     return f'{off}, by which shape = "calibrated" goes'
 
 
+def _circumstances(model: Model, temperature: float | None) -> Iterator[str]:
+    """What is taken of the circumstances that the model depends on, where they are not asked for."""
+    known = set() if temperature is None else {"temperature"}
+    yield from (effect.taken for effect in model.records if effect.taken and not known & {*effect.under})
+
+
 def _extrapolations(
     result: Result, direction: Place, frequency: Array, amplitude: Array, what: str | None = None
 ) -> Iterator[str]:
@@ -361,7 +391,7 @@ def _extrapolations(
         ("strains", "%", amplitude * result.model.unit_strain(direction), result.measured.strain),
     )
     for axis, unit, asked, (low, high) in axes:
-        if asked.min() < low * (1 - _MARGIN) or asked.max() > high * (1 + _MARGIN):
+        if asked.min() < low * (1 - MARGIN) or asked.max() > high * (1 + MARGIN):
             here, there = _span(asked.min(), asked.max(), unit), _span(low, high, unit)
             said = f"predicted at {axis} of {here}, but fitted at {there} only: extrapolated beyond"
             yield f"{what or direction}: {said}"

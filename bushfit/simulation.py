@@ -17,10 +17,12 @@ import numpy as np
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.naming import folder_name
+from bushfit.campaign.noise import filtered_noise, reached_over_asked, with_noise
 from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulatedTest, SimulateSettings
+from bushfit.campaign.session import planned_session
 from bushfit.campaign.written import body_lines, table_lines
-from bushfit.effects import BASE, Level, effect_of
-from bushfit.effects.contract import Array
+from bushfit.effects import Level, effect_of, with_base
+from bushfit.effects.contract import UNKNOWN, Array, Circumstances
 from bushfit.errors import CampaignError, naming, typed
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.model import rig
@@ -123,7 +125,9 @@ def model_of(campaign: Campaign) -> Model:
     effects = campaign.simulate.effects
     own = {f"{effect}.{name}": value for effect, table in effects.items() for name, value in table.items()}
     with naming(campaign.path):
-        return Model(campaign.bushing, (*BASE, *dict.fromkeys(map(effect_of, own))), {**values, **own})
+        names = with_base(dict.fromkeys(map(effect_of, own)))
+        kept = {name: value for name, value in values.items() if effect_of(name) in names}
+        return Model(campaign.bushing, names, {**kept, **own})
 
 
 def simulate(truth: Model, plan: SimulateSettings) -> Simulated:
@@ -153,9 +157,10 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
                 expected="a campaign with [[simulate.sweeps]] of a specimen; the paper's tests are those of a bushing",
             )
         loops, sweeps = PAPER_LOOPS, PAPER_SWEEPS
+    under = planned_session(truth.bushing, [*loops, *sweeps, *resonances], plan.repeats)
     return Undisturbed(
         truth,
-        tuple((test, _clean_loop(truth, test)) for test in loops),
+        tuple((test, _clean_loop(truth, test, own.at(0))) for test, own in zip(loops, under, strict=False)),
         tuple((test, _clean_sweep(truth, test, steps_per_cycle)) for test in sweeps),
         tuple((test, _clean_resonance(truth, test, steps_per_cycle)) for test in resonances),
     )
@@ -165,22 +170,22 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
     """What the rig writes with the plan's noise, repeats and seed; quick, so that many seeds can be drawn.
 
     Notes:
-        Where a sweep does not reach its amplitudes, the stiffness is that at the amplitude reached (see `_near`).
+        Where a sweep does not reach its amplitudes, the stiffness is that at the amplitude reached (see `_near`), and
+        where it depends on the order of the tests, that at each point's turn: the plan's loops come first.
     """
+    planned = [test for kind in (clean.loops, clean.sweeps, clean.resonances) for test, _ in kind]
+    under = planned_session(clean.truth.bushing, planned, plan.repeats)[len(clean.loops) :]
+    named = zip(_names("sweep", [test for test, _ in clean.sweeps]), clean.sweeps, under, strict=False)
     random = np.random.default_rng(plan.seed)
     loops = tuple(_loop(test, force, number, plan, random) for number, (test, force) in enumerate(clean.loops, start=1))
-    sweeps = tuple(
-        _sweep(clean.truth, test, stiffness, name, plan, random)
-        for name, (test, stiffness) in zip(_names("sweep", [t for t, _ in clean.sweeps]), clean.sweeps, strict=True)
-    )
+    sweeps = tuple(_sweep(clean.truth, test, k, name, plan, random, own) for name, (test, k), own in named)
     shaken = [each for each in clean.resonances for _ in range(plan.repeats)]
     resonances = tuple(
         (test.mass, _resonance(test, ratio, name, plan, random))
         for name, (test, ratio) in zip(_names("resonance", [t for t, _ in shaken]), shaken, strict=True)
     )
-    tests = [test for kind in (clean.loops, clean.sweeps, clean.resonances) for test, _ in kind]
-    specimens = tuple(dict.fromkeys(test.direction for test in tests if isinstance(test.direction, Specimen)))
-    return Simulated(clean.truth, plan, loops, sweeps, resonances, specimens)
+    specimens = dict.fromkeys(test.direction for test in planned if isinstance(test.direction, Specimen))
+    return Simulated(clean.truth, plan, loops, sweeps, resonances, tuple(specimens))
 
 
 def _names(kind: str, tests: Sequence[SimulatedTest]) -> list[str]:
@@ -189,10 +194,10 @@ def _names(kind: str, tests: Sequence[SimulatedTest]) -> list[str]:
     return [stem if stems.count(stem) == 1 else f"{stem}_{place}" for place, stem in enumerate(stems, start=1)]
 
 
-def _clean_loop(truth: Model, test: SimulatedLoop) -> rig.Record:
+def _clean_loop(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.Record:
     """The record of a loop or a programme without noise, `_ROWS_PER_CYCLE` rows a cycle of its highest frequency."""
     if len(test.parts) > 1:
-        return _clean_programme(truth, test)
+        return _clean_programme(truth, test, under)
     measured = rig.record(
         truth,
         test.direction,
@@ -203,12 +208,13 @@ def _clean_loop(truth: Model, test: SimulatedLoop) -> rig.Record:
         steps_per_cycle=_ROWS_PER_CYCLE * _STEPS_PER_ROW,
         waveform=test.waveform,
         kind="loop",
+        under=under,
     )
     return _thinned(measured)
 
 
-def _clean_programme(truth: Model, test: SimulatedLoop) -> rig.Record:
-    """The record of a programme from rest, without noise."""
+def _clean_programme(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.Record:
+    """The record of a programme from rest, without noise, all of it under what it begins under."""
     fastest = max(frequency for frequency, _ in test.parts)
     step = 1.0 / (fastest * _ROWS_PER_CYCLE * _STEPS_PER_ROW)
     duration = sum(test.cycles / frequency + test.pause for frequency, _ in test.parts)
@@ -225,8 +231,8 @@ def _clean_programme(truth: Model, test: SimulatedLoop) -> rig.Record:
     for frequency, amplitude in test.parts:
         phase = np.arange(round(test.cycles / (frequency * step))) * (frequency * step)
         motions += [amplitude * rig.wave(test.waveform, phase), rest]
-    whole = rig.imposed(truth, test.direction, np.concatenate([*motions[:-1], [0.0]]), step, test.parts[0][0])
-    return _thinned(whole)
+    motion = np.concatenate([*motions[:-1], [0.0]])
+    return _thinned(rig.imposed(truth, test.direction, motion, step, test.parts[0][0], under=under))
 
 
 def _thinned(record: rig.Record) -> rig.Record:
@@ -237,15 +243,10 @@ def _thinned(record: rig.Record) -> rig.Record:
 
 def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Array:
     """Complex stiffness, (held, steps)."""
-    points = (values.ravel() for values in _points(test))
-    found = rig.dynamic_stiffness(truth, test.direction, *points, steps_per_cycle=steps_per_cycle)
+    points = (values.ravel() for values in test.points)
+    under = Circumstances(test.temperature)
+    found = rig.dynamic_stiffness(truth, test.direction, *points, steps_per_cycle=steps_per_cycle, under=under)
     return found.reshape(len(test.held), -1)
-
-
-def _points(test: SimulatedSweep) -> tuple[Array, Array]:
-    """Frequency [Hz] and amplitude [m or rad, or strain] of each point, (held, steps) each."""
-    held, step = np.meshgrid(test.held, test.steps, indexing="ij")
-    return (step, held) if test.stepped == "frequency" else (held, step)
 
 
 def _clean_resonance(truth: Model, test: SimulatedResonance, steps_per_cycle: int) -> Array:
@@ -266,15 +267,24 @@ def _clean_resonance(truth: Model, test: SimulatedResonance, steps_per_cycle: in
     return response(_near(mount, test.direction, frequency, about, stiffness), test.mass, frequency, base)[1]
 
 
-def _near(truth: Model, place: Place, frequency: Array, amplitude: Array, stiffness: Array) -> Callable[[Array], Array]:
-    """The rig's stiffness at amplitudes near those at which it is known: it changes as that of the closed form does.
+def _near(
+    truth: Model,
+    place: Place,
+    frequency: Array,
+    amplitude: Array,
+    stiffness: Array,
+    known: Circumstances = UNKNOWN,
+    wanted: Circumstances = UNKNOWN,
+) -> Callable[[Array], Array]:
+    """The rig's stiffness at amplitudes near those at which it is known, and under what is wanted: it changes as that
+    of the closed form does.
 
     Notes:
         The rig is within 0.1 % of the closed form, and this ratio hardly changes with the amplitude: 2 % away the error
         is below 1e-5, and 10 % away below 4e-5, a tenth of the rig's own.
     """
-    ratio = stiffness / truth.stiffness(place, frequency, amplitude)
-    return lambda reached: ratio * truth.stiffness(place, frequency, reached)
+    ratio = stiffness / truth.stiffness(place, frequency, amplitude, under=known)
+    return lambda reached: ratio * truth.stiffness(place, frequency, reached, under=wanted)
 
 
 def _loop(test: SimulatedLoop, clean: rig.Record, number: int, plan: SimulateSettings, random: Generator) -> Loop:
@@ -284,36 +294,45 @@ def _loop(test: SimulatedLoop, clean: rig.Record, number: int, plan: SimulateSet
         test.direction,
         clean.time,
         clean.displacement + plan.displacement_noise * largest * random.standard_normal(clean.time.size),
-        clean.force + plan.force_noise * np.ptp(clean.force) / 2.0 * random.standard_normal(clean.time.size),
+        clean.force + plan.force_noise * np.ptp(clean.force) / 2.0 * filtered_noise(clean.time.size, plan, random),
+        temperature=test.temperature,
     )
 
 
 def _sweep(
-    truth: Model, test: SimulatedSweep, clean: Array, name: str, plan: SimulateSettings, random: Generator
+    truth: Model,
+    test: SimulatedSweep,
+    clean: Array,
+    name: str,
+    plan: SimulateSettings,
+    random: Generator,
+    under: Circumstances,
 ) -> Sweep:
     """All repeats of a sweep; where the amplitude is stepped, with the levels that a reader finds in those reached."""
     shape = (len(test.held), plan.repeats, len(test.steps))
-    frequency, level = (np.broadcast_to(values[:, None], shape).ravel() for values in _points(test))
+    frequency, level = (np.broadcast_to(values[:, None], shape).ravel() for values in test.points)
     repeat = np.broadcast_to(np.arange(1, plan.repeats + 1)[:, None], shape).ravel()
     stiffness, reached = np.broadcast_to(clean[:, None], shape), None
     if test.reached:
-        reached = level * _reached(test, plan, random)
-        stiffness = _near(truth, test.direction, frequency, level, stiffness.ravel())(reached).reshape(shape)
-    measured = np.stack([_with_noise(stiffness[:, number], plan, random) for number in range(plan.repeats)], axis=1)
+        reached = level * reached_over_asked(test, plan, random)
+    if test.reached or truth.knows_circumstances:
+        planned = frequency, level, stiffness.ravel(), Circumstances(test.temperature)
+        near = _near(truth, test.direction, *planned, under)
+        stiffness = near(level if reached is None else reached).reshape(shape)
+    measured = np.stack([with_noise(stiffness[:, number], plan, random) for number in range(plan.repeats)], axis=1)
     if test.stepped == "amplitude" and reached is not None:
         level = runs_of(frequency, reached, repeat).amplitude
     return Sweep(
-        name, test.direction, frequency, level, measured.ravel(), repeat, reached=reached, stepped=test.stepped
+        name,
+        test.direction,
+        frequency,
+        level,
+        measured.ravel(),
+        repeat,
+        reached=reached,
+        stepped=test.stepped,
+        temperature=test.temperature,
     )
-
-
-def _reached(test: SimulatedSweep, plan: SimulateSettings, random: Generator) -> Array:
-    """Amplitude reached over that asked for, (held x repeats x steps,): off by as much at each frequency as at each
-    point; lognormal, so that it stays above zero."""
-    at_frequency = random.standard_normal(len(test.frequencies))
-    at_frequency = at_frequency if test.stepped == "frequency" else at_frequency[:, None, None]
-    at_point = random.standard_normal((len(test.held), plan.repeats, len(test.steps)))
-    return np.exp(test.reached * np.sqrt(0.5) * (at_frequency + at_point)).ravel()
 
 
 def _resonance(
@@ -324,19 +343,10 @@ def _resonance(
         name,
         test.direction,
         np.array(test.frequencies),
-        _with_noise(clean[None], plan, random)[0],
+        with_noise(clean[None], plan, random)[0],
         np.full(clean.shape, test.base_acceleration),
         Source(Path(f"{name}.csv"), ""),
     )
-
-
-def _with_noise(clean: Array, plan: SimulateSettings, random: Generator) -> Array:
-    """Runs with noise, (runs, steps): scatter of each point, gain and phase error of each run."""
-    runs = (clean.shape[0], 1)
-    gain = plan.gain_error * random.standard_normal(runs)
-    phase = plan.phase_error * random.standard_normal(runs)
-    scatter = plan.noise * (random.standard_normal(clean.shape) + 1j * random.standard_normal(clean.shape))
-    return clean * (1.0 + gain) * np.exp(1j * phase) * (1.0 + scatter)
 
 
 def to_files(simulated: Simulated) -> dict[str, bytes]:
@@ -361,7 +371,8 @@ def _campaign_toml(simulated: Simulated) -> str:
     lines = [f"# Simulated by bushfit simulate with seed {seed}: no rubber was tested. The model is in truth.json."]
     lines += body_lines(simulated.truth.bushing, simulated.specimens)
     for kind, tests in (("loops", simulated.loops), ("sweeps", simulated.sweeps)):
-        lines += [line for test in tests for line in table_lines(kind, f"{test.name}.csv", test.direction)]
+        for each in tests:
+            lines += table_lines(kind, f"{each.name}.csv", each.direction, each.temperature)
     for mass, test in simulated.resonances:
         file, folder = (typed(Path(name)) for name in (f"{test.name}.csv", test.name))
         tested = "specimen" if isinstance(test.direction, Specimen) else "direction"

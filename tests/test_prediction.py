@@ -12,23 +12,18 @@ from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.schema import SimulatedSweep, SimulateSettings
 from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import sweep_data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction, Shape, Specimen
+from bushfit.jobs.grid import PAPER_AMPLITUDES, PAPER_FREQUENCIES, default_grid
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
-from bushfit.model.result import Range, Result
-from bushfit.prediction import (
-    PAPER_AMPLITUDES,
-    PAPER_FREQUENCIES,
-    carried,
-    caveats,
-    default_grid,
-    predict,
-    predict_resonance,
-)
+from bushfit.model.result import Range, Result, carried
+from bushfit.prediction import caveats, predict, predict_resonance
 from bushfit.reading.measurement import Sweep
-from bushfit.report.tables import prediction_table
+from bushfit.report.tables import prediction_table, shaken_table
 from bushfit.simulation import measure, undisturbed
+from bushfit.units import CELSIUS
 
 #: A grid, not in order [Hz] and [m].
 FREQUENCIES = np.array([155.0, 5.0, 55.0])
@@ -140,6 +135,96 @@ def test_instrument_effects_are_left_out_and_component_ones_kept(paper_model: Mo
     stop = paper_model.with_effect("bump_stop", {"bump_stop.gap": 2e-4, "bump_stop.stiffness": 1e6})
     kept = predict(Result(stop), Direction.AXIAL, FREQUENCIES, AMPLITUDES)
     assert kept.stiffness.value[-1] > 1.1 * plain.stiffness.value[-1]
+
+
+@pytest.fixture
+def either(paper_model: Model) -> Result:
+    """The paper's bushing with a sleeve that flexes, or a rig that gives way."""
+    model = paper_model.with_effect("sleeve_compliance", {"sleeve_compliance.compliance": 2e-8})
+    names, measured = ("mu", "sleeve_compliance.compliance"), Range((5.0, 155.0), (1e-3, 0.1))
+    covariance = Covariance(names, np.diag([1e6, 1e-18]))
+    return Result(model, names, covariance, measured=measured, unresolved=("sleeve_compliance",))
+
+
+def test_what_may_be_the_rigs_is_predicted_both_ways_and_the_bands_span_both(either: Result) -> None:
+    found = predict(either, Direction.RADIAL, FREQUENCIES, AMPLITUDES)
+    settled = replace(either, model=either.model.with_twin("rig_compliance"), unresolved=())
+    other = predict(settled, Direction.RADIAL, FREQUENCIES, AMPLITUDES)
+    told = predict(replace(either, unresolved=()), Direction.RADIAL, FREQUENCIES, AMPLITUDES)
+    assert found.if_rigs is not None
+    np.testing.assert_array_equal(found.stiffness.value, told.stiffness.value)
+    np.testing.assert_array_equal(found.if_rigs.stiffness.value, other.stiffness.value)
+    assert np.all(other.stiffness.value > 1.05 * told.stiffness.value)
+    np.testing.assert_array_equal(found.stiffness.low, told.stiffness.low)
+    np.testing.assert_allclose(found.stiffness.high, other.stiffness.high)
+    assert told.if_rigs is None
+    table = prediction_table(found)
+    rigs = [f"{name}, if it is the rig's" for name in FOUR]
+    assert list(table.columns[14:]) == rigs
+    np.testing.assert_allclose(table[rigs[1]], found.if_rigs.loss_factor.value)
+    print(*found.warnings, sep="\n")
+    said = "\n".join(found.warnings)
+    assert "sleeve_compliance is taken as the bushing's, but these tests cannot tell it from rig_compliance" in said
+    assert "% if sleeve_compliance is the rig's; low and high span both" in said
+    assert predict(either, Direction.RADIAL, FREQUENCIES, AMPLITUDES, rig=True).warnings == told.warnings
+
+
+def test_of_two_that_may_be_the_rigs_the_band_spans_every_reading(either: Result) -> None:
+    model = either.model.with_effect("stiffness_factor.radial", {"stiffness_factor.radial": 1.1})
+    found = predict(
+        replace(either, model=model, unresolved=("stiffness_factor.radial", "sleeve_compliance")),
+        *(Direction.RADIAL, [55.0], [1e-4]),
+    )
+    ends = [
+        abs(complex(model.without(*left).stiffness("radial", 55.0, 1e-4)))
+        for left in ((), ("stiffness_factor.radial",), ("sleeve_compliance",), model.effects[3:])
+    ]
+    assert found.if_rigs is not None
+    assert found.if_rigs.stiffness.value[0] == pytest.approx(ends[3])
+    assert found.stiffness.low[0] < min(ends[1], ends[0])
+    assert found.stiffness.high[0] > ends[2] == max(ends)
+
+
+def test_a_mass_on_a_mount_that_may_flex_or_the_rig_resonates_at_two_places(either: Result) -> None:
+    found = predict_resonance(either, Direction.RADIAL, 1.0, 1.0, None)
+    assert found.if_rigs is not None
+    assert found.if_rigs.peak[0] > 1.02 * found.peak[0]
+    assert f"at {found.if_rigs.peak[0]:.4g} Hz" in found.warnings[-1]
+    table = shaken_table(found)
+    assert len(table.columns) == 11
+    other = table["transmissibility [-], if it is the rig's"]
+    np.testing.assert_allclose(other, np.abs(found.if_rigs.transmissibility))
+
+
+def test_what_may_be_the_rigs_stays_with_its_bushing_or_goes_with_its_specimen(either: Result) -> None:
+    wide, mount = Bushing("wide", 0.010, 0.018, 0.068), Specimen("mount", "shear", area=1e-3, thickness=1e-2)
+    model = either.model.with_effect("stiffness_factor.mount", {"stiffness_factor.mount": 1.1})
+    both = ("stiffness_factor.mount", "sleeve_compliance")
+    other, said = carried(replace(either, model=model, specimens=(mount,), unresolved=both), wide)
+    assert other.unresolved == ("stiffness_factor.mount",)
+    assert said.endswith("rig: sleeve_compliance")
+    assert predict(other, mount, [55.0], [1e-4]).if_rigs is not None
+
+
+def test_the_measured_stiffness_stands_beside_and_what_the_rig_took_is_said(paper_model: Model) -> None:
+    rigged = paper_model.with_effect("rig_compliance", {"rig_compliance.compliance": 2e-8})
+    frequency, amplitude = np.array([5.0, 5.02, 55.0, 155.0]), np.array([1e-4, 1.005e-4, 1e-4, 3e-4])
+    stiffness = rigged.stiffness("radial", frequency, amplitude) * np.array([1.01, 0.99, 1.0, 1.0])
+    sweep = Sweep("radial", Direction.RADIAL, frequency, amplitude, stiffness, repeat=np.array([1, 2, 1, 1]))
+    sweeps = sweep_data([sweep])
+    found = predict(Result(rigged), Direction.RADIAL, FREQUENCIES, AMPLITUDES, sweeps=sweeps)
+    table = prediction_table(found)
+    measured = table["measured stiffness [N/mm]"].to_numpy() * 1e3
+    assert measured[0] == pytest.approx(abs(stiffness[:2].mean()))
+    assert measured[1] == pytest.approx(abs(stiffness[2]))
+    assert np.isnan(measured[2:]).all()
+    assert table["measured loss factor [-]"][1] == pytest.approx(stiffness[2].imag / stiffness[2].real)
+    off = 100.0 * (found.stiffness.value[:2] / measured[:2] - 1.0)
+    (said,) = [line for line in found.warnings if "without rig_compliance" in line]
+    assert f"is +{off.min():.2g} to +{off.max():.2g} % against what was measured" in said
+    elsewhere = predict(Result(rigged), Direction.AXIAL, FREQUENCIES, AMPLITUDES, sweeps=sweeps)
+    assert prediction_table(elsewhere)["measured stiffness [N/mm]"].isna().all()
+    assert not [line for line in elsewhere.warnings if "measured" in line and "without" in line]
 
 
 def test_extrapolation_is_said(result: Result) -> None:
@@ -364,3 +449,13 @@ def test_impossible_requests(result: Result, frequencies: list[float], amplitude
 
 def test_all_five_parameters_have_a_share_in_the_bands(result: Result) -> None:
     assert set(result.covariance.names) == set(FIVE)
+
+
+def test_a_prediction_is_at_the_temperature_asked_for(paper_model: Model) -> None:
+    warm = Result(paper_model.with_effect("temperature", {"temperature.softening": 3e-3, "temperature.shift": 0.0}))
+    plain, hot = (predict(warm, Direction.AXIAL, [10.0], [1e-4], temperature=at) for at in (None, 33.0 + CELSIUS))
+    np.testing.assert_allclose(hot.stiffness.value, plain.stiffness.value * np.exp(-0.03), rtol=1e-12)
+    assert any(line.startswith("predicted at 23 degC") for line in plain.warnings)
+    assert not any("degC" in line for line in hot.warnings)
+    shaken = [predict_resonance(warm, Direction.AXIAL, 1.0, 1.0, None, temperature=at) for at in (None, 33.0 + CELSIUS)]
+    assert shaken[1].peak[0] == pytest.approx(shaken[0].peak[0] * np.exp(-0.015), rel=0.01)

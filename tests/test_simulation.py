@@ -75,6 +75,18 @@ def test_noise_is_as_large_as_asked_for(clean: Undisturbed) -> None:
     assert np.std(noisy.loops[0].displacement - ideal.loops[0].displacement) == pytest.approx(1e-6, rel=0.05)
 
 
+@pytest.mark.parametrize("correlation", [0.5, 0.98])
+def test_noise_of_a_loop_is_correlated_as_asked_for(clean: Undisturbed, correlation: float) -> None:
+    ideal = measure(clean, PLAN).loops[0].force
+    plan = replace(PLAN, force_noise=0.02, force_correlation=correlation)
+    unit = 0.02 * np.ptp(ideal) / 2.0
+    noise = np.array([measure(clean, replace(plan, seed=seed)).loops[0].force - ideal for seed in range(300)]) / unit
+    for rows in (noise[:, :2], noise[:, -2:]):  # as large from the first row on
+        assert np.std(rows) == pytest.approx(1.0, abs=0.1)
+        assert np.mean(rows[:, 0] * rows[:, 1]) == pytest.approx(correlation, abs=0.2)
+    assert np.mean(noise[:, 1:] * noise[:, :-1]) == pytest.approx(correlation, abs=0.05)
+
+
 def test_gain_and_phase_errors_are_shared_by_a_run(clean: Undisturbed) -> None:
     """A run is one repeat at one amplitude: its points are off by one factor, those of other runs by others."""
     ideal = measure(clean, PLAN).sweeps[0].stiffness.reshape(2, 1, 3)
@@ -305,3 +317,21 @@ def test_what_a_simulate_table_lacks_is_said(bushing: Bushing, table_1: dict[str
         model_of(campaign(SimulateSettings(parameters=lacking)))
     with pytest.raises(ModelError, match=r"c.toml[\s\S]*friktion"):
         model_of(campaign(SimulateSettings(parameters=table_1, effects={"friktion": {"x": 1.0}})))
+
+
+def test_the_rig_is_warm_and_drifts_as_planned(paper_model: Model, tmp_path: Path) -> None:
+    """Temperatures are stated in the campaign that is written, and turns are those it gives when it is read back."""
+    values = {"temperature.softening": 5e-3, "temperature.shift": 0.02, "drift.gain": 0.1}
+    truth = paper_model.with_effect("temperature", values).with_effect("drift", values)
+    tests = (replace(LOOP, temperature=300.0), replace(SWEEP, temperature=305.0))
+    simulated = simulate(truth, SimulateSettings(repeats=2, loops=tests[:1], sweeps=tests[1:]))
+    for name, content in to_files(simulated).items():
+        (tmp_path / name).write_bytes(content)
+    data = Data.of(load_campaign(tmp_path / "campaign.toml"))
+    (loop,), (sweep,) = data.loops, data.sweeps
+    assert loop.circumstances.temperature == pytest.approx(300.0)
+    assert (loop.circumstances.turn, sweep.circumstances.turn[-1]) == (0.0, 1.0)
+    off = np.abs(sweep.stiffness(truth) / sweep.measured - 1.0).max(), np.abs(loop.relative(truth)).max()
+    print(f"without noise, sweep off the closed form by {off[0]:.1e}, loop by {off[1]:.1e}")
+    assert max(off) < 5e-4
+    assert np.abs(sweep.stiffness(paper_model) / sweep.measured - 1.0).max() > 0.03

@@ -26,7 +26,7 @@ from bushfit.batch.manifest import Row
 from bushfit.batch.points import At, Point
 from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, STIFFNESS, Figures, Quantity, Record, at_point, figures
 from bushfit.campaign.parameters import parameter_value
-from bushfit.campaign.schema import Share
+from bushfit.campaign.quantities import Share
 from bushfit.campaign.toml import read_toml
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
@@ -93,16 +93,14 @@ class Bounds:
 _SIZES = ("min", "max", "nominal")
 
 
-def _parameter(name: str, table: object) -> object:
-    """A parameter's table of limits with its sizes in SI."""
-    if not isinstance(table, dict):
-        return table
-    sizes = {key: parameter_value(f"{name}.{key}", name, table[key]) for key in _SIZES if key in table}
-    return {**table, **sizes}
-
-
 def _parameters(raw: object, _: ValidationInfo) -> object:
-    return {name: _parameter(name, table) for name, table in raw.items()} if isinstance(raw, dict) else raw
+    """Tables of limits by parameter with their sizes in SI; what is no table is left to pydantic."""
+    settings = {}
+    for name, table in raw.items() if isinstance(raw, dict) else ():
+        given = [key for key in _SIZES if isinstance(table, dict) and key in table]
+        sizes = {key: parameter_value(f"{name}.{key}", name, table[key]) for key in given}
+        settings[name] = {**table, **sizes} if given else table
+    return settings if isinstance(raw, dict) else raw
 
 
 def _stiffness(raw: object, info: ValidationInfo) -> object:

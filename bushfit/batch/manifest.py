@@ -19,7 +19,7 @@ from pydantic import BeforeValidator, ConfigDict, Field
 
 from bushfit.batch.points import At, Point
 from bushfit.campaign.naming import folder_name
-from bushfit.campaign.schema import Share
+from bushfit.campaign.quantities import Share
 from bushfit.campaign.toml import read_toml
 from bushfit.effects import Effect, effect_named
 from bushfit.effects.mistakes import candidate_named

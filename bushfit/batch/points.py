@@ -62,9 +62,5 @@ def _motion(amplitude: str) -> Motion:
     return STRAINING if agrees(amplitude.lstrip("+-.0123456789eE "), STRAINING.displacement_unit) else TRANSLATION
 
 
-def _parsed(raw: object, _: object) -> object:
-    return parse_point(raw) if isinstance(raw, str) else raw
-
-
 #: A point as a key of a TOML file.
-At = Annotated[Point, converted(_parsed)]
+At = Annotated[Point, converted(lambda raw, _: parse_point(raw) if isinstance(raw, str) else raw)]

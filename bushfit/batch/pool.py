@@ -14,15 +14,8 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    CancelledError,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    wait,
-)
+from concurrent import futures
+from concurrent.futures import CancelledError, Executor, Future
 from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -68,7 +61,7 @@ class LocalPool:
             context = multiprocessing.get_context(kind)
             if kind == "forkserver":
                 context.set_forkserver_preload(["bushfit.batch.work", "bushfit.jobs.fits"])
-            self._executor = ProcessPoolExecutor(self._jobs, context, initializer=_begin_worker)
+            self._executor = futures.ProcessPoolExecutor(self._jobs, context, initializer=_begin_worker)
         return self._executor
 
     def workers(self) -> int:
@@ -181,7 +174,7 @@ def run(
                 number, row = suspects.popleft()
                 yield number, _alone(row, work, give_up, pool)
                 continue
-            done, _ = wait(out, return_when=FIRST_COMPLETED)
+            done, _ = futures.wait(out, return_when=futures.FIRST_COMPLETED)
             for future in done:
                 chunk, seconds = out.pop(future), time.monotonic() - started.pop(future)
                 try:
@@ -205,7 +198,7 @@ def _submit(pool: Pool, work: Callable[[Sequence[T]], Sequence[R]], rows: Sequen
     for _ in range(_MOST_DEATHS):
         try:
             return pool.executor().submit(work, rows)
-        except (BrokenExecutor, OSError) as error:
+        except (futures.BrokenExecutor, OSError) as error:
             pool.mend(error)
     return pool.executor().submit(work, rows)
 

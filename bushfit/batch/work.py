@@ -15,6 +15,7 @@ from bushfit.batch import ledger
 from bushfit.batch.ledger import Record
 from bushfit.batch.points import Point
 from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.effects import effect_named
 from bushfit.effects.contract import Parameter
 from bushfit.errors import BatchError, BushfitError
 from bushfit.fitting.data import Data
@@ -167,7 +168,10 @@ def _verdict(diagnosis: Diagnosis) -> Record:
     return {
         "verdict": diagnosis.verdict,
         "effects": [named.label for named in diagnosis.effects],
-        "alternatives": [name for named in diagnosis.effects for name in named.alternatives],
+        "alternatives": [
+            *(name for named in diagnosis.effects for name in named.alternatives),
+            *(twin for name in diagnosis.result.unresolved for twin in effect_named(name).twins),
+        ],
         "warnings": list(diagnosis.notes),
     }
 
@@ -177,8 +181,10 @@ def _diagnose(settings: Settings) -> Diagnose:
     from bushfit.jobs.diagnose import Diagnose
 
     asked = {key: getattr(settings, key) for key in ("max_effects", "tolerance", "adopt", "without")}
+    start = load_result(Path(settings.model)) if settings.model else None
+    asked["unresolved"] = start and start.unresolved
     how = How(**{key: value for key, value in asked.items() if value is not None})
-    return Diagnose(how, load_result(Path(settings.model)).model if settings.model else None)
+    return Diagnose(how, start.model if start else None)
 
 
 def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> Record:

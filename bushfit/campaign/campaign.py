@@ -11,9 +11,17 @@ from typing import Any
 
 from bushfit.campaign.naming import folder_name
 from bushfit.campaign.places import place_tested
-from bushfit.campaign.schema import CampaignFile, FitSettings, LoopFile, PredictSettings, SimulateSettings, SweepFile
+from bushfit.campaign.schema import (
+    CampaignFile,
+    FitSettings,
+    LoopFile,
+    PredictSettings,
+    RigSettings,
+    SimulateSettings,
+    SweepFile,
+)
 from bushfit.campaign.toml import read_toml
-from bushfit.effects.stiffness_factor import FAMILY
+from bushfit.effects import place_of
 from bushfit.errors import CampaignError, naming, typed
 from bushfit.geometry import Bushing, Specimen, place_named
 from bushfit.reading.layout import FileFormat
@@ -26,8 +34,8 @@ from bushfit.units import CELSIUS, quantity
 #: Endings of test files, which `bushfit init` makes a campaign of.
 TEST_FILES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods")
 
-#: Keys of a test that no fit uses, and that results carry on.
-_CONDITIONS = ("preload", "date", "operator", "specimen_number")
+#: Keys of a test that its file has nothing to do with, and that results carry on.
+_CONDITIONS = ("order", "preload", "date", "operator", "specimen_number")
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +58,7 @@ class Campaign:
     predict: PredictSettings = field(default_factory=PredictSettings)
     simulate: SimulateSettings | None = None
     specimens: tuple[Specimen, ...] = ()
+    rig: RigSettings = field(default_factory=RigSettings)
 
     @property
     def slug(self) -> str:
@@ -83,7 +92,7 @@ def load_campaign(path: str | Path) -> Campaign:
         with naming(place="predict.directions"):
             for name in content.predict.directions or ():
                 place_named(name, specimens)
-        _check_factors(content, specimens)
+        _check_places(content, specimens)
     return Campaign(
         content.name or (bushing or specimens[0]).name,
         path,
@@ -98,6 +107,7 @@ def load_campaign(path: str | Path) -> Campaign:
         content.predict,
         content.simulate,
         specimens,
+        content.rig,
     )
 
 
@@ -126,14 +136,14 @@ def _check_bodies(bushing: Bushing | None, specimens: Sequence[Specimen]) -> Non
         raise CampaignError("two specimens have one name", place="[[specimens]]", found=", ".join(sorted(doubles)))
 
 
-def _check_factors(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
-    """Raise a ModelError where a stiffness factor is of a place that the campaign does not have."""
+def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
+    """Raise a ModelError where an effect belongs to a place that the campaign does not have."""
     simulated = content.simulate.effects if content.simulate else {}
     own = [f"{effect}.{name}" for effect, table in simulated.items() for name in table]
     for name in (*content.fit.effects, *content.fit.parameters, *own):
-        if name.startswith(f"{FAMILY}."):
+        if place := place_of(name):
             with naming(place=name):
-                place_named(name.removeprefix(f"{FAMILY}."), specimens)
+                place_named(place, specimens)
 
 
 def refuse_tests(paths: Sequence[Path]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
@@ -11,7 +11,25 @@ from pydantic import BeforeValidator, ConfigDict, Field, InstanceOf
 
 from bushfit.campaign.parameters import effect_values, parameter_settings, parameter_values
 from bushfit.campaign.places import KEYS, with_places
+from bushfit.campaign.quantities import (
+    FIRST_ERROR,
+    LARGEST_SHAKEN,
+    SHAKEN,
+    Angle,
+    Count,
+    Displacement,
+    Frequencies,
+    Frequency,
+    Length,
+    Share,
+    Strain,
+    Temperature,
+    motion,
+    si,
+    table,
+)
 from bushfit.effects import is_parameter, parameter_names
+from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
 from bushfit.geometry import TRANSLATION, Direction, Place, Shape, Specimen, SpecimenKind, StatedStrain
 from bushfit.reading.headers import AmplitudeConvention
@@ -19,7 +37,6 @@ from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Stepped, Waveform
 from bushfit.reading.resonance import FEWEST_ROWS
 from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
-from bushfit.units import quantity, temperature
 from bushfit.validation import Flag, Name, Text, converted, known_keys, standing_in_table, unknown_key
 
 #: What a sweep's residuals compare: real and imaginary part, or |K| and loss factor.
@@ -27,50 +44,8 @@ Residuals = Literal["complex", "magnitude_loss_factor"]
 #: What is summed over the residuals: their squares, or soft_l1 with outliers left out.
 Loss = Literal["linear", "soft_l1"]
 
-#: Steps of a range of frequencies at most: more than any sweep has, and quick to predict.
-_LARGEST_GRID = 100_000
-#: Relative width by which a range of frequencies is widened, so that rounding does not drop its last step.
-_ROUNDING = 1e-9
-#: Repeats or cycles at most: more than any rig runs.
-_LARGEST_COUNT = 1_000_000
-#: Mass [kg], acceleration [m/s^2] and frequency [Hz] of a resonance test at most, and their inverse at least; chosen:
-#: far beyond every shaker, and numbers stay finite.
-_LARGEST_SHAKEN = 1e6
 #: [s] Pause in a simulated programme at most: a day is more than any rig rests between two loops.
 _LONGEST_PAUSE = 86_400.0
-#: Ends the check of a list at its first error: those of a hundred thousand would fill the memory.
-_FIRST_ERROR = Field(fail_fast=True)
-
-
-def _si(*units: str) -> BeforeValidator:
-    """A validator that takes a text with any of these units, and gives SI."""
-    return converted(lambda raw, _: quantity(raw, *units))
-
-
-def _motion(per: str = "") -> BeforeValidator:
-    """A validator as `_si("m")`, but by the motion of the table's direction: [rad], or a strain; "/s" for a speed."""
-
-    def unit(direction: object) -> str:
-        return (direction.motion if isinstance(direction, Place) else TRANSLATION).displacement_unit + per
-
-    return converted(lambda raw, info: quantity(raw, unit(info.data.get("direction"))))
-
-
-def _table(convert: Callable[[dict[str, Any]], Any]) -> BeforeValidator:
-    """A validator that converts a table; what is none it leaves to pydantic."""
-    return converted(lambda raw, _: convert(raw) if isinstance(raw, dict) else raw)
-
-
-def _frequencies(raw: dict[str, Any]) -> list[str]:
-    """A list of frequencies as texts from { start, stop, step }, with both ends."""
-    expected = '{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }, or a list such as ["5 Hz", "15 Hz"]'
-    if set(raw) != {"start", "stop", "step"}:
-        raise CampaignError("this is no range of frequencies", found=str(raw), expected=expected)
-    start, stop, step = (quantity(raw[key], "Hz") for key in ("start", "stop", "step"))
-    if not (0.0 < start <= stop and step > 0.0 and (stop - start) / step < _LARGEST_GRID):
-        raise CampaignError("this is no range of frequencies", found=str(raw), expected="0 < start <= stop, step > 0")
-    count = int((stop - start) / step * (1.0 + _ROUNDING)) + 1
-    return [f"{value!r} Hz" for value in (start + step * np.arange(count)).tolist()]
 
 
 def _fit_table(raw: dict[str, Any]) -> dict[str, Any]:
@@ -90,23 +65,13 @@ def _roles(known: Collection[str]) -> BeforeValidator:
                 raise unknown_key(role, known)
         return raw
 
-    return _table(check_keys)
+    return table(check_keys)
 
 
 #: Puts the direction or specimen itself into each test of [simulate].
 _SIMULATED_PLACES = converted(
     lambda raw, info: with_places(raw, [Specimen(**vars(table)) for table in info.data.get("specimens", ())])
 )
-Temperature = Annotated[float, converted(lambda raw, _: temperature(raw))]
-Length = Annotated[float, _si("m"), Field(gt=0)]
-Angle = Annotated[float, _si("rad"), Field(gt=0)]
-Strain = Annotated[float, _si("1"), Field(gt=0)]
-Frequency = Annotated[float, _si("Hz"), Field(gt=0)]
-Frequencies = Annotated[tuple[Frequency, ...], _FIRST_ERROR, _table(_frequencies), Field(min_length=1)]
-Displacement = Annotated[float, _motion(), Field(gt=0)]
-_SHAKEN = Field(ge=1.0 / _LARGEST_SHAKEN, le=_LARGEST_SHAKEN)
-Share = Annotated[float, _si("1"), Field(ge=0, lt=1)]
-Count = Annotated[int, Field(strict=True, ge=1, le=_LARGEST_COUNT)]
 
 
 @dataclass(frozen=True)
@@ -127,7 +92,7 @@ class SpecimenTable:
     name: Name
     kind: SpecimenKind
     strain: StatedStrain = "engineering"
-    area: Annotated[float, _si("m^2"), Field(gt=0)] | None = None
+    area: Annotated[float, si("m^2"), Field(gt=0)] | None = None
     thickness: Length | None = None
     elements: Count = 1
 
@@ -147,6 +112,7 @@ class TestFile(FileFormat):
         noise: relative standard deviation of a point, where it is known.
         weight: of the test in the fit, a share of the weight that its noise gives it.
         temperature: [K]; it selects the rows of a file that has several.
+        order: number of the test in the session; its place among all [[loops]], then all [[sweeps]], unless stated.
         preload, date, operator, specimen_number: carried on to results as they are written.
     """
 
@@ -158,6 +124,7 @@ class TestFile(FileFormat):
     noise: Share | None = None
     weight: Annotated[float, Field(gt=0, le=1)] = 1.0
     temperature: Temperature | None = None
+    order: Count | None = None
     preload: Text | None = None
     date: Text | None = None
     operator: Text | None = None
@@ -171,7 +138,7 @@ class LoopFile(TestFile):
     columns: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS)] = field(default_factory=dict)
     units: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS)] = field(default_factory=dict)
     force_sign: Literal[1, -1] = 1
-    rate: Annotated[float, _motion("/s"), Field(gt=0)] | None = None
+    rate: Annotated[float, motion("/s"), Field(gt=0)] | None = None
     frequency: Frequency | None = None
     waveform: Waveform | None = None
 
@@ -215,6 +182,31 @@ class ParameterSetting:
 
 
 @dataclass(frozen=True)
+class RigSettings:
+    """[rig]: the class of the test machine, standard deviations of errors that all repeats of a test may share.
+
+    Args:
+        gain_error, displacement_error: of the force's and of the displacement's calibration, relative.
+        phase_error: [rad].
+    """
+
+    gain_error: Share | None = None
+    phase_error: Annotated[float, si("rad"), Field(ge=0)] | None = None
+    displacement_error: Share | None = None
+
+    @property
+    def stated(self) -> tuple[float | None, float | None]:
+        """Standard deviation of the stiffness in gain and phase, None where nothing is stated; K is force over
+        displacement, so either calibration is a gain error of it."""
+        gains = [error for error in (self.gain_error, self.displacement_error) if error is not None]
+        return float(np.linalg.norm(gains)) if gains else None, self.phase_error
+
+
+#: The class of a rig of which nothing is stated.
+UNSTATED = RigSettings()
+
+
+@dataclass(frozen=True)
 class FitSettings:
     """[fit]: how the model is fitted.
 
@@ -223,11 +215,11 @@ class FitSettings:
         effects: added to the paper's model, such as "stiffness_factor.mount".
     """
 
-    dynamic_amplitudes: Annotated[tuple[Annotated[float, _si("m", "rad"), Field(gt=0)], ...], _FIRST_ERROR] = ()
+    dynamic_amplitudes: Annotated[tuple[Annotated[float, si("m", "rad"), Field(gt=0)], ...], FIRST_ERROR] = ()
     residuals: Residuals = "complex"
     loss: Loss = "linear"
     effects: tuple[Text, ...] = ()
-    parameters: Annotated[Mapping[str, ParameterSetting], _table(parameter_settings)] = field(
+    parameters: Annotated[Mapping[str, ParameterSetting], table(parameter_settings)] = field(
         default_factory=dict, metadata=standing_in_table(parameter_names)
     )
 
@@ -243,17 +235,19 @@ class PredictSettings:
     """
 
     frequencies: Frequencies | None = None
-    amplitudes: Annotated[tuple[Length, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
-    torsion_amplitudes: Annotated[tuple[Angle, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
-    directions: Annotated[tuple[Name, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
-    strain_amplitudes: Annotated[tuple[Strain, ...], _FIRST_ERROR, Field(min_length=1)] | None = None
+    amplitudes: Annotated[tuple[Length, ...], FIRST_ERROR, Field(min_length=1)] | None = None
+    torsion_amplitudes: Annotated[tuple[Angle, ...], FIRST_ERROR, Field(min_length=1)] | None = None
+    directions: Annotated[tuple[Name, ...], FIRST_ERROR, Field(min_length=1)] | None = None
+    strain_amplitudes: Annotated[tuple[Strain, ...], FIRST_ERROR, Field(min_length=1)] | None = None
 
 
 @dataclass(frozen=True)
 class SimulatedTest:
-    """What [[simulate.loops]], [[simulate.sweeps]] and [[simulate.resonances]] say alike: what is tested."""
+    """What [[simulate.loops]], [[simulate.sweeps]] and [[simulate.resonances]] say alike: what is tested, and at which
+    temperature [K], where that is to be known."""
 
     direction: Annotated[Place, InstanceOf[Place]] = field(metadata=standing_in_table(lambda: KEYS))
+    temperature: Temperature | None = field(default=None, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -268,9 +262,9 @@ class SimulatedLoop(SimulatedTest):
     frequency: Frequency = 0.0
     cycles: Count = 3
     waveform: Waveform = "sine"
-    amplitudes: Annotated[tuple[Displacement, ...], _FIRST_ERROR, Field(min_length=1)] = ()
-    frequencies: Annotated[tuple[Frequency, ...], _FIRST_ERROR, Field(min_length=1)] = ()
-    pause: Annotated[float, _si("s"), Field(ge=0, le=_LONGEST_PAUSE)] = 0.0
+    amplitudes: Annotated[tuple[Displacement, ...], FIRST_ERROR, Field(min_length=1)] = ()
+    frequencies: Annotated[tuple[Frequency, ...], FIRST_ERROR, Field(min_length=1)] = ()
+    pause: Annotated[float, si("s"), Field(ge=0, le=_LONGEST_PAUSE)] = 0.0
 
     def __post_init__(self) -> None:
         for one, several in (("amplitude", "amplitudes"), ("frequency", "frequencies")):
@@ -296,7 +290,7 @@ class SimulatedSweep(SimulatedTest):
         reached: standard deviation of the amplitude that a point really reached, relative to the one that was asked.
     """
 
-    amplitudes: Annotated[tuple[Displacement, ...], _FIRST_ERROR, Field(min_length=1)]
+    amplitudes: Annotated[tuple[Displacement, ...], FIRST_ERROR, Field(min_length=1)]
     frequencies: Frequencies
     stepped: Stepped = "frequency"
     reached: Share = 0.0
@@ -311,6 +305,12 @@ class SimulatedSweep(SimulatedTest):
         """What changes from point to point of a run: frequencies [Hz] or amplitudes [m or rad, or strain]."""
         return self.frequencies if self.stepped == "frequency" else self.amplitudes
 
+    @property
+    def points(self) -> tuple[Array, Array]:
+        """Frequency [Hz] and amplitude [m or rad, or strain] of each point, (held, steps) each."""
+        held, step = np.meshgrid(self.held, self.steps, indexing="ij")
+        return (step, held) if self.stepped == "frequency" else (held, step)
+
 
 @dataclass(frozen=True)
 class SimulatedResonance(SimulatedTest):
@@ -319,15 +319,15 @@ class SimulatedResonance(SimulatedTest):
     `base_acceleration` is zero-to-peak [m/s^2], the same at all frequencies [Hz].
     """
 
-    mass: Annotated[float, _si("kg"), _SHAKEN]
-    base_acceleration: Annotated[float, _si("m/s^2"), _SHAKEN]
+    mass: Annotated[float, si("kg"), SHAKEN]
+    base_acceleration: Annotated[float, si("m/s^2"), SHAKEN]
     frequencies: Frequencies
 
     def __post_init__(self) -> None:
         if self.direction.motion is not TRANSLATION:
             expected = "a direction with a displacement, or a specimen in shear"
             raise ValueError(CampaignError("no mass swings on this", found=str(self.direction), expected=expected))
-        known = [f for f in self.frequencies if 1.0 / _LARGEST_SHAKEN <= f <= _LARGEST_SHAKEN]
+        known = [f for f in self.frequencies if 1.0 / LARGEST_SHAKEN <= f <= LARGEST_SHAKEN]
         if len(known) < max(FEWEST_ROWS, len(self.frequencies)):
             expected = f"at least {FEWEST_ROWS}, through the resonance"
             raise ValueError(CampaignError("no frequencies of a shaker", found=f"{len(known)}", expected=expected))
@@ -345,20 +345,22 @@ class SimulateSettings:
         noise: standard deviation of a sweep point's real and imaginary part, relative to |K|; of a resonance test's
             transmissibility likewise.
         force_noise, displacement_noise: standard deviation of a loop's samples, relative to the amplitude.
+        force_correlation: of the noise of one row's force with that of the next, as a filter makes it (AR(1)).
         gain_error: standard deviation of the gain of a run: of one repeat of what is held, or of a resonance test.
         phase_error: standard deviation of the phase of a run [rad].
         loops, sweeps, resonances: the tests; empty for the rig's own choice.
     """
 
-    parameters: Annotated[Mapping[str, float], _table(parameter_values)] = field(default_factory=dict)
-    effects: Annotated[Mapping[str, Mapping[str, float]], _table(effect_values)] = field(default_factory=dict)
+    parameters: Annotated[Mapping[str, float], table(parameter_values)] = field(default_factory=dict)
+    effects: Annotated[Mapping[str, Mapping[str, float]], table(effect_values)] = field(default_factory=dict)
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
     repeats: Count = 1
     noise: Share = 0.0
     force_noise: Share = 0.0
+    force_correlation: Share = 0.0
     displacement_noise: Share = 0.0
     gain_error: Share = 0.0
-    phase_error: Annotated[float, _si("rad"), Field(ge=0)] = 0.0
+    phase_error: Annotated[float, si("rad"), Field(ge=0)] = 0.0
     loops: tuple[SimulatedLoop, ...] = ()
     sweeps: tuple[SimulatedSweep, ...] = ()
     resonances: tuple[SimulatedResonance, ...] = ()
@@ -375,6 +377,7 @@ class CampaignFile:
     specimens: tuple[SpecimenTable, ...] = ()
     loops: tuple[LoopFile, ...] = ()
     sweeps: tuple[SweepFile, ...] = ()
-    fit: Annotated[FitSettings, _table(_fit_table)] = field(default_factory=FitSettings)
+    rig: RigSettings = field(default_factory=RigSettings)
+    fit: Annotated[FitSettings, table(_fit_table)] = field(default_factory=FitSettings)
     predict: PredictSettings = field(default_factory=PredictSettings)
     simulate: Annotated[SimulateSettings | None, _SIMULATED_PLACES] = None

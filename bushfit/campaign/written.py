@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from bushfit.geometry import Bushing, Place, Specimen
+from bushfit.units import CELSIUS
 
 
 def body_lines(bushing: Bushing | None, specimens: Iterable[Specimen]) -> list[str]:
@@ -16,19 +17,26 @@ def body_lines(bushing: Bushing | None, specimens: Iterable[Specimen]) -> list[s
         lines += [f"{key} = {_mm(getattr(bushing, key))}" for key in ("inner_radius", "outer_radius", "length")]
         lines += [f'shape = "{bushing.shape}"'] if bushing.shape != "paper" else []
     for specimen in specimens:
-        lines += ["", "[[specimens]]", f"name = {toml_value(specimen.name)}", f'kind = "{specimen.kind}"']
-        if specimen.strain != "engineering":
-            lines.append(f'strain = "{specimen.strain}"')
-        if specimen.area and specimen.thickness:
-            lines += [f'area = "{specimen.area * 1e6:.6g} mm^2"', f"thickness = {_mm(specimen.thickness)}"]
-            lines.append(f"elements = {specimen.elements}")
+        lines += ["", *specimen_lines(specimen)]
     return lines
 
 
-def table_lines(kind: str, file: str, place: Place) -> list[str]:
-    """The lines of one of [[loops]] or [[sweeps]], with the file and what was tested."""
+def specimen_lines(specimen: Specimen) -> list[str]:
+    """The lines of one of [[specimens]]."""
+    lines = ["[[specimens]]", f"name = {toml_value(specimen.name)}", f'kind = "{specimen.kind}"']
+    if specimen.strain != "engineering":
+        lines.append(f'strain = "{specimen.strain}"')
+    if specimen.area and specimen.thickness:
+        lines += [f'area = "{specimen.area * 1e6:.12g} mm^2"', f'thickness = "{specimen.thickness * 1e3:.12g} mm"']
+        lines.append(f"elements = {specimen.elements}")
+    return lines
+
+
+def table_lines(kind: str, file: str, place: Place, temperature: Any = None) -> list[str]:
+    """The lines of one of [[loops]] or [[sweeps]]: the file, what was tested, and at what temperature [K], if one."""
     tested = f"specimen = {toml_value(place.name)}" if isinstance(place, Specimen) else f'direction = "{place}"'
-    return ["", f"[[{kind}]]", f"file = {toml_value(file)}", tested]
+    warm = [] if temperature is None else [f'temperature = "{temperature - CELSIUS:.6g} degC"']
+    return ["", f"[[{kind}]]", f"file = {toml_value(file)}", tested, *warm]
 
 
 def toml_value(value: Any) -> str:

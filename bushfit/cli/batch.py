@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from bushfit.cli.common import Options, example, naming_option, path_option, place_option, shared_options
+from bushfit.cli.common import Options, example, path_option, place_option, shared_options
 from bushfit.cli.show import new_table, warn
+from bushfit.errors import naming
 from bushfit.units import alike, for_people
 
 if TYPE_CHECKING:
@@ -103,7 +105,7 @@ def command(
     judged_by = read_limits(limits) if limits else None
     if limits and judged_by:
         check_judged(judged_by, limits, read.rows)
-    with naming_option("--at"):
+    with naming(place="--at"):
         points = (*read.points, *map(parse_point, at), *(judged_by.points if judged_by else ()))
     formats = tuple(kind for kind, wanted in (("csv", tables), ("png", plots and options.plots)) if wanted)
     output = options.folder(read.stem).absolute()
@@ -131,8 +133,6 @@ def _settings(commands: tuple[Command, ...], directions: tuple[str, ...], effect
 @contextmanager
 def _progress(options: Options, total: int) -> Iterator[Callable[[str], None]]:
     """Rate and time left: a bar on a terminal, now and then a line elsewhere."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
     console = options.console
     columns = (
         TextColumn("{task.description}"),

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
+from rich.console import Console
 
-from bushfit.errors import BushfitError, ModelError, typed
+from bushfit.errors import ModelError, typed
 from bushfit.report.folder import check_free, to_json, write_files
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from bushfit.campaign.schema import Loss
     from bushfit.geometry import Direction
     from bushfit.jobs import Found, Job
@@ -49,17 +47,6 @@ class _Place(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows none
         return str(value) if str(value).strip() else self.fail("this is no direction: an empty text", param, ctx)
 
 
-class _DirectionOption(click.Option):
-    """An option that takes directions; they stand in its help in place of "{directions}"."""
-
-    def get_help_record(self, ctx: click.Context) -> tuple[str, str]:
-        from bushfit.geometry import Direction
-
-        name, text = super().get_help_record(ctx) or ("", "")
-        *most, last = Direction
-        return name, text.replace("{directions}", f"{', '.join(most)} or {last}")
-
-
 class _Folder(click.Path):
     """A folder for results; an empty text, as of a variable that is not set, is none."""
 
@@ -80,9 +67,9 @@ class _Share(click.FloatRange):
 
 
 #: Decorator of a command that takes a direction, or several.
-direction_option = partial(click.option, "--direction", cls=_DirectionOption, type=_Direction())
+direction_option = partial(click.option, "--direction", type=_Direction())
 #: The same of a command that takes specimens by their names, too.
-place_option = partial(click.option, "--direction", cls=_DirectionOption, type=_Place())
+place_option = partial(click.option, "--direction", type=_Place())
 #: Decorator of a command that takes a file.
 path_option = partial(click.option, type=click.Path(path_type=Path))
 
@@ -90,16 +77,6 @@ path_option = partial(click.option, type=click.Path(path_type=Path))
 def option_of(key: str) -> str:
     """The option of a key: --force-sign of force_sign."""
     return "--" + key.replace("_", "-")
-
-
-@contextmanager
-def naming_option(option: str) -> Iterator[None]:
-    """Errors about a value name the option that it was given with."""
-    try:
-        yield
-    except BushfitError as error:
-        error.place = option
-        raise
 
 
 @dataclass(frozen=True)
@@ -125,8 +102,6 @@ class Options:
     @property
     def console(self) -> Console:
         """People read standard error; nothing at all with --quiet."""
-        from rich.console import Console
-
         console = Console(stderr=True, quiet=self.quiet, highlight=False, soft_wrap=True)
         return console if console.is_terminal else Console(stderr=True, quiet=self.quiet, soft_wrap=True, width=_WIDTH)
 

@@ -8,17 +8,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from rich.markup import escape
 
-from bushfit.cli.common import Options, Task, campaign_options, example, naming_option, open_model, path_option
+from bushfit.cli.common import Options, Task, campaign_options, example, open_model, path_option
 from bushfit.cli.show import new_table, parameter_table, warn
-from bushfit.errors import BushfitError
-from bushfit.units import alike, for_people, quantity
+from bushfit.errors import BushfitError, naming
+from bushfit.units import alike, for_people, number, quantity
 
 if TYPE_CHECKING:
+    from bushfit.diagnosis.record import Diagnosis
     from bushfit.jobs.diagnose import Diagnosed
 
 #: Colours of the verdicts on a terminal.
-_COLOURS = {"consistent": "green", "named": "green", "ambiguous": "yellow", "partly": "yellow", "unexplained": "red"}
+_COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 
 
 @click.command("diagnose", epilog=example("bushfit diagnose configs/mystery_mount.toml"))
@@ -48,20 +50,21 @@ def command(
 
     All tests are used, in every direction. The verdict is one of: consistent (nothing is missing), named (what was
     added closes the gap; or the tests agree if one of them was recorded wrongly, which is told and never mended unless
-    adopted), ambiguous (look-alikes: all are listed, none is added), partly (a remainder stays) or unexplained (no
-    known effect closes the gap; the model is left as it was).
+    adopted), ambiguous (look-alikes: all are listed, none is added), described (it has no name, but a smooth
+    correction), partly (a little remains) or unexplained (no known effect closes the gap; the model is left as it was).
 
     Writes diagnosis.json, model.json with what was added, gap.csv, candidates.csv and gap.png.
     """
     from bushfit.diagnosis.record import Settings
     from bushfit.jobs.diagnose import Diagnose
 
-    settings = Settings(max_effects, _share(tolerance), adopt, without)
-    task.perform(Diagnose(settings, open_model(model).model if model else None), tell_diagnosis)
+    start = open_model(model) if model else None
+    settings = Settings(max_effects, _share(tolerance), adopt, without, start.unresolved if start else ())
+    task.perform(Diagnose(settings, start.model if start else None), tell_diagnosis)
 
 
 def _share(text: str) -> float:
-    with naming_option("--tolerance"):
+    with naming(place="--tolerance"):
         share = quantity(text, "1")
         if not 0.0 <= share <= 1.0:
             raise BushfitError("this is no share of |K|", found=f'"{text}"', expected="0 % to 100 %")
@@ -69,36 +72,34 @@ def _share(text: str) -> float:
 
 
 def tell_diagnosis(options: Options, name: str, outcome: Diagnosed) -> None:
-    """The finding at a glance: verdict, names with sizes, gap before and after, where, and what to do next."""
+    """The finding at a glance: the result with its gap, where it is, the next test, and then the details."""
     diagnosis = outcome.diagnosis
     tell_verdict(options, name, outcome)
     tell_findings(options, outcome)
+    for effect in outcome.document["effects"]:
+        _tell_evidence(options, effect)
+    if options.verbose:
+        _tell_candidates(options, diagnosis)
     if diagnosis.added or options.verbose:
         title = "model with what was added" if diagnosis.added else "model as it was"
         options.console.print(parameter_table(title, diagnosis.result))
-    warn(options, (*diagnosis.notes, *diagnosis.result.warnings))
+    warn(options, list(dict.fromkeys((*diagnosis.notes, *diagnosis.result.warnings))))
 
 
 def tell_verdict(options: Options, name: str, outcome: Diagnosed) -> None:
     """The verdict in a word and in a sentence."""
-    from rich.markup import escape
-
     verdict = outcome.diagnosis.verdict
-    options.console.print(f"[bold]{escape(name)}:[/bold] [bold {_COLOURS[verdict]}]{verdict}[/]")
+    colour = _COLOURS.get(verdict, "yellow")
+    options.console.print(f"[bold]{escape(name)}:[/bold] [bold {colour}]{verdict}[/]")
     options.console.print(f"  {escape(outcome.diagnosis.summary)}")
 
 
 def tell_findings(options: Options, outcome: Diagnosed) -> None:
-    """The effects named, the gap before and after, where it is, and the next test."""
-    from rich.markup import escape
-
-    console, diagnosis = options.console, outcome.diagnosis
-    for effect in outcome.document["effects"]:
+    """The effects named with their sizes, the gap before and after, what is usable, where it is, and the next test."""
+    console, diagnosis, document = options.console, outcome.diagnosis, outcome.document
+    for effect in document["effects"]:
         _tell_effect(options, effect)
-    table = new_table("gap, in units of noise (1 is the floor)", "", "before", "after")
-    table.add_row("data fitted", *(f"{value:.2f}" for value in diagnosis.calibration))
-    table.add_row("held out", f"{diagnosis.holdout.before:.2f}", f"{diagnosis.holdout.after:.2f}")
-    console.print(table)
+    _tell_gap(options, document)
     for title, regions in (("where", diagnosis.where), ("what remains", diagnosis.remainder)):
         if regions and not (title == "what remains" and diagnosis.remainder == diagnosis.where):
             console.print(f"  [bold]{title}[/bold]")
@@ -108,10 +109,33 @@ def tell_findings(options: Options, outcome: Diagnosed) -> None:
         console.print(f"  [bold]next test:[/bold] {escape(diagnosis.next_test)}")
 
 
+def _tell_gap(options: Options, document: Mapping[str, Any]) -> None:
+    """The gap, held out first, how often the name came out again, and within what the model is usable."""
+    gap, usable, console = document["gap"], document["usable"], options.console
+    table = new_table("gap, in units of noise (1 is the floor)", "", "before", "after")
+    held = gap["heldout"]
+    table.add_row(
+        "held out", *([f"{held[when]:.2f}" for when in ("before", "after")] if held else ["not testable", ""])
+    )
+    table.add_row("data fitted", *(f"{value:.2f}" for value in gap["calibration"].values()))
+    console.print(table)
+    if gap["name_again"]:
+        again, searched = gap["name_again"]
+        what = "it" if document["effects"] else "what was taken back"
+        console.print(
+            f"  searched anew without each of {searched} parts of the tests, {what} comes out again in {again}"
+        )
+    if usable:
+        how = "of what was predicted from other runs" if usable["held_out"] else "of what was fitted"
+        words = f"{number(100 * usable['stiffness'], 2)} % of stiffness and {number(usable['loss_factor'], 2)}"
+        console.print(f"  usable within {words} of loss factor (95 % {how})")
+    if options.verbose:
+        for part in gap["skipped"]:
+            console.print(f"  not held out: {part['part']}; {part['reason']}")
+
+
 def _tell_effect(options: Options, effect: Mapping[str, Any]) -> None:
     """One effect that was named, as an entry of the document: its physics, sizes, evidence and look-alikes."""
-    from rich.markup import escape
-
     console = options.console
     test = f" in {effect['test']}" if effect["test"] else ""
     console.print(f"  [bold]{effect['name']}[/bold]{escape(test)} ({effect['level']}): {escape(effect['sentence'])}")
@@ -120,10 +144,28 @@ def _tell_effect(options: Options, effect: Mapping[str, Any]) -> None:
         value, *ends = alike([factor * x for x in (entry["value"], *(entry["ci95"] or ()))], 4, least=2)
         size = f"{value} {unit}".removesuffix(" -")
         console.print(f"    {parameter} = {size}" + (f", 95 % {' to '.join(ends)}" if ends else ""))
-    console.print(f"    {escape(effect['evidence'])}")
+    if effect["twins"]:
+        console.print(f"    its size is known, its level is not: it could as well be {' or '.join(effect['twins'])}")
     if effect["correction"]:
         console.print(f"    the line that puts it right: {escape(effect['correction'])}")
     if effect["alternatives"]:
         console.print(f"    cannot be told from: {escape(', '.join(effect['alternatives']))}")
+
+
+def _tell_evidence(options: Options, effect: Mapping[str, Any]) -> None:
+    """Why an effect was named."""
+    console = options.console
+    console.print(f"  [bold]why {effect['name']}:[/bold] {escape(effect['evidence'])}")
     if effect["richer"]:
         console.print(f"    the simpler name; a limit of {', '.join(effect['richer'])}, which these tests do not show")
+
+
+def _tell_candidates(options: Options, diagnosis: Diagnosis) -> None:
+    """Every candidate that was refitted, and why it won or lost."""
+    title = "candidates: what each takes off chi-square, and the gap held out"
+    table = new_table(title, "candidate", "why", "gain", "held out", names=2)
+    for judged in diagnosis.candidates:
+        if judged.gain is not None:
+            held = "" if judged.heldout is None else f"{judged.heldout:.2f}"
+            table.add_row(judged.name, judged.why, f"{judged.gain:.0f}", held)
+    options.console.print(table)

@@ -7,6 +7,7 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import click
+from rich.progress import Progress
 
 from bushfit.cli.common import Options, Task, campaign_options, example, open_model, path_option, place_option
 from bushfit.cli.show import tell_fit
@@ -53,8 +54,8 @@ def dynamic(static: Path | None, task: Task) -> None:
 @place_option(
     "directions",
     multiple=True,
-    help="Tests to fit: {directions}, or a specimen's name; may be given again [axial, as in the paper, and all "
-    "specimens; of loops, or of sweeps, all where none is axial].",
+    help="Tests to fit: axial, radial or torsion, or a specimen's name; may be given again [axial, as in the paper, "
+    "and all specimens; of loops, or of sweeps, all where none is axial].",
 )
 @click.option(
     "--effect",
@@ -87,8 +88,6 @@ def fit(directions: tuple[str, ...], effects: tuple[str, ...], profile: bool, ta
 @contextmanager
 def _progress(options: Options) -> Iterator[Callable[[str, int], None]]:
     """Which parameter's profile is done: a bar on a terminal, a line each elsewhere."""
-    from rich.progress import Progress
-
     console = options.console
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("profiles", total=None)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import re
 
-from bushfit.cli.common import naming_option
-from bushfit.errors import UnitError
+from bushfit.errors import UnitError, naming
 from bushfit.units import quantity
 
 #: Values of a grid at most: more is a typing error in the step.
@@ -20,7 +19,7 @@ def positive(text: str | None, option: str, unit: str) -> float | None:
     """
     if text is None:
         return None
-    with naming_option(option):
+    with naming(place=option):
         value = quantity(text, unit)
         if not value > 0.0:
             raise UnitError("this is not positive", found=f'"{text}"', expected="a value above zero")
@@ -36,7 +35,7 @@ def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | 
     if text is None:
         return None
     expected = 'such as "5:155:10 Hz" (start:stop:step) or "0.1, 0.2, 0.5 mm", with one unit at the end'
-    with naming_option(option):
+    with naming(place=option):
         if re.search(r"\d,\d", text):
             raise UnitError(
                 "a comma between two digits may part numbers or be a decimal comma",

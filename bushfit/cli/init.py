@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, example, naming_option, option_of, shared_options
-from bushfit.cli.inspect import KEYS, tell_left_out
+from bushfit.cli.common import Options, example, option_of, shared_options
+from bushfit.cli.inspect import tell_left_out
 from bushfit.cli.raw import direction_error, file_options, options_named
 from bushfit.cli.show import warn
-from bushfit.errors import BushfitError, CampaignError, MeasurementError, typed
+from bushfit.errors import BushfitError, CampaignError, MeasurementError, naming, typed
+from bushfit.units import quantity
 
 if TYPE_CHECKING:
     from bushfit.geometry import Bushing
@@ -35,7 +36,7 @@ _SIDES = ("inner", "outer")
 @click.option("--outer-diameter", help='such as "36 mm".')
 @click.option("--length", help='Mean length of the rubber, such as "34 mm".')
 @click.option("--name", help="Of the bushing [the folder of the first file].")
-@file_options(*KEYS)
+@file_options()
 @shared_options
 def command(
     files: tuple[Path, ...], name: str | None, stated: Mapping[str, Any], options: Options, **sizes: str | None
@@ -75,8 +76,6 @@ def command(
 
 def _radius(side: str, sizes: Mapping[str, str | None]) -> str:
     """A radius as the campaign has it, from the one of the two options that was given."""
-    from bushfit.units import quantity
-
     radius, diameter = sizes[f"{side}_radius"], sizes[f"{side}_diameter"]
     options = f"--{side}-radius", f"--{side}-diameter"
     if radius is not None and diameter is not None:
@@ -85,7 +84,7 @@ def _radius(side: str, sizes: Mapping[str, str | None]) -> str:
         return radius
     if diameter is None:
         raise click.UsageError(f"Missing option '{options[0]}' or '{options[1]}'.")
-    with naming_option(options[1]):
+    with naming(place=options[1]):
         return f"{1e3 * quantity(diameter, 'm') / 2.0:.12g} mm"
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from rich.markup import escape
 
 from bushfit.cli.common import Options, example, shared_options
 from bushfit.cli.raw import file_options, options_named
@@ -17,14 +18,6 @@ from bushfit.errors import BushfitError
 if TYPE_CHECKING:
     from bushfit.inspection.record import Inspected
 
-#: Keys of a campaign's tables that say how a file is written.
-FORMAT_KEYS = ("encoding", "delimiter", "decimal", "thousands", "header_line", "sheet")
-#: Keys of a campaign's tables that inspect and init take as options.
-KEYS = (
-    *("force_sign", "rate", "frequency", "waveform", "amplitude", "at_amplitude", "at_frequency", "temperature"),
-    *("specimen", "area", "thickness", "elements"),
-    *FORMAT_KEYS,
-)
 #: Kinds of test file, in words.
 _KINDS = {"loop": "a hysteresis loop", "sweep": "a sweep", "history": "a raw stepped-sine history"}
 #: Files in one picture: more would be too small to read.
@@ -36,7 +29,7 @@ _FILES_A_PICTURE = 5
     epilog=example("bushfit inspect data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_radial.csv"),
 )
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@file_options(*KEYS)
+@file_options()
 @shared_options
 def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options) -> None:
     """Look at test files before a campaign names them: loops, sweeps, raw stepped-sine histories, in any mixture.
@@ -95,8 +88,6 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
 
 def tell(options: Options, seen: Inspected) -> None:
     """One file in words: columns, facts, oddities."""
-    from rich.markup import escape
-
     console = options.console
     written = ", ".join(f"{label} {value}" for label, value in seen.written.items())
     table = new_table(

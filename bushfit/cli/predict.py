@@ -40,12 +40,14 @@ _MOST_OF_FIT = 3
 @place_option(
     "directions",
     multiple=True,
-    help="{directions}, or a specimen's name; may be given again [axial and radial of a bushing, and all specimens].",
+    help="axial, radial or torsion, or a specimen's name; may be given again [axial and radial of a bushing, and all "
+    "specimens].",
 )
 @click.option("--frequencies", help='Such as "5:155:10 Hz" or "20, 50, 100 Hz" [the campaign\'s].')
 @click.option("--amplitudes", help='Zero-to-peak, such as "0.1, 0.2, 0.5 mm" [the campaign\'s].')
 @click.option("--torsion-amplitudes", help='Zero-to-peak rotation, for --direction torsion ["0.5, 1, 2 deg"].')
 @click.option("--strain-amplitudes", help='Zero-to-peak strain, for specimens that give a modulus ["1, 2, 5 %"].')
+@click.option("--temperature", help='Of the rubber, such as "40 degC", for a model with the effect of it [23 degC].')
 @click.option("--mass", help='Predict its resonance on each place, too: such as "1.2 kg", with --base-acceleration.')
 @click.option("--base-acceleration", help='Amplitude of the base under the mass, such as "0.1 g" or "1 m/s^2".')
 @shared_options
@@ -54,6 +56,7 @@ def command(
     campaign: Path | None,
     bushing: Path | None,
     directions: tuple[str, ...],
+    temperature: str | None,
     mass: str | None,
     base_acceleration: str | None,
     options: Options,
@@ -62,9 +65,10 @@ def command(
     """Dynamic stiffness and loss factor of MODEL (the model.json of run, fit or diagnose, or dynamic.json) over a grid.
 
     Writes axial.csv and radial.csv (torsion.csv on request), and a table of each specimen, with 95 % bands, and a plot
-    of each; with --campaign measured.csv, its sweeps beside the model. Effects of the rig are left out. Without a grid
-    in the options or the campaign it is that of the campaign's sweeps at each place, or the paper's as far as it was
-    measured. A warning names what leaves the fitted directions, strains or frequencies.
+    of each; with --campaign measured.csv, its sweeps beside the model. Effects of the rig are left out; of what may be
+    the bushing's or the rig's both readings are written. Without a grid in the options or the campaign it is that of
+    the campaign's sweeps at each place, or the paper's as far as it was measured. A warning names what leaves the
+    fitted directions, strains or frequencies.
 
     --mass shakes the base under a mass: the transmissibility over frequency, in <place>_resonance.csv.
 
@@ -75,8 +79,10 @@ def command(
     from bushfit.campaign.naming import folder_name
     from bushfit.campaign.schema import PredictSettings
     from bushfit.cli.grids import parse_grid, positive
+    from bushfit.errors import naming
     from bushfit.jobs.predict import Predict
-    from bushfit.prediction import carried
+    from bushfit.model.result import carried
+    from bushfit.units import temperature as kelvin
 
     result, notes = open_model(model), list[str]()
     of_fit = [f"of the fit: {line}" for line in result.warnings[:_MOST_OF_FIT]]
@@ -91,7 +97,9 @@ def command(
     if (mass is None) != (base_acceleration is None):
         raise click.UsageError("'--mass' and '--base-acceleration' go together.")
     shaken = positive(mass, "--mass", "kg"), positive(base_acceleration, "--base-acceleration", "m/s^2")
-    job = Predict(PredictSettings(directions=directions or None, **asked), *shaken)
+    with naming(place="--temperature"):
+        warm = None if temperature is None else kelvin(temperature)
+    job = Predict(PredictSettings(directions=directions or None, **asked), *shaken, warm)
     folder = options.folder(loaded.slug if loaded else folder_name(result.name))
     measured = ["measured.csv"] if loaded and loaded.sweeps else []
     options.require_free(folder, [*job.names(result, loaded, options.formats), *measured])

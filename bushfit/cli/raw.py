@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import fields
 from functools import reduce, wraps
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -14,6 +15,7 @@ import click
 from bushfit.cli.common import direction_option, option_of
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.reading.headers import AmplitudeConvention
+from bushfit.reading.layout import FileFormat
 from bushfit.reading.words import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -38,6 +40,8 @@ _SAME_NAME = {
     "header_line": "Line of the header, from 1 [found].",
     "sheet": "Of a workbook [all with a test].",
 }
+#: Keys of them that a command on raw histories takes: they tell how any file is written.
+_OF_ANY_FILE = ("force_sign", *(field.name for field in fields(FileFormat)))
 #: Keys that are whole numbers.
 _NUMBERS = ("force_sign", "header_line", "elements")
 #: An inline table of TOML in the hint of an error.
@@ -46,12 +50,24 @@ _TABLE = re.compile(r"\{[^}]*\}")
 _PAIRED = re.compile(r'(column|unit)s = \{ (\w+) = "([^"]*)"')
 
 
-def file_options(*keys: str, sweeps: bool = True) -> Callable[[F], F]:
+def file_options(*, sweeps: bool = True) -> Callable[[F], F]:
     """--direction, --column, --unit and an option for each of some keys of a campaign, gathered into one `stated`.
 
-    Beside loops the command takes sweeps, or else resonance tests.
+    Beside loops the command takes sweeps, with all keys, or else resonance tests, with those of any file.
     """
-    known = tuple(dict.fromkeys((*LOOP_COLUMNS, *(SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS))))
+    other = SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS
+    known = tuple(dict.fromkeys((*LOOP_COLUMNS, *other)))
+    keys = [key for key in _SAME_NAME if sweeps or key in _OF_ANY_FILE]
+    roles = f"ROLEs{' of loops' * sweeps}: {', '.join(LOOP_COLUMNS)}; of {'sweeps' if sweeps else 'resonance tests'}: "
+    help_ = f'Such as "force=Fz", of files that have this header; may be given again. {roles}{", ".join(other)}.'
+    options: list[Callable[[Any], Any]] = [
+        direction_option(help="axial, radial or torsion [found in names or columns]."),
+        click.option("--column", "columns", multiple=True, metavar="ROLE=HEADER", help=help_),
+        click.option("--unit", "units", multiple=True, metavar="ROLE=UNIT", help='Such as "force=kN"; ROLEs as above.'),
+    ]
+    for key in keys:
+        kind = int if key in _NUMBERS else str
+        options.append(click.option(option_of(key), key, type=kind, help=_SAME_NAME[key]))
 
     def decorate(function: F) -> F:
         @wraps(function)
@@ -62,31 +78,9 @@ def file_options(*keys: str, sweeps: bool = True) -> Callable[[F], F]:
             _check_amplitude(stated.get("amplitude"))
             return function(*args, stated={key: value for key, value in stated.items() if value}, **kwargs)
 
-        return reduce(lambda command, option: option(command), reversed(_options(keys, sweeps=sweeps)), wrapped)  # type: ignore[return-value]
+        return reduce(lambda command, option: option(command), reversed(options), wrapped)  # type: ignore[return-value]
 
     return decorate
-
-
-def _options(keys: Sequence[str], *, sweeps: bool) -> list[Callable[[Any], Any]]:
-    """The options that state what a file does not say itself."""
-    roles = f"ROLEs: {', '.join(LOOP_COLUMNS)}; of resonance tests: {', '.join(RESONANCE_COLUMNS)}"
-    if sweeps:
-        roles = f"ROLEs of loops: {', '.join(LOOP_COLUMNS)}; of sweeps: {', '.join(SWEEP_COLUMNS)}"
-    return [
-        direction_option(help="{directions} [found in names or columns]."),
-        click.option(
-            "--column",
-            "columns",
-            multiple=True,
-            metavar="ROLE=HEADER",
-            help=f'Such as "force=Fz", of files that have this header; may be given again. {roles}.',
-        ),
-        click.option("--unit", "units", multiple=True, metavar="ROLE=UNIT", help='Such as "force=kN"; ROLEs as above.'),
-        *(
-            click.option(option_of(key), key, type=int if key in _NUMBERS else str, help=_SAME_NAME[key])
-            for key in keys
-        ),
-    ]
 
 
 @contextmanager

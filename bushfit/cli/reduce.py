@@ -13,7 +13,6 @@ import click
 
 from bushfit.cli.common import Options, example, shared_options
 from bushfit.cli.grids import parse_grid, positive
-from bushfit.cli.inspect import FORMAT_KEYS
 from bushfit.cli.raw import direction_error, file_options, options_named
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import BushfitError, MeasurementError
@@ -41,7 +40,7 @@ _LINES_AN_OCTAVE = 3
     ),
 )
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@file_options("force_sign", *FORMAT_KEYS, sweeps=False)
+@file_options(sweeps=False)
 @click.option("--levels", help='Amplitudes that were asked for, such as "0.1, 0.2 mm" [found].')
 @click.option("--cycles", type=click.IntRange(3, 1000), default=3, show_default=True, help="Fewest steady cycles.")
 @click.option("--mass", help='Of a resonance test, such as "0.5 kg".')

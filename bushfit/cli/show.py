@@ -6,11 +6,13 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from rich import box
+from rich.markup import escape
+from rich.table import Table
+
 from bushfit.units import alike, for_people, number
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from bushfit.cli.common import Options
     from bushfit.jobs.fits import Fitted
     from bushfit.model.result import Misfit, Result, Usable
@@ -99,18 +101,12 @@ def tell_sources(options: Options, result: Result) -> None:
 
 def warn(options: Options, lines: Sequence[str]) -> None:
     """A line for each warning."""
-    from rich.markup import escape
-
     for line in lines:
         options.console.print(f"[yellow]warning:[/yellow] {escape(line)}")
 
 
 def new_table(title: str, *columns: str, names: int = 1) -> Table:
     """An empty table: so many columns hold names, which wrap, the others numbers."""
-    from rich import box
-    from rich.markup import escape
-    from rich.table import Table
-
     table = Table(title=escape(title), title_justify="left", box=box.SIMPLE_HEAD, title_style="bold")
     for place, column in enumerate(columns):
         number = place >= names

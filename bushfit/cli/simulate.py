@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, example, naming_option, open_model, option_of, shared_options
-from bushfit.errors import naming
+from bushfit.cli.common import Options, example, open_model, option_of, shared_options
+from bushfit.errors import ModelError, UnitError, naming
+from bushfit.units import is_number, quantity
 
 if TYPE_CHECKING:
     from bushfit.campaign.schema import SimulateSettings
@@ -79,13 +80,10 @@ def _task(source: Path) -> tuple[Model, SimulateSettings]:
 
 
 def _with_options(plan: SimulateSettings, settings: dict[str, Any]) -> SimulateSettings:
-    from bushfit.errors import UnitError
-    from bushfit.units import quantity
-
     changes = {name: value for name, value in settings.items() if value is not None}
     for name, given in changes.items():
         if isinstance(given, str):
-            with naming_option(option_of(name)):
+            with naming(place=option_of(name)):
                 changes[name] = quantity(given, "rad" if name == "phase_error" else "1")
                 if not 0.0 <= changes[name] < 1.0:
                     raise UnitError("impossible size", found=given, expected="0 up to 100 %, or below 1 rad")
@@ -94,8 +92,6 @@ def _with_options(plan: SimulateSettings, settings: dict[str, Any]) -> SimulateS
 
 def _with_effect(model: Model, text: str) -> Model:
     from bushfit.effects import effect_named, effect_of, is_parameter, qualified
-    from bushfit.errors import ModelError
-    from bushfit.units import is_number, quantity
 
     name, found, value = text.replace(" ", "").partition("=")
     known = "." in name and is_parameter(name)
@@ -109,7 +105,7 @@ def _with_effect(model: Model, text: str) -> Model:
             + f"{effect.name}: {', '.join(parameter.name for parameter in effect.parameters)}",
         )
     unit = next(parameter.unit for parameter in effect.parameters if qualified(effect, parameter) == name)
-    with naming_option("--effect"):
+    with naming(place="--effect"):
         size = float(value) if is_number(value) and unit == "1" else quantity(text.partition("=")[2].strip(), unit)
     values = {name: size}
     return model.with_values(values) if effect.name in model.effects else model.with_effect(effect.name, values)

@@ -18,7 +18,7 @@ from bushfit.effects.mistakes import MISTAKES, SEPARATOR, labelled, mistake_name
 from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_set import DataSet
-from bushfit.fitting.data_sets import SweepData, loop_data, sweep_data
+from bushfit.fitting.data_sets import SweepData, loop_data
 from bushfit.geometry import Bushing, Place
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
@@ -78,7 +78,7 @@ class Claim:
         campaign = data.campaign
         if not self.tests:
             bushing = campaign.bushing and self.mistake.mended_bushing(campaign.bushing)
-            return replace(data, campaign=replace(campaign, bushing=bushing))
+            return replace(data, campaign=replace(campaign, bushing=bushing)).in_session()
         loops, sweeps, count = list(data.loops), [sweep.test for sweep in data.sweeps], len(data.loops)
         for place in self.tests:
             test = self.mistake.mended([*data.loops, *data.sweeps][place].test)
@@ -86,9 +86,10 @@ class Claim:
                 loops[place] = loop_data([test], without_outliers=data.robust)[0]
             elif isinstance(test, Sweep):
                 sweeps[place - count] = test
-        if all(place < count for place in self.tests):
-            return replace(data, loops=tuple(loops))
-        return replace(data, loops=tuple(loops), sweeps=tuple(sweep_data(sweeps, campaign.fit.residuals)))
+        data = replace(data, loops=tuple(loops))
+        if any(place >= count for place in self.tests):
+            data = data.with_sweeps(sweeps)
+        return data.in_session()
 
 
 def adopted(data: Data, names: Collection[str]) -> tuple[Data, list[str]]:

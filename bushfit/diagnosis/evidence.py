@@ -50,8 +50,8 @@ class Evidence:
 
     @property
     def penalty(self) -> float:
-        """Price of one parameter by the Bayesian information criterion: ln of the number of residuals."""
-        return float(np.log(self.residual.size))
+        """Price of one parameter by the Bayesian information criterion: ln of the number of independent points."""
+        return float(np.log(sum(data_set.independent for data_set in self.data_sets)))
 
     @property
     def bic(self) -> float:
@@ -59,14 +59,14 @@ class Evidence:
         return self.chi_square + self.parameters * self.penalty
 
     @cached_property
-    def _span(self) -> Array:
+    def span(self) -> Array:
         """Orthonormal basis of what the model's own parameters can absorb, (n, k)."""
         basis, size, _ = np.linalg.svd(self.solution.jacobian.T, full_matrices=False)
         return basis[:, size > 1e-10 * size[0]]
 
     def beside(self, columns: Array) -> Array:
         """What is left of columns, (c, n), when the model's own parameters have absorbed what they can."""
-        return columns - (columns @ self._span) @ self._span.T
+        return columns - (columns @ self.span) @ self.span.T
 
     @cached_property
     def place(self) -> Mapping[DataSet, slice]:
@@ -75,14 +75,16 @@ class Evidence:
         return {data_set: slice(end - data_set.size, end) for end, data_set in zip(ends, self.data_sets, strict=True)}
 
     @cached_property
-    def rigs(self) -> list[tuple[Freedoms, Array, list[Array]]]:
-        """Per rig how well its noise is known, the indices of its residuals, and of those that share an error each."""
-        found: dict[Freedoms, tuple[list[Array], list[Array]]] = {}
+    def rigs(self) -> list[tuple[Freedoms, Array, list[Array], list[Array]]]:
+        """Per rig how well its noise is known, the indices of its residuals, of those that share an error of a block
+        each, and of those that share an error of a level."""
+        found: dict[Freedoms, tuple[list[Array], list[Array], list[Array]]] = {}
         for data_set, place in self.place.items():
-            rows, blocks = found.setdefault(data_set.freedoms, ([], []))
+            rows, blocks, levels = found.setdefault(data_set.freedoms, ([], [], []))
             rows.append(np.arange(place.start, place.stop))
             blocks += [place.start + block for block in data_set.blocks]
-        return [(freedoms, np.concatenate(rows), blocks) for freedoms, (rows, blocks) in found.items()]
+            levels += [place.start + level for level in data_set.levels]
+        return [(freedoms, np.concatenate(rows), blocks, levels) for freedoms, (rows, blocks, levels) in found.items()]
 
     def embedded(self, values: Array, data_set: DataSet) -> Array:
         """Residuals of one data set among those of all, 0 elsewhere, (n,)."""

@@ -1,4 +1,4 @@
-"""Faults of the measurement: one frequency, level, repeat, loop or row that disagrees with all the others.
+"""Faults of the measurement: one frequency, level, repeat or loop that disagrees with all the others.
 
 What a single place of the tests shows alone is no physics. Each suspect may deviate freely in gain and phase; what that
 takes off chi-square competes with the effects.
@@ -57,7 +57,7 @@ def faults(evidence: Evidence, level: float) -> tuple[list[Fault], float]:
     groups = [np.array([index[id(column)] for column in suspect.columns]) for suspect in suspects]
     test = ScoreTest(evidence, np.array(list(columns.values())), groups, PATTERN_LEFT)
     looked = Counter(suspect.kind for suspect in suspects)
-    places = np.array([max(suspect.looked, looked[suspect.kind]) for suspect in suspects])
+    places = np.array([looked[suspect.kind] for suspect in suspects])
     prices = (np.array(test.sizes) * evidence.penalty + 2.0 * np.log(places)).tolist()
     largest = [float(np.abs(amount).max()) for amount in test.amounts()]
     found = list(map(Fault, suspects, test.sizes, test.gains(), prices, largest))
@@ -69,9 +69,9 @@ def _of_each(evidence: Evidence) -> list[Suspect]:
     loops, _ = parted(evidence.data_sets)
     suspects = [
         replace(suspect, columns=[evidence.embedded(column, data_set) for column in suspect.columns])
-        for data_set, place in evidence.place.items()
+        for data_set in evidence.data_sets
         if [data_set] != loops
-        for suspect in data_set.suspects(evidence.residual[place])
+        for suspect in data_set.suspects()
     ]
     return sorted(suspects, key=lambda suspect: SUSPECT_KINDS.index(suspect.kind))
 

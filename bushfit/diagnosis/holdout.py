@@ -5,20 +5,23 @@ loop are held out in turn, and predicted from the rest.
 
 Notes:
     Refitting without a part is one Gauss-Newton step from the full fit, which is exact where the model is linear over
-    that step.
+    that step; where the step is long, the model is fitted to the rest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.evidence import Evidence, fit
+from bushfit.effects import effect_of
 from bushfit.effects.contract import Array
-from bushfit.fitting.agreement import LeaveOut
-from bushfit.fitting.data_sets import DataSet, parted
+from bushfit.errors import FitError, ModelError
+from bushfit.fitting.agreement import LeaveOut, is_far
+from bushfit.fitting.data_sets import DataSet, SweepData, parted
+from bushfit.fitting.solve import Bounds, jacobian, residual
 from bushfit.reading.measurement import Stepped
 
 #: Held-out gap, in units of noise, that counts as closed: noise and its own estimate make 1.1.
@@ -35,77 +38,190 @@ _NAMES: dict[Stepped | None, tuple[str, str]] = {
     "amplitude": ("frequency", "amplitudes"),
     None: ("run", ""),
 }
-#: Every point of a data set.
-_ALL = np.array(True)
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """What is held out together: of each test which points, (n,) bool; of a loop all or none."""
+
+    name: str
+    points: Sequence[Array]
+
+    def rows(self, data_sets: Sequence[DataSet]) -> Array:
+        """Its residuals among those of all tests, (n,) bool."""
+        return np.concatenate([np.tile(of, data.parts) for data, of in zip(data_sets, self.points, strict=True)])
+
+    def rest(self, data_sets: Sequence[DataSet]) -> list[DataSet]:
+        """The tests without it, with the same noise."""
+        left = [(data, of) for data, of in zip(data_sets, self.points, strict=True) if not of.all()]
+        return [data.without(np.flatnonzero(of)).standing() if of.any() else data for data, of in left]
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Root mean square residual of one part, in units of noise, predicted from the other parts."""
+    """Root mean square residual of one part, predicted from the other parts.
+
+    Args:
+        before, after: in units of noise, as it is shown.
+        whitened: before and after in units of noise and of the prediction's own error, by which is decided.
+    """
 
     part: str
     before: float
     after: float
+    whitened: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """A part that was not held out, why, and the effects of the model after of which the rest says nothing."""
+
+    part: str
+    reason: str
+    effects: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class HoldOut:
-    """All parts held out in turn, and the verdict."""
+    """All parts held out in turn.
 
-    parts: tuple[HeldOut, ...]
-    before: float
-    after: float
+    Args:
+        before, after: root mean square over all parts, in units of noise; None where nothing can be held out.
+        whitened: the same in units of noise and of the prediction's own error, by which is decided.
+        name_again: in how many parts what was named came out again when it was searched without the part, and of how
+            many; None where it was not searched.
+    """
+
+    parts: tuple[HeldOut, ...] = ()
+    skipped: tuple[Skipped, ...] = ()
+    before: float | None = None
+    after: float | None = None
+    whitened: tuple[float, float] = (0.0, 0.0)
+    name_again: tuple[int, int] | None = None
+
+    @classmethod
+    def of(cls, told: Mapping[str, Array], skipped: Sequence[Skipped] = ()) -> HoldOut:
+        """The figures of residuals that were predicted, (models, plain and whitened, n), by part."""
+        told = {name: pair for name, pair in told.items() if pair.size}  # one frequency has no top third
+        if not told:
+            return cls((), tuple(skipped))
+        figures = {name: _figures(pair) for name, pair in told.items()}
+        every = _figures(np.concatenate(list(told.values()), axis=-1))
+        return cls(tuple(HeldOut(name, *each) for name, each in figures.items()), tuple(skipped), *every)
 
     @property
     def passed(self) -> bool:
-        """Whether the gap shrinks where it was not fitted, and nowhere grows."""
-        closed = self.after <= max(_CLOSED, _SHRUNK * self.before)
-        return closed and all(part.after <= max(_MOST_WORSENED * part.before, _CLOSED) for part in self.parts)
+        """Whether the gap shrinks where it was not fitted, and nowhere grows; where nothing is held out, it does."""
+        before, after = self.whitened
+        closed = after <= max(_CLOSED, _SHRUNK * before)
+        return closed and all(
+            after <= max(_MOST_WORSENED * before, _CLOSED) for before, after in (part.whitened for part in self.parts)
+        )
 
 
-def hold_out(before: Evidence, after: Evidence) -> HoldOut:
-    """Compare two models of the same tests on every part that both can predict from the rest."""
-    models = (before, after)
-    whole = [LeaveOut.of(evidence.solution.jacobian, evidence.residual) for evidence in models]
-    gaps = {name: list(map(_predicted, models, whole, [chosen] * 2)) for name, chosen in _parts(after)}
-    told = {name: pair for name, pair in gaps.items() if all(gap.size for gap in pair)}
-    parts = tuple(HeldOut(name, *map(_rms, pair)) for name, pair in told.items())
-    together = zip(*told.values(), strict=True) if told else [[evidence.residual] for evidence in models]
-    return HoldOut(parts, *(_rms(np.concatenate(list(each))) for each in together))
+def hold_out(before: Evidence, after: Evidence, bounds: Bounds) -> HoldOut:
+    """Compare two models of the same tests on every part that both can predict from the rest.
+
+    Args:
+        bounds: of parameters, where a model has to be fitted to the rest.
+    """
+    models = [_Fitted.of(evidence) for evidence in dict.fromkeys((before, after))]
+    told, skipped = dict[str, Array](), list[Skipped]()
+    for part in parts(after.data_sets):
+        predictions = [model.predicted(part, bounds) for model in models]
+        for prediction in predictions:
+            if isinstance(prediction, Skipped):
+                skipped.append(prediction)
+                break
+        else:
+            told[part.name] = np.array([predictions[0], predictions[-1]])
+    return HoldOut.of(told, skipped)
 
 
-def _rms(gap: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(gap))))
+def _figures(pair: Array) -> tuple[float, float, tuple[float, float]]:
+    """Root mean squares before and after, plain, and both whitened, of residuals (2, 2, n)."""
+    (one, one_whitened), (other, other_whitened) = np.sqrt(np.mean(np.square(pair), axis=-1)).tolist()
+    return one, other, (one_whitened, other_whitened)
 
 
-def _predicted(evidence: Evidence, whole: LeaveOut, chosen: Array) -> Array:
-    """Residuals of the chosen rows with the model fitted to the others; none where those leave it open."""
-    step = whole.step(chosen)
-    return np.empty(0) if step is None else evidence.residual[chosen] + step @ evidence.solution.jacobian[:, chosen]
+@dataclass(frozen=True, eq=False)
+class _Fitted:
+    """A fitted model, ready to be asked what it would be without a part.
+
+    Args:
+        free: numbers of the parameters that rest on no bound.
+    """
+
+    evidence: Evidence
+    free: list[int]
+    whole: LeaveOut
+
+    @classmethod
+    def of(cls, evidence: Evidence) -> _Fitted:
+        solution = evidence.solution
+        free = [i for i, name in enumerate(solution.coordinates.names) if name not in solution.at_bound]
+        return cls(evidence, free, LeaveOut.of(solution.jacobian[free], solution.residual))
+
+    def predicted(self, part: Part, bounds: Bounds) -> tuple[Array, Array] | Skipped:
+        """Residuals of a part with the model fitted to the others, plain and whitened by the prediction's error."""
+        evidence, names = self.evidence, self.evidence.solution.coordinates.names
+        rows, clusters = part.rows(evidence.data_sets), _clusters(evidence.data_sets)
+        if left_open := [names[self.free[i]] for i in np.flatnonzero(self.whole.open(rows))]:
+            reason = f"the rest does not tell {', '.join(left_open)}"
+            return Skipped(part.name, reason, tuple(dict.fromkeys(map(effect_of, left_open))))
+        step = self.whole.step(rows)
+        if step is not None and not is_far(step):
+            return self.whole.predicted(rows, clusters)
+        refitted = _refitted(evidence, part, bounds)
+        if refitted is None or refitted.whole.open(rows).any():
+            return Skipped(part.name, "no fit to the rest comes to an end")
+        return refitted.whole.predicted(rows, clusters, stepped=False)
 
 
-def _parts(evidence: Evidence) -> Iterator[tuple[str, Array]]:
-    """Name and rows of each part: lines, the top third of what they step through, directions, loops."""
-    loops, sweeps = parted(evidence.data_sets)
+def _refitted(evidence: Evidence, part: Part, bounds: Bounds) -> _Fitted | None:
+    """A model fitted to the tests without a part, asked about all of them; None where the fit comes to no end."""
+    data_sets, names = evidence.data_sets, evidence.solution.coordinates.names
+    held = [name for name in evidence.model.parameters if name not in names]
+    try:
+        rest = fit(evidence.model, part.rest(data_sets), held, bounds).solution
+    except (FitError, ModelError):
+        return None
+    slopes = jacobian(rest.model, data_sets, names)
+    told = replace(rest, residual=residual(rest.model, data_sets), jacobian=slopes)
+    return None if rest.stopped else _Fitted.of(Evidence(told, data_sets))
+
+
+def _clusters(data_sets: Sequence[DataSet]) -> Array:
+    """Number of the line of a sweep, or of the loop, that each residual belongs to, (n,)."""
+    numbers, first = list[Array](), 0
+    for data_set in data_sets:
+        line = np.zeros(data_set.size // data_set.parts, dtype=int)
+        if isinstance(data_set, SweepData):
+            line = np.unique(data_set.held, return_inverse=True)[1]
+        numbers.append(np.tile(first + line, data_set.parts))
+        first += int(line.max()) + 1
+    return np.concatenate(numbers)
+
+
+def parts(data_sets: Sequence[DataSet]) -> Iterator[Part]:
+    """Each part: lines, the top third of what they step through, directions, loops."""
+
+    def part(name: str, chosen: Mapping[DataSet, Array]) -> Part:
+        return Part(name, [chosen.get(data, np.zeros(data.size // data.parts, dtype=bool)) for data in data_sets])
+
+    loops, sweeps = parted(data_sets)
     for stepped, (held, top) in _NAMES.items():
         mine = [sweep for sweep in sweeps if sweep.sweep.stepped == stepped]
-        ranks = [np.unique(sweep.held, return_inverse=True)[1] for sweep in mine]
-        for rank in range(max((int(r.max()) + 1 for r in ranks), default=0)):
-            yield f"{held} {rank + 1}", _rows(evidence, zip(mine, [r == rank for r in ranks], strict=True))
+        ranks = {sweep: np.unique(sweep.held, return_inverse=True)[1] for sweep in mine}
+        for rank in range(max((int(r.max()) + 1 for r in ranks.values()), default=0)):
+            yield part(f"{held} {rank + 1}", {sweep: r == rank for sweep, r in ranks.items()})
         if mine and top:
             limit = np.quantile(np.concatenate([sweep.step for sweep in mine]), 1.0 - _TOP)
-            yield f"top third of the {top}", _rows(evidence, ((sweep, sweep.step > limit) for sweep in mine))
-    for direction in dict.fromkeys(data_set.direction for data_set in evidence.data_sets):
-        whole = [data_set for data_set in evidence.data_sets if data_set.direction == direction]
-        if len(whole) < len(evidence.data_sets):
-            yield f"{direction} direction", _rows(evidence, ((data_set, _ALL) for data_set in whole))
+            yield part(f"top third of the {top}", {sweep: sweep.step > limit for sweep in mine})
+    wholes = {data: np.ones(data.size // data.parts, dtype=bool) for data in data_sets}
+    for direction in dict.fromkeys(data.direction for data in data_sets):
+        own = {data: whole for data, whole in wholes.items() if data.direction == direction}
+        if len(own) < len(wholes):
+            yield part(f"{direction} direction", own)
     for loop in loops if len(loops) > 1 else ():
-        yield f"loop {loop.name}", _rows(evidence, [(loop, _ALL)])
-
-
-def _rows(evidence: Evidence, picked: Iterable[tuple[DataSet, Array]]) -> Array:
-    """Residuals of some points of some data sets, (n,) bool."""
-    chosen = np.zeros(evidence.residual.size, dtype=bool)
-    for data_set, points in picked:
-        chosen[evidence.place[data_set]].reshape(data_set.parts, -1)[:] = points
-    return chosen
+        yield part(f"loop {loop.name}", {loop: wholes[loop]})

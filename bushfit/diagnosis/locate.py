@@ -98,7 +98,8 @@ def _read_sweep(
     what = "stiffness" if part == "storage" else "loss"
     worst = max(touched, key=lambda i: float(np.abs(pieces[i]).max()))
     largest = max(pieces[worst].tolist(), key=abs)
-    size = f"{number(100 * abs(largest), 2)} % of |K| {'above' if largest > 0 else 'below'} the model"
+    sides = ("above", "below") if largest > 0 else ("below", "above")
+    size = f"{number(100 * abs(largest), 2)} % of |K| {sides[0]} the model"
     line = lines[worst]
     held = {"frequency": "amplitude", "amplitude": "frequency", None: "run"}[line.stepped]
     level = f"at every {held}{_over_lines(pieces, held)}"
@@ -107,7 +108,16 @@ def _read_sweep(
     unit, factor = ("Hz", 1.0) if line.stepped != "amplitude" else line.direction.display.displacement
     low, high = (factor * end for end in spans[line.stepped == "amplitude"])
     trend = _trend(line.stepped or "frequency", line.step, pieces[worst])
-    return f"measured {line.direction} {what} is up to {size}, {trend} ({low:.3g} to {high:.3g} {unit}), {level}"
+    if len(touched) > 1 and line.stepped:
+        trend = f"most at {line.words}, there {trend}"
+    across = [line.words for line, piece in zip(lines, pieces, strict=True) if _crosses(piece, largest)]
+    other = f"; {sides[1]} it at {', '.join(across)}" if across else ""
+    return f"measured {line.direction} {what} is up to {size} ({low:.3g} to {high:.3g} {unit}), {level}, {trend}{other}"
+
+
+def _crosses(piece: Array, largest: float) -> bool:
+    """Whether a line has much misfit of the other sign than the largest."""
+    return bool(np.max(-np.sign(largest) * piece) > _STRONG * abs(largest))
 
 
 def _trend(stepped: str, step: Array, misfit: Array) -> str:
@@ -115,18 +125,26 @@ def _trend(stepped: str, step: Array, misfit: Array) -> str:
     if np.var(misfit) < _FLAT * np.mean(np.square(misfit)):
         return f"much the same at every {stepped}"
     shapes = {
-        f"changing with the logarithm of {stepped}": np.log(step),
-        f"changing in proportion to {stepped}": step,
-        f"changing with the square of {stepped}": step**2,
+        f"with the logarithm of {stepped}": np.log(step),
+        f"in proportion to {stepped}": step,
+        f"with the square of {stepped}": step**2,
     }
-    return max(shapes, key=lambda words: abs(float(np.corrcoef(shapes[words], misfit)[0, 1])))
+    shape = max(shapes, key=lambda words: abs(float(np.corrcoef(shapes[words], misfit)[0, 1])))
+    return f"{_way(float(misfit[np.argmin(step)]), float(misfit[np.argmax(step)]))} {shape}"
 
 
 def _over_lines(pieces: Sequence[Array], held: str) -> str:
     means = [float(np.mean(piece)) for piece in pieces]
     if len(means) < 2 or np.ptp(means) < _CHANGES * max(abs(mean) for mean in means):
         return ""
-    return f", {'rising' if means[-1] > means[0] else 'falling'} with {held}"
+    return f", {_way(means[0], means[-1])} with {held}"
+
+
+def _way(first: float, last: float) -> str:
+    """Whether a misfit grows or fades from its first to its last value, or changes sides."""
+    if first * last < 0.0 and min(abs(first), abs(last)) > _FLAT * max(abs(first), abs(last)):
+        return f"going from {'above to below' if first > 0.0 else 'below to above'}"
+    return "growing" if abs(last) > abs(first) else "fading"
 
 
 def _loop_regions(evidence: Evidence) -> Iterator[Where]:
@@ -134,10 +152,11 @@ def _loop_regions(evidence: Evidence) -> Iterator[Where]:
     loops, _ = parted(evidence.data_sets)
     for data_set in loops:
         columns, amplitude = data_set.contrasts(), data_set.drive.amplitude
-        amounts = columns @ evidence.residual[evidence.place[data_set]] / np.linalg.norm(columns, axis=1)
-        sizes = np.hypot(amounts[::2], [0.0, *amounts[1::2]])
-        order = int(np.argmax(sizes))
-        share = sizes[order] * np.sqrt(2.0 / data_set.size) * data_set.relative_noise
+        norms = np.linalg.norm(columns, axis=1)
+        amounts = columns @ evidence.residual[evidence.place[data_set]] / norms
+        by_order = [np.hypot(each[::2], [0.0, *each[1::2]]) for each in (amounts, amounts / norms)]
+        order = int(np.argmax(by_order[0]))
+        share = by_order[1][order]
         if share < _LEAST:
             continue
         unit, factor = data_set.direction.display.displacement

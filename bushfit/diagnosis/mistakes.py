@@ -16,6 +16,7 @@ from bushfit.diagnosis.record import Diagnosis, Judged, Named
 from bushfit.diagnosis.refit import EXCLUDED
 from bushfit.diagnosis.search import SAME, Search
 from bushfit.diagnosis.verdict import finish, is_consistent, worst_fault
+from bushfit.effects import effect_named
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data import Data
 from bushfit.units import number
@@ -46,7 +47,8 @@ def mistaken(search: Search, data: Data, fitted: Fitted) -> Diagnosis | None:
 
     Notes:
         Two effects cost more by BIC than a claim and the margin by which candidates count as one set, and a claim that
-        closes the gap leaves nothing that they could gain: so it need only be weighed against single effects.
+        closes the gap leaves nothing that they could gain: so it need only be weighed against single effects. One whose
+        free factor makes the claim at one value has to be better by the margin: else the claim is the simpler name.
     """
     fault, effect = worst_fault(search, search.base), search.first.real
     rivals = {effect.name: effect.evidence.bic} if effect else {}
@@ -55,6 +57,9 @@ def mistaken(search: Search, data: Data, fitted: Fitted) -> Diagnosis | None:
     closing = [one for one in weighed if one.bic < weighed[0].bic + SAME and _closes(one.evidence, search)]
     if not closing:
         return None
+    claimed = {one.mistake.name for one in closing[0].claim.each}
+    if effect and claimed & {*effect_named(effect.name).frees}:
+        rivals[effect.name] += 2.0 * SAME
     others = [name for name, bic in rivals.items() if bic < closing[0].bic + SAME]
     closing.sort(key=lambda one: len(one.claim.tests))
     if others or len(closing) > 1:
@@ -112,7 +117,7 @@ def _told(search: Search, data: Data, one: Weighed, behind: Sequence[Weighed]) -
         diagnosis,
         after=one.evidence,
         remainder=locate(one.evidence),
-        holdout=hold_out(search.base, one.evidence),
+        holdout=hold_out(search.base, one.evidence, search.bounds),
         result=replace(diagnosis.result, warnings=(*diagnosis.result.warnings, warning)),
     )
 
@@ -137,6 +142,6 @@ def _judged(search: Search, data: Data, weighed: Sequence[Weighed], closing: Seq
         far = one.evidence.chi_square > weighed[0].evidence.chi_square + EXCLUDED
         lost = "far behind the best of the record" if far else "does not close the gap, or an effect does better"
         why = "closes the gap" if one in closing else lost
-        held = hold_out(base, one.evidence).after
+        held = hold_out(base, one.evidence, search.bounds).after
         judged.append(Judged(" + ".join(one.claim.labels(data)), gain, gain, base.bic - one.bic, held, {}, why))
     return judged

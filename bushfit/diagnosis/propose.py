@@ -8,20 +8,24 @@ Notes:
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
-from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.evidence import Evidence, fit_from
 from bushfit.diagnosis.score_test import SENSITIVITY_LEFT, ScoreTest
-from bushfit.effects import Effect, Parameter, at_places, qualified
+from bushfit.effects import Branch, Effect, Parameter, at_places, qualified, twins_of
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import DataSet
+from bushfit.errors import FitError, ModelError
+from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.model.model import Model
 
 #: Values tried of a shape parameter (a time, a gap, a frequency), spread evenly in its logarithm.
 _PROBES = 5
+#: Least and largest order of a derivative that is tried: one far below and one far above that of filled rubber, 0.2.
+_ORDERS = (0.05, 0.9)
 #: Amount at which a sensitivity is taken, relative to the typical one: small enough to be a derivative, large enough to
 #: keep ten digits of the difference.
 _STEP = 1e-5
@@ -33,9 +37,9 @@ class Proposal:
 
     Args:
         model: the model with the effect in its best shape and at no amount; an amount that is fitted in its logarithm
-            stands where the score suggests.
+            stands where the score suggests. One that replaces a branch stands where that branch suggests.
         score: what it would take off chi-square if everything were linear.
-        column: its sensitivity, whitened, (n,).
+        columns: its sensitivity, whitened, (1, n); of one that replaces a branch by each of its parameters, (k, n).
         sense: +1 where only positive amounts are physical, 0 where both signs are.
         visible: whether these tests could show the effect at all, beside the model's own parameters.
     """
@@ -43,15 +47,24 @@ class Proposal:
     name: str
     model: Model
     score: float
-    column: Array
+    columns: Array
     sense: int
     visible: bool
 
 
-def proposals(evidence: Evidence, excluded: Collection[str]) -> list[Proposal]:
-    """Every effect of the library that is not yet in the model, in its best shape, best score first."""
+def proposals(evidence: Evidence, excluded: Collection[str], held: Sequence[str]) -> list[Proposal]:
+    """Every effect of the library that the model lacks, with its twins, in its best shape, best score first.
+
+    `held` are parameters of the model that do not move.
+    """
     library = at_places(str(data_set.direction) for data_set in evidence.data_sets)
-    asked = [effect for name, effect in library.items() if name not in (*evidence.model.effects, *excluded)]
+    present = (None, *evidence.model.effects)
+    told = {name for known in (*evidence.model.effects, *excluded) for name in twins_of(known)}
+    values = {*evidence.model.values}
+    there = {*told, *(effect.replaces for effect in evidence.model.records)}
+    possible = [effect for effect in library.values() if not (isinstance(effect, Branch) and {*effect.uses} - values)]
+    missing = [effect for effect in possible if effect.name not in there]
+    asked = [effect for effect in missing if effect.replaces is None and effect.after in present]
     probed = [_probed(evidence, effect) for effect in asked]
     ends = np.cumsum([0, *(len(columns) for _, columns in probed)])
     every = np.concatenate([np.empty((0, evidence.residual.size)), *(columns for _, columns in probed)])
@@ -67,8 +80,22 @@ def proposals(evidence: Evidence, excluded: Collection[str]) -> list[Proposal]:
         shape = shapes[best] | ({qualified(effect, amount): suggested} if amount.log else {})
         model = evidence.model.with_effect(effect.name, shape)
         visible = sizes[first + best] > 0
-        found.append(Proposal(effect.name, model, float(scores[best]), columns[best], sense, visible))
+        found.append(Proposal(effect.name, model, float(scores[best]), columns[best, None], sense, visible))
+    for effect in missing:
+        if effect.replaces in evidence.model.effects:
+            with suppress(FitError, ModelError):  # no response with this effect: no candidate
+                found.append(_replacing(evidence, effect, held))
     return sorted(found, key=lambda proposal: -proposal.score)
+
+
+def _replacing(evidence: Evidence, effect: Effect, held: Sequence[str]) -> Proposal:
+    """An effect in place of a branch, as its first step from where that branch stood would leave it."""
+    model = evidence.model.with_effect(effect.name)
+    own = [qualified(effect, parameter) for parameter in effect.parameters]
+    fit = fit_from(model, evidence.data_sets, held, {})
+    score = evidence.chi_square - fit.chi_square + fit.expected_fall
+    columns = fit.jacobian[[fit.coordinates.names.index(name) for name in own]]
+    return Proposal(effect.name, model, max(score, 0.0), columns, 0, visible=True)
 
 
 def _probed(evidence: Evidence, effect: Effect) -> tuple[list[dict[str, float]], Array]:
@@ -105,6 +132,12 @@ def _probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) ->
             strains = [data_set.amplitude * model.unit_strain(data_set.direction) for data_set in data_sets]
             low = 0.03 * np.concatenate(strains).min()
             high = max(0.5 * model.values.get("eps_half", np.concatenate(strains).max()), low)
+        case "force":
+            along = [sweep for sweep in parted(data_sets)[1] if not sweep.direction.is_rotation]
+            high = max((float(np.max(np.abs(each.measured) * each.amplitude)) for each in along), default=1.0)
+            low, high = 0.3 * high, 0.95 * high
+        case "order":
+            low, high = _ORDERS
         case None:
             return np.array([parameter.typical])
     return np.clip(np.geomspace(low, high, _PROBES), *parameter.bounds)

@@ -1,20 +1,21 @@
-"""What a diagnosis found, frozen, and as JSON in the schema bushfit/diagnosis/1."""
+"""What a diagnosis found, frozen, and as JSON in the schema bushfit/diagnosis/2."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.holdout import HoldOut
 from bushfit.effects import effect_of, parameter_named
 from bushfit.effects.mistakes import candidate_named, labelled
+from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.geometry import Place
 from bushfit.model.result import Result
 
-SCHEMA = "bushfit/diagnosis/1"
-Verdict = Literal["consistent", "named", "ambiguous", "partly", "unexplained"]
+SCHEMA = "bushfit/diagnosis/2"
+Verdict = Literal["consistent", "named", "ambiguous", "described", "partly", "unexplained"]
 
 
 @dataclass(frozen=True)
@@ -25,13 +26,15 @@ class Settings:
         max_effects: effects added in turn at the most.
         tolerance: gaps below this share of |K| (or of half a loop's force range) do not count.
         adopt: effects to add by hand, whatever the evidence.
-        without: effects not to consider.
+        without: effects not to consider, with their twins.
+        unresolved: effects of the model to start from that these tests could not tell from a twin of the rig.
     """
 
     max_effects: int = 3
     tolerance: float = 0.01
     adopt: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
+    unresolved: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -93,6 +96,22 @@ class Judged:
     why: str
 
 
+@dataclass(frozen=True)
+class Description:
+    """What a gap without a name is like: one term A e^(i phi) f^p X^q beside the model; value, low and high of each.
+
+    Args:
+        phase_deg: phi [deg].
+        frequency_power, amplitude_power: p and q [1].
+        words: the same for people.
+    """
+
+    phase_deg: tuple[float, float, float]
+    frequency_power: tuple[float, float, float]
+    amplitude_power: tuple[float, float, float]
+    words: str
+
+
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """The whole finding.
@@ -105,6 +124,7 @@ class Diagnosis:
         before: the model as it came, refitted to all tests.
         after: the model with what was added; where a mistake in the record is named, fitted to the mended tests.
         result: the model to use with its uncertainty: `after`; `before` where the record is mistaken.
+        description: of a gap that has no name; None where there is none, or it is like no such term.
     """
 
     verdict: Verdict
@@ -119,6 +139,7 @@ class Diagnosis:
     after: Evidence
     result: Result
     notes: tuple[str, ...] = ()
+    description: Description | None = None
 
     @property
     def changed(self) -> bool:
@@ -137,7 +158,6 @@ class Diagnosis:
 
     def to_document(self) -> dict[str, Any]:
         """JSON-ready data."""
-        before, after = self.calibration
         return {
             "schema": SCHEMA,
             "verdict": self.verdict,
@@ -145,13 +165,34 @@ class Diagnosis:
             "effects": [self._effect(named) for named in self.effects],
             "where": [_where(where) for where in self.where],
             "remainder": [_where(where) for where in self.remainder],
-            "gap": {
-                "calibration": {"before": before, "after": after},
-                "heldout": {"before": self.holdout.before, "after": self.holdout.after},
-                "heldout_parts": [vars(part) for part in self.holdout.parts],
-            },
+            "description": asdict(self.description) if self.description else None,
+            "gap": self._gap(),
+            "usable": self._usable(),
             "next_test": self.next_test,
-            "warnings": list(self.notes),
+            "warnings": list(dict.fromkeys((*self.notes, *self.result.warnings))),
+        }
+
+    def _gap(self) -> dict[str, Any]:
+        before, after = self.calibration
+        held = self.holdout
+        return {
+            "calibration": {"before": before, "after": after},
+            "heldout": {"before": held.before, "after": held.after} if held.parts else None,
+            "parts": [asdict(part) for part in held.parts],
+            "skipped": [asdict(part) for part in held.skipped],
+            "name_again": held.name_again,
+        }
+
+    def _usable(self) -> dict[str, Any] | None:
+        """Within what the model to use meets the tests, at the worst of all places and place by place."""
+        places = self.result.usable
+        if not places:
+            return None
+        return {
+            "stiffness": max(place.stiffness for place in places),
+            "loss_factor": max(place.loss_factor for place in places),
+            "held_out": all(place.held_out for place in places),
+            "places": [asdict(place) for place in places],
         }
 
     def _effect(self, named: Named) -> dict[str, Any]:
@@ -160,7 +201,9 @@ class Diagnosis:
         values = model.values if named.name in model.effects else judged.get(named.name, {})
         return {
             "name": named.name,
-            "level": str(effect.level),
+            "level": level_of(named.name),
+            "twins": list(effect.twins),
+            "replaces": effect.replaces,
             "test": named.test,
             "sentence": named.sentence or effect.sentence,
             "correction": named.correction or None,
@@ -183,8 +226,15 @@ class Diagnosis:
         }
 
 
+def level_of(name: str) -> str:
+    """The level of an effect or mistake that is not in the model yet; "unresolved" where the
+    rig has a twin of it, or it has no name."""
+    candidate = candidate_named(name)
+    return "unresolved" if candidate.twins or name == UNNAMED else str(candidate.level)
+
+
 def _rms(evidence: Evidence) -> float:
-    return float((evidence.chi_square / max(evidence.residual.size, 1)) ** 0.5)
+    return float((evidence.chi_square / max(sum(data_set.counted for data_set in evidence.data_sets), 1)) ** 0.5)
 
 
 def _where(where: Where) -> dict[str, Any]:

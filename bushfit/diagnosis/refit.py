@@ -62,7 +62,8 @@ def refits(
     for proposal in proposed:
         limits = {**_within_stroke(evidence.data_sets, proposal.name), **bounds}
         with suppress(FitError, ModelError):  # no response with this effect: no candidate
-            fits[proposal.name] = fit_from(proposal.model.with_values(start), evidence.data_sets, held, limits)
+            known_to_it = {name: value for name, value in start.items() if name in proposal.model.values}
+            fits[proposal.name] = fit_from(proposal.model.with_values(known_to_it), evidence.data_sets, held, limits)
     claimed = {proposal.name: evidence.chi_square - proposal.score for proposal in proposed}
     least = min((candidate.evidence.chi_square for candidate in known), default=np.inf)
     running = list(fits)

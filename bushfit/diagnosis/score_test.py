@@ -106,17 +106,30 @@ class ScoreTest:
 
 
 def _draw(evidence: Evidence, rows: Array) -> Array:
-    """Amounts of noise along rows, (c, DRAWS): what blocks share, and what scatters from point to point."""
+    """Amounts of noise along rows, (c, DRAWS): what levels share, what blocks share, what scatters from point to
+    point."""
     drawn = np.zeros((len(rows), DRAWS))
-    for number, (freedoms, own, blocks) in enumerate(evidence.rigs):
-        columns = [rows[:, block].sum(axis=1) / np.sqrt(block.size) for block in blocks]
-        shared = np.reshape(columns, (-1, len(rows))).T
-        size, vectors = np.linalg.eigh(rows[:, own] @ rows[:, own].T - shared @ shared.T)
-        kept = size > _ROUNDING * max(float(size.max()), 1e-300)
-        root = vectors[:, kept] * np.sqrt(size[kept])
-        drawn += shared @ _normals(shared.shape[1], 4 * number) * _unknown(freedoms.shared, 4 * number + 2)
-        drawn += root @ _normals(root.shape[1], 4 * number + 1) * _unknown(freedoms.scatter, 4 * number + 3)
+    for number, (freedoms, own, blocks, levels) in enumerate(evidence.rigs):
+        of_levels, of_blocks = _moved_together(rows, levels), _moved_together(rows, blocks)
+        of_points = _rest(rows[:, own], of_blocks)
+        in_levels = _rest(of_blocks, of_levels) if levels else of_blocks
+        drawn += in_levels @ _normals(in_levels.shape[1], 6 * number) * _unknown(freedoms.shared, 6 * number + 2)
+        drawn += of_points @ _normals(of_points.shape[1], 6 * number + 1) * _unknown(freedoms.scatter, 6 * number + 3)
+        drawn += of_levels @ _normals(of_levels.shape[1], 6 * number + 4) * _unknown(freedoms.level, 6 * number + 5)
     return drawn
+
+
+def _moved_together(rows: Array, groups: Sequence[Array]) -> Array:
+    """Amounts along rows, (c, n), of the unit error of each group of residuals, (c, groups)."""
+    columns = [rows[:, group].sum(axis=1) / np.sqrt(group.size) for group in groups]
+    return np.reshape(columns, (-1, len(rows))).T
+
+
+def _rest(whole: Array, part: Array) -> Array:
+    """A root of what is left of whole @ whole.T without part @ part.T, (c, r)."""
+    size, vectors = np.linalg.eigh(whole @ whole.T - part @ part.T)
+    kept = size > _ROUNDING * max(float(size.max()), 1e-300)
+    return vectors[:, kept] * np.sqrt(size[kept])
 
 
 @lru_cache(maxsize=32)

@@ -21,8 +21,9 @@ from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.solve import Bounds
 
-#: Probability with which noise alone stays below the threshold of the best candidate: one false alarm in 200.
-_CHANCE_LEVEL = 0.995
+#: Probability with which noise alone stays below the thresholds of the best candidate, of a remainder and of a fault:
+#: all are asked of every clean campaign, and one false alarm in 170 is what the score card's 1 % leaves room for.
+CHANCE_LEVEL = 0.998
 #: Difference in BIC within which candidates are one set: odds of 20 to 1, "strong" after Kass and Raftery (1995).
 SAME = 6.0
 #: Chi-square that a rival must stay away from the model's noise-free prediction to be excluded: three standard errors.
@@ -36,10 +37,12 @@ _LEAST_IMPROVEMENT = 1e-6
 #: Reduced chi-square beyond which a model has bent its parameters too far for a refit to start from its values.
 _BENT = 1.5
 #: Candidates that are refitted in each round at most, the best scores first; chosen for time: the truth ranks third
-#: at worst on the score card.
-_MOST_REFITTED = 6
+#: at worst on the score card, and look-alikes of it up to the seventh.
+_MOST_REFITTED = 8
 #: Share of the best score that a candidate needs to be refitted.
 _LEAST_SCORE = 0.1
+#: Share of what chance makes that its score has to reach: a refit may gain more than its score, but not so much more.
+_LEAST_CHANCE = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,12 +78,18 @@ class Round:
 
     @cached_property
     def critical(self) -> float:
-        """The gain that noise alone exceeds with probability 1 - _CHANCE_LEVEL."""
+        """The gain that noise alone exceeds with probability 1 - CHANCE_LEVEL."""
         return critical_gain(self.evidence, self.proposed)
 
     @property
     def best(self) -> Candidate | None:
-        return self.tried[0] if self.tried else None
+        """The best candidate; in place of one that acts in one direction alone, where it is the same by BIC, that which
+        acts in all."""
+        if not self.tried:
+            return None
+        first = self.tried[0]
+        everywhere = next((other for other in self.tried if other.name == first.name.partition(".")[0]), first)
+        return everywhere if everywhere.evidence.bic - first.evidence.bic < SAME else first
 
     @property
     def real(self) -> Candidate | None:
@@ -132,8 +141,9 @@ class Search:
         """
         key = frozenset(added)
         if key not in self.rounds:
-            proposed = tuple(proposals(evidence, (*self.settings.without, *added)))
-            least = max(evidence.penalty / 2.0, _LEAST_SCORE * max((claim.score for claim in proposed), default=0.0))
+            proposed = tuple(proposals(evidence, (*self.settings.without, *added), self.held))
+            chance = _LEAST_CHANCE * critical_gain(evidence, proposed)
+            least = max(chance, _LEAST_SCORE * max((claim.score for claim in proposed), default=0.0))
             fitted = {candidate.name for candidate in known}
             best = [claim for claim in proposed[:_MOST_REFITTED] if claim.score > least and claim.name not in fitted]
             start = self.start if not added and evidence.reduced > _BENT else {}
@@ -176,7 +186,8 @@ class Search:
             name = names[len(steps)]
             others = [other for other in names if other != name]
             place = self._place(current, name, others)
-            best, may_swap = place.best, swaps < _MOST_SWAPS
+            best = place.best
+            may_swap = swaps < _MOST_SWAPS and not any(effect_named(other).after == name for other in others)
             if may_swap and best and best.name != name and best.evidence.bic < current.bic - _LEAST_IMPROVEMENT:
                 names[len(steps)], current = best.name, best.evidence
             elif may_swap and others and place.evidence.bic - current.bic < SAME:
@@ -191,7 +202,8 @@ class Search:
         """Sort an effect's rivals: those these tests cannot tell from it, and those that contain it.
 
         A rival is the same within SAME by BIC, or nearer than APART to the model's own noise-free prediction. A richer
-        one that meets this prediction contains the model: then the simpler name stands.
+        one that meets this prediction contains the model: then the simpler name stands. So it does where the rival is
+        the same effect in one direction alone.
         """
         rivals, richer = [], []
         clean = [data_set.noise_free(current.model) for data_set in current.data_sets]
@@ -199,9 +211,11 @@ class Search:
             if rival.name == name or rival.evidence.chi_square - current.chi_square > EXCLUDED:
                 continue
             distance = self._distance(clean, rival)
-            if distance < _CONTAINS and rival.evidence.parameters > current.parameters:
+            contains = distance < _CONTAINS and rival.evidence.parameters > current.parameters
+            alike = rival.evidence.bic - current.bic < SAME or distance < APART
+            if contains or (alike and rival.name.partition(".")[0] == name):
                 richer.append(rival)
-            elif rival.evidence.bic - current.bic < SAME or distance < APART:
+            elif alike:
                 rivals.append(rival)
         gain = place.evidence.chi_square - current.chi_square
         return Step(name, gain, tuple(rivals), tuple(richer), place.tried)
@@ -231,10 +245,13 @@ class Search:
 
 
 def critical_gain(evidence: Evidence, proposed: Sequence[Proposal]) -> float:
-    """The gain that the best of all candidates makes of noise alone, with probability 1 - _CHANCE_LEVEL."""
-    columns = np.array([proposal.column for proposal in proposed])
-    test = ScoreTest(evidence, columns, [np.array([i]) for i in range(len(proposed))], SENSITIVITY_LEFT)
-    return test.largest_by_chance(_CHANCE_LEVEL, [proposal.sense for proposal in proposed])
+    """The gain that the best of all candidates makes of noise alone, with probability 1 - CHANCE_LEVEL."""
+    if not proposed:
+        return float("inf")
+    columns = np.concatenate([proposal.columns for proposal in proposed])
+    groups = np.split(np.arange(len(columns)), np.cumsum([len(proposal.columns) for proposal in proposed])[:-1])
+    test = ScoreTest(evidence, columns, groups, SENSITIVITY_LEFT)
+    return test.largest_by_chance(CHANCE_LEVEL, [proposal.sense for proposal in proposed])
 
 
 def footprint(before: Evidence, after: Evidence) -> float:

@@ -7,31 +7,52 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bushfit.diagnosis.again import searched_again
+from bushfit.diagnosis.described import describe
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.faults import Fault, faults
-from bushfit.diagnosis.holdout import hold_out
+from bushfit.diagnosis.form import other_form
+from bushfit.diagnosis.holdout import HoldOut, hold_out
+from bushfit.diagnosis.leads import leads
 from bushfit.diagnosis.locate import contrasts, largest_smooth_misfit, locate
 from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.propose import Proposal
-from bushfit.diagnosis.record import Diagnosis, Judged, Named, Verdict, Where
+from bushfit.diagnosis.record import Description, Diagnosis, Judged, Named, Verdict, Where
 from bushfit.diagnosis.refit import Candidate
 from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
-from bushfit.diagnosis.search import SAME, Search, Step
+from bushfit.diagnosis.search import CHANCE_LEVEL, SAME, Search, Step
 from bushfit.effects import effect_named, effect_of, qualified
-from bushfit.fitting.agreement import misfits, usable
+from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.fitting.agreement import met_within, misfits, usable
 from bushfit.fitting.assess import Stage, covariance, measured_range, quality
-from bushfit.fitting.data_sets import parted, sources
+from bushfit.fitting.data_sets import sources
 from bushfit.fitting.plausible import apart_in_temperature
 from bushfit.fitting.procedures import cautions
-from bushfit.fitting.solve import Bounds
 from bushfit.model.result import Result
 from bushfit.units import number
 
-#: Probability with which noise alone stays below the thresholds of a remainder and of a fault: both are asked of every
-#: clean campaign, and one false alarm in 250 is what the score card's 1 % leaves room for.
-_CHANCE_LEVEL = 0.998
-#: Share of the held-out gap that may be left for the verdict `partly`.
-_PARTLY = 0.5
+#: Held-out gap, in units of noise, up to which little is left (`partly`): chosen, wrong names leave more.
+_PARTLY = 1.15
+#: Share of the tolerance that a remainder may have beside a name: more may be another effect that the name bends to.
+_BESIDE_A_NAME = 0.25
+#: Share of all that is smooth in the residuals that may stay beside a fault for it to be all there is: chosen, a wrong
+#: level leaves up to a third, physics that one level shows best a half and more.
+_BESIDE_A_FAULT = 0.4
+#: Faults that no physics makes: a level or a loop that stands out may be what a wrong name leaves.
+_NO_PHYSICS = ("frequency", "repeat", "row")
+#: Parts without which another name comes out, from which on a single name is doubted: one may do so by chance. Of
+#: several effects one part is enough: wrong ones are mostly added several at a time.
+_ELSEWHERE = 2
+#: What is said where there is no gap.
+_NOTHING = "nothing is missing beyond noise and tolerance"
+#: What is said of a gap without a name.
+_NO_NAME = "a real gap stays that no known effect closes"
+#: What is said of the parameters beside a correction.
+_BENT_BY_THE_GAP = (
+    "the parameters are those of the plain model, bent by the gap that was described: their intervals are invalid"
+)
+#: Names in one set at most, for it to be a finding: more than three tell an engineer nothing.
+_LARGEST_SET = 3
 
 
 @dataclass(frozen=True)
@@ -43,20 +64,18 @@ class Remainder:
 
 
 def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
-    """Doubt the finding: a fault instead, look-alikes, held-out data, what remains."""
+    """Doubt the finding: a fault instead, look-alikes, held-out data, what remains, the same name found again."""
     base = search.base
     if not steps:
         trace = search.trace()
         remainder = find_remainder(search, trace.evidence if trace else base)
         if remainder is None:
-            words = "nothing is missing beyond noise and tolerance"
-            words += f"; what there is of {trace.name} stays below the tolerance" if trace else ""
-            return finish(search, "consistent", words, base, ())
-        return finish(search, "unexplained", remainder.words, base, (), fault=remainder.fault)
+            return consistent(search)
+        return unexplained(search, remainder.words, fault=remainder.fault)
     fault = worst_fault(search, base)
     worth = base.bic - final.bic
     if fault and fault.worth > worth + SAME:
-        return finish(search, "unexplained", _fault_words(fault), base, (), fault=fault)
+        return unexplained(search, _fault_words(fault), fault=fault)
     if fault and fault.worth > worth - SAME:
         leaders = [replace(_named(step), alternatives=(f"fault: {fault.suspect.words}",)) for step in steps]
         words = f"{' and '.join(step.name for step in steps)}, or a fault of the measurement: {fault.suspect.words}"
@@ -64,20 +83,115 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
     names = [_named(step) for step in steps]
     if beyond := _at_bound(final, steps):
         words = f"{_closing(names)} the gap only with {beyond} at the edge of what is possible"
-        return finish(search, "unexplained", words, base, ())
-    held = hold_out(base, final)
+        return unexplained(search, words, steps)
+    held = hold_out(base, final, search.bounds)
     if not held.passed:
         words = f"{_closing(names)} the gap only where fitted, so the name is taken back"
-        return finish(search, "unexplained", words, base, ())
+        if find_remainder(search, base):
+            return unexplained(search, words, steps)
+        return finish(search, "consistent", f"{_NOTHING}; {words}", base, ())
+    if bent := _bent(final, steps):
+        words = f"these tests show {bent} with another dependence on frequency and amplitude than its law has"
+        return unexplained(search, words, steps)
+    remainder = find_remainder(search, final, _BESIDE_A_NAME)
+    if remainder and not _is_little(search, final, remainder, held):
+        return unexplained(search, remainder.words, steps, fault=remainder.fault)
+    again = searched_again(search, steps, held)
+    counted = (sum(each.came_again for each in again), len(again)) if again else None
+    others = sorted({other for each in again for other in each.others})
+    if sum(bool(each.others) for each in again) >= (_ELSEWHERE if len(steps) == 1 else 1):
+        return _another_name(search, steps, names, others, counted)
     if any(step.rivals for step in steps):
-        return _ambiguous(search, final, steps, names)
-    remainder = find_remainder(search, final)
-    if remainder is None:
-        return finish(search, "named", f"{_closing(names)} the gap", final, names)
-    if held.after < _PARTLY * held.before:
-        words = f"{_closing(names)} part of the gap; {remainder.words}"
-        return finish(search, "partly", words, final, names, fault=remainder.fault)
-    return finish(search, "unexplained", remainder.words, base, (), fault=remainder.fault)
+        return _ambiguous(search, final, steps, names, counted)
+    words = f"{_closing(names)} {'part of the gap; ' + remainder.words if remainder else 'the gap'}"
+    verdict: Verdict = "partly" if remainder else "named"
+    fault = remainder.fault if remainder else None
+    words += _untested(held, steps)
+    return finish(search, verdict, words, final, names, fault=fault, held=held, again=counted)
+
+
+def _bent(final: Evidence, steps: Sequence[Step]) -> str | None:
+    """An effect that the tests show with another form than its law has, with all that cannot be told from it."""
+    bent = other_form(final, [step.name for step in steps], CHANCE_LEVEL)
+    rivals = [rival for step in steps if step.name == bent for rival in step.rivals]
+    every = all(other_form(rival.evidence, [rival.name], CHANCE_LEVEL) for rival in rivals)
+    return bent if every else None
+
+
+def _is_little(search: Search, final: Evidence, remainder: Remainder, held: HoldOut) -> bool:
+    """Whether a name may stand beside what remains: it is within the tolerance, or a fault that no physics makes."""
+    if held.after is None or held.after > _PARTLY:
+        return False
+    if remainder.fault:
+        return remainder.fault.suspect.kind in _NO_PHYSICS
+    return largest_smooth_misfit(final) <= search.settings.tolerance
+
+
+def unexplained(
+    search: Search,
+    words: str,
+    steps: Sequence[Step] = (),
+    *,
+    fault: Fault | None = None,
+    again: tuple[int, int] | None = None,
+) -> Diagnosis:
+    """The finding that a real gap stays, described where it can be: effects that shrink the gap are leads only.
+
+    Where it cannot, the model stays as it was.
+    """
+    lead = leads(search)
+    if steps and not lead:
+        lead = f"; no more than a lead: {' and '.join(step.name for step in steps)}"
+    alone = fault and fault.suspect.kind != "frequency" and _share_beside(search.base, fault) < _BESIDE_A_FAULT
+    alone = alone or not search.settings.max_effects  # then nothing is to be added, without a name either
+    start, held, bounds = search.start, search.held, search.bounds
+    if alone or not (found := describe(search.base, CHANCE_LEVEL, start, held, bounds)):
+        return finish(search, "unexplained", words + lead, search.base, (), fault=fault, again=again)
+    told = "" if words == _NO_NAME else f"; {words}"
+    said = f"{_NO_NAME}: {found.size}; {found.words}{told}{lead}"
+    names, out, about = [Named(UNNAMED, found.evidence)], found.correction.held, found.description
+    return finish(search, "described", said, found.after, names, fault=fault, held=out, description=about)
+
+
+def _share_beside(evidence: Evidence, fault: Fault) -> float:
+    """The share of all that is smooth in the residuals that stays beside a fault."""
+    columns, solution = contrasts(evidence), evidence.solution
+    freed = replace(solution, jacobian=np.concatenate((solution.jacobian, fault.suspect.columns)))
+    tests = [
+        ScoreTest(each, columns, [np.arange(len(columns))], PATTERN_LEFT)
+        for each in (evidence, replace(evidence, solution=freed))
+    ]
+    every, rest = (max(test.gains()[0] - test.sizes[0], 1.0) for test in tests)  # less what noise makes
+    return rest / every
+
+
+def _another_name(
+    search: Search,
+    steps: Sequence[Step],
+    names: Sequence[Named],
+    others: Sequence[str],
+    again: tuple[int, int] | None,
+) -> Diagnosis:
+    """The finding where another name comes out without some part: a set of look-alikes, or no name."""
+    words = f"without some of the tests {' or '.join(others)} comes out in place of {_all(names)}"
+    alternatives = tuple(dict.fromkeys((*names[0].alternatives, *others)))
+    if len(steps) > 1 or len(alternatives) >= _LARGEST_SET:
+        return unexplained(search, words, steps, again=again)
+    doubtful = [replace(names[0], alternatives=alternatives)]
+    return finish(search, "ambiguous", words, search.base, doubtful, again=again)
+
+
+def _untested(held: HoldOut, steps: Sequence[Step]) -> str:
+    """What hold-out could not show of the effects that were added, in words."""
+    if held.after is None:
+        return "; nothing can be held out of these tests, so it stands on the fit alone"
+    own = {step.name for step in steps}
+    open_parts = [skipped.part for skipped in held.skipped if own & set(skipped.effects)]
+    return (
+        f"; what shows it ({', '.join(open_parts)}) cannot be held out, and no part held out is that one"
+        if open_parts
+        else ""
+    )
 
 
 def _at_bound(final: Evidence, steps: Sequence[Step]) -> str | None:
@@ -86,8 +200,17 @@ def _at_bound(final: Evidence, steps: Sequence[Step]) -> str | None:
     return next((name for name in final.solution.at_bound if name in amounts), None)
 
 
-def _ambiguous(search: Search, final: Evidence, steps: Sequence[Step], names: Sequence[Named]) -> Diagnosis:
-    """Keep what is certain; leave out what has look-alikes."""
+def _ambiguous(
+    search: Search,
+    final: Evidence,
+    steps: Sequence[Step],
+    names: Sequence[Named],
+    again: tuple[int, int] | None,
+) -> Diagnosis:
+    """Keep what is certain; leave out what has look-alikes.
+
+    More than three that close the gap alike are listed all the same, as leads: that nothing closes it would be wrong.
+    """
     model = search.base.model
     for step in steps:
         if not step.rivals:
@@ -97,7 +220,17 @@ def _ambiguous(search: Search, final: Evidence, steps: Sequence[Step], names: Se
     sets = "; ".join(f"{name.name} from {' or '.join(name.alternatives)}" for name in names if name.alternatives)
     rivals = [[final.model, *(rival.evidence.model for rival in step.rivals)] for step in steps if step.rivals]
     words = f"these tests cannot tell {sets}"
-    return finish(search, "ambiguous", words, kept, names, next_test=deciding_test(rivals[0], final.data_sets))
+    if any(len(name.alternatives) >= _LARGEST_SET for name in names):
+        words += "; so many names are no more than leads"
+    advice = deciding_test(rivals[0], final.data_sets)
+    return finish(search, "ambiguous", words, kept, names, next_test=advice, again=again)
+
+
+def consistent(search: Search) -> Diagnosis:
+    """The finding that nothing is missing, once that stands; what stays below the tolerance is said."""
+    trace = search.trace()
+    words = _NOTHING + (f"; what there is of {trace.name} stays below the tolerance" if trace else "")
+    return finish(search, "consistent", words, search.base, ())
 
 
 def is_consistent(search: Search) -> bool:
@@ -106,24 +239,24 @@ def is_consistent(search: Search) -> bool:
     return not search.matters and find_remainder(search, trace.evidence if trace else search.base) is None
 
 
-def find_remainder(search: Search, evidence: Evidence) -> Remainder | None:
-    """What is left beyond noise and tolerance: a fault at one place, or something smooth."""
+def find_remainder(search: Search, evidence: Evidence, share: float = 1.0) -> Remainder | None:
+    """What is left beyond noise and tolerance: a fault at one place, or something smooth beyond a share of it."""
     fault = worst_fault(search, evidence)
     if fault:
         return Remainder(_fault_words(fault), fault)
     columns = contrasts(evidence)
     smooth = ScoreTest(evidence, columns, [np.arange(len(columns))], PATTERN_LEFT)
     if (
-        smooth.gains()[0] > smooth.largest_by_chance(_CHANCE_LEVEL)
-        and largest_smooth_misfit(evidence) > search.settings.tolerance
+        smooth.gains()[0] > smooth.largest_by_chance(CHANCE_LEVEL)
+        and largest_smooth_misfit(evidence) > share * search.settings.tolerance
     ):
-        return Remainder("a real gap stays that no known effect closes", None)
+        return Remainder(_NO_NAME, None)
     return None
 
 
 def worst_fault(search: Search, evidence: Evidence) -> Fault | None:
     """The worthiest fault, where it is more than chance, more than its price and larger than the tolerance."""
-    found, chance = faults(evidence, _CHANCE_LEVEL)
+    found, chance = faults(evidence, CHANCE_LEVEL)
     worst = max(found, key=lambda fault: fault.worth, default=None)
     if worst is None or worst.worth < SAME or worst.size < search.settings.tolerance:
         return None
@@ -135,7 +268,11 @@ def _fault_words(fault: Fault) -> str:
 
 
 def _closing(names: Sequence[Named]) -> str:
-    return f"{' and '.join(named.name for named in names)} {'closes' if len(names) == 1 else 'close'}"
+    return f"{_all(names)} {'closes' if len(names) == 1 else 'close'}"
+
+
+def _all(names: Sequence[Named]) -> str:
+    return " and ".join(named.name for named in names)
 
 
 def _named(step: Step) -> Named:
@@ -158,8 +295,15 @@ def finish(
     *,
     fault: Fault | None = None,
     next_test: str = "",
+    held: HoldOut | None = None,
+    description: Description | None = None,
+    again: tuple[int, int] | None = None,
 ) -> Diagnosis:
-    """The whole finding, once the verdict stands."""
+    """The whole finding, once the verdict stands; what was held out is held out here where it was not yet.
+
+    Args:
+        again: in how many parts, and of how many, what was added came out again, whether it was believed or not.
+    """
     base = search.base
     if not next_test and effects:
         next_test = effect_named(effects[0].name).confirmed_by
@@ -170,13 +314,14 @@ def finish(
         tuple(effects),
         where,
         where if after is base else locate(after),
-        hold_out(base, after),
+        replace(held or hold_out(base, after, search.bounds), name_again=again),
         f"measure again: {fault.suspect.words}" if fault else next_test,
         tuple(_candidates(search, {named.name for named in effects})),
         base,
         after,
-        _result(after, search.bounds),
-        _notes(search, after),
+        _result(after, search),
+        _notes(search),
+        description,
     )
 
 
@@ -210,15 +355,20 @@ def _judged(search: Search, proposal: Proposal, candidate: Candidate | None, kep
     else:
         why = f"{number(evidence.bic - min(c.evidence.bic for c in first.tried), 3)} behind the best by BIC"
     own = {name: value for name, value in evidence.model.values.items() if name not in base.model.values}
-    held = hold_out(base, evidence).after
+    held = hold_out(evidence, evidence, search.bounds).after
     return Judged(proposal.name, proposal.score, candidate.gain, base.bic - evidence.bic, held, own, why)
 
 
-def _result(evidence: Evidence, bounds: Bounds) -> Result:
-    """The model with its uncertainty; a parameter at rest on a bound counts as held there."""
+def _result(evidence: Evidence, search: Search) -> Result:
+    """The model with its uncertainty; a parameter at rest on a bound counts as held there.
+
+    Of what was added, and not told by the user, the level is unresolved where the rig has a twin of it. Beside a
+    correction the parameters are those of the plain model, and so are their errors, by its misfit.
+    """
+    told = {*search.base.model.effects} - {*search.settings.unresolved}
     model, names = evidence.model, evidence.solution.coordinates.names
     moving = tuple(name for name in names if name not in evidence.solution.at_bound)
-    cov = covariance(model, [Stage(moving, evidence.data_sets)])
+    cov = covariance(model.without(UNNAMED), [Stage(moving, evidence.data_sets)])
     return Result(
         model,
         moving,
@@ -226,24 +376,22 @@ def _result(evidence: Evidence, bounds: Bounds) -> Result:
         quality(model, evidence.data_sets, len(moving)),
         measured_range(model, evidence.data_sets),
         (
-            *apart_in_temperature(evidence.data_sets),
-            *cautions(model, evidence.solution, evidence.data_sets, bounds, cov),
+            *([_BENT_BY_THE_GAP] if UNNAMED in model.effects else []),
+            *apart_in_temperature(model, evidence.data_sets),
+            *cautions(model, evidence.solution, evidence.data_sets, search.bounds, cov),
         ),
         sources(evidence.data_sets),
         at_bound=evidence.solution.at_bound,
         tests=misfits(model, evidence.data_sets),
-        usable=usable(evidence.solution, evidence.data_sets),
+        usable=met_within(model, evidence.data_sets, ())  # a correction has seen every run
+        if UNNAMED in model.effects
+        else usable(evidence.solution, evidence.data_sets),
+        unresolved=tuple(effect.name for effect in model.records if effect.twins and effect.name not in told),
     )
 
 
-def _notes(search: Search, after: Evidence) -> tuple[str, ...]:
+def _notes(search: Search) -> tuple[str, ...]:
     """What these tests could not show at all."""
-    blind = [proposal.name for proposal in search.first.proposed if not proposal.visible]
-    notes = [f"not identifiable from these tests: {', '.join(blind)}"] if blind else []
-    _, sweeps = parted(after.data_sets)
-    if sweeps and sweeps[0].noise.origin == "assumed":
-        notes.append(
-            "nothing was repeated at three points or more: "
-            "errors shared by a run are assumed, 0.5 % gain and 0.25 deg phase"
-        )
-    return tuple(notes)
+    unseen = [proposal.name for proposal in search.first.proposed if not proposal.visible]
+    blind = [name for name in unseen if not effect_named(name).under]  # what no test states is not asked for
+    return (f"not identifiable from these tests: {', '.join(blind)}",) if blind else ()

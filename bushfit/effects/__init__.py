@@ -7,9 +7,10 @@ from collections.abc import Iterable
 from functools import cache
 from importlib import import_module
 
-from bushfit.effects import stiffness_factor
+from bushfit.effects import unnamed
 from bushfit.effects.contract import Branch as Branch
 from bushfit.effects.contract import Effect as Effect
+from bushfit.effects.contract import Family as Family
 from bushfit.effects.contract import Layer as Layer
 from bushfit.effects.contract import Level as Level
 from bushfit.effects.contract import Modifier as Modifier
@@ -25,33 +26,68 @@ _FILES = (
     "springpot",
     "friction",
     "viscous",
+    "hysteretic_loss",
+    "second_springpot",
     "maxwell",
+    "second_maxwell",
     "strain_stiffening",
+    "fifth_power_stiffening",
     "asymmetry",
     "second_friction",
     "mullins_softening",
     "rate_dependent_friction",
     "coupled_breakdown",
+    "intrinsic_time",
+    "fractional_zener",
+    "kraus",
+    "sliders",
     "self_heating",
+    "temperature",
+    "mullins_levels",
+    "elastic_preload",
+    "strain_scale",
     "clearance",
     "interface_slip",
     "bump_stop",
+    "one_sided_stop",
     "stiffness_factor",
+    "preload_stiffening",
+    "sleeve_compliance",
+    "sleeve_compliance_of_direction",
+    "transducer_gain",
     "rig_compliance",
+    "rig_compliance_of_direction",
+    "fixture_play",
+    "guide_friction",
     "inertia",
     "fixture_resonance",
+    "high_pass",
+    "force_saturation",
+    "displacement_gain",
     "delay",
     "amplitude_rolloff",
+    "loop_clock",
     "force_gain",
+    "drift",
     "force_offset",
 )
 
-_EFFECTS: list[Effect] = [import_module(f"{__name__}.{file}").EFFECT for file in _FILES]
-#: Every effect by name, in that order.
+_MODULES = [import_module(f"{__name__}.{file}") for file in _FILES]
+_EFFECTS: list[Effect] = [module.EFFECT for module in _MODULES]
+#: Every effect by name, in that order; of a kind that belongs to a place, that of the radial direction.
 LIBRARY: dict[str, Effect] = {effect.name: effect for effect in _EFFECTS}
+#: Every kind of effect that belongs to a place, by name: where a file has one, it is called FAMILY there.
+FAMILIES: dict[str, Family] = {module.FAMILY.name: module.FAMILY for module in _MODULES if hasattr(module, "FAMILY")}
 
 #: The paper's model.
 BASE = ("elastic", "springpot", "friction")
+
+
+def with_base(names: Iterable[str]) -> tuple[str, ...]:
+    """The paper's branches, less those that these effects replace, and these."""
+    own = tuple(names)
+    replaced = {effect_named(name).replaces for name in own}
+    return (*(name for name in BASE if name not in replaced), *own)
 
 
 def effect_named(name: str) -> Effect:
@@ -62,9 +98,10 @@ def effect_named(name: str) -> Effect:
     """
     if name in LIBRARY:
         return LIBRARY[name]
-    family, _, place = name.partition(".")
-    if family == stiffness_factor.FAMILY and place:
-        return stiffness_factor.stiffness_factor(place)
+    if name == unnamed.NAME:
+        return unnamed.EFFECT
+    if place := place_of(name):
+        return FAMILIES[name.partition(".")[0]].of_place(place)
     near = difflib.get_close_matches(name, LIBRARY, n=1)
     raise ModelError(
         "unknown effect",
@@ -72,6 +109,21 @@ def effect_named(name: str) -> Effect:
         expected="one of " + ", ".join(LIBRARY),
         hint=f"did you mean {near[0]}?" if near else None,
     )
+
+
+def place_of(name: str) -> str | None:
+    """The place in the name of an effect that belongs to one, and of its parameter: `stiffness_factor.radial`."""
+    family, _, place = name.partition(".")
+    own = name in LIBRARY or name not in _parameters()
+    return place or None if family in FAMILIES and own else None
+
+
+def twins_of(name: str) -> tuple[str, ...]:
+    """The names of an effect and of all that no test tells from it, the bushing's first; (name,) without twins."""
+    place = place_of(name)
+    known = [*LIBRARY.values(), *(family.of_place(place) for family in FAMILIES.values() if place)]
+    sets = ((effect.name, *effect.twins) for effect in known if effect.twins)
+    return next((names for names in sets if name in names), (name,))
 
 
 def qualified(effect: Effect, parameter: Parameter) -> str:
@@ -86,7 +138,7 @@ def qualified(effect: Effect, parameter: Parameter) -> str:
 
 def effect_of(name: str) -> str:
     """The name of the effect that a parameter belongs to, by the name of the parameter in files and reports."""
-    if name.startswith(f"{stiffness_factor.FAMILY}."):
+    if place_of(name):
         return name
     effect, dot, _ = name.partition(".")
     return effect if dot else next(base for base in BASE for own in LIBRARY[base].parameters if own.name == name)
@@ -105,8 +157,7 @@ def parameter_names() -> tuple[str, ...]:
 
 def is_parameter(name: str) -> bool:
     """Whether a name in files and reports is that of a parameter."""
-    family, _, place = name.partition(".")
-    return name in _parameters() or (family == stiffness_factor.FAMILY and bool(place))
+    return name in _parameters() or place_of(name) is not None
 
 
 def parameter_named(name: str) -> Parameter:
@@ -115,13 +166,15 @@ def parameter_named(name: str) -> Parameter:
 
 
 def at_places(places: Iterable[str]) -> dict[str, Effect]:
-    """The library for tests at these places: a stiffness factor for each but the first, which the moduli go by.
+    """The library for tests at these places: of each kind that belongs to a place, those that are to be sought there.
+
+    Of twins that of the bushing is there alone.
 
     Args:
-        places: directions, or specimens by name; one that is axial counts as the first.
+        places: directions, or specimens by name; one that is axial counts as the first, which the moduli go by.
     """
-    known = dict.fromkeys(sorted(places, key=lambda place: place != Direction.AXIAL))
-    factors = {f"{stiffness_factor.FAMILY}.{place}" for place in list(known)[1:]}
-    others = {name: effect_named(name) for name in sorted(factors)}
-    kept = {name: effect for name, effect in LIBRARY.items() if name != stiffness_factor.EFFECT.name or name in factors}
-    return kept | others
+    known = list(dict.fromkeys(sorted(places, key=lambda place: place != Direction.AXIAL)))
+    found = [family.of_place(place) for family in FAMILIES.values() for place in sorted(family.places(known))]
+    of_places = {effect.name: effect for effect in found}
+    sought = {name: effect for name, effect in LIBRARY.items() if not place_of(name) or name in of_places} | of_places
+    return {name: effect for name, effect in sought.items() if name == twins_of(name)[0]}

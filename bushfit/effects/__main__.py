@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from bushfit.effects import LIBRARY, Effect, qualified
+from bushfit.effects import LIBRARY, Effect, effect_named, qualified
 from bushfit.effects.mistakes import MISTAKES
 
 #: The page, and the comments between which its tables stand.
@@ -22,11 +22,16 @@ def renewed(page: str) -> str:
 
 
 def _tables() -> Iterator[str]:
-    """Effects; where the law of each comes from and what would prove it; mistakes in the record."""
+    """Effects; twins; where the law of each comes from and what would prove it; mistakes in the record."""
     library = LIBRARY.values()
+    twinned = [effect for effect in library if effect.twins]
     yield _table(
         ("name", "level", "kind", "what it is", "first harmonic", "parameters"),
         ((_link(e), e.level, type(e).__name__.lower(), e.sentence, f"`{e.equation}`", _parameters(e)) for e in library),
+    )
+    yield _table(
+        ("named and proposed", "its twins, which no test of this kind tells from it"),
+        ((f"`{e.name}`", ", ".join(f"`{twin}` ({effect_named(twin).level})" for twin in e.twins)) for e in twinned),
     )
     yield _table(
         ("name", "source", "cheapest test that would prove it"), ((_link(e), e.source, e.confirmed_by) for e in library)

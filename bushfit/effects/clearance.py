@@ -12,7 +12,7 @@ from bushfit.effects.history import History
 #: a test resolves.
 SAMPLES = 64
 #: Factors of the samples in the complex first harmonic of a cycle that starts at the top of the motion.
-_FIRST = 2.0 / SAMPLES * np.exp(-2j * np.pi * np.arange(SAMPLES) / SAMPLES)
+FIRST = 2.0 / SAMPLES * np.exp(-2j * np.pi * np.arange(SAMPLES) / SAMPLES)
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
@@ -32,8 +32,8 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     wave = np.cos(2.0 * np.pi * np.arange(SAMPLES) / SAMPLES)
     bent = dead_zone(amplitude[..., None] * wave, np.asarray(delta)[..., None])
     crossed = reach > 0.0
-    round_ = below.cycle(omega, reach[..., None] * wave) @ _FIRST / np.where(crossed, reach, 1.0)
-    seen = below.cycle(omega, bent) @ _FIRST / np.where(crossed, amplitude, 1.0)
+    round_ = below.cycle(omega, reach[..., None] * wave) @ FIRST / np.where(crossed, reach, 1.0)
+    seen = below.cycle(omega, bent) @ FIRST / np.where(crossed, amplitude, 1.0)
     return below(omega, reach) * share + (seen - share * round_) * crossed
 
 
@@ -49,8 +49,9 @@ EFFECT = Layer(
     level=Level.COMPONENT,
     parameters=(Parameter("delta", "m", (0.0, 1e-2), 0.0, 1e-5, meaning="play, each way"),),
     source="A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B",
-    confirmed_by="sweep at a third of the smallest amplitude: play takes away most there",
+    confirmed_by="log the displacement at the sleeve itself, and put a steel dummy in place of the bushing",
     harmonic_error=1e-3,
+    twins=("fixture_play",),
     turns=False,
     stiffness=stiffness,
     force=force,

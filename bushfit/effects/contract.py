@@ -16,14 +16,19 @@ Notes:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from bushfit.effects.history import Array as Array
 from bushfit.effects.history import History
 from bushfit.geometry import Bushing, Place
+
+if TYPE_CHECKING:
+    from bushfit.effects.unnamed import Unnamed
 
 #: A number, or an array that broadcasts against operating points or samples.
 Value = Any
@@ -73,7 +78,8 @@ class Parameter:
         typical: a usual distance from the neutral value; the scale on which a fit moves a linear parameter.
         log: whether a fit moves its logarithm (strictly positive parameters).
         scale: what of the tests its size goes with, so that a search knows where to start: "period",
-            "frequency", "displacement" or "strain"; none where `typical` is good for any test.
+            "frequency", "displacement", "strain" or "force"; "order" where it is one of derivation, of
+            which there is but one range; none where `typical` is good for any test.
     """
 
     name: str
@@ -83,11 +89,35 @@ class Parameter:
     typical: float
     meaning: str
     log: bool = False
-    scale: Literal["period", "frequency", "displacement", "strain"] | None = None
+    scale: Literal["period", "frequency", "displacement", "strain", "force", "order"] | None = None
 
     def sized(self, share: float) -> float:
         """The value at a share of the typical distance from the neutral one, or from 0 where none is neutral."""
         return (self.neutral or 0.0) + share * self.typical
+
+
+@dataclass(frozen=True, eq=False)
+class Circumstances:
+    """What a test was made under besides its motion; where it is not known, effects of it stand still.
+
+    Args:
+        temperature: of the rubber [K], a number or one per operating point, (n,).
+        turn: when in the session a point was measured, from 0 for the first to 1 for the last, as temperature.
+        strained: largest strain amplitude that the rubber had seen before [1], as temperature.
+    """
+
+    temperature: Array | float | None = None
+    turn: Array | float | None = None
+    strained: Array | float | None = None
+
+    def at(self, points: Any) -> Circumstances:
+        """The circumstances of some operating points, by an index; numbers stay."""
+        known = (self.temperature, self.turn, self.strained)
+        return Circumstances(*(each[points] if isinstance(each, np.ndarray) else each for each in known))
+
+
+#: Circumstances of which nothing is known: those of a prediction.
+UNKNOWN = Circumstances()
 
 
 @dataclass(frozen=True)
@@ -98,11 +128,15 @@ class Setting:
         bushing: on whose rig the test is made; None where specimens alone are tested.
         direction: of the motion, or the specimen under test.
         kind: of the test: some effects belong to the rig that makes one of the two.
+        under: what it was made under.
+        unnamed: the data of the model's effect of that name.
     """
 
     bushing: Bushing | None
     direction: Place
     kind: Literal["sweep", "loop"]
+    under: Circumstances = UNKNOWN
+    unnamed: Unnamed | None = None
 
 
 @dataclass(frozen=True)
@@ -136,6 +170,16 @@ class Effect:
         settles: whether the response changes from cycle to cycle, so that a loop is followed through all its cycles.
         corrects: the direction, or specimen, whose stiffness formula it scales by a fitted factor; where the effect is
             in a model, that formula's own error needs no warning. None where it scales no formula.
+        twins: names of effects, of the rig above all, with the same equation for all tests. Of such twins the one that
+            belongs to the bushing, which is this one, is proposed; its size is then known, its level is not.
+        replaces: the branch of the paper that it stands in place of; None where it is added to the others.
+        frees: mistakes of the record that are single values of it; where one explains the tests as well, it stands.
+        under: what of a test's circumstances it depends on, by the names of `Circumstances`.
+        taken: what a prediction takes of these where they are not known, for its user; none of the rig's effects.
+        in_place_of: of one that replaces a branch, where a fit begins: its values by those of that branch.
+        harmonic_only: whether it has no law in time: of a loop it answers the first harmonic alone, by
+            `harmonic_response`, and the rig refuses it.
+        after: the effect without which it is no other: it is looked for beside that one only.
     """
 
     name: str
@@ -148,10 +192,18 @@ class Effect:
     harmonic_error: float = 0.0
     settles: bool = False
     corrects: str | None = None
+    twins: tuple[str, ...] = ()
+    replaces: str | None = None
+    frees: tuple[str, ...] = ()
+    under: tuple[Literal["temperature", "turn", "strained"], ...] = ()
+    taken: str = ""
+    harmonic_only: bool = False
+    in_place_of: Callable[[Values], dict[str, float]] | None = None
+    after: str | None = None
 
     @property
     def amount(self) -> Parameter:
-        """The parameter whose neutral value makes the effect vanish."""
+        """The parameter that the effect is searched by: the first that has a neutral value, where it vanishes."""
         return next(parameter for parameter in self.parameters if parameter.neutral is not None)
 
 
@@ -201,6 +253,31 @@ class Layer(Effect):
     force: Callable[[Values, ForceBelow, History, Setting], Array]
 
 
+def all_but_the_first(places: Sequence[str]) -> Sequence[str]:
+    """The places that have an effect of their own where the first is what the moduli go by."""
+    return places[1:]
+
+
+@dataclass(frozen=True)
+class Family:
+    """A kind of effect of which each place, a direction of the bushing or a specimen, may have its own.
+
+    Args:
+        name: of the kind; an effect of it, and its one parameter, is called `<name>.<place>`.
+        of_place: the effect of one place, kept from one call to the next.
+        places: of the places tested, that by which the moduli go first, those that a search gives one.
+    """
+
+    name: str
+    of_place: Callable[[str], Effect]
+    places: Callable[[Sequence[str]], Sequence[str]] = all_but_the_first
+
+
+def only_at(place: str, law: Callable[..., Array], p: Values, below: Callable[..., Array], *motion: Any) -> Array:
+    """A layer's law, of either face, at one place; elsewhere the response below. `motion` ends with the setting."""
+    return law(p, below, *motion) if str(motion[-1].direction) == place else below(*motion[:-1])
+
+
 def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str, Value]:
     """The named values times a factor, as far as the model has them: what most modifiers return."""
     return {name: p[name] * factor for name in names if name in p}
@@ -212,3 +289,19 @@ def linear_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, h
     The modulus at omega = 0 must be finite; it multiplies the mean strain.
     """
     return history.response(lambda omega: 2.0 * modulus(p, omega, history.amplitude))
+
+
+def harmonic_response(transfer: Value, history: History) -> Array:
+    """What an effect without a law in time answers: its complex ratio times the first harmonic of the motion, no more.
+
+    It is the steady answer, from the first sample on.
+
+    Args:
+        transfer: stress over strain (2 mu^) or force over displacement (K), (..., 1).
+    """
+    return np.real(np.asarray(transfer) * history.fundamental)
+
+
+def harmonic_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:
+    """Stress of a branch without a law in time: s_1 = 2 mu^(omega, e0) e_1, no mean and no overtones."""
+    return harmonic_response(2.0 * modulus(p, np.atleast_1d(history.omega), history.amplitude), history)

@@ -1,4 +1,4 @@
-"""Delay: the force is recorded later than the displacement."""
+"""Delay: the force is recorded later than the displacement, or the displacement later than the force."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """F(t - tau) [N]: every harmonic turned back in a steady cycle, straight lines between samples from rest."""
+    """F(t - tau) [N]: every harmonic turned in a steady cycle, straight lines between samples from rest.
+
+    What an early force (tau < 0) does after the last sample is taken from the same phase of the last cycle.
+    """
     undelayed = below(history)
     if history.periodic:
         turn = np.expm1(-1j * history.harmonics * p["tau"])
@@ -22,15 +25,21 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     place = np.arange(undelayed.shape[-1] + 1.0)
     from_zero = np.concatenate([np.zeros_like(undelayed[..., :1]), undelayed], axis=-1)
     row_by_row = np.vectorize(np.interp, signature="(n),(m),(m)->(n)")
-    return row_by_row(place[1:] - np.asarray(p["tau"]) / history.step, place, from_zero)
+    asked, cycle = place[1:] - np.asarray(p["tau"]) / history.step, 1.0 / (history.frequency * history.step)
+    beyond = np.ceil(np.maximum(asked - place[-1], 0.0) / cycle)
+    return row_by_row(asked - beyond * cycle, place, from_zero)
 
 
 EFFECT = Layer(
     name="delay",
-    sentence="The force channel lags: the loss factor falls in proportion to frequency, at every amplitude alike.",
+    sentence="Force, or displacement, is recorded late: the loss factor falls, or rises, in proportion to frequency.",
     equation="K exp(-i omega tau)",
     level=Level.INSTRUMENT,
-    parameters=(Parameter("tau", "s", (0.0, 1e-2), 0.0, 1e-4, meaning="time by which the force is late"),),
+    parameters=(
+        Parameter(
+            "tau", "s", (-1e-2, 1e-2), 0.0, 1e-4, meaning="time by which the force is late; below 0 the displacement is"
+        ),
+    ),
     source="shift theorem of the Fourier transform",
     confirmed_by="put a steel dummy in place of the bushing: its loss factor must be zero",
     stiffness=stiffness,

@@ -62,6 +62,14 @@ class History:
         return np.fft.irfft(transfer(self.harmonics) * self.spectrum, n=self.value.shape[-1])
 
     @cached_property
+    def fundamental(self) -> Array:
+        """The last cycle's first harmonic X exp(i omega t), whose real part is its share of the motion, same shape."""
+        samples = self.value.shape[-1]
+        cycle = round(1.0 / float(np.max(self.step * self.frequency)))
+        turn = np.exp(2j * np.pi * np.arange(samples) / cycle)
+        return 2.0 * np.mean(self.value[..., -cycle:] * turn[-cycle:].conj(), axis=-1, keepdims=True) * turn
+
+    @cached_property
     def turning(self) -> Turning:
         """The turning points of each row."""
         count = self.value.shape[-1]
@@ -88,7 +96,7 @@ class History:
         if self.periodic:
             ahead, behind = np.roll(self.value, -1, axis=-1), np.roll(self.value, 1, axis=-1)
             return (ahead - behind) / (2.0 * self.step)
-        return np.gradient(self.value, self.step, axis=-1)
+        return np.gradient(self.value, axis=-1) / self.step
 
     @property
     def cycles(self) -> int:
@@ -110,6 +118,10 @@ class History:
     def with_value(self, value: Array) -> History:
         """Other values at the same times."""
         return replace(self, value=value)
+
+    def faster(self, factor: Any) -> History:
+        """The same motion so many times as fast, a number or (..., 1)."""
+        return replace(self, step=self.step / factor, frequency=self.frequency * factor)
 
     def driven(self) -> History:
         """The same motion, kept as the driver of those that are made from it."""

@@ -34,7 +34,8 @@ EFFECT = Layer(
     level=Level.COMPONENT,
     parameters=(Parameter("force", "N", (0.0, 1e5), 0.0, 5.0, meaning="Coulomb force"),),
     source="Coulomb friction; A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B",
-    confirmed_by="store the raw force waveforms: slip makes odd harmonics at the smallest amplitude",
+    confirmed_by="run the empty fixture slowly, and a steel dummy: friction that stays is that of the guides",
+    twins=("guide_friction",),
     stiffness=stiffness,
     force=force,
 )

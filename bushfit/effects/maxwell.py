@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Values, linear_stress
+from bushfit.effects.contract import Array, Branch, Level, Parameter, Value, Values, linear_stress
 from bushfit.effects.history import History
 
 
@@ -14,23 +14,26 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     return p["mu1"] * turn / (1.0 + turn)
 
 
-def relaxed(tau: float, values: Array, step: float) -> Array:
-    """The response y to tau dy/dt + y = tau dx/dt from rest, exact for an x that is straight between samples.
+def relax(rate: Value, values: Array, step: Value) -> Array:
+    """The response y to dy/dt + rate y = dx/dt from rest, row by row, exact for an x that is straight between samples.
 
-    y_n = r y_{n-1} + (1 - r) tau/step (x_n - x_{n-1}), r = exp(-step/tau).
+    y_n = r y_{n-1} + (1 - r)/(rate step) (x_n - x_{n-1}), r = exp(-rate step).
     """
     from scipy.signal import lfilter
+    from scipy.special import exprel
 
-    gain = -np.expm1(-step / tau) * tau / step
-    return np.asarray(lfilter([gain, -gain], [1.0, -np.exp(-step / tau)], values, axis=-1))
+    def row(decay: float, values: Array) -> Array:
+        gain = exprel(-decay)
+        return np.asarray(lfilter([gain, -gain], [1.0, -np.exp(-decay)], values))
+
+    return np.asarray(np.vectorize(row, signature="(),(n)->(n)")(np.atleast_1d(rate * step)[..., 0], values))
 
 
 def stress(p: Values, history: History) -> Array:
     """s + tau ds/dt = 2 mu1 tau de/dt [Pa]."""
     if history.periodic:
         return linear_stress(modulus, p, history)
-    row_by_row = np.vectorize(relaxed, signature="(),(n),()->(n)")
-    return 2.0 * p["mu1"] * row_by_row(np.atleast_1d(p["tau"])[..., 0], history.value, history.step)
+    return 2.0 * p["mu1"] * relax(1.0 / p["tau"], history.value, history.step)
 
 
 EFFECT = Branch(

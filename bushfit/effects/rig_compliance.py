@@ -109,7 +109,7 @@ EFFECT = Layer(
     level=Level.INSTRUMENT,
     parameters=(Parameter("compliance", "m/N", (0.0, 1e-5), 0.0, 2e-8, meaning="give of the rig per force"),),
     source="springs in series; ISO 10846-2:2008",
-    confirmed_by="put a steel dummy in place of the bushing",
+    confirmed_by="put a steel dummy in place of the bushing: what still gives way is the rig",
     harmonic_error=2e-3,
     turns=False,
     stiffness=stiffness,

@@ -22,8 +22,8 @@ from bushfit.reading.measurement import loss_factor
 #: A part without which some parameter's variance would grow by more than this factor is not held out: what is left does
 #: not determine that parameter, so a prediction would say nothing.
 _MOST_GROWTH = 100.0
-#: Condition number of the remaining information beyond which its inverse is rounding.
-_SINGULAR = 1e14
+#: Singular value, relative to the largest, below which what is left of the derivatives is their rounding.
+_LEAST_SEEN = 1e-7
 #: Step of a parameter, in coordinates, which are of order one, beyond which one Gauss-Newton step tells nothing of a
 #: refit: chosen, a third of its value.
 _LONGEST_STEP = 0.3
@@ -50,44 +50,79 @@ class LeaveOut:
     """A fit at its end, ready to be asked what it would be without some of its rows.
 
     Args:
-        moving: which parameters the rows depend on, (k,) bool.
-        basis: orthonormal basis of what these can do to the whitened residuals, (n, m).
-        triangle: of the derivatives by coordinate, jacobian^T = basis triangle, (m, m).
+        basis: orthonormal basis of what the parameters can do to the whitened residuals, (n, m).
+        back: how far the parameters move, in coordinates, with a unit along the basis, (k, m).
         along: the residuals along the basis, (m,).
         residual: the whitened residuals, (n,).
     """
 
-    moving: Array
     basis: Array
-    triangle: Array
+    back: Array
     along: Array
     residual: Array
 
     @classmethod
     def of(cls, jacobian: Array, residual: Array) -> LeaveOut:
-        """The same from the derivatives of the whitened residuals by coordinate, (k, n), and the residuals, (n,)."""
-        moving = np.any(jacobian != 0.0, axis=1)
-        basis, triangle = np.linalg.qr(jacobian[moving].T)
-        return cls(moving, basis, triangle, basis.T @ residual, residual)
+        """The same from the derivatives of the whitened residuals by coordinate, (k, n), and the residuals, (n,).
+
+        What all rows together leave open moves no residual, and stays where it is.
+        """
+        basis, size, directions = np.linalg.svd(jacobian.T, full_matrices=False)
+        seen = size > _LEAST_SEEN * size.max(initial=0.0)
+        basis = basis[:, seen]
+        return cls(basis, directions[seen].T / size[seen], basis.T @ residual, residual)
+
+    def open(self, rows: Array) -> Array:
+        """Which parameters the fit leaves open without these rows, (k,) bool."""
+        size, vectors = np.linalg.eigh(self._rest(rows))
+        without = np.square(self.back @ vectors) @ (1.0 / np.maximum(size, _LEAST_SEEN**2))
+        return without > _MOST_GROWTH * np.sum(np.square(self.back), axis=1)
 
     def step(self, rows: Array) -> Array | None:
         """How far the parameters move without these rows, in coordinates, (k,); None where the rest leaves one open.
 
         It is one Gauss-Newton step, which is exact where the model is linear over that step.
         """
-        step = np.zeros(self.moving.size)
-        if not self.basis.size:
-            return step
-        left_out = self.basis[rows]
-        rest = np.eye(len(self.triangle)) - left_out.T @ left_out
-        if max(np.linalg.cond(rest), np.linalg.cond(self.triangle) ** 2) > _SINGULAR:
-            return None
-        back, inverse = np.linalg.inv(self.triangle), np.linalg.inv(rest)
-        variance, without = (np.einsum("ij,jk,ik->i", back, inner, back) for inner in (np.eye(len(rest)), inverse))
-        if np.any(without > _MOST_GROWTH * variance):
-            return None
-        step[self.moving] = -back @ (inverse @ (self.along - left_out.T @ self.residual[rows]))
-        return step
+        return None if self.open(rows).any() else self.back @ self._moved(rows)
+
+    def predicted(self, rows: Array, clusters: Array, *, stepped: bool = True) -> tuple[Array, Array]:
+        """Residuals of these rows, (n,) each, after that step: in units of noise, and whitened by the error of the
+        prediction too.
+
+        Args:
+            rows: which the rest determines, (all rows,) bool.
+            stepped: False where the fit is one to the rest already.
+            clusters: number of the group of rows whose misfit is of one kind that each row belongs to, (all rows,).
+
+        Notes:
+            The whitened ones have the covariance 1 + J C J^T before, with the robust covariance C of the fit to the
+            rest: A^-1 M A^-1, where M adds what each cluster pulls at the parameters (Liang and Zeger 1986, sandwich).
+            Of the noise that the tests are known to have no direction may have less.
+        """
+        moved, out = self._moved(rows) * stepped, self.basis[rows]
+        plain = self.residual[rows] + out @ moved
+        left = self.residual + self.basis @ moved
+        left[rows] = 0.0
+        pulls = np.zeros((int(clusters.max()) + 1, moved.size))
+        np.add.at(pulls, clusters, self.basis * left[:, None])
+        root = np.linalg.inv(np.linalg.cholesky(self._rest(rows)))
+        size, vectors = np.linalg.eigh(root @ pulls.T @ pulls @ root.T)
+        error = out @ root.T @ vectors * np.sqrt(np.maximum(size, 1.0))
+        along, scale, _ = np.linalg.svd(error, full_matrices=False)
+        return plain, plain - along @ ((1.0 - 1.0 / np.hypot(1.0, scale)) * (along.T @ plain))
+
+    def _rest(self, rows: Array) -> Array:
+        """Information of the other rows along the basis, (m, m)."""
+        return np.eye(self.along.size) - self.basis[rows].T @ self.basis[rows]
+
+    def _moved(self, rows: Array) -> Array:
+        """The step along the basis, (m,)."""
+        return -np.linalg.solve(self._rest(rows), self.along - self.basis[rows].T @ self.residual[rows])
+
+
+def is_far(step: Array) -> bool:
+    """Whether a step, in coordinates, is too long for one Gauss-Newton step to tell of a refit."""
+    return bool(np.abs(step).max(initial=0.0) > _LONGEST_STEP)
 
 
 def misfits(model: Model, fitted: Sequence[DataSet], left: Sequence[DataSet] = ()) -> tuple[Misfit, ...]:
@@ -100,11 +135,12 @@ def _misfits(model: Model, data_set: DataSet, *, was_fitted: bool) -> Iterator[M
     """The figures of a test without points of no weight, and of its runs where there are several."""
     relative, gain = data_set.relative(model), np.abs(data_set.noise_free(model).measured / data_set.measured) - 1.0
     squares = np.square(data_set.residual(model)).reshape(data_set.parts, -1).sum(axis=0)
-    place, every = str(data_set.direction), np.ones(data_set.frequency.size, dtype=bool)
+    place, every, rows = str(data_set.direction), np.ones(data_set.frequency.size, dtype=bool), relative.size
 
     def figures(run: _Run, relative: Array, squares: Array, gain: Array) -> Misfit:
         named = data_set.name, place, was_fitted, run.held, run.value, run.unit
-        reduced = float(squares.sum()) / (data_set.parts * relative.size * data_set.test.weight)
+        counted = data_set.counted * relative.size / rows
+        reduced = float(squares.sum()) / (counted * data_set.test.weight)
         return Misfit(*named, relative.size, float(np.sqrt(np.mean(relative**2))), reduced, float(gain.mean()))
 
     yield figures(_Run(None, None, None, every), relative, squares, gain)
@@ -130,10 +166,10 @@ def usable(solution: Solution, data_sets: Sequence[DataSet], left: Sequence[Data
         for run in _runs(data_set):
             points = np.broadcast_to(run.points, (data_set.parts, data_set.size // data_set.parts))
             step = whole.step(begin + np.flatnonzero(points))
-            if step is not None and np.abs(step).max(initial=0.0) > _LONGEST_STEP:
+            if step is not None and is_far(step):
                 step = None
             moved = modelled if step is None else modelled * np.exp(step @ slopes)
-            counted = run.points & _counted(data_set)
+            counted = run.points & (data_set.weights > 0.0 if isinstance(data_set, SweepData) else True)
             off = _off(moved[counted], data_set.measured[counted])
             found.setdefault(str(data_set.direction), []).append((off, step is not None))
         begin += data_set.size
@@ -174,10 +210,9 @@ def _off(modelled: Array, measured: Array) -> Array:
 def _slopes(solution: Solution, data_set: DataSet) -> Array:
     """Derivatives of ln K by coordinate at the operating points, (k, n)."""
     model, names = solution.model, solution.coordinates.names
-    if not names:
-        return np.zeros((0, data_set.frequency.size))
     test = data_set.direction, data_set.frequency, data_set.amplitude
-    slopes = stiffness_jacobian(model, *test, names, data_set.kind) / model.stiffness(*test, kind=data_set.kind)
+    kind, under = data_set.kind, data_set.circumstances
+    slopes = stiffness_jacobian(model, *test, names, kind, under) / model.stiffness(*test, kind=kind, under=under)
     return slopes * solution.coordinates.slopes(model.values)[:, None]
 
 
@@ -191,8 +226,3 @@ def _runs(data_set: DataSet) -> Iterator[_Run]:
     held = data_set.sweep.held[data_set.order]
     for value in np.unique(held):
         yield _Run(what, float(value), unit, held == value)
-
-
-def _counted(data_set: DataSet) -> Array:
-    """Which operating points carry weight, (n,) bool."""
-    return data_set.weights > 0.0 if isinstance(data_set, SweepData) else np.ones(1, dtype=bool)

@@ -37,9 +37,9 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
     `held` is that of parameters which all stages held.
 
     Returns:
-        By parameter value. Where the residuals of a stage exceed its noise, its share is inflated by its reduced
-        chi-square. What the error of an estimated noise adds is counted as Kenward and Roger (1997) do, and how far
-        the covariance may be off for it goes along as `spread`.
+        By parameter value. Where the residuals of a stage, or of one test of it, exceed its noise, the share of each
+        test is inflated by the larger of the two reduced chi-squares. What the error of an estimated noise adds is
+        counted as Kenward and Roger (1997) do, and how far the covariance may be off for it goes along as `spread`.
 
     Notes:
         Each stage solves J_own (J_own^T d_own + J_rest^T d_rest + noise) = 0 for its own parameters while the rest
@@ -59,9 +59,10 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
         slope = jacobian(model, stage.data_sets, names)
         basis = np.linalg.qr(slope[own].T)[0]
         system[own] = basis.T @ slope.T
-        inflation = np.sqrt(lack_of_fit(model, stage.data_sets, len(stage.names)) or 1.0)
-        root[own, own] = inflation * np.eye(len(stage.names))
-        bases.append((own, inflation * basis.T))
+        inflation = np.concatenate([np.full(data_set.size, excess) for data_set, excess in _excess(model, stage)])
+        share = basis.T * np.sqrt(inflation)
+        root[own, own] = np.linalg.qr(share.T)[1].T
+        bases.append((own, share))
         begin = own.stop
     reaction = _inverse(system)
     answer = reaction @ root
@@ -71,8 +72,21 @@ def covariance(model: Model, stages: Sequence[Stage], held: Covariance | None = 
     matrix = by_value @ by_value.T
     for part, lost in _unsure(stages, [(reaction[:, own], basis) for own, basis in bases]):
         spread.append(part)
-        matrix = matrix + 2.0 * lost
+        matrix = matrix + 2.0 * _positive(lost, np.sqrt(np.diag(matrix)))
     return Covariance(names, matrix, tuple(spread))
+
+
+def _excess(model: Model, stage: Stage) -> list[tuple[DataSet, float]]:
+    """By how much each test of a stage exceeds its noise, reduced chi-square, and as all together; else 1."""
+    together = lack_of_fit(model, stage.data_sets, len(stage.names)) or 1.0
+    return [(one, max(together, lack_of_fit(model, [one], 0) or 1.0)) for one in stage.data_sets]
+
+
+def _positive(matrix: Array, sizes: Array) -> Array:
+    """A symmetric matrix without the directions in which it is below zero, those of parameters of these sizes."""
+    scale = np.outer(sizes, sizes) + np.finfo(float).tiny
+    values, vectors = np.linalg.eigh(matrix / scale)
+    return (vectors * np.maximum(values, 0.0)) @ vectors.T * scale
 
 
 def _inverse(system: Array) -> Array:
@@ -147,11 +161,15 @@ def lack_of_fit(model: Model, data_sets: Sequence[DataSet], parameters: int) -> 
 
 
 def misfit(model: Model, data_sets: Sequence[DataSet], parameters: int, advice: str = "") -> list[str]:
-    """A sentence, with advice, where the model misses the data by more than their noise; else none."""
-    reduced = lack_of_fit(model, data_sets, parameters)
-    if reduced is None:
+    """A sentence, with advice, where the model misses all data, or one test, by more than the noise; else none."""
+    together = lack_of_fit(model, data_sets, parameters)
+    each = {one.name: missed for one in data_sets if (missed := lack_of_fit(model, [one], 0)) is not None}
+    if together is None and not each:
         return []
+    worst, reduced = max(each, key=lambda name: each[name], default=""), _reduced(model, data_sets, parameters)[0]
+    where = f", {number(each[worst], 2)} in {worst}" if len(data_sets) > 1 and worst else ""
     return [
         "the model misses the data by more than their noise "
-        f"(reduced chi-square {number(reduced, 2)}): standard errors are scaled up{advice}"
+        f"(reduced chi-square {number(reduced, 2)}{where}): intervals are invalid, though standard errors are scaled "
+        f"up{advice}"
     ]

@@ -10,15 +10,17 @@ from typing import TypeVar
 import numpy as np
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.effects import BASE
+from bushfit.campaign.session import measured_session
+from bushfit.effects import with_base
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, naming
-from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data, sweep_data
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data, sweep_data, with_level_errors
 from bushfit.fitting.solve import Bounds
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction, Specimen, place_named
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
+from bushfit.reading.measurement import Sweep
 
 #: Difference of two amplitudes relative to their size up to which they are the same level.
 _SAME_LEVEL = 1e-3
@@ -44,13 +46,20 @@ class Data:
             ModelError: [fit] effects has an unknown effect, or one twice.
         """
         with naming(campaign.path, place="[fit] effects"):
-            Model.started(None, (*BASE, *campaign.fit.effects), {})
+            Model.started(None, with_base(campaign.fit.effects), {})
         return cls(
             campaign,
             tuple(loop_data(campaign.loops, without_outliers=campaign.fit.loss != "linear")),
-            tuple(sweep_data(campaign.sweeps, campaign.fit.residuals)),
+            tuple(sweep_data(campaign.sweeps, campaign.fit.residuals, campaign.rig)),
             {name: (setting.min, setting.max) for name, setting in campaign.fit.parameters.items()},
-        )
+        ).in_session()
+
+    def in_session(self) -> Data:
+        """The same data, each point with what it was measured under."""
+        tests = [data_set.test for data_set in (*self.loops, *self.sweeps)]
+        under = iter(measured_session(self.campaign.bushing, tests))
+        loops = tuple(replace(loop, under=next(under).at(0)) for loop in self.loops)
+        return replace(self, loops=loops, sweeps=tuple(replace(sweep, under=next(under)) for sweep in self.sweeps))
 
     @property
     def robust(self) -> bool:
@@ -73,6 +82,19 @@ class Data:
             sweeps.append(data_set.without(np.flatnonzero(np.isin(data_set.order, rows))))
         return replace(self, sweeps=tuple(sweeps))
 
+    def with_sweeps(self, sweeps: Sequence[Sweep]) -> Data:
+        """The same data with its sweeps read anew, row by row: noise is estimated again, rows left out stay so."""
+        fit, new = self.campaign.fit, []
+        for old, data_set in zip(self.sweeps, sweep_data(sweeps, fit.residuals, self.campaign.rig), strict=True):
+            rows = old.order[old.weights == 0.0]
+            new.append(data_set.without(np.flatnonzero(np.isin(data_set.order, rows))))
+        noise = self.sweeps[0].noise
+        return replace(self, sweeps=with_level_errors(new, noise.level, noise.level_freedom))
+
+    def with_level_errors(self, error: tuple[float, float], freedom: int) -> Data:
+        """The same data with an error of each level of the sweeps; see `data_sets.with_level_errors`."""
+        return replace(self, sweeps=with_level_errors(self.sweeps, error, freedom))
+
     @property
     def given(self) -> dict[str, float]:
         """Values the campaign gives, to start from or to hold."""
@@ -92,7 +114,7 @@ class Data:
     @property
     def effects(self) -> tuple[str, ...]:
         """The model that [fit] asks for: the paper's three branches and the effects that it adds."""
-        return (*BASE, *self.campaign.fit.effects)
+        return with_base(self.campaign.fit.effects)
 
     def chosen(self, places: Sequence[str] | None) -> list[DataSet]:
         """Data sets of the places of these names; by default the axial ones, as in the paper, and the specimens'.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import wraps
 from typing import Any, ClassVar, NamedTuple, Self
 
-from bushfit.effects.contract import Array, Values
+from bushfit.effects.contract import Array, Circumstances, Values
 from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model
 from bushfit.model.result import Outlier
@@ -30,7 +30,6 @@ class Suspect:
         direction: of the first test touched.
         frequency: lowest and highest [Hz].
         amplitude: lowest and highest, zero-to-peak [m or rad].
-        looked: how many places of this kind were looked at, where more than are listed.
     """
 
     words: str
@@ -39,7 +38,6 @@ class Suspect:
     direction: Place
     frequency: tuple[float, float]
     amplitude: tuple[float, float]
-    looked: int = 0
 
 
 class Freedoms(NamedTuple):
@@ -49,15 +47,17 @@ class Freedoms(NamedTuple):
         rig: what tests of one rig have in common; None where nothing is estimated.
         shared: behind the errors that blocks share; 0 where these are not measured.
         scatter: behind what scatters from point to point; 0 where it counts as known.
+        level: behind the errors that all runs of a level share; 0 where they count as known.
     """
 
     rig: Hashable
     shared: int
     scatter: int
+    level: int = 0
 
 
 #: Kinds of suspects, in the order in which they are listed.
-SUSPECT_KINDS = ("frequency", "level", "repeat", "row", "loop")
+SUSPECT_KINDS = ("frequency", "level", "repeat", "loop")
 
 
 class DataSet(ABC):
@@ -68,11 +68,16 @@ class DataSet(ABC):
 
     Args:
         kind: whether it is a loop or a sweep.
-        parts: numbers that make up a point: 1 for a force, 2 for a complex stiffness.
+        components: what a point's residuals are of: force, or storage and loss.
     """
 
     kind: ClassVar[Kind]
-    parts: ClassVar[int]
+    components: ClassVar[tuple[str, ...]]
+
+    @property
+    def parts(self) -> int:
+        """Numbers that make up a point: 1 for a force, 2 for a complex stiffness."""
+        return len(self.components)
 
     @property
     @abstractmethod
@@ -110,6 +115,11 @@ class DataSet(ABC):
         """Number of residuals that carry weight."""
 
     @property
+    def independent(self) -> float:
+        """Number of independent points behind what varies slowly: fewer than `counted` where noise is correlated."""
+        return float(self.counted)
+
+    @property
     @abstractmethod
     def frequency(self) -> Array:
         """Of the operating points [Hz], (n,); a loop has one."""
@@ -118,6 +128,11 @@ class DataSet(ABC):
     @abstractmethod
     def amplitude(self) -> Array:
         """Of the operating points, zero-to-peak [m or rad], (n,); a loop has one."""
+
+    @property
+    @abstractmethod
+    def circumstances(self) -> Circumstances:
+        """What the operating points were measured under, as `frequency`."""
 
     @property
     @abstractmethod
@@ -135,6 +150,11 @@ class DataSet(ABC):
         return ()
 
     @property
+    def levels(self) -> Sequence[Array]:
+        """The same of the errors that all runs of a level share, which hold whole blocks each; else none."""
+        return ()
+
+    @property
     def freedoms(self) -> Freedoms:
         """How well the noise of the rig is known that the test was made on."""
         return Freedoms(None, 0, 0)
@@ -148,6 +168,20 @@ class DataSet(ABC):
         """Derivatives of the whitened residuals by fit coordinate, (len(names), size)."""
 
     @abstractmethod
+    def moved(self, change: Array, model: Model, beside: Array | float = 0.0) -> Array:
+        """What a small change of the model's stiffness at the operating points, complex (..., n) [N/m or N m/rad], does
+        to the whitened residuals, (..., size), with another stiffness beside the model's; a loop changes by its first
+        harmonic."""
+
+    @abstractmethod
+    def residual_with(self, added: Array, model: Model) -> Array:
+        """Whitened residuals with a stiffness of any size added, complex (n,), (size,); as `moved`, but exact."""
+
+    @abstractmethod
+    def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
+        """As `jacobian`, of `residual_with`: what is added stays as it is, or stays the same share of the model's."""
+
+    @abstractmethod
     def relative(self, model: Model) -> Array:
         """Misfit of the points that carry weight, relative to |K| or to half a loop's force range, for NRMSE."""
 
@@ -155,9 +189,13 @@ class DataSet(ABC):
     def distance(self, model: Model) -> Array:
         """How far each point lies off the model, in units of noise, (n,)."""
 
+    def misfit(self, model: Model) -> Array:
+        """As `residual`, but each row of a loop in units of its own noise, whatever those before it tell, (size,)."""
+        return self.residual(model)
+
     @abstractmethod
     def shown(self, model: Model) -> Array:
-        """As `residual`, and of points without weight how far one lies off, in units of noise, (size,)."""
+        """As `misfit`, and of points without weight how far one lies off, in units of noise, (size,)."""
 
     @abstractmethod
     def change(self, one: Model, other: Model) -> float:
@@ -177,6 +215,10 @@ class DataSet(ABC):
 
     def standing(self) -> Self:
         """The part of the test that carries weight."""
+        return self
+
+    def timeless(self) -> Self:
+        """The same test as far as an addition without a law in time can answer it: a loop by its first harmonic."""
         return self
 
     @abstractmethod
@@ -208,16 +250,12 @@ class DataSet(ABC):
         """Largest smooth misfit, relative to |K| or to half a loop's force range."""
 
     @abstractmethod
-    def suspects(self, residual: Array) -> Iterator[Suspect]:
-        """Points that a fault of the rig may have moved together, given the whitened residuals, (size,)."""
+    def suspects(self) -> Iterator[Suspect]:
+        """Points that a fault of the rig may have moved together."""
 
     @abstractmethod
     def columns(self) -> Mapping[str, Any]:
         """What names each residual's point in a table: columns by header."""
-
-    @abstractmethod
-    def components(self, residual: Array) -> Mapping[str, Array]:
-        """Whitened residuals by what they are residuals of: storage and loss, or force."""
 
 
 def kept(answer: Callable[..., Array]) -> Callable[..., Array]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TypeVar
+from dataclasses import replace
 
 import numpy as np
 
-from bushfit.campaign.schema import Residuals
+from bushfit.campaign.schema import UNSTATED, Residuals, RigSettings
 from bushfit.fitting.data_set import DataSet
 from bushfit.fitting.drive import drive_of
 from bushfit.fitting.loop_data import LoopData
@@ -16,27 +16,32 @@ from bushfit.fitting.sweep_data import SweepData
 from bushfit.geometry import Specimen
 from bushfit.reading.measurement import Loop, Source, Sweep
 
-Kind = TypeVar("Kind", LoopData, SweepData)
-
 __all__ = ["DataSet", "LoopData", "SweepData", "loop_data", "parted", "sources", "sweep_data"]
 
 
 def loop_data(loops: Sequence[Loop], *, without_outliers: bool = False) -> list[LoopData]:
     """One data set per loop; rows that are outliers carry no weight where they are to be left out."""
-    return [_weighed(LoopData(drive_of(loop, without_outliers=without_outliers))) for loop in loops]
+    drives = [drive_of(loop, without_outliers=without_outliers) for loop in loops]
+    return [LoopData(drive).weighted(np.array(drive.loop.weight)) for drive in drives]
 
 
-def _weighed(data_set: Kind) -> Kind:
-    """A data set with the weight that the campaign gives its test."""
-    return data_set if data_set.test.weight == 1.0 else data_set.weighted(np.array(data_set.test.weight))
-
-
-def sweep_data(sweeps: Sequence[Sweep], residuals: Residuals = "complex") -> list[SweepData]:
+def sweep_data(
+    sweeps: Sequence[Sweep], residuals: Residuals = "complex", stated: RigSettings = UNSTATED
+) -> list[SweepData]:
     """One data set per sweep; the noise of those of one rig, the bushing's or a specimen's, is estimated together."""
     rigs = [sweep.direction if isinstance(sweep.direction, Specimen) else None for sweep in sweeps]
-    noises = {rig: sweep_noise([sweep for sweep, own in zip(sweeps, rigs, strict=True) if own == rig]) for rig in rigs}
+    noises = {
+        rig: sweep_noise([sweep for sweep, own in zip(sweeps, rigs, strict=True) if own == rig], stated) for rig in rigs
+    }
     data_sets = [SweepData(sweep, noises[rig], residuals) for sweep, rig in zip(sweeps, rigs, strict=True)]
-    return [_weighed(data_set) for data_set in data_sets]
+    return [data_set.weighted(np.array(data_set.sweep.weight)) for data_set in data_sets]
+
+
+def with_level_errors(sweeps: Sequence[SweepData], error: tuple[float, float], freedom: int) -> tuple[SweepData, ...]:
+    """The same sweeps with gain and phase errors [rad] that all runs of a level share, told by so many degrees of
+    freedom; 0 where they count as known."""
+    noises = {id(sweep.noise): replace(sweep.noise, level=error, level_freedom=freedom) for sweep in sweeps}
+    return tuple(replace(sweep, noise=noises[id(sweep.noise)]) for sweep in sweeps)
 
 
 def parted(data_sets: Iterable[DataSet]) -> tuple[list[LoopData], list[SweepData]]:

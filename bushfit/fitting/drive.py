@@ -17,11 +17,12 @@ from bushfit.effects.contract import Array
 from bushfit.effects.history import History, reversals
 from bushfit.errors import FitError
 from bushfit.fitting.clock import fundamental
-from bushfit.fitting.fourier import GRID, basis, least_squares, series
-from bushfit.fitting.loop_harmonics import MOST_ROWS, LoopHarmonics, OutlierRows, loop_harmonics
+from bushfit.fitting.fourier import GRID, as_complex, basis, least_squares, series
+from bushfit.fitting.loop_harmonics import MOST_ROWS, LoopHarmonics, OutlierRows, less_slow, loop_harmonics
 from bushfit.fitting.motion import mean_of_preload, preload, wrong_clock
 from bushfit.fitting.noise import FLOOR
 from bushfit.fitting.phase_bins import phase_bins
+from bushfit.fitting.row_noise import RowNoise, of_a_lone_cycle, row_noise
 from bushfit.fitting.runin import steady_part, thinned
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.cycles import HOLE
@@ -49,6 +50,8 @@ _MEDIAN_OVER_MEAN = 1.25
 _NO_LOSS = 2e-3
 #: Share of the amplitude by which a motion may lie off zero before its middle is taken for unknown.
 _CENTRED = 0.01
+#: Rows of a cycle behind an estimate of how its noise depends from row to row; chosen: fewer resolve no correlation.
+_FEWEST_ROWS = 32
 #: Share of a cycle by which a record may go on after its last whole one and still count as whole: rounding.
 _WHOLE = 1e-6
 
@@ -73,6 +76,7 @@ class Drive:
         notes: sentences on what of the record was left out, and on a time that does not go with its rows.
         outliers: by column, rows of the loop that are faults of the record, and how far they lie off [noise].
         first_row: row of the whole record that the loop begins with.
+        row_noise: how the noise of a row depends on that of the rows before.
     """
 
     loop: Loop
@@ -89,6 +93,7 @@ class Drive:
     notes: tuple[str, ...] = ()
     outliers: Mapping[str, OutlierRows] = field(default_factory=dict)
     first_row: int = 0
+    row_noise: RowNoise = field(default_factory=RowNoise)
     # by length of a response: the samples before and after each row, and the part of the way between
     _places: dict[int, tuple[Array, Array, Array]] = field(default_factory=dict, init=False, repr=False)
 
@@ -96,6 +101,15 @@ class Drive:
     def amplitude(self) -> float:
         """Zero-to-peak displacement [m or rad]."""
         return float(self.history(settles=False).amplitude[0])
+
+    @property
+    def correlated(self) -> str:
+        """Over how many rows the noise of the force is correlated, as the end of a sentence; "" where it is not."""
+        if not self.row_noise.order:
+            return ""
+        time = self.row_noise.rows_as_one * float(np.median(np.diff(self.phase))) / self.frequency
+        rows = time * self.loop.time.size * self.frequency / self.cycles
+        return f", correlated over about {number(rows, 2)} rows ({number(time, 2)} s)"
 
     def displacement(self, phase: Array) -> Array:
         """The motion at any phase [cycles], noise removed [m or rad], (n,)."""
@@ -188,6 +202,7 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
         outliers=found.outliers,
         first_row=first_row,
     )
+    drive = _with_row_noise(drive, found)
     drive = replace(drive, weight=np.where(_at_reversal(drive), 0.0, drive.weight))
     _check_loses_energy(drive)
     if from_rest and not rests[0]:
@@ -224,7 +239,8 @@ def _check_no_hole(loop: Loop, clock: Array, frequency: float) -> None:
 def _check_loses_energy(drive: Drive) -> None:
     """Refuse a force that lags behind the displacement, beyond noise and what the delay of a rig makes."""
     stiffness = drive.first_harmonic()
-    chance = drive.noise * np.sqrt(2.0 / drive.weight.sum()) / abs(drive.coefficients[1])
+    rows = drive.weight.sum() / drive.row_noise.rows_as_one
+    chance = drive.noise * np.sqrt(2.0 / rows) / abs(drive.coefficients[1])
     if stiffness.imag < -max(_CERTAIN * chance, _NO_LOSS * abs(stiffness)):
         raise FitError(
             "the loop gives energy, which no bushing does",
@@ -234,6 +250,41 @@ def _check_loses_energy(drive: Drive) -> None:
             hint="are the columns of displacement and force swapped, or do the rows run backwards in time? Name the "
             'columns in the campaign: columns = { displacement = "...", force = "..." }',
         )
+
+
+def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
+    """The loop with the noise of its rows, or bins, estimated from whole cycles, but the first where it began at rest.
+
+    Where that leaves no cycle, or no noise above that of any rig, rows count as independent.
+    """
+    binned = drive.force.size < drive.loop.force.size
+    turn = drive.phase.astype(np.intp)
+    turns = np.unique(turn)
+    first, whole = int(drive.from_rest), int(drive.cycles + _WHOLE)
+    rows = (turn >= first) & (turn < whole)
+    cycles = int(np.count_nonzero((turns >= first) & (turns < whole)))
+    if not cycles or np.count_nonzero(rows) < _FEWEST_ROWS * cycles:
+        return drive
+    phase, weight = drive.phase[rows], np.sqrt(drive.weight[rows])
+    harmonics = found.force
+    if drive.from_rest:
+        columns = basis(phase, harmonics.size - 1)
+        harmonics = as_complex(least_squares(columns * weight[:, None], drive.force[rows] * weight))
+    if cycles == 1:
+        harmonics = np.where(of_a_lone_cycle(np.arange(harmonics.size)), 0.0, harmonics)
+    off = drive.force[rows] - series(harmonics, phase)
+    if np.std(off) < FLOOR * drive.half_range:
+        return drive
+    if not weight.all():
+        off = np.interp(phase, phase[weight > 0.0], off[weight > 0.0])
+    scale = np.sqrt(drive.weight[rows]) if binned else 1.0
+    model, size = row_noise(off * scale, less_slow(phase, off)[0] * scale, cycles)
+    if binned:
+        return replace(drive, row_noise=replace(model, size=max(size / found.force_noise, 1.0)))
+    if not model.order:
+        return drive
+    noise = drive.noise if drive.loop.noise is not None else max(size, FLOOR * drive.half_range)
+    return replace(drive, noise=noise, row_noise=model)
 
 
 def _without(values: Array, rows: Array) -> Array:

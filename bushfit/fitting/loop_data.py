@@ -9,13 +9,13 @@ from typing import Any, Self
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Values
+from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.effects.history import History
 from bushfit.fitting.data_set import DataSet, Suspect, kept
 from bushfit.fitting.drive import Drive
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
-from bushfit.model.sensitivity import force_jacobian
+from bushfit.model.sensitivity import force_jacobian, stiffness_jacobian
 from bushfit.reading.measurement import Loop
 
 #: Harmonics of a loop that count as smooth misfit: beyond the fifth, physics makes next to nothing.
@@ -27,11 +27,17 @@ class LoopData(DataSet):
     """Force over the rows of a loop; see `DataSet` for its answers.
 
     Rows that are left out carry no weight from the start, see `drive_of`, and stay: the others need them to keep time.
+
+    Args:
+        fundamental_only: whether all but the first harmonic of its residuals is left out, so that it counts as one
+            operating point: of an addition without a law in time nothing else is known.
     """
 
     drive: Drive
+    under: Circumstances = UNKNOWN
+    fundamental_only: bool = False
     kind = "loop"
-    parts = 1
+    components = ("force",)
 
     @property
     def size(self) -> int:
@@ -39,7 +45,11 @@ class LoopData(DataSet):
 
     @cached_property
     def counted(self) -> int:
-        return int(np.count_nonzero(self.drive.weight))
+        return 2 if self.fundamental_only else self._rows
+
+    @property
+    def independent(self) -> float:
+        return self.counted / (1.0 if self.fundamental_only else self.drive.row_noise.rows_as_one)
 
     @property
     def test(self) -> Loop:
@@ -57,6 +67,10 @@ class LoopData(DataSet):
     def amplitude(self) -> Array:
         return np.array([self.drive.amplitude])
 
+    @property
+    def circumstances(self) -> Circumstances:
+        return self.under
+
     @cached_property
     def measured(self) -> Array:
         return np.array([self.drive.first_harmonic()])
@@ -68,16 +82,31 @@ class LoopData(DataSet):
     @kept
     def force(self, model: Model, values: Values | None = None) -> Array:
         """Model force at the rows [N or N m], (..., n)."""
-        force = model.force(self.direction, self._history(model), kind="loop", values=values)
+        force = model.force(self.direction, self._history(model), kind="loop", values=values, under=self.under)
         return self.drive.at_rows(self.drive.from_datum(force)) + (self.drive.datum or 0.0)
 
     def residual(self, model: Model, values: Values | None = None) -> Array:
-        return (self.force(model, values) - self.drive.force) * self._per_noise
+        return self._whitened((self.force(model, values) - self.drive.force) * self._per_noise)
 
     @kept
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        slopes = force_jacobian(model, self.direction, self._history(model), names)
-        return self.drive.at_rows(self.drive.from_datum(slopes)) * self._per_noise
+        slopes = force_jacobian(model, self.direction, self._history(model), names, self.under)
+        return self._whitened(self.drive.at_rows(self.drive.from_datum(slopes)) * self._per_noise)
+
+    def moved(self, change: Array, model: Model, beside: Array | float = 0.0) -> Array:
+        wave = self.drive.coefficients[1] * np.exp(2j * np.pi * self.drive.phase)
+        return self._whitened(np.real(change * wave) * self._per_noise)
+
+    def residual_with(self, added: Array, model: Model) -> Array:
+        return self.residual(model) + self.moved(added, model)
+
+    def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
+        slopes = self.jacobian(model, names)
+        if as_share:
+            test = self.direction, self.frequency, self.amplitude
+            share = added / model.stiffness(*test, kind="loop", under=self.under)
+            slopes = slopes + self.moved(share * stiffness_jacobian(model, *test, names, "loop", self.under), model)
+        return slopes
 
     def _history(self, model: Model) -> History:
         return self.drive.history(any(effect.settles for effect in model.records))
@@ -85,6 +114,9 @@ class LoopData(DataSet):
     def noise_free(self, model: Model) -> Self:
         force = self.force(model)
         return replace(self, drive=replace(self.drive, force=force, half_range=float(np.ptp(force)) / 2.0))
+
+    def timeless(self) -> Self:
+        return replace(self, fundamental_only=True)
 
     def with_noise(self, relative: float) -> Self:
         """The same loop with another standard deviation of one row, relative to half the force range."""
@@ -97,11 +129,14 @@ class LoopData(DataSet):
         return ((self.force(model) - self.drive.force) / self.drive.half_range)[self.drive.weight > 0.0]
 
     def distance(self, model: Model) -> Array:
-        return np.abs(self.residual(model))
+        return np.abs(self.misfit(model))
+
+    def misfit(self, model: Model) -> Array:
+        return (self.force(model) - self.drive.force) * self._per_noise
 
     def shown(self, model: Model) -> Array:
         off = (self.force(model) - self.drive.force) / self.drive.noise
-        return np.where(self.drive.weight > 0.0, self.residual(model), off)
+        return np.where(self.drive.weight > 0.0, self.misfit(model), off)
 
     def weighted(self, weight: Array) -> Self:
         return replace(self, drive=replace(self.drive, weight=self.drive.weight * weight))
@@ -118,26 +153,24 @@ class LoopData(DataSet):
                 yield Outlier(self.name, file, row + before + 1, column, off)
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
-        return {} if self.test.noise is not None else {self.name: np.sqrt(2.0 / self.counted) * influence}
+        by_noise = self.drive.row_noise.unsure(influence)
+        if not by_noise and self.test.noise is None:
+            by_noise = [np.sqrt(2.0 / self._rows) * influence]
+        return {(self.name, which): part for which, part in enumerate(by_noise)}
 
     def contrasts(self) -> Array:
         """A constant force, and the cosine and sine of each harmonic, as whitened residuals, (11, n)."""
-        scale = self._per_noise * self.drive.half_range
-        angle = 2.0 * np.pi * self.drive.phase
-        waves = [wave(order * angle) for order in range(1, _SMOOTH_HARMONICS + 1) for wave in (np.cos, np.sin)]
-        return scale * np.array([np.ones_like(angle), *waves])
+        return self._whitened(self._waves * (self._per_noise * self.drive.half_range))
 
     def smooth_misfit(self, model: Model) -> float:
-        columns = self.contrasts()
-        fitted = np.linalg.lstsq(columns.T, self.residual(model), rcond=None)[0] @ columns
-        weighty = self.drive.weight > 0.0
-        scale = self.drive.noise / (self.drive.half_range * np.sqrt(self.drive.weight[weighty]))
-        return float(np.abs(fitted[weighty] * scale).max())
+        sizes = np.linalg.lstsq(self.contrasts().T, self.residual(model), rcond=None)[0]
+        return float(np.abs(sizes @ self._waves[:, self.drive.weight > 0.0]).max())
 
-    def suspects(self, residual: Array) -> Iterator[Suspect]:
+    def suspects(self) -> Iterator[Suspect]:
         """The loop as a whole, wrong in gain or offset."""
-        columns = [self.drive.force * self._per_noise, self.drive.half_range * self._per_noise]
+        wrong = np.stack((self.drive.force, np.full(self.size, self.drive.half_range)))
         ends = (self.drive.frequency,) * 2, (self.drive.amplitude,) * 2
+        columns = list(self._whitened(wrong * self._per_noise))
         yield Suspect(f"the loop {self.name}", "loop", columns, self.direction, *ends)
 
     def columns(self) -> dict[str, Any]:
@@ -148,9 +181,33 @@ class LoopData(DataSet):
             f"amplitude [{unit}]": self.drive.amplitude * factor,
         }
 
-    def components(self, residual: Array) -> dict[str, Array]:
-        return {"force": residual}
+    @cached_property
+    def _waves(self) -> Array:
+        """1, and the cosine and sine of each harmonic that counts as smooth, (11, n)."""
+        angle = 2.0 * np.pi * self.drive.phase
+        waves = [wave(order * angle) for order in range(1, _SMOOTH_HARMONICS + 1) for wave in (np.cos, np.sin)]
+        return np.array([np.ones_like(angle), *waves])
+
+    def _whitened(self, rows: Array) -> Array:
+        """Rows in units of noise, (..., n), as independent numbers, 0 where one is told from a row left out."""
+        white = self.drive.row_noise.whiten(rows) * self._told
+        return white @ self._fundamental @ self._fundamental.T if self.fundamental_only else white
+
+    @cached_property
+    def _fundamental(self) -> Array:
+        """Orthonormal basis of the residuals that a first harmonic makes, (n, 2)."""
+        waves = self.drive.row_noise.whiten(self._waves[1:3] * self._per_noise) * self._told
+        return np.linalg.qr(waves.T)[0]
+
+    @cached_property
+    def _rows(self) -> int:
+        """Rows that carry weight, as far as they tell one from another."""
+        return round(self.drive.row_noise.share * np.count_nonzero(self._told))
+
+    @cached_property
+    def _told(self) -> Array:
+        return self.drive.row_noise.told(self.drive.weight)
 
     @cached_property
     def _per_noise(self) -> Array:
-        return np.sqrt(self.drive.weight) / self.drive.noise
+        return np.sqrt(self.drive.weight) / (self.drive.noise * self.drive.row_noise.size)

@@ -66,15 +66,20 @@ class LoopHarmonics(NamedTuple):
 
     Args:
         motion: complex harmonics of the displacement that rise above its noise, mean first.
-        force_mean: mean of the force [N or N m].
+        force: complex harmonics of the force, mean first [N or N m].
         force_noise: standard deviation of one row's force [N or N m].
         outliers: of the columns displacement and force.
     """
 
     motion: Array
-    force_mean: float
+    force: Array
     force_noise: float
     outliers: Mapping[str, OutlierRows]
+
+    @property
+    def force_mean(self) -> float:
+        """Mean of the force [N or N m]."""
+        return float(self.force[0].real)
 
 
 def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics:
@@ -106,8 +111,9 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
     triangle = _triangle(coefficients[0], coefficients[1])
     alike = _is_triangle(triangle, coefficients, motion_noise, phase[of_motion], values[of_motion, 0])
     motion = triangle if alike else _significant(coefficients, motion_noise, phase.size)
-    force_noise = _scatter(phase[of_force], left[of_force, 1], freedom[1])
-    return LoopHarmonics(motion, float(solution[0, 1]), force_noise, outliers)
+    settled, unknowns = less_slow(phase[of_force], left[of_force, 1])
+    force_noise = float(np.sqrt(np.sum(np.square(settled)) / max(freedom[1] - unknowns, 1)))
+    return LoopHarmonics(motion, as_complex(solution[:, 1]), force_noise, outliers)
 
 
 def _significant(coefficients: Array, noise: float, rows: int) -> Array:
@@ -132,18 +138,18 @@ def _triangle(mean: complex, fundamental: complex) -> Array:
     return coefficients
 
 
-def _scatter(phase: Array, residual: Array, freedom: int) -> float:
-    """Standard deviation of the force's residuals less the slow part of each cycle's own."""
+def less_slow(phase: Array, residual: Array) -> tuple[Array, int]:
+    """Residuals of the force less the slow part of each cycle's own, (n,), and how many unknowns that took."""
     number = np.floor(phase).astype(np.intp)
-    unknowns = 2 * _SLOW_HARMONICS + 1
+    size, unknowns = 2 * _SLOW_HARMONICS + 1, 0
     left = residual.copy()
     for cycle in np.unique(number):
         rows = np.flatnonzero(number == cycle)
-        if rows.size > _ROWS_PER_UNKNOWN * unknowns:
+        if rows.size > _ROWS_PER_UNKNOWN * size:
             slow = basis(phase[rows], _SLOW_HARMONICS)
             left[rows] -= slow @ np.linalg.lstsq(slow, left[rows], rcond=None)[0]
-            freedom -= unknowns
-    return float(np.sqrt(np.sum(np.square(left)) / max(freedom, 1)))
+            unknowns += size
+    return left, unknowns
 
 
 def residual_limit(solution: Array, residual: Array, rows: int) -> float:

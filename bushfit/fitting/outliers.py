@@ -122,7 +122,8 @@ def outlying_points(
     """Points that lie farther off the model than noise reaches, and as far off their neighbours, by number, (k,).
 
     A point that was repeated must stand out from its repeats as well: what all of them do is no fault of one row.
-    Where two repeats or more agree against it that is enough, so that outliers side by side do not hide each other.
+    Where two repeats or more agree against it that is enough, so that neither outliers side by side nor a misfit of
+    the model hide it; of those repeats, the one farthest out need not be far off the model.
 
     Args:
         deviation: of each point from the model, gain and phase, complex (n,).
@@ -132,17 +133,22 @@ def outlying_points(
         freedom: degrees of freedom behind the noise; inf where it is known.
     """
     distance = apart(deviation)
-    limit = outlier_limit(deviation.size, 2, freedom) * misfit_scale(distance, 2)
+    by_noise = outlier_limit(deviation.size, 2, freedom)
+    limit = by_noise * misfit_scale(distance, 2)
     far = distance > limit
-    if not far.any():
-        return np.flatnonzero(far)
     local = _from_neighbours(deviation, starts, _NEAR_NEIGHBOURS)
-    repeats, beside = _from_repeats(local, points)
+    _, place = np.unique(points, axis=1, return_inverse=True)
+    repeats, beside = _from_repeats(local, place)
     alone = np.minimum(apart(local, shared=False), np.where(repeats > 0, apart(beside, shared=False), np.inf))
-    against = _from_neighbours(_from_repeats(deviation, points)[1], starts, NEIGHBOURS)
+    against = _from_neighbours(_from_repeats(deviation, place)[1], starts, NEIGHBOURS)
     # the median of n repeats has pi/(2 n) of the variance of one
     agreed = apart(against, shared=False) / np.sqrt(1.0 + np.pi / 2.0 / np.maximum(repeats, 1))
-    return np.flatnonzero(far & (np.where(repeats > 1, agreed, alone) > limit))
+    farthest = np.zeros(place.max() + 1)
+    np.maximum.at(farthest, place, agreed)
+    apart_from_repeats = agreed > by_noise * misfit_scale(agreed[repeats > 1], 2)
+    return np.flatnonzero(
+        np.where(repeats > 1, apart_from_repeats & (far | (agreed == farthest[place])), far & (alone > limit))
+    )
 
 
 def misfit_scale(distance: Array, parts: int) -> float:
@@ -162,10 +168,12 @@ def _from_neighbours(values: Array, starts: Array, window: int) -> Array:
     return local
 
 
-def _from_repeats(values: Array, points: Array) -> tuple[Array, Array]:
-    """How many other repeats each point has, (n,), and its distance from their median, 0 without any, complex (n,)."""
+def _from_repeats(values: Array, place: Array) -> tuple[Array, Array]:
+    """How many other repeats each point has, (n,), and its distance from their median, 0 without any, complex (n,).
+
+    Points of one `place`, (n,), are repeats.
+    """
     repeats, distance = np.zeros(values.size, dtype=int), np.zeros_like(values)
-    _, place = np.unique(points, axis=1, return_inverse=True)
     for row, same in enumerate(place == place[:, None]):
         same[row] = False
         repeats[row] = np.count_nonzero(same)

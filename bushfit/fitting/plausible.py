@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bushfit.effects import temperature
 from bushfit.fitting.assess import lack_of_fit, quality
 from bushfit.fitting.data_sets import DataSet
 from bushfit.geometry import Bushing, stiffness_per_modulus
 from bushfit.model.model import Model
-from bushfit.units import modulus, number
+from bushfit.units import CELSIUS, modulus, number
 
 #: Least shear modulus of a rubber [Pa]: that of the softest gel of a mount, with room.
 _SOFTEST = 5e4
@@ -38,17 +39,24 @@ def implausible(bushing: Bushing | None, data_sets: Sequence[DataSet]) -> list[s
     return [] if _SOFTEST < moduli[hardest] < _HARDEST else [said]
 
 
-def apart_in_temperature(data_sets: Sequence[DataSet]) -> list[str]:
+def apart_in_temperature(model: Model, data_sets: Sequence[DataSet]) -> list[str]:
     """A sentence on tests whose temperatures, where they are known, lie too far apart for one model."""
-    sources = [(data_set.name, data_set.source.conditions) for data_set in data_sets if data_set.source]
-    known = sorted((float(told["temperature_degC"]), name) for name, told in sources if "temperature_degC" in told)
-    if not known or known[-1][0] - known[0][0] <= _ONE_TEMPERATURE:
+    degrees = [(data_set.name, data_set.test.temperature) for data_set in data_sets]
+    known = sorted((float(np.mean(kelvin)) - CELSIUS, name) for name, kelvin in degrees if kelvin is not None)
+    if not known:
         return []
     (low, coldest), (high, warmest) = known[0], known[-1]
+    tested = f"{warmest} was tested at {number(high, 3)} degC and {coldest} at {number(low, 3)} degC"
+    if temperature.EFFECT.name in model.effects:
+        reference = temperature.REFERENCE - CELSIUS
+        beyond = max(high - reference, reference - low) > temperature.REACH
+        law = f"the effect of temperature holds within {temperature.REACH:g} K of {number(reference, 3)} degC"
+        return [f"{tested}: {law}, beyond which a rubber keeps no single alpha"] if beyond else []
+    if high - low <= _ONE_TEMPERATURE:
+        return []
     return [
-        f"{warmest} was tested at {number(high, 3)} degC and {coldest} at {number(low, 3)} degC, "
-        f"{number(high - low, 3)} degC apart: the model knows no temperature, and an effect that is named may be that "
-        "of temperature; fit the tests of each temperature by themselves"
+        f"{tested}, {number(high - low, 3)} degC apart: this model has no effect of temperature, and another that is "
+        "named may be one; fit the tests of each temperature by themselves, or with --effect temperature"
     ]
 
 

@@ -13,8 +13,10 @@ from bushfit.errors import FitError
 from bushfit.fitting.agreement import misfits, usable
 from bushfit.fitting.assess import Stage, covariance, lack_of_fit, measured_range, misfit, quality
 from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import DataSet, parted, sources
+from bushfit.fitting.data_sets import DataSet, parted, sources, with_level_errors
 from bushfit.fitting.identify import left_open
+from bushfit.fitting.levels import largest_level_error, level_errors
+from bushfit.fitting.noise import words_of
 from bushfit.fitting.plausible import apart_in_temperature, implausible, unfitted
 from bushfit.fitting.profile import profile95
 from bushfit.fitting.robust import Estimate, estimate, told
@@ -28,6 +30,8 @@ from bushfit.units import number
 STATIC = ("mu", "sigma_fmax", "eps_half")
 DYNAMIC = ("m", "alpha")
 
+#: Share of the largest error of a level from which on a fit takes it for a gap of the model: rounding aside, all.
+_AT_LIMIT = 0.99
 #: Passes of the two-step procedure agree when no parameter moves by more than this, relative.
 _AGREED = 1e-5
 _MOST_PASSES = 50
@@ -39,6 +43,8 @@ _TYPICAL_SPRINGPOT = (0.18, 0.24)
 _STOPPED = "the fit was stopped after {} evaluations of the model, where {}"
 _FLAT = "chi-square is flat: parameters that stay open could move on, for next to nothing"
 _SLOPE = "it had not come to its end: the parameters are not the best ones"
+#: What is said of levels that disagree by more than their repeats do.
+_LEVELS = "levels disagree by more than their repeats do: an error of {} of each counts as noise"
 #: What to do about a model that does not fit.
 _NEXT = "; bushfit diagnose looks for what is missing"
 
@@ -73,9 +79,18 @@ def fit_joint(
         if effect.corrects:
             place_named(effect.corrects, data.campaign.specimens)
     data_sets = data.chosen(directions)
-    found = _solve(data, data_sets, data.effects if effects is None else effects, {})
     left: list[DataSet] = [data_set for data_set in (*data.loops, *data.sweeps) if data_set not in data_sets]
-    result = _result(data, [found], notes=unfitted(found.solution.model, left, _NEXT), left=left)
+    effects = data.effects if effects is None else effects
+    found = _solve(data, data_sets, effects, {})
+    most = largest_level_error(data.campaign.rig)
+    errors = level_errors(found.minimised, found.solution.residual, found.solution.jacobian, most)
+    at_limit = any(error >= _AT_LIMIT * limit for error, limit in zip(errors.error, most, strict=True))
+    if errors.freedom and any(errors.error) and not at_limit:  # an error that would have to be larger is a gap
+        loops, sweeps = parted(data_sets)
+        data_sets = [*loops, *with_level_errors(sweeps, errors.error, errors.freedom)]
+        found = _solve(data, data_sets, effects, {}, found.solution.model)
+    notes = [_LEVELS.format(words_of(errors.error))] if errors.matters and not at_limit else []
+    result = _result(data, [found], notes=[*notes, *unfitted(found.solution.model, left, _NEXT)], left=left)
     result = replace(result, usable=usable(found.solution, found.minimised, left))
     if profile is None:
         return result
@@ -124,17 +139,16 @@ def fit_two_step(data: Data) -> TwoStep:
         FitError: a test is missing, or the passes do not settle.
     """
     loops, sweep = data.static_loops(), data.smallest_sweep
-    springpot: dict[str, float] = {}
-    passes: list[Mapping[str, float]] = []
-    asked: list[Array] = []
-    answered: list[Array] = []
+    springpot, passes = dict[str, float](), list[Mapping[str, float]]()
+    asked, answered = list[Array](), list[Array]()
     for _ in range(_MOST_PASSES):
         static = _solve(data, loops, BASE if springpot else ("elastic", "friction"), springpot)
         found = static.solution.model.values
         dynamic = _solve(data, [sweep], BASE, {name: found[name] for name in STATIC})
         model = dynamic.solution.model
+        before = passes[-1] if passes else {}
         passes.append(dict(model.values))
-        if len(passes) > 1 and _agree(passes[-2], passes[-1]):
+        if all(abs(before.get(name, np.inf) - value) <= _AGREED * abs(value) for name, value in passes[-1].items()):
             return TwoStep(tuple(passes), _result(data, [static, dynamic]))
         coordinates = Coordinates.of(model, DYNAMIC)
         if springpot:
@@ -164,10 +178,6 @@ def _anderson(asked: Sequence[Array], answered: Sequence[Array]) -> Array:
     return images[-1] + weight * (images[-1] - images[-2])
 
 
-def _agree(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
-    return all(abs(other[name] - one[name]) <= _AGREED * abs(other[name]) for name in other)
-
-
 def _springpot(data: Data, springpot: Result | None) -> tuple[dict[str, float], Covariance | None]:
     if springpot is not None:
         return {name: springpot.model.values[name] for name in DYNAMIC}, springpot.covariance.restricted(DYNAMIC)
@@ -193,9 +203,15 @@ def _without_springpot(data: Data, solution: Solution, data_sets: Sequence[DataS
     )
 
 
-def _solve(data: Data, data_sets: Sequence[DataSet], effects: Sequence[str], held: Mapping[str, float]) -> Estimate:
-    """Fit what the campaign leaves free of a model, from start values taken from the data."""
-    model = Model.started(data.campaign.bushing, effects, data.start(data_sets, held))
+def _solve(
+    data: Data,
+    data_sets: Sequence[DataSet],
+    effects: Sequence[str],
+    held: Mapping[str, float],
+    model: Model | None = None,
+) -> Estimate:
+    """Fit what the campaign leaves free of a model, from its values or else from start values taken from the data."""
+    model = model or Model.started(data.campaign.bushing, effects, data.start(data_sets, held))
     names = [name for name in data.free(tuple(model.parameters)) if name not in held]
     return estimate(model, data_sets, names, data.bounds, robust=data.robust)
 
@@ -213,7 +229,7 @@ def _result(
     fitted = tuple(name for stage in stages for name in stage.names)
     cov = covariance(model, stages, held) if stages else held or Covariance()
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
-    of_tests = (*implausible(data.campaign.bushing, data_sets), *apart_in_temperature(data_sets))
+    of_tests = (*implausible(data.campaign.bushing, data_sets), *apart_in_temperature(model, data_sets))
     doubts = [*of_tests, *_assumed(data_sets)]
     odd = [note for step in steps for note in cautions(model, step.solution, step.data_sets, data.bounds, cov, _NEXT)]
     return Result(

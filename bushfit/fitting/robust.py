@@ -86,10 +86,7 @@ def estimate(
         moved = (solution.coordinates.point(solution.model.values) - before) @ solution.jacobian
         model = solution.model
         if float(moved @ moved) < _SETTLED**2:
-            weighed = tuple(
-                data_set.weighted(np.full(data_set.size // data_set.parts, _efficiency(data_set.parts)))
-                for data_set in kept
-            )
+            weighed = tuple(data_set.weighted(np.array(_efficiency(data_set.parts))) for data_set in kept)
             return Estimate(solution, kept, softened, weighed, outliers_at(model, kept, outlying))
     raise FitError(
         "the robust fit does not settle",

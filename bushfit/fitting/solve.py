@@ -179,11 +179,14 @@ def _fitted(
     ends = list(zip(low.tolist(), high.tolist(), strict=True))
 
     @lru_cache(maxsize=2)  # data sets know again the model they answered last: the best so far, and the one tried
-    def model_at(point: tuple[float, ...]) -> Model:
+    def model_of(point: tuple[float, ...]) -> Model:
         return model.with_values(coordinates.values(point))
 
+    def model_at(parameters: lmfit.Parameters) -> Model:
+        return model_of(tuple(parameter.value for parameter in parameters.values()))
+
     def misfit(parameters: lmfit.Parameters) -> Array:
-        return residual(model_at(_point(parameters)), data_sets)
+        return residual(model_at(parameters), data_sets)
 
     def misfit_inside(parameters: lmfit.Parameters) -> Array:
         if not all(low <= u.value <= high for u, (low, high) in zip(parameters.values(), ends, strict=True)):
@@ -191,7 +194,7 @@ def _fitted(
         return misfit(parameters)
 
     def slopes(parameters: lmfit.Parameters) -> Array:
-        return jacobian(model_at(_point(parameters)), data_sets, names)
+        return jacobian(model_at(parameters), data_sets, names)
 
     fit = None
     if set(model.effects) <= set(BASE):
@@ -201,14 +204,10 @@ def _fitted(
     if fit is None or fit.aborted:
         by_row = {"jac": lambda parameters: slopes(parameters).T, "x_scale": "jac", "gtol": None}
         fit = lmfit.minimize(misfit, _lmfit_parameters(start, low, high), "least_squares", **by_row, **limits)
-    end = _point(fit.params)
-    best, met = model_at(end), at_bound(names, np.array(end), low, high)
+    end = np.array([parameter.value for parameter in fit.params.values()])
+    best, met = model_at(fit.params), at_bound(names, end, low, high)
     left, slope = residual(best, data_sets), jacobian(best, data_sets, names)
     return Solution(best, coordinates, left, slope, int(fit.nfev), met, bool(fit.aborted))
-
-
-def _point(parameters: lmfit.Parameters) -> tuple[float, ...]:
-    return tuple(parameter.value for parameter in parameters.values())
 
 
 def starting_point(

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from bushfit.campaign.schema import Residuals
-from bushfit.effects.contract import Array, Values
+from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.fitting.data_set import DataSet, Freedoms, Suspect, kept, shown_amplitude
 from bushfit.fitting.noise import FLOOR, SweepNoise, unit
 from bushfit.fitting.outliers import outlying_points
@@ -25,10 +25,6 @@ from bushfit.reading.measurement import Stepped, Sweep
 
 #: Degree, in the logarithm of what is stepped, of the Legendre polynomials that count as smooth misfit.
 _SMOOTH_DEGREE = 3
-#: A single point is a suspect beyond so many standard deviations: noise makes one in 16,000.
-_FAR = 4.0
-#: Single points of a sweep that are suspects at most, the farthest first: more are no single faults.
-_MOST_ROWS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,11 +70,12 @@ class SweepData(DataSet):
     """Dynamic stiffness of a sweep, as relative complex residual or as magnitude and loss factor; see `DataSet`.
 
     Points stand sorted by run (what it holds, repeat), then step; a run is a block. The residual
-    (K - K_meas)/K_meas has the gain error in its real and the phase error in its imaginary part.
+    ln K/K_meas has the gain error in its real and the phase error in its imaginary part.
 
     Args:
         weight: share of its weight that each point has, (n,) in `order`; all for None.
         part: rows of the sweep that belong to it, (n,) in `order`; all for None.
+        under: what its rows were measured under, (rows,) each.
     """
 
     sweep: Sweep
@@ -86,8 +83,9 @@ class SweepData(DataSet):
     residuals: Residuals = "complex"
     weight: Array | None = None
     part: Array | None = None
+    under: Circumstances = UNKNOWN
     kind = "sweep"
-    parts = 2
+    components = ("storage", "loss")
 
     @property
     def test(self) -> Sweep:
@@ -107,13 +105,20 @@ class SweepData(DataSet):
 
     @property
     def freedoms(self) -> Freedoms:
-        return Freedoms(id(self.noise), self.noise.freedom, self.noise.scatter_freedom)
+        return Freedoms(id(self.noise), self.noise.freedom, self.noise.scatter_freedom, self.noise.level_freedom)
 
     @property
     def blocks(self) -> list[Array]:
+        return self._rows_from(self.block_starts)
+
+    @property
+    def levels(self) -> list[Array]:
+        return self._rows_from(self._line_starts) if any(self.noise.level) else []
+
+    def _rows_from(self, starts: Array) -> list[Array]:
+        """Indices of the residuals of stretches of points that begin there, gains, then phases."""
         count = self.frequency.size
-        edges = [*self.block_starts.tolist(), count]
-        return [part + np.arange(first, last) for part in (0, count) for first, last in pairwise(edges)]
+        return [part + np.arange(first, last) for part in (0, count) for first, last in pairwise([*starts, count])]
 
     def at_amplitudes(self, amplitudes: Sequence[float] | Array) -> Self:
         """The part of the sweep at some of its levels, with the same noise."""
@@ -152,6 +157,10 @@ class SweepData(DataSet):
         return self.sweep.amplitude[self.order]
 
     @cached_property
+    def circumstances(self) -> Circumstances:
+        return self.under.at(self.order)
+
+    @cached_property
     def held(self) -> Array:
         """What each point's run holds, (n,): amplitude [m or rad] or frequency [Hz], or else the number of the run."""
         return self.sweep.held[self.order]
@@ -175,11 +184,25 @@ class SweepData(DataSet):
         label = np.stack((self.held, self.repeat.astype(float)))
         return np.concatenate(([0], 1 + np.flatnonzero(np.any(np.diff(label), axis=0))))
 
+    @cached_property
+    def _line_starts(self) -> Array:
+        """Index of the first point of each line."""
+        return np.concatenate(([0], 1 + np.flatnonzero(np.diff(self.held))))
+
     @kept
     def stiffness(self, model: Model, values: Values | None = None) -> Array:
         """Model stiffness at the points, (..., n); what repeats is computed once."""
+        frequency, amplitude, under, place = self._asked(model)
+        return model.stiffness(self.direction, frequency, amplitude, values=values, under=under)[..., place]
+
+    def _asked(self, model: Model) -> tuple[Array, Array, Circumstances, Array | slice]:
+        """Frequency, reached amplitude and circumstances that a model is asked at, and the place of each point there:
+        the distinct points, or all of them where the model depends on when each was measured."""
+        if model.knows_circumstances:
+            reached = self.sweep.amplitude_reached[self.order]
+            return self.frequency, reached, self.circumstances, slice(None)
         frequency, amplitude, place = self._distinct
-        return model.stiffness(self.direction, frequency, amplitude, values=values)[..., place]
+        return frequency, amplitude, UNKNOWN, place
 
     @cached_property
     def _distinct(self) -> tuple[Array, Array, Array]:
@@ -209,9 +232,12 @@ class SweepData(DataSet):
 
     def deviation(self, model: Model, values: Values | None = None) -> Array:
         """Residual before whitening: gain in the real, phase (or loss factor) in the imaginary part, (..., n)."""
-        stiffness = self.stiffness(model, values)
+        return self._off(self.stiffness(model, values))
+
+    def _off(self, stiffness: Array) -> Array:
+        """The deviation of a stiffness at the points, (..., n)."""
         if self.residuals == "complex":
-            return stiffness / self.measured - 1.0
+            return np.log(stiffness / self.measured)
         gain = np.abs(stiffness / self.measured) - 1.0
         loss = stiffness.imag / stiffness.real - self.measured.imag / self.measured.real
         return gain + 1j * loss * self._loss_scale
@@ -222,12 +248,25 @@ class SweepData(DataSet):
 
     @kept
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        frequency, amplitude, place = self._distinct
-        slopes = stiffness_jacobian(model, self.direction, frequency, amplitude, names)[:, place]
+        return self.moved(self._slopes(model, names), model)
+
+    def _slopes(self, model: Model, names: Sequence[str]) -> Array:
+        """Derivatives of the stiffness at the points by fit coordinate, (len(names), n)."""
+        frequency, amplitude, under, place = self._asked(model)
+        return stiffness_jacobian(model, self.direction, frequency, amplitude, names, under=under)[:, place]
+
+    def residual_with(self, added: Array, model: Model) -> Array:
+        return self.whiten(self._off(self.stiffness(model) + added))
+
+    def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
+        grown = 1.0 + added / self.stiffness(model) if as_share else 1.0
+        return self.moved(grown * self._slopes(model, names), model, added)
+
+    def moved(self, change: Array, model: Model, beside: Array | float = 0.0) -> Array:
+        stiffness = self.stiffness(model) + beside
+        relative = change / stiffness
         if self.residuals == "complex":
-            return self.whiten(slopes / self.measured)
-        stiffness = self.stiffness(model)
-        relative = slopes / stiffness
+            return self.whiten(relative)
         gain = np.abs(stiffness / self.measured) * relative.real
         loss = relative.imag * (np.abs(stiffness) / stiffness.real) ** 2
         return self.whiten(gain + 1j * loss * self._loss_scale)
@@ -246,12 +285,10 @@ class SweepData(DataSet):
 
     @cached_property
     def _whitening(self) -> Whitening:
-        counts = np.diff(self.block_starts, append=self.frequency.size)
-        lines = [self.noise.random[self.name, float(held)] for held in self.held[self.block_starts]]
-        random = np.repeat(np.array(lines).T, counts, axis=1)
+        random = self.noise.scatter(self.name, self.held, self.step)
         if self.sweep.relative_error is not None and self.sweep.noise is None:
             random = np.maximum(np.tile(self.sweep.relative_error[self.order], (2, 1)), FLOOR)
-        return Whitening(self.block_starts, random, self.noise, self.weights)
+        return Whitening(self.block_starts, self._line_starts, random, self.noise, self.weights)
 
     @cached_property
     def weights(self) -> Array:
@@ -279,22 +316,22 @@ class SweepData(DataSet):
             mean = np.bincount(place, ratio[chosen].real) + 1j * np.bincount(place, ratio[chosen].imag)
             of_one = np.square(self.noise.random[self.name, float(held)]) + np.square(self.noise.shared)
             frequency, amplitude = (values[chosen][first] for values in (self.frequency, self.amplitude))
-            noise = np.sqrt(of_one / np.median(counts))
+            noise = np.sqrt(of_one / np.median(counts) + np.square(self.noise.level))
             line = Line(self.name, self.direction, self.sweep.stepped, frequency, amplitude, mean / counts, noise)
             lines.append(line)
         return lines
 
     def contrasts(self) -> Array:
         """Gain and phase of each line as polynomials in the logarithm of its step, as whitened residuals, (c, 2 n)."""
-        lines = np.split(self.step, np.flatnonzero(np.diff(self.held)) + 1)
+        lines = np.split(self.step, self._line_starts[1:])
         columns = block_diag(*(_polynomials(step).T for step in lines))
         return self.whiten(np.concatenate((columns, 1.0j * columns)))
 
     def smooth_misfit(self, model: Model) -> float:
         return max(float(np.abs(line.smooth).max()) for line in self.lines(model))
 
-    def suspects(self, residual: Array) -> Iterator[Suspect]:
-        """One line wrong as a whole, one repeat of one, and single points that lie far out."""
+    def suspects(self) -> Iterator[Suspect]:
+        """One line wrong as a whole, and one repeat of one."""
         every = np.unique(self.held)
         for held in every:
             here = self.held == held
@@ -304,15 +341,6 @@ class SweepData(DataSet):
             numbers = np.unique(self.repeat[here])
             for number in numbers if numbers.size > 2 else ():
                 yield self._suspect(f"repeat {number} of {words}", "repeat", here & (self.repeat == number))
-        count = self.frequency.size
-        distance = np.maximum(np.abs(residual[:count]), np.abs(residual[count:]))
-        farthest = np.argsort(-distance, kind="stable")[:_MOST_ROWS]
-        for row in farthest[distance[farthest] > _FAR]:
-            words = (
-                f"the point at {self.frequency[row]:.4g} Hz, {shown_amplitude(self.direction, self.amplitude[row])}, "
-                f"repeat {self.repeat[row]}, {self.direction}"
-            )
-            yield replace(self._suspect(words, "row", np.arange(count) == row), looked=count)
 
     def _line_words(self, point: int) -> str:
         """The line that a point belongs to, for people."""
@@ -334,10 +362,6 @@ class SweepData(DataSet):
         unit, factor = self.direction.display.displacement
         amplitude = self.amplitude * factor
         return {"frequency [Hz]": self.frequency, f"amplitude [{unit}]": amplitude, "repeat": self.repeat}
-
-    def components(self, residual: Array) -> dict[str, Array]:
-        storage, loss = np.split(residual, 2)
-        return {"storage": storage, "loss": loss}
 
 
 def _polynomials(step: Array) -> Array:

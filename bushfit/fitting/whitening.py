@@ -2,9 +2,10 @@
 
 Notes:
     Within a block of points with random parts s_i and a shared part t the covariance is V = diag(s_i^2) + t^2 1 1^T.
-    With a_i = 1/s_i, divided by s_i and less the share 1 - 1/sqrt(1 + t^2 sum a_i^2) of what lies along a, a deviation
-    is white. A point of weight w has s_i^2 = s^2/w; without weight it is not there, for the block's shared error
-    either.
+    All runs of a line may share an error besides, u^2 1 1^T over the line. With a_i = 1/s_i, divided by s_i and less
+    the share 1 - 1/sqrt(1 + t^2 sum a_i^2) of what lies along a, a deviation is white; of what all runs of a line share
+    then, as much is taken out in the same way. A point of weight w has s_i^2 = s^2/w; without weight it is not there,
+    for shared errors either.
 """
 
 from __future__ import annotations
@@ -20,31 +21,76 @@ from bushfit.fitting.noise import SweepNoise
 
 
 @dataclass(frozen=True, eq=False)
+class _Shared:
+    """An error that the points of each group share, groups side by side; what else they have is white.
+
+    Args:
+        starts: index of the first point of each group, (groups,).
+        unit: what a unit of the error makes of each point's gain and phase, in units of noise, (2, n).
+        variance: of the error, in gain and in phase, (2, 1).
+    """
+
+    starts: Array
+    unit: Array
+    variance: Array
+
+    @cached_property
+    def group(self) -> Array:
+        """Number of the group that each point belongs to, (n,)."""
+        return np.repeat(np.arange(self.starts.size), np.diff(self.starts, append=self.unit.shape[-1]))
+
+    @cached_property
+    def weight(self) -> Array:
+        """Sum of the squares of the unit error of each group, (2, groups)."""
+        return np.maximum(np.add.reduceat(self.unit**2, self.starts, axis=-1), np.finfo(float).tiny)
+
+    @cached_property
+    def share(self) -> Array:
+        """Share of what lies along the unit error of a group that is taken out, (2, groups)."""
+        return 1.0 - 1.0 / np.sqrt(1.0 + self.variance * self.weight)
+
+    def along(self, parts: Array) -> Array:
+        """What lies along the unit error of each group, (..., 2, n) -> (..., 2, groups)."""
+        return np.add.reduceat(parts * self.unit, self.starts, axis=-1)
+
+    def made(self, error: Array) -> Array:
+        """What an error of each group makes of its points, (..., 2, groups) -> (..., 2, n)."""
+        return error[..., self.group] * self.unit
+
+    def less(self, parts: Array) -> Array:
+        """Deviations less the share of what lies along the unit error, which makes them white, (..., 2, n)."""
+        return parts - self.made(self.along(parts) / self.weight * self.share) if self.variance.any() else parts
+
+
+@dataclass(frozen=True, eq=False)
 class Whitening:
     """Covariance of a sweep's deviations, gain and phase apart, block by block.
 
     Args:
         starts: index of the first point of each block, (blocks,).
+        lines: index of the first point of each line, whose blocks stand side by side, (lines,).
         random: standard deviation of each point's gain and phase, as if it had all its weight, (2, n).
         noise: of the campaign's sweeps: its shared part, and how well either part is known.
         weights: share of its weight that each point has, (n,).
     """
 
     starts: Array
+    lines: Array
     random: Array
     noise: SweepNoise
     weights: Array
 
     def whiten(self, deviation: Array) -> Array:
         """Deviations in units of noise, shared errors taken out, complex (..., n) -> (..., 2 n), all gains first."""
-        return _flat(self._less_shared(_gain_and_phase(deviation) * self._scale))
+        return _flat(self._line.less(self._block.less(_gain_and_phase(deviation) * self._block.unit)))
 
     def own(self, deviation: Array, *, shared: bool = True) -> Array:
         """Deviations over the random noise, complex (n,) -> (2, n), with `shared` less the block's likeliest error."""
-        parts = _gain_and_phase(deviation)
+        parts, block = _gain_and_phase(deviation), self._block
         if shared:
-            mean = np.add.reduceat(parts * self._scale**2, self.starts, axis=-1) / self._block_weight
-            parts = parts - ((1.0 - (1.0 - self._share) ** 2) * mean)[:, self._block]
+            mean = block.along(parts * block.unit) / block.weight
+            weight = (block.variance + self._line.variance) * block.weight
+            parts = parts - (weight / (1.0 + weight) * mean)[:, block.group]
         return parts / self.random
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
@@ -52,49 +98,38 @@ class Whitening:
 
         Notes:
             Within a block V has the derivatives I by s^2 and 1 1^T by t^2, whitened W^2 and (W 1)(W 1)^T. The estimate
-            of t^2 is a mean of `freedom` squares that expect t^2 + s^2/n, and scatters no further down than to 0.
+            of t^2 is a mean of `freedom` squares that expect t^2 + s^2/n, and scatters no further down than to 0. So
+            with what lines share.
         """
-        parts = influence.reshape(-1, 2, self.weights.size)
+        block, line, noise = self._block, self._line, self.noise
+        parts = line.less(influence.reshape(-1, 2, self.weights.size))
         reactions = {}
-        if self.noise.scatter_freedom:
-            twice = self._less_shared(self._less_shared(parts))
-            reactions["scatter"] = twice * np.sqrt(2.0 / self.noise.scatter_freedom)
-        if self.noise.freedom:
-            variance = np.square(self.noise.shared)[:, None]
-            expected = variance + self.random[:, self.starts] ** 2 / np.bincount(self._block)
-            error = np.minimum(expected * np.sqrt(2.0 / self.noise.freedom), variance) * (1.0 - self._share) ** 2
-            along = np.add.reduceat(parts * self._scale, self.starts, axis=-1)
-            reactions["shared"] = (along * error)[..., self._block] * self._scale
+        if noise.scatter_freedom:
+            reactions["scatter"] = line.less(block.less(block.less(parts))) * np.sqrt(2.0 / noise.scatter_freedom)
+        if noise.freedom:
+            expected = block.variance + self.random[:, self.starts] ** 2 / np.bincount(block.group)
+            error = np.minimum(expected * np.sqrt(2.0 / noise.freedom), block.variance) * (1.0 - block.share) ** 2
+            reactions["shared"] = line.less(block.made(block.along(parts) * error))
+        if noise.level_freedom:
+            expected = line.variance + 1.0 / line.weight
+            error = np.minimum(expected * np.sqrt(2.0 / noise.level_freedom), line.variance) * (1.0 - line.share)
+            reactions["level"] = line.made(line.along(parts) * error)
         return {
-            (id(self.noise), kind, which): _flat(reaction * only)
+            (id(noise), kind, which): _flat(reaction * only)
             for kind, reaction in reactions.items()
             for which, only in enumerate(np.eye(2)[..., None])
         }
 
-    def _less_shared(self, parts: Array) -> Array:
-        """Deviations over their noise, (..., 2, n), less the share of what lies along it in each block."""
-        along = np.add.reduceat(parts * self._scale, self.starts, axis=-1) / self._block_weight
-        return parts - (along * self._share)[..., self._block] * self._scale
+    @cached_property
+    def _block(self) -> _Shared:
+        """What the points of a block share, in units of their own noise."""
+        return _Shared(self.starts, np.sqrt(self.weights) / self.random, np.square(self.noise.shared)[:, None])
 
     @cached_property
-    def _block(self) -> Array:
-        """Number of the block that each point belongs to, (n,)."""
-        return np.repeat(np.arange(self.starts.size), np.diff(self.starts, append=self.weights.size))
-
-    @cached_property
-    def _scale(self) -> Array:
-        """One over the noise of each point's gain and phase, (2, n)."""
-        return np.sqrt(self.weights) / self.random
-
-    @cached_property
-    def _block_weight(self) -> Array:
-        """Sum of the squares of one over the noise in each block, (2, blocks)."""
-        return np.maximum(np.add.reduceat(self._scale**2, self.starts, axis=-1), np.finfo(float).tiny)
-
-    @cached_property
-    def _share(self) -> Array:
-        """Share of what lies along the noise in a block that is taken out, (2, blocks)."""
-        return 1.0 - 1.0 / np.sqrt(1.0 + np.square(self.noise.shared)[:, None] * self._block_weight)
+    def _line(self) -> _Shared:
+        """What the blocks of a line share, less what is taken out of each block."""
+        unit = (1.0 - self._block.share)[:, self._block.group] * self._block.unit
+        return _Shared(self.lines, unit, np.square(self.noise.level)[:, None])
 
 
 def _gain_and_phase(deviation: Array) -> Array:

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bushfit.reading.measurement import Floats, Loop
 from bushfit.reduction.cycles import least_prominence, lone_outliers
@@ -36,9 +35,6 @@ _JUST_BELOW = 2e-3
 _ONE_STEP = 1.01
 #: Outliers that are told one by one; chosen: they make a sentence.
 _MOST_LISTED = 3
-
-#: Which rows something is true of.
-Flags = NDArray[np.bool_]
 
 
 def clock(history: Loop) -> str:
@@ -75,15 +71,10 @@ def odd_channels(history: Loop) -> Iterator[str]:
         yield from _outliers(channel, history.time)
 
 
-def _wide(steps: Floats) -> Flags:
-    """Which steps from row to row are far wider than the others, (n,)."""
-    return steps > max(_GAP_STEPS * np.median(steps), _GAP_WIDEST_STEPS * np.quantile(steps, _WIDEST_QUANTILE))
-
-
 def _gaps(motion: Channel, time: Floats, *, timed: bool) -> Iterator[str]:
     """A sentence on gaps in a recorded time; in a file without it, only the motion tells of them."""
     steps = np.diff(time) if timed else np.abs(np.diff(motion.values))
-    wide = _wide(steps)
+    wide = steps > max(_GAP_STEPS * np.median(steps), _GAP_WIDEST_STEPS * np.quantile(steps, _WIDEST_QUANTILE))
     if not timed:
         outliers = lone_outliers(time, motion.values)
         wide &= (steps > least_prominence(motion.values)) & ~(outliers[1:] | outliers[:-1])

@@ -10,7 +10,7 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
-from bushfit.campaign.written import toml_value
+from bushfit.campaign.written import specimen_lines, toml_value
 from bushfit.geometry import Specimen
 from bushfit.inspection.record import Inspected
 
@@ -49,13 +49,7 @@ def named_apart(files: Sequence[Inspected]) -> list[Inspected]:
 def _specimens(files: Sequence[Inspected]) -> Iterator[str]:
     """The table of each specimen that was tested."""
     for body in dict.fromkeys(seen.direction for seen in files if isinstance(seen.direction, Specimen)):
-        keys: dict[str, Any] = {"name": body.name, "kind": body.kind}
-        if body.strain != "engineering":
-            keys["strain"] = body.strain
-        if body.area and body.thickness:
-            keys |= {"area": f"{1e6 * body.area:.12g} mm^2", "thickness": f"{1e3 * body.thickness:.12g} mm"}
-            keys["elements"] = body.elements
-        yield "\n".join(["[[specimens]]", *_lines(keys), ""])
+        yield "\n".join([*specimen_lines(body), ""])
 
 
 def _lines(keys: Mapping[str, Any]) -> Iterator[str]:

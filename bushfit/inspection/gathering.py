@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from bushfit.campaign.campaign import TEST_FILES
 from bushfit.errors import BushfitError, NoColumnError, NoTestError
@@ -47,18 +47,11 @@ class Source:
         return inspect(self.file, self.stated or {}, self.beside)
 
 
-class Gathered(NamedTuple):
-    """The tests among what the user gave, and a sentence for each file and sheet that holds none."""
-
-    sources: tuple[Source, ...]
-    left_out: tuple[str, ...]
-
-
-def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> Gathered:
+def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Source], tuple[str, ...]]:
     """The tests among files, the sheets of workbooks, and the files of folders, of which no deeper ones are opened.
 
     A file that the user names and that is no workbook with several sheets is not opened. `stated` are the keys of
-    [[loops]] and [[sweeps]] that the user states.
+    [[loops]] and [[sweeps]] that the user states. A sentence is told for each file and sheet that holds no test.
 
     Raises:
         NoTestError: a folder without a test.
@@ -88,7 +81,7 @@ def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> Gathered:
                 hint="bushfit inspect FILE says what it makes of one",
             )
         sources += found
-    return Gathered(tuple(stated_of_each(sources, stated)), tuple(left_out))
+    return stated_of_each(sources, stated), tuple(left_out)
 
 
 def stated_of_each(sources: Sequence[Source], stated: Mapping[str, Any]) -> list[Source]:

@@ -60,7 +60,8 @@ def look_at_loop(loop: Loop, named: Said) -> Looked:
         # as far down as the amplitude is told: what lies below is noise
         f"mean {names[0]}": f"{alike([to_length * amplitude, to_length * mean_motion], 4)[1]} {length}",
         f"mean {names[1]}": f"{alike([to_force * half_force, to_force * mean_force], 4)[1]} {force}",
-        "noise": f"{number(100 * drive.noise / half_force, 2)} % of half the {names[1]}'s range, a row",
+        "noise": f"{number(100 * drive.noise / half_force, 2)} % of half the {names[1]}'s range, a row"
+        f"{drive.correlated}",
     }
     odd = [
         *wrong_labels(named, loop.direction, [amplitude, half_motion], [drive.frequency]),
@@ -133,7 +134,7 @@ def look_at_programme(record: Loop, loops: Sequence[Loop], named: Said) -> Looke
         motion = (
             f"{number(factor * drive.amplitude, 4)} {unit} at {drive.frequency:.4g} Hz, {waveform(drive.coefficients)}"
         )
-        noise = f"noise {number(100 * drive.noise / drive.half_range, 2)} % of half the range, a row"
+        noise = f"noise {number(100 * drive.noise / drive.half_range, 2)} % of half the range, a row{drive.correlated}"
         facts[f"loop {place}"] = "; ".join(filter(None, (motion, noise, left_out)))
         odd += [f"loop {place}: {note}" for note in (*drive.notes, *_changing(drive)) if note != left_out]
     facts["sampling"] = clock(record) if record.timed else "no time in the file"

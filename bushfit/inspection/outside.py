@@ -124,9 +124,12 @@ def wrong_labels(
     """A sentence where the name of a file states an amplitude or a frequency that the file does not contain."""
     unit, factor = direction.display.displacement
     expected = direction.motion.displacement_unit
-    stated = [(each, _zero_to_peak(each, expected)) for each in named.of(expected)]
-    if stated and not any(_near(value, x) for _, value in stated for x in amplitudes):
-        double = any(_near(value, 2.0 * x) for _, value in stated for x in amplitudes)
+    stated = [
+        units.quantity(each.text, expected) / (2.0 if each.convention == "peak-to-peak" else 1.0)
+        for each in named.of(expected)
+    ]
+    if stated and not any(_near(value, x) for value in stated for x in amplitudes):
+        double = any(_near(value, 2.0 * x) for value in stated for x in amplitudes)
         found = _listed([factor * x for x in amplitudes])
         yield f"the name says {_or(named.of(expected))}, the amplitude is {found} {unit} zero-to-peak" + (
             ": the name may count peak-to-peak" if double else ""
@@ -134,11 +137,6 @@ def wrong_labels(
     said = named.of("Hz")
     if said and not any(_near(units.quantity(each.text, "Hz"), f) for each in said for f in frequencies):
         yield f"the name says {_or(said)}, the frequency is {_listed(frequencies)} Hz"
-
-
-def _zero_to_peak(each: Named, expected: str) -> float:
-    """The amplitude that a name states [SI]."""
-    return units.quantity(each.text, expected) / (2.0 if each.convention == "peak-to-peak" else 1.0)
 
 
 def _near(one: float, other: float) -> bool:

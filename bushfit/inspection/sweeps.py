@@ -15,27 +15,22 @@ from bushfit.inspection.outside import wrong_labels
 from bushfit.inspection.record import Looked, told_frequencies
 from bushfit.reading.measurement import Sweep, loss_factor
 from bushfit.reading.names import Said
+from bushfit.reduction.result import MISSED_LEVEL
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 from bushfit.units import number
 
-#: Standard deviations from its repeats from which a point is an outlier; chosen: noise never goes that far.
-_OUTLIER_DEVIATIONS = 8.0
+#: Standard deviations from which a point is off its repeats, or a block off the others; chosen: no noise goes that far.
+_FAR = 8.0
 #: Distance of ln K from its repeats from which a point is an outlier; chosen: less does not matter to a fit.
 _LEAST_OUTLIER = 0.01
-#: Standard deviations of the blocks from which one is off; chosen: noise never goes that far.
-_BLOCK_DEVIATIONS = 8.0
 #: Distance of ln |K| from the other repeats from which a block is off; chosen: mountings differ by less.
 _LEAST_BLOCK_OFFSET = 0.02
 #: Blocks whose scatter can be judged.
 _FEWEST_BLOCKS = 5
-#: Probability of chance below which |K| drifts over the repeats; chosen.
-_DRIFT_P = 1e-4
+#: Probability of chance below which equal points are copies, and |K| drifts over the repeats; chosen.
+_CHANCE = 1e-4
 #: Change of ln |K| from the first repeat to the last that is told; chosen: less does not matter to a fit.
 _LEAST_DRIFT = 5e-3
-#: Relative distance of the amplitude reached from that of the level that is told; chosen: |K| may then be 1 % off.
-_MISSED_LEVEL = 0.03
-#: Probability of chance below which equal points are copies; chosen.
-_COPIED_P = 1e-4
 #: Probability at the least that two phases are equal; chosen: some files have them in few digits.
 _SAME_PHASE_P = 0.05
 #: Step in ln X from one level to the next below which they may be repeats of one; chosen: nobody sets finer levels.
@@ -80,7 +75,11 @@ def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
 
     It is due where noise would hardly make as many equal by chance, in as many digits as the file has.
     """
-    magnitude, phase = (_rounded(values) for values in (np.abs(sweep.stiffness), np.angle(sweep.stiffness)))
+    # nine digits leave out what the conversion of units leaves in the last ones
+    magnitude, phase = (
+        np.array([float(f"{value:.9g}") for value in values])
+        for values in (np.abs(sweep.stiffness), np.angle(sweep.stiffness))
+    )
     finest = _finest(magnitude)
     copies, expected, first = 0, 0.0, sweep.frequency.size
     for rows in _groups(sweep.frequency, sweep.amplitude):
@@ -91,17 +90,12 @@ def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
         scatter = noise.random[sweep.name, float(sweep.held[rows[0]])][0] * magnitude[rows[0]]
         same = min(float(finest[rows[0]] / scatter), 1.0)  # two draws fall on the same last digit
         expected += rows.size * (rows.size - 1) / 2.0 * same * max(same, _SAME_PHASE_P)
-    if copies and poisson.sf(copies - 1, expected) < _COPIED_P:
+    if copies and poisson.sf(copies - 1, expected) < _CHANCE:
         verb = "s repeat others" if copies > 1 else " repeats another"
         yield (
             f"{copies} row{verb} digit by digit, the first of them at {sweep.frequency[first]:.4g} Hz (data row "
             f"{first + 1}): copied, not measured again?"
         )
-
-
-def _rounded(values: Array) -> Array:
-    """Values in nine digits, without what the conversion of units leaves in the last ones."""
-    return np.array([float(f"{value:.9g}") for value in values])
 
 
 def _finest(values: Array) -> Array:
@@ -149,7 +143,7 @@ def _outliers(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
         off[rows] -= _median(off[rows])
     random = np.array([noise.random[sweep.name, float(held)] for held in sweep.held])
     parts = np.stack((off.real, off.imag), axis=1)
-    far = np.any((np.abs(parts) > _OUTLIER_DEVIATIONS * random) & (np.abs(parts) > _LEAST_OUTLIER), axis=1)
+    far = np.any((np.abs(parts) > _FAR * random) & (np.abs(parts) > _LEAST_OUTLIER), axis=1)
     for row in np.flatnonzero(far)[:_MOST_LISTED]:
         yield (
             f"data row {row + 1} ({sweep.frequency[row]:.4g} Hz, {_told(sweep, sweep.amplitude[row])}, repeat "
@@ -183,7 +177,7 @@ def _odd_blocks(sweep: Sweep) -> Iterator[str]:
     gain = np.array([_median(off[rows]).real for rows in blocks])
     usual = MEDIAN_TO_SIGMA * float(np.median(np.abs(gain[gain != 0.0]))) if np.any(gain) else 0.0
     for rows, own in zip(blocks, gain, strict=True):
-        if abs(own) > max(_BLOCK_DEVIATIONS * usual, _LEAST_BLOCK_OFFSET):
+        if abs(own) > max(_FAR * usual, _LEAST_BLOCK_OFFSET):
             yield (
                 f"{_told(sweep, sweep.amplitude[rows[0]])}, repeat {sweep.repeat[rows[0]]} lies "
                 f"{number(100 * np.expm1(own), 2, '+')} % off the other repeats as a whole: "
@@ -193,7 +187,7 @@ def _odd_blocks(sweep: Sweep) -> Iterator[str]:
     if np.unique(repeat).size > 2 and np.ptp(gain) > 0.0:
         line = linregress(repeat, gain)
         drift = line.slope * np.ptp(repeat)
-        if line.pvalue < _DRIFT_P and abs(drift) > _LEAST_DRIFT:
+        if line.pvalue < _CHANCE and abs(drift) > _LEAST_DRIFT:
             yield (
                 f"|K| drifts by {number(100 * drift, 2, '+')} % from the first repeat to the last: warming up, or "
                 "settling?"
@@ -204,7 +198,7 @@ def _missed(sweep: Sweep) -> Iterator[str]:
     """A sentence on the point that missed the amplitude of its level by most."""
     off = sweep.amplitude_reached / sweep.amplitude - 1.0
     row = int(np.argmax(np.abs(off)))
-    if abs(off[row]) > _MISSED_LEVEL:
+    if abs(off[row]) > MISSED_LEVEL:
         reached, level = _told(sweep, sweep.amplitude_reached[row]), _told(sweep, sweep.amplitude[row])
         yield f"{reached} was reached where the level is {level} ({sweep.frequency[row]:.4g} Hz)"
 

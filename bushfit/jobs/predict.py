@@ -8,15 +8,21 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from bushfit.campaign.schema import PredictSettings
+from bushfit.campaign.session import measured_session
+from bushfit.errors import ModelError
 from bushfit.fitting.agreement import met_within, misfits
 from bushfit.fitting.data_sets import SweepData, sweep_data
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Specimen, place_named
-from bushfit.prediction import PredictedResonance, Prediction, caveats, default_grid, predict, predict_resonance
+from bushfit.jobs.grid import default_grid
+from bushfit.prediction import PredictedResonance, Prediction, caveats, predict, predict_resonance
 from bushfit.reading.csvfile import to_csv
 from bushfit.report.artifacts import artifact_names, measured_file, place_files, prediction_files, resonance_files
 from bushfit.report.tables import prediction_table, shaken_table
+from bushfit.units import CELSIUS
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from bushfit.campaign.campaign import Campaign
     from bushfit.geometry import Place
     from bushfit.model.result import Misfit, Result, Usable
@@ -42,7 +48,7 @@ class Predicted:
 
     @property
     def document(self) -> Mapping[str, Any]:
-        tables = {str(p.direction): prediction_table(p).to_dict(orient="list") for p in self.predictions}
+        tables = {str(p.direction): _filled(prediction_table(p)) for p in self.predictions}
         shaken = {f"{found.place}_resonance": shaken_table(found).to_dict(orient="list") for found in self.resonances}
         return {**tables, **shaken, "warnings": self.warnings}
 
@@ -81,16 +87,23 @@ class Predicted:
         return self.files(formats) | measured_file(self.result, *self._parted, formats)
 
 
+def _filled(table: pd.DataFrame) -> dict[str, list[float | None]]:
+    """The columns of a table, None where a cell is empty."""
+    return {str(name): [None if x != x else x for x in column.tolist()] for name, column in table.items()}
+
+
 @dataclass(frozen=True)
 class Predict:
     """Dynamic stiffness over a grid: the one asked for, else the campaign's [predict], else that of its sweeps.
 
-    With a mass [kg] and the acceleration of its base [m/s^2], its resonance at each place, too.
+    With a mass [kg] and the acceleration of its base [m/s^2], its resonance at each place, too. All at a temperature
+    [K], where the model has an effect of it.
     """
 
     asked: PredictSettings = field(default_factory=PredictSettings)
     mass: float | None = None
     base_acceleration: float | None = None
+    temperature: float | None = None
 
     def places(self, result: Result | None, campaign: Campaign | None) -> list[Place]:
         """Those asked for, else the paper's directions where there is a bushing, and all specimens.
@@ -117,17 +130,34 @@ class Predict:
         """One prediction a place.
 
         Raises:
-            ModelError: a frequency or amplitude that is not positive, or a direction where there is no bushing.
+            ModelError: a frequency or amplitude that is not positive, a direction where there is no bushing, or a
+                temperature of which the model has no effect.
         """
+        if self.temperature is not None and not any("temperature" in effect.under for effect in result.model.records):
+            raise ModelError(
+                "the model knows no temperature",
+                found=f"{self.temperature - CELSIUS:.4g} degC asked for",
+                expected="a model with the effect of temperature",
+                hint="fit tests at several temperatures with --effect temperature",
+            )
         settings, sweeps = self._settings(campaign), campaign.sweeps if campaign else ()
+        under = measured_session(result.model.bushing, (*campaign.loops, *sweeps) if campaign else ())
+        known = [
+            replace(each, under=own)
+            for each, own in zip(sweep_data(sweeps), under[len(under) - len(sweeps) :], strict=True)
+            if result.model.bushing or isinstance(each.direction, Specimen)
+        ]
         predictions = []
         for place in self.places(result, campaign):
             frequencies, amplitudes = default_grid(result, place, sweeps)
             asked = getattr(settings, _AMPLITUDES[place.motion]) or amplitudes
-            predictions.append(predict(result, place, settings.frequencies or frequencies, asked))
-        known = [each for each in sweep_data(sweeps) if result.model.bushing or isinstance(each.direction, Specimen)]
+            grid = settings.frequencies or frequencies, asked
+            beside = known if campaign else None
+            predictions.append(predict(result, place, *grid, sweeps=beside, temperature=self.temperature))
         resonances = [
-            predict_resonance(result, place, self.mass, self.base_acceleration, settings.frequencies)
+            predict_resonance(
+                result, place, self.mass, self.base_acceleration, settings.frequencies, temperature=self.temperature
+            )
             for place in self.places(result, campaign)
             if self.mass and self.base_acceleration
         ]

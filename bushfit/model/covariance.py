@@ -44,16 +44,15 @@ class Covariance:
 
     @cached_property
     def root(self) -> Array:
-        """A matrix B with B B^T the covariance, (k, k).
+        """A matrix B with B B^T the covariance, (k, k), from the eigenvectors of the correlation matrix.
 
         Notes: |B^T slope| is the standard error of a quantity with these slopes. Unlike sqrt(slope^T C slope), it is
         never the root of a negative number, however ill-conditioned the covariance C is.
         """
-        return _root(self.matrix)
-
-    @cached_property
-    def _spread_roots(self) -> list[Array]:
-        return [_root(part) for part in self.spread]
+        sigma = np.sqrt(np.diag(self.matrix))
+        safe = np.where(sigma > 0.0, sigma, 1.0)
+        values, vectors = np.linalg.eigh(self.matrix / np.outer(safe, safe))
+        return sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
 
     def half_width(self, slopes: Array) -> Array:
         """Half width of the 95 % intervals of n quantities, (n,).
@@ -65,7 +64,7 @@ class Covariance:
         where v is the quantity's variance, and the variance of v is the sum of squares of what each spread adds to v.
         """
         variance = np.sum(np.square(self.root.T @ slopes), axis=0)
-        moved = [np.sum(np.square(root.T @ slopes), axis=0) for root in self._spread_roots]
+        moved = [np.sum(slopes * (part @ slopes), axis=0) for part in self.spread]
         unsure = np.sqrt(np.sum(np.square(moved), axis=0)) if moved else np.zeros_like(variance)
         least = np.sqrt(2.0 / _MOST_FREEDOM)
         share = np.divide(unsure, variance, out=np.zeros_like(variance), where=variance > 0.0)
@@ -87,11 +86,3 @@ class Covariance:
         square = np.ix_(kept, kept)
         names = tuple(self.names[i] for i in kept)
         return Covariance(names, self.matrix[square], tuple(part[square] for part in self.spread))
-
-
-def _root(matrix: Array) -> Array:
-    """A matrix B with B B^T the given covariance, from the eigenvectors of the correlation matrix."""
-    sigma = np.sqrt(np.diag(matrix))
-    safe = np.where(sigma > 0.0, sigma, 1.0)
-    values, vectors = np.linalg.eigh(matrix / np.outer(safe, safe))
-    return sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))

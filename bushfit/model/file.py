@@ -17,6 +17,8 @@ import numpy as np
 
 from bushfit import __version__
 from bushfit.effects.stiffness_factor import EFFECT as FACTOR
+from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError, naming
 from bushfit.geometry import Bushing, Shape, Specimen, SpecimenKind, StatedStrain
 from bushfit.model.covariance import Covariance
@@ -94,13 +96,9 @@ class CovarianceTable:
 
 
 @dataclass(frozen=True)
-class FitTable:
+class FitTable(Quality):
     """fit: how well the model meets its tests, and their operating conditions, which older files do not say."""
 
-    nrmse: Number
-    reduced_chi_square: Number
-    points: WholeNumber
-    noise: Number
     frequency_Hz: tuple[Number, Number] | None = None  # noqa: N815
     strain: tuple[Number, Number] | None = None
     directions: tuple[Name, ...] = ()
@@ -143,6 +141,8 @@ class ModelFile:
     outliers: tuple[Outlier, ...] = ()
     provenance: ProvenanceTable = field(default_factory=ProvenanceTable)
     specimens: tuple[SpecimenTable, ...] = ()
+    unresolved: tuple[str, ...] = ()
+    unnamed: Unnamed | None = None
 
 
 def load_result(file: Path) -> Result:
@@ -187,6 +187,7 @@ def _result(tables: ModelFile) -> Result:
         Bushing(*astuple(tube)) if tube else None,
         tables.effects,
         {name: entry.value for name, entry in entries.items()},
+        tables.unnamed,
     )
     result = Result(
         model,
@@ -202,6 +203,7 @@ def _result(tables: ModelFile) -> Result:
         specimens=tuple(Specimen(*astuple(table)) for table in tables.specimens),
         tests=fit.tests if fit else (),
         usable=fit.usable if fit else (),
+        unresolved=tuple(name for name in tables.unresolved if name in model.effects),
     )
     with naming(place="fit, directions"):
         for name in result.measured.directions if result.measured else ():
@@ -231,6 +233,7 @@ def to_document(result: Result) -> dict[str, Any]:
             "spread": [part.tolist() for part in covariance.spread],
         },
         "fit": _fit(result, result.quality, result.measured) if result.quality and result.measured else None,
+        **({"unresolved": list(result.unresolved)} if result.unresolved else {}),
         "warnings": list(result.warnings),
         "outliers": [asdict(outlier) for outlier in result.outliers],
         "provenance": {
@@ -262,6 +265,7 @@ def model_document(model: Model) -> dict[str, Any]:
             name: {"value": float(model.values[name]), "unit": parameter.unit}
             for name, parameter in model.parameters.items()
         },
+        **({UNNAMED: asdict(model.unnamed)} if model.unnamed else {}),
     }
 
 

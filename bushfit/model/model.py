@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial, reduce
 from types import MappingProxyType
 from typing import Any, Literal, cast
@@ -23,9 +23,12 @@ from bushfit.effects import (
     Setting,
     effect_named,
     qualified,
+    twins_of,
 )
-from bushfit.effects.contract import Array, Condition, ForceBelow, StiffnessBelow, Values
+from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Condition, ForceBelow, StiffnessBelow, Values
 from bushfit.effects.history import History
+from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import STRAINING, Bushing, Direction, Place
 from bushfit.units import for_people
@@ -54,9 +57,11 @@ class _Structure:
         doubles = {name for name in names if names.count(name) > 1}
         if doubles:
             raise ModelError("an effect is listed twice", found=", ".join(sorted(doubles)))
-        place = {name: place for place, name in enumerate(LIBRARY)}
+        place = {name.partition(".")[0]: place for place, name in enumerate(LIBRARY)}
         known = map(effect_named, names)
-        order = sorted(known, key=lambda effect: (effect.level, place.get(effect.name, len(place)), effect.name))
+        order = sorted(
+            known, key=lambda effect: (effect.level, place.get(effect.name.partition(".")[0], len(place)), effect.name)
+        )
         records = tuple(order)
         return cls(
             records,
@@ -77,19 +82,24 @@ class Model:
         bushing: geometry; None where specimens of the compound alone are known.
         effects: names from the library, in any order.
         values: SI value of every parameter, by the names of files and reports.
+        unnamed: the data of the effect of that name; None without it.
 
     Raises:
-        ModelError: an unknown effect, one named twice, or a value that is missing, unknown, not finite or
-            outside the parameter's bounds.
+        ModelError: an unknown effect, one named twice, one without its data, or a value that is missing, unknown, not
+            finite or outside the parameter's bounds.
     """
 
     bushing: Bushing | None
     effects: tuple[str, ...]
     values: Mapping[str, float]
+    unnamed: Unnamed | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", tuple(self.effects))
         object.__setattr__(self, "values", MappingProxyType(dict(self.values)))
+        if (UNNAMED in self.effects) != (self.unnamed is not None):
+            expected = "both, or neither"
+            raise ModelError("an effect without its data, or data without an effect", place=UNNAMED, expected=expected)
         known = self.parameters
         for name in dict.fromkeys([*known, *self.values]):
             if name not in self.values:
@@ -99,7 +109,7 @@ class Model:
             _check(name, self.values[name], known[name])
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Model, (self.bushing, self.effects, dict(self.values))
+        return Model, (self.bushing, self.effects, dict(self.values), self.unnamed)
 
     @cached_property
     def _structure(self) -> _Structure:
@@ -121,6 +131,11 @@ class Model:
         return len(self._structure.branches) == len(self.records)
 
     @property
+    def knows_circumstances(self) -> bool:
+        """Whether the response depends on what a test was made under besides its motion."""
+        return any(effect.under for effect in self.records)
+
+    @property
     def name(self) -> str:
         """Of the bushing; "compound" where there is none."""
         return self.bushing.name if self.bushing else "compound"
@@ -135,26 +150,56 @@ class Model:
 
     def with_values(self, values: Mapping[str, float]) -> Model:
         """The same model with some values replaced."""
-        return Model(self.bushing, self.effects, {**self.values, **values})
+        return replace(self, values={**self.values, **values})
 
     @classmethod
-    def started(cls, bushing: Bushing | None, effects: Sequence[str], values: Mapping[str, float]) -> Model:
+    def started(
+        cls,
+        bushing: Bushing | None,
+        effects: Sequence[str],
+        values: Mapping[str, float],
+        unnamed: Unnamed | None = None,
+    ) -> Model:
         """A model with the values given; other parameters have their neutral value, or a typical one."""
         defaults = {
             qualified(effect, parameter): parameter.typical if parameter.neutral is None else parameter.neutral
             for effect in map(effect_named, effects)
             for parameter in effect.parameters
         }
-        return cls(bushing, tuple(effects), {name: values.get(name, default) for name, default in defaults.items()})
+        found = {name: values.get(name, default) for name, default in defaults.items()}
+        return cls(bushing, tuple(effects), found, unnamed)
 
     def with_effect(self, name: str, values: Mapping[str, float] | None = None) -> Model:
-        """The model with one effect more; parameters of it without a value start as in `started`."""
-        return Model.started(self.bushing, (*self.effects, name), {**self.values, **(values or {})})
+        """The model with one effect more, in place of the branch that it replaces, if it replaces one.
 
-    def without(self, level: Level) -> Model:
-        """The model without the effects of a level."""
-        kept = [effect.name for effect in self.records if effect.level is not level]
-        return Model.started(self.bushing, kept, self.values)
+        Parameters of it without a value start from those of that branch, or else as in `started`.
+        """
+        effect, starts = effect_named(name), dict[str, float]()
+        if effect.replaces in self.effects and effect.in_place_of:
+            suggested = effect.in_place_of(self.values)
+            own = [(qualified(effect, each), suggested[each.name], each.bounds) for each in effect.parameters]
+            starts = {key: float(np.clip(value, *bounds)) for key, value, bounds in own}
+        kept = [other for other in self.effects if other != effect.replaces]
+        return Model.started(self.bushing, (*kept, name), {**self.values, **starts, **(values or {})}, self.unnamed)
+
+    def with_twin(self, name: str) -> Model:
+        """The model with that effect in place of its twins, of the same values; as it is where it has none of them."""
+        twins = [effect for effect in self.records if effect.name in twins_of(name) and effect.name != name]
+        effects = [effect.name for effect in self.records if effect not in twins]
+        moved = {
+            qualified(effect_named(name), new): self.values[qualified(twin, old)]
+            for twin in twins
+            for old, new in zip(twin.parameters, effect_named(name).parameters, strict=True)
+        }
+        added = [name] if twins and name not in effects else []
+        if not twins:
+            return self
+        return Model.started(self.bushing, [*effects, *added], {**self.values, **moved}, self.unnamed)
+
+    def without(self, *left: Level | str) -> Model:
+        """The model without the effects of these levels and names."""
+        kept = [effect.name for effect in self.records if not {effect.level, effect.name} & {*left}]
+        return Model.started(self.bushing, kept, self.values, self.unnamed if UNNAMED in kept else None)
 
     def equation(self) -> str:
         """The model as text: the formula of its first-harmonic stiffness, other effects, and values in common units."""
@@ -174,6 +219,7 @@ class Model:
         *,
         kind: Kind = "sweep",
         values: Values | None = None,
+        under: Circumstances = UNKNOWN,
     ) -> Array:
         """Complex dynamic stiffness of the steady first harmonic [N/m or N m/rad].
 
@@ -184,6 +230,7 @@ class Model:
             kind: whether a loop or a sweep records it; only effects of the instrument tell them apart.
             values: parameter values in place of the model's own; arrays whose last axis has length 1 add
                 leading axes to the result.
+            under: what the test was made under.
 
         Notes:
             The rubber has k = G mu^(omega, e0), with G of Eqs. 10, 11, 12 and e0 of Eqs. 7, 8 (Eqs. 6 to 12); the
@@ -194,9 +241,8 @@ class Model:
         if omega.shape != amplitude.shape:
             omega, amplitude = np.broadcast_arrays(omega, amplitude)
         points = np.atleast_1d(omega)
-        respond = self._stack_stiffness(
-            _setting(self.bushing, direction, kind), self.values if values is None else values
-        )
+        setting = self.setting(direction, kind, under)
+        respond = self._stack_stiffness(setting, self.values if values is None else values)
         stiffness = respond(points, np.atleast_1d(amplitude))
         if stiffness.shape[-points.ndim :] != points.shape:
             stiffness = stiffness + np.zeros(points.shape)
@@ -209,14 +255,20 @@ class Model:
         *,
         kind: Kind = "sweep",
         values: Values | None = None,
+        under: Circumstances = UNKNOWN,
     ) -> Array:
         """Force over a history of displacement [m or rad], from rest or on the steady cycle: (..., n) [N or N m].
 
         The other arguments are as of `stiffness`.
         """
-        setting = _setting(self.bushing, direction, kind)
+        setting = self.setting(direction, kind, under)
         respond = self._stack_force(setting, self.values if values is None else values, self._layers(setting))
         return respond(displacement)
+
+    def setting(self, place: Place | str, kind: Kind = "sweep", under: Circumstances = UNKNOWN) -> Setting:
+        """The test of a place, or of one by its name, that a response belongs to."""
+        direction = Direction(place) if isinstance(place, str) else place
+        return Setting(self.bushing, direction, kind, under, self.unnamed)
 
     def _layers(self, setting: Setting) -> tuple[Layer, ...]:
         """The layers that act on a test: a coupon whose modulus is measured has no rig and no sleeves around it."""
@@ -242,7 +294,8 @@ class Model:
 
         def below(count: int) -> StiffnessBelow:
             def cycle(omega: Array, motion: Array) -> Array:
-                force = self._stack_force(setting, per_sample, layers[:count])
+                cycles = replace(setting, under=setting.under.at((..., None)))
+                force = self._stack_force(cycles, per_sample, layers[:count])
                 return force(History.steady(motion, cast(float, omega[..., None] / (2.0 * np.pi))))
 
             if count == 0:
@@ -287,10 +340,6 @@ class Model:
         for modifier in self._structure.modifiers:
             base = {**base, **modifier.adjust(seen_by(modifier, values, base), condition)}
         return base
-
-
-def _setting(bushing: Bushing | None, place: Place | str, kind: Kind) -> Setting:
-    return Setting(bushing, Direction(place) if isinstance(place, str) else place, kind)
 
 
 def _check(name: str, value: float, parameter: Parameter) -> None:

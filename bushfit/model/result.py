@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
-from bushfit.geometry import Place, Specimen, place_named
+from bushfit.effects import Level
+from bushfit.geometry import Bushing, Place, Specimen, place_named
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Source
@@ -33,10 +34,10 @@ class Quality:
         noise: standard deviation of one point, relative, root mean square over all.
     """
 
-    nrmse: float
-    reduced_chi_square: float
-    points: int
-    noise: float
+    nrmse: Number
+    reduced_chi_square: Number
+    points: WholeNumber
+    noise: Number
 
 
 @dataclass(frozen=True)
@@ -134,6 +135,7 @@ class Result:
         warnings: what a user must know before using the numbers.
         profile: 95 % intervals by profile likelihood, where they were asked for; None is an open end.
         at_bound: parameters that came to rest on the least or largest value they may have, and on which.
+        unresolved: effects of the model with a twin of the rig, which these tests cannot tell from it.
     """
 
     model: Model
@@ -149,6 +151,7 @@ class Result:
     specimens: tuple[Specimen, ...] = ()
     tests: tuple[Misfit, ...] = ()
     usable: tuple[Usable, ...] = ()
+    unresolved: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -175,3 +178,26 @@ class Result:
             low, high = value / factor, value * factor
         least, most = parameter.bounds
         return max(low, min(least, value)), min(high, max(most, value))
+
+
+def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
+    """The compound of a fitted model in another bushing, and a sentence on what stayed behind.
+
+    What belongs to the material is kept, and the factors of specimens of it.
+    """
+    names = [specimen.name for specimen in result.specimens]
+    records = result.model.records
+    kept = [effect.name for effect in records if effect.level is Level.MATERIAL or effect.corrects in names]
+    model = Model.started(bushing, kept, result.model.values)
+    left = ", ".join(effect.name for effect in records if effect.name not in kept)
+    said = f"{bushing.name}: the compound of {result.name}, of which no bushing of this shape was tested"
+    said += f"; left out, because they belong to {result.name} or its rig: {left}" if left else ""
+    measured = result.measured
+    if measured:
+        of_specimens = tuple(name for name in measured.directions if name in names)
+        measured = replace(measured, directions=of_specimens or (result.name,))
+    there = [name for name in result.covariance.names if name in model.values]
+    fitted = tuple(name for name in result.fitted if name in model.values)
+    covariance = result.covariance.restricted(there)
+    carried_there = Result(model, fitted, covariance, None, measured, inputs=result.inputs, specimens=result.specimens)
+    return replace(carried_there, unresolved=tuple(name for name in result.unresolved if name in kept)), said

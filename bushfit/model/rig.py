@@ -8,11 +8,13 @@ state, so each checks the other.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from bushfit.effects.contract import Array
+from bushfit.effects.contract import UNKNOWN, Array, Circumstances
 from bushfit.effects.history import History
+from bushfit.errors import ModelError
 from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model
 
@@ -47,6 +49,7 @@ def record(
     steps_per_cycle: int = STEPS_PER_CYCLE,
     waveform: str = "sine",
     kind: Kind = "sweep",
+    under: Circumstances = UNKNOWN,
 ) -> Record:
     """Impose `run_in + cycles` cycles from rest and keep the last `cycles`.
 
@@ -55,23 +58,43 @@ def record(
         steps_per_cycle: the springpot's error falls in proportion: its Gruenwald-Letnikov sum is of first order.
         waveform: sine or triangle.
         kind: whether a loop or a sweep is recorded; only effects of the instrument tell them apart.
+        under: what the test is made under, numbers.
     """
     index = np.arange((run_in + cycles) * steps_per_cycle + 1)
     motion = amplitude * wave(waveform, index / steps_per_cycle)
-    whole = imposed(model, direction, motion, 1.0 / (frequency * steps_per_cycle), frequency, kind=kind)
+    whole = imposed(model, direction, motion, 1.0 / (frequency * steps_per_cycle), frequency, kind=kind, under=under)
     kept = slice(run_in * steps_per_cycle, None)
     return Record(whole.time[kept] - whole.time[kept][0], whole.displacement[kept], whole.force[kept])
 
 
 def imposed(
-    model: Model, direction: Place, motion: Array, step: float, frequency: float, *, kind: Kind = "loop"
+    model: Model,
+    direction: Place,
+    motion: Array,
+    step: float,
+    frequency: float,
+    *,
+    kind: Kind = "loop",
+    under: Circumstances = UNKNOWN,
 ) -> Record:
     """Impose any motion, in even steps of time [s] from rest: displacement [m or rad], (n,).
 
     The frequency of its cycles [Hz] is for effects that count them.
+
+    Raises:
+        ModelError: an effect has no law in time.
     """
+    timeless = [effect.name for effect in model.records if effect.harmonic_only]
+    if timeless:
+        raise ModelError(
+            "the rig follows a motion through time, for which there is no law",
+            place=timeless[0],
+            found="a law of the steady first harmonic alone",
+            expected="effects with a law in time",
+            hint="ask predict for the stiffness of the steady state",
+        )
     history = History(motion, step, periodic=False, frequency=frequency)
-    force = model.force(direction, history, kind=kind)
+    force = model.force(direction, history, kind=kind, under=under)
     return Record(np.arange(motion.size) * step, motion, force)
 
 
@@ -97,15 +120,12 @@ def dynamic_stiffness(
     *,
     run_in: int = 10,
     steps_per_cycle: int = STEPS_PER_CYCLE,
+    under: Circumstances = UNKNOWN,
 ) -> Array:
     """Complex dynamic stiffness by stepped sine, one settled cycle per operating point: (n,) [N/m or N m/rad].
 
-    Frequencies are in Hz, amplitudes zero-to-peak in m or rad, (n,) each.
+    Frequencies are in Hz, amplitudes zero-to-peak in m or rad, (n,) each; circumstances are numbers or likewise.
     """
-    points = zip(np.atleast_1d(frequency), np.atleast_1d(amplitude), strict=True)
-    return np.array(
-        [
-            lock_in(record(model, direction, f, x, cycles=1, run_in=run_in, steps_per_cycle=steps_per_cycle), f)
-            for f, x in points
-        ]
-    )
+    measured = partial(record, model, direction, cycles=1, run_in=run_in, steps_per_cycle=steps_per_cycle)
+    points = enumerate(zip(np.atleast_1d(frequency), np.atleast_1d(amplitude), strict=True))
+    return np.array([lock_in(measured(f, x, under=under.at(number)), f) for number, (f, x) in points])

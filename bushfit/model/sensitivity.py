@@ -15,7 +15,7 @@ from typing import cast
 import numpy as np
 
 from bushfit.effects import Branch, Parameter, qualified
-from bushfit.effects.contract import Array, Value, Values
+from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Value, Values
 from bushfit.effects.history import History
 from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model, seen_by
@@ -30,16 +30,21 @@ Face = Callable[[Branch], tuple[Callable[..., Array], Callable[..., dict[str, Ar
 
 
 def stiffness_jacobian(
-    model: Model, direction: Place, frequency: Array, amplitude: Array, names: Sequence[str], kind: Kind = "sweep"
+    model: Model,
+    direction: Place,
+    frequency: Array,
+    amplitude: Array,
+    names: Sequence[str],
+    kind: Kind = "sweep",
+    under: Circumstances = UNKNOWN,
 ) -> Array:
     """Derivatives of the complex dynamic stiffness by parameters: (k, n) [N/m or N m/rad per unit of the parameter].
 
     Frequencies are in Hz, amplitudes zero-to-peak in m or rad, (n,) each.
     """
     if not model.only_branches:
-        return differences(
-            model, names, lambda values: model.stiffness(direction, frequency, amplitude, kind=kind, values=values)
-        )
+        respond = partial(model.stiffness, direction, frequency, amplitude, kind=kind, under=under)
+        return differences(model, names, lambda values: respond(values=values))
     omega = 2.0 * np.pi * frequency
     strain = amplitude * model.unit_strain(direction)
     total = np.zeros((len(names), frequency.size), dtype=complex)
@@ -47,12 +52,13 @@ def stiffness_jacobian(
     return model.stiffness_per_modulus(direction) * total
 
 
-def force_jacobian(model: Model, direction: Place, displacement: History, names: Sequence[str]) -> Array:
+def force_jacobian(
+    model: Model, direction: Place, displacement: History, names: Sequence[str], under: Circumstances = UNKNOWN
+) -> Array:
     """Derivatives of a loop's force by parameters along a history of displacement: (k, n) [N or N m per unit]."""
     if not model.only_branches:
-        return differences(
-            model, names, lambda values: model.force(direction, displacement, kind="loop", values=values)
-        )
+        respond = partial(model.force, direction, displacement, kind="loop", under=under)
+        return differences(model, names, lambda values: respond(values=values))
     per_displacement = model.unit_strain(direction)
     test = (displacement.scaled(per_displacement),)
     total = np.zeros((len(names), displacement.value.shape[-1]))

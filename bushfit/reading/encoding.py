@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from bushfit.errors import MeasurementError
-from bushfit.reading.files import Bytes, line_of, not_utf8
+from bushfit.reading.files import CHUNK_BYTES, HEAD_BYTES, Bytes, line_of, not_utf8
 from bushfit.reading.parallel import by_chunks
 
 #: Byte order marks, and Python's name of the encoding that each tells. UTF-32's begins with UTF-16's.
@@ -27,10 +27,6 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
-#: Bytes that are checked at a time; chosen: few enough to be held beside the file, enough to be fast.
-_CHUNK_BYTES = 1 << 22
-#: Bytes at the start of a file in which zeros are counted; chosen: they hold the header and many rows.
-_HEAD_BYTES = 1 << 16
 #: Share of zeros among every other byte from which a text is taken for UTF-16; ASCII has nearly all of them zero.
 _LEAST_ZERO_SHARE = 0.3
 #: Runs of bytes beyond ASCII that are compared; chosen: many times those of a header.
@@ -47,8 +43,9 @@ def to_utf8(data: Bytes, file: Path, stated: str | None = None) -> tuple[Bytes, 
     Raises:
         MeasurementError: no text, or not in the encoding stated.
     """
-    if stated is None and _is_ascii(data):
-        return data, "utf-8"
+    codes = np.frombuffer(data, dtype=np.int8)
+    if stated is None and all(by_chunks(lambda part: bool(codes[part].min() > 0), codes.size, CHUNK_BYTES)):
+        return data, "utf-8"  # ASCII: all bytes are from 1 to 127
     data = data[:]
     encoding = stated or detect(data)
     if encoding in ("utf-8", "utf-8-sig"):
@@ -70,18 +67,12 @@ def to_utf8(data: Bytes, file: Path, stated: str | None = None) -> tuple[Bytes, 
     return text.removeprefix("\ufeff").encode(), encoding
 
 
-def _is_ascii(data: Bytes) -> bool:
-    """Whether all bytes are from 1 to 127."""
-    codes = np.frombuffer(data, dtype=np.int8)
-    return all(by_chunks(lambda part: bool(codes[part].min() > 0), codes.size, _CHUNK_BYTES))
-
-
 def detect(data: bytes) -> str:
     """Python's name of the encoding of a text; "utf-8" also where it is no text."""
     for mark, encoding in _MARKS:
         if data.startswith(mark):
             return encoding
-    if 0 in (head := data[:_HEAD_BYTES]):
+    if 0 in (head := data[:HEAD_BYTES]):
         even, odd = head[::2].count(0), head[1::2].count(0)
         if max(even, odd) > _LEAST_ZERO_SHARE * len(head) / 2 and min(even, odd) == 0:
             return "utf-16-le" if odd else "utf-16-be"

@@ -5,21 +5,19 @@ from __future__ import annotations
 import codecs
 import hashlib
 import mmap
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from threading import Thread
 
 from bushfit.errors import BushfitError, did_you_mean
 
 #: Bytes of the largest file that is read: ten times a loop of 10 million rows.
 _LARGEST_BYTES = 4 << 30
-#: Bytes from which a file is mapped and not copied, and its checksum made in a thread; chosen: a smaller one takes
-#: milliseconds.
+#: Bytes from which a file is mapped and not copied; chosen: a smaller one takes milliseconds.
 _MAPPED_BYTES = 1 << 22
-#: Bytes at the start of a file in which anything but blanks is looked for first; chosen: nearly every file has some.
-_HEAD_BYTES = 1 << 16
-#: Bytes that are decoded at a time; chosen: few enough to be held beside the file, enough to be fast.
-_CHUNK_BYTES = 1 << 22
+#: Bytes at the start of a file that are looked at first; chosen: they hold the header and many rows.
+HEAD_BYTES = 1 << 16
+#: Bytes that are checked at a time; chosen: few enough to be held beside the file, enough to be fast.
+CHUNK_BYTES = 1 << 22
 
 #: The bytes of a file: copied, or where the system keeps those of a large one.
 Bytes = bytes | mmap.mmap
@@ -46,7 +44,7 @@ def view_bytes(
             data = stream.read() if size < _MAPPED_BYTES else mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
     except OSError as error:
         raise kind("the file cannot be read", file=file, found=error.strerror or str(error)) from error
-    if (data[:_HEAD_BYTES].isspace() and data[:].isspace()) or not data:
+    if (data[:HEAD_BYTES].isspace() and data[:].isspace()) or not data:
         raise kind("the file is empty", file=file, expected="text", hint="export it again")
     return data
 
@@ -88,9 +86,9 @@ def not_utf8(data: bytes) -> int | None:
     if (zero := data.find(0)) >= 0:
         return zero
     decoder = codecs.getincrementaldecoder("utf-8")()
-    for start in range(0, len(data), _CHUNK_BYTES):
+    for start in range(0, len(data), CHUNK_BYTES):
         try:
-            decoder.decode(data[start : start + _CHUNK_BYTES], final=start + _CHUNK_BYTES >= len(data))
+            decoder.decode(data[start : start + CHUNK_BYTES], final=start + CHUNK_BYTES >= len(data))
         except UnicodeDecodeError as error:
             return min(start + error.start, len(data) - 1)
     return None
@@ -103,14 +101,8 @@ def line_of(data: bytes, index: int) -> str:
 
 
 def sha256(data: Bytes) -> Future[str]:
-    """SHA-256 of a file's bytes as hexadecimal digits; that of a large file is made meanwhile, in a thread."""
-    future: Future[str] = Future()
-
-    def digest() -> None:
-        future.set_result(hashlib.sha256(data).hexdigest())
-
-    if len(data) >= _MAPPED_BYTES:
-        Thread(target=digest).start()
-    else:
-        digest()
-    return future
+    """SHA-256 of a file's bytes as hexadecimal digits, made meanwhile in a thread."""
+    thread = ThreadPoolExecutor(1)
+    digest = thread.submit(lambda: hashlib.sha256(data).hexdigest())
+    thread.shutdown(wait=False)
+    return digest

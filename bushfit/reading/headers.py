@@ -10,6 +10,7 @@ from functools import lru_cache
 from typing import Literal
 
 from bushfit import units
+from bushfit.reading.words import WORDS
 
 #: How an amplitude is counted.
 AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak"]
@@ -28,14 +29,8 @@ _ASIDES = re.compile(r"\b(?:axial|radial|torsional|measured|actual|gemessen|mesu
 _UNITS_NOT_F = {"force": ("Hz",), "frequency": ("N", "N m")}
 #: Units by which a symbol stands for its role: A for an amplitude and not for an area, K for a stiffness.
 _UNITS_OF = {"a": ("m", "rad"), "k": ("N/m", "N*m/rad")}
-#: Names of an amplitude that count it peak-to-peak by themselves. "range" alone and "Schwingungsweite" are not among
-#: them, because some call the amplitude so.
-_PEAK_TO_PEAK_NAMES = {
-    *("doppelamplitude", "schwingbreite", "schwingungsbreite", "schwingweite", "doppelhub", "2a", "2amplitude"),
-    *("doubleamplitude", "totalamplitude", "fullamplitude", "doublestroke", "displacementrange", "rotationrange"),
-    *("amplitudedouble", "amplitudetotale", "amplituddoble", "dobleamplitud", "amplitudtotal"),
-    *("2xamplitude", "2xa", "峰峰值"),
-}
+#: Names of an amplitude that count it peak-to-peak by themselves.
+_PEAK_TO_PEAK_NAMES = frozenset(WORDS["counting"]["peak_to_peak"])
 #: The word "peak".
 _PEAK = r"(?:peak|pk|spitze|crete|cresta|pico|pic)"
 #: Where a word begins; an underscore parts words.

@@ -54,7 +54,7 @@ def read_loop(
         frequency: cycles per time [Hz], for a file without time; goes with `waveform`.
         waveform: course of the displacement in time.
         noise, weight: of the loop, see `Loop`.
-        temperature, conditions: at which it was tested [K] and what else is stated of the test, for provenance.
+        temperature, conditions: at which it was tested [K], and what else is stated of the test, for provenance.
 
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
@@ -73,7 +73,10 @@ def read_loop(
     else:
         _check_increases(table, wanted["time"], time)
     source = source_of(file, listed_as, table.sha256, temperature, conditions)
-    return Loop(name or file.stem, direction, time, displacement, force, noise, source, "time" in values, weight)
+    timed = "time" in values
+    return Loop(
+        name or file.stem, direction, time, displacement, force, noise, source, timed, weight, temperature=temperature
+    )
 
 
 def _check_not_swapped(table: Table, direction: Place) -> None:

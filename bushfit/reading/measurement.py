@@ -69,6 +69,7 @@ class Loop:
         part: where it stands in a record of several loops; None where the record is one loop.
         softening: by how much its first cycle is stiffer than its last, relative to the last; None where no more than
             noise and the memory of rubber make.
+        temperature: at which it was tested [K], where it is known.
 
     Raises:
         MeasurementError: arrays of different length.
@@ -85,6 +86,7 @@ class Loop:
     weight: float = 1.0
     part: Part | None = None
     softening: float | None = None
+    temperature: float | None = None
 
     def __post_init__(self) -> None:
         _check_lengths(self.name, self.time, self.displacement, self.force)
@@ -113,6 +115,7 @@ class Sweep:
         stepped: what changes from point to point of a run; the other is held. None where neither is.
         relative_error: standard deviation of the real and of the imaginary part of each point relative to |K|, (n,),
             where the file states it.
+        temperature: at which it was tested [K], or each point, (n,), where it is known.
 
     Raises:
         MeasurementError: arrays of different length.
@@ -130,6 +133,7 @@ class Sweep:
     stepped: Stepped | None = "frequency"
     relative_error: Floats | None = None
     weight: float = 1.0
+    temperature: Floats | float | None = None
 
     def __post_init__(self) -> None:
         if self.repeat.size == 0:

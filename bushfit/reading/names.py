@@ -15,7 +15,7 @@ from bushfit.errors import UnitError
 from bushfit.geometry import Direction
 from bushfit.reading.headers import AmplitudeConvention, Vocabulary, plain, split_convention
 from bushfit.reading.layout import Line
-from bushfit.reading.words import SWEEP_COLUMNS
+from bushfit.reading.words import SWEEP_COLUMNS, WORDS
 
 #: Units as names have them, in lower case, with the usual spelling of those that have another one elsewhere.
 _UNITS = {
@@ -32,23 +32,8 @@ _QUANTITY = re.compile(
     r"(?![\s/_-]*(?:(?:per|pro|p)[\s_-]*)?(?:min|s|sec)(?![A-Za-z]|-s))",
     re.IGNORECASE,
 )
-#: Words, glued to a number or before it, that say what it is.
-_AMPLITUDE_WORDS = {"a", "amp", "ampl", "amplitude", "amplitud"}
-_WORDS = {
-    "Hz": {"f", "freq", "frequency", "frequenz", "frequence", "frecuencia"},
-    "K": {"t", "temp", "temperature", "temperatur", "temperatura"},
-    "N": {"f", "fz", "fx", "fy", "fv", "fm"},
-}
-#: Words of a preload, in English, German, French and Spanish, beside a length or a force.
-_PRELOAD_WORDS = {
-    *("preload", "pre", "mean", "static", "offset", "vorlast", "vorkraft", "vorspannung", "mittellast", "mittelkraft"),
-    *("mittelweg", "statisch", "precharge", "statique", "precarga"),
-}
-#: Words of a size of the specimen: the length beside them is no amplitude.
-_SIZE_WORDS = {
-    *("d", "di", "da", "dia", "diameter", "durchmesser", "diametre", "l", "length", "lange", "longueur", "h", "height"),
-    *("t", "thickness", "dicke", "epaisseur", "w", "width", "breite", "radius", "r"),
-}
+#: Words, glued to a number or before it, that say what it is: an amplitude, a preload, a size and so on.
+_WORDS = {meant: frozenset(words) for meant, words in WORDS["beside"].items()}
 #: A date: 2024-05-03, 2024_05_03, 20240503 or 03.05.2024.
 _DATE = re.compile(
     r"(?<!\d)(?:20\d\d([-_.]?)(?:0[1-9]|1[0-2])\1(?:0[1-9]|[12]\d|3[01])"
@@ -62,19 +47,8 @@ _SPECIMEN_NUMBER = re.compile(
 )
 #: What the temperature of a test may be [degC], so that a part's number with a C is none; chosen.
 _TEMPERATURES = (-100.0, 300.0)
-#: For each thing that the lines above a table may state, the names it goes by; amplitude and frequency are headers.
-_KEYS = {
-    "temperature": ("temperature", "test temperature", "temp", "Temperatur", "Prüftemperatur", "température"),
-    "preload": ("preload", "mean load", "Vorlast", "Vorkraft", "Mittellast", "précharge", "precarga"),
-    "date": ("date", "test date", "Datum", "Prüfdatum", "fecha"),
-    "operator": ("operator", "tested by", "Prüfer", "Bediener", "Bearbeiter", "opérateur", "operador"),
-    "specimen_number": (
-        *("specimen number", "specimen no", "specimen", "sample", "sample no", "sample id", "serial number"),
-        *("serial no", "Probe", "Probennummer", "Proben-Nr", "Probe Nr", "Prüfling", "Prüflingsnummer"),
-        *("Seriennummer", "éprouvette"),
-    ),
-}
-_KEY_OF = {plain(name): key for key, names in _KEYS.items() for name in names}
+#: What the lines above a table may state, by the names that it goes by; amplitude and frequency are headers.
+_KEY_OF = {plain(name): key for key, names in WORDS["above"].items() for name in names}
 #: The names that an amplitude and a frequency go by there.
 _VOCABULARY = Vocabulary({role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}, {})
 #: What parts a key from its value above a table.
@@ -84,13 +58,8 @@ _COMMA = re.compile(r"^([+-]?\d+),(?=\d+(?!\d|[.,]\d))")
 #: Characters of the longest value above a table that is taken; chosen: a longer one is a text.
 _LONGEST_VALUE = 60
 
-#: For the starts of words in English, German, French and Spanish, without accents, the direction they name.
-_WORD_STARTS = {
-    **dict.fromkeys(("axial", "axiaux"), Direction.AXIAL),
-    **dict.fromkeys(("radial", "radiaux"), Direction.RADIAL),
-    **dict.fromkeys(("torsi", "tordu", "verdreh", "drehwinkel", "drehmoment"), Direction.TORSION),
-    **dict.fromkeys(("rotation", "rotacion"), Direction.TORSION),
-}
+#: For the starts of words, without accents, the direction they name.
+_WORD_STARTS = {start: Direction(named) for named, starts in WORDS["direction"].items() for start in starts}
 #: Short for a direction in names; in headers rad is a unit.
 _SHORT = {"ax": Direction.AXIAL, "rad": Direction.RADIAL, "tors": Direction.TORSION, "tor": Direction.TORSION}
 #: A word, without the letters of a unit behind a number.
@@ -148,14 +117,18 @@ def _named(name: str) -> Said:
         word, is_glued = plain(match["word"] or ""), bool(match["word"]) and not match["gap"] and not match["sign"]
         unit, digits = _UNITS[match["unit"].lower()], re.sub("[,p]", ".", match["number"].lower())
         # a dash after a word parts it from the number, unless the word says what the number is
-        known = word in _PRELOAD_WORDS | _WORDS["K"] | _WORDS["N"] or not match["word"] or bool(match["gap"])
+        known = (
+            word in _WORDS["preload"] | _WORDS["temperature"] | _WORDS["force"]
+            or not match["word"]
+            or bool(match["gap"])
+        )
         text = f"{'-' if match['sign'] == '-' and known else ''}{float(digits):g} {unit}"
-        if word in _PRELOAD_WORDS or (unit in ("N", "kN") and word in _WORDS["N"]):
+        if word in _WORDS["preload"] or (unit in ("N", "kN") and word in _WORDS["force"]):
             stated.setdefault("preload", text)
         elif unit == "degC":
             is_plain = match["unit"].lower() != "c" or len(match["number"]) > 1
             low, high = _TEMPERATURES
-            is_said = word in _WORDS["K"] or (is_plain and not is_glued)
+            is_said = word in _WORDS["temperature"] or (is_plain and not is_glued)
             if is_said and low < float(text.split()[0]) < high:
                 stated.setdefault("temperature", text)
         elif unit not in ("N", "kN") and float(text.split()[0]) > 0.0:
@@ -168,13 +141,13 @@ def _amplitude_or_frequency(
 ) -> list[Named]:
     """The quantity of a match, unless a word beside it says that it is another one."""
     if unit in ("Hz", "mHz"):
-        return [Named(text, unit, word in _WORDS["Hz"])] if not is_glued or word in _WORDS["Hz"] else []
+        return [Named(text, unit, word in _WORDS["frequency"])] if not is_glued or word in _WORDS["frequency"] else []
     padded = re.match(r"0\d", match["number"])  # "05mm" may be 5 mm or 0.5 mm
-    if padded or word in _SIZE_WORDS or (is_glued and word not in _AMPLITUDE_WORDS):
+    if padded or word in _WORDS["size"] or (is_glued and word not in _WORDS["amplitude"]):
         return []
     is_peak = match["sign"] in ("+-", "+/-", "±")
     convention = "zero-to-peak" if is_peak else split_convention(name[match.end("unit") :])[1]
-    return [Named(text, unit, is_peak or word in _AMPLITUDE_WORDS, convention)]
+    return [Named(text, unit, is_peak or word in _WORDS["amplitude"], convention)]
 
 
 def stated_above(lines: Iterable[Line]) -> Said:

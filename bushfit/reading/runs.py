@@ -24,8 +24,7 @@ _WIDEST_PASS = 0.4
 _LEAST_HELD = 0.1
 #: The same share from which on the rows stand in the order in which they were recorded.
 _IN_ORDER = 0.4
-#: Values of what is stepped at least, for the order of the rows to tell it; chosen: a table of three amplitudes is
-#: often sorted by frequency.
+#: Fewest values of what the order of rows tells to be stepped; chosen: tables of three amplitudes are often sorted.
 _FEWEST_STEPS = 4
 #: Points of a run at least for its levels to be told by their place in it.
 _FEWEST_POINTS = 3

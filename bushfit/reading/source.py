@@ -21,12 +21,9 @@ from bushfit.reading.parallel import by_chunks
 
 if TYPE_CHECKING:
     import pandas as pd
-    from _typeshed import WriteableBuffer
 
 #: [SI] The largest value of a cell: far beyond every rig, and its square is still a number.
 LARGEST_VALUE = 1e100
-#: Bytes of lines that are read at a time; chosen: enough for thousands of rows.
-_BUFFER_BYTES = 1 << 16
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 #: Signs that part thousands in a number, other than those which may part columns or decimals.
 _SEPARATORS = ("'", "\u2019", "\u00a0", "\u2009", "\u202f")
@@ -36,7 +33,7 @@ _GROUP_BY_BLANK = re.compile(rb"\d \d{3}(?!\d)")
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """A text as rows of cells, with the line, from 1, that each stands on; `data` is in UTF-8."""
+    """A text as rows of cells, with the line, from 1, that each stands on; `data`, in UTF-8, may be the mapped file."""
 
     file: Path
     data: Bytes
@@ -49,7 +46,9 @@ class Text:
 
     def lines(self, after: int) -> Iterator[Line]:
         """All filled lines after a line."""
-        return _lines(io.BufferedReader(_View(self.data, self._offset(after)), _BUFFER_BYTES), after)
+        stream = self.file.open("rb") if isinstance(self.data, mmap.mmap) else io.BytesIO(self.data)
+        stream.seek(self._offset(after))
+        return _lines(stream, after)
 
     def may_have_comma(self, layout: Layout) -> bool:
         """Whether cells below the header may have a comma in them."""
@@ -134,27 +133,12 @@ class Text:
         return 0 if after == 0 else ends[-1] if len(ends) == after else len(self.data)
 
 
-class _View(io.RawIOBase):
-    """The bytes of a file from `start` on, as a stream that copies them only as they are read."""
-
-    def __init__(self, data: Bytes, start: int) -> None:
-        self._rest = memoryview(data)[start:]
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: WriteableBuffer) -> int:
-        place = memoryview(buffer)
-        count = min(len(place), len(self._rest))
-        place[:count], self._rest = self._rest[:count], self._rest[count:]
-        return count
-
-
 def _lines(data: io.BytesIO | io.BufferedReader, after: int) -> Iterator[Line]:
-    """The filled lines of a stream that begins after a line of the file."""
-    for number, line in enumerate(io.TextIOWrapper(data, encoding="utf-8", errors="replace"), start=after + 1):
-        if line.strip(" \t\r\n,;|"):
-            yield Line(number, line.rstrip("\n"))
+    """The filled lines of a stream that begins after a line of the file; the stream is closed."""
+    with io.TextIOWrapper(data, encoding="utf-8", errors="replace") as text:
+        for number, line in enumerate(text, start=after + 1):
+            if line.strip(" \t\r\n,;|"):
+                yield Line(number, line.rstrip("\n"))
 
 
 @dataclass(frozen=True, eq=False)

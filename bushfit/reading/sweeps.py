@@ -34,7 +34,7 @@ _LOWEST_LOSS_FACTOR = -0.5
 #: [-] Loss factor above which no point of a bushing lies; chosen: many times that of the softest rubber.
 _HIGHEST_LOSS_FACTOR = 5.0
 #: [-] Loss factor that every rubber exceeds somewhere; chosen: a tenth of what little-damping rubber has.
-_LEAST_LOSS_FACTOR = 0.005
+LEAST_LOSS_FACTOR = 0.005
 #: Share of the points that are clearly below zero where a loss counts the other way; chosen: noise may lift some, and a
 #: channel that is late leaves the loss of low frequencies above zero.
 _THROUGHOUT = 0.95
@@ -108,7 +108,7 @@ def read_sweep(
     _check_loss(table, wanted[pair[1]], loss_factor)
     _check_agreement(table, pair, values, stiffness)
     repeat = _repeats(table, wanted, values)
-    rows, temperature = _of_temperature(table, values, temperature)
+    rows, temperature, degrees = _of_temperature(table, values, temperature)
     frequency, level = values["frequency"][rows], to_peak * values["amplitude"][rows]
     reached = to_peak * values["amplitude_reached"][rows] if "amplitude_reached" in values else None
     runs = runs_of(frequency, level, None if repeat is None else repeat[rows], stepped)
@@ -128,6 +128,7 @@ def read_sweep(
         runs.stepped,
         values["relative_error"][rows] if "relative_error" in values else None,
         weight=weight,
+        temperature=degrees,
     )
 
 
@@ -170,7 +171,7 @@ def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str], at: Ma
 
 def _check_loss(table: Table, column: Column, loss_factor: Floats) -> None:
     """Refuse a loss that counts the other way throughout, ratios stated in %, and a loss that no bushing has."""
-    if np.mean(loss_factor < -_LEAST_LOSS_FACTOR) > _THROUGHOUT:
+    if np.mean(loss_factor < -LEAST_LOSS_FACTOR) > _THROUGHOUT:
         raise table.error(
             "the loss counts the other way",
             column=column,
@@ -179,12 +180,12 @@ def _check_loss(table: Table, column: Column, loss_factor: Floats) -> None:
             hint="turn the sign of this column in the file",
         )
     largest = float(np.abs(loss_factor).max())
-    if column.role == "loss_factor" and column.scale != 1.0 and 0.0 < largest < _LEAST_LOSS_FACTOR:
+    if column.role == "loss_factor" and column.scale != 1.0 and 0.0 < largest < LEAST_LOSS_FACTOR:
         raise table.error(
             "no rubber loses so little",
             column=column,
             found=f"{largest / column.scale:.3g} {column.unit} at most",
-            expected=f"a loss factor above {_LEAST_LOSS_FACTOR / column.scale:g} {column.unit} somewhere",
+            expected=f"a loss factor above {LEAST_LOSS_FACTOR / column.scale:g} {column.unit} somewhere",
             hint=f'if these are ratios, write "[-]" for "[{column.unit}]" in the header',
         )
     table.refuse(
@@ -230,24 +231,25 @@ def _stated(table: Table, column: Column | None, values: Mapping[str, Floats], s
 
 def _of_temperature(
     table: Table, values: Mapping[str, Floats], stated: float | None
-) -> tuple[NDArray[np.intp], float | None]:
-    """The rows of a test, by index, and its temperature [K]: as stated, or else the mean of its column."""
+) -> tuple[NDArray[np.intp], float | None, Floats | float | None]:
+    """The rows of a test, by index, its temperature [K], as stated or else the mean of its column, and that of each."""
     rows = np.arange(values["frequency"].size)
     if "temperature" not in values:
-        return rows, stated
+        return rows, stated, stated
     found, unit = values["temperature"], table.roles["temperature"].unit
     if unit is None and stated is None and np.ptp(found) <= ONE_TEST:
-        return rows, None
+        return rows, None, None
     column = table.column("temperature", "K")
     celsius = found + (si.kelvin(unit or "") or (1.0, 0.0))[1] - si.CELSIUS
+    each = celsius + si.CELSIUS
     if stated is None:
         if np.ptp(celsius) <= ONE_TEST:
-            return rows, round(float(celsius.mean()), 2) + si.CELSIUS
+            return rows, round(float(celsius.mean()), 2) + si.CELSIUS, each
         problem, expected = "this file holds tests at several temperatures", "one temperature"
     else:
-        rows = np.flatnonzero(np.abs(celsius + si.CELSIUS - stated) <= _SAME_TEMPERATURE)
+        rows = np.flatnonzero(np.abs(each - stated) <= _SAME_TEMPERATURE)
         if rows.size >= _FEWEST_SWEEP_ROWS:
-            return rows, stated
+            return rows, stated, each[rows]
         problem = "too few rows are near the temperature that is stated"
         expected = f"{_FEWEST_SWEEP_ROWS} rows or more within {_SAME_TEMPERATURE:g} K of {stated - si.CELSIUS:.4g} degC"
     ordered = np.sort(celsius)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.reading.measurement import Complex, Floats
+from bushfit.reading.parallel import CHUNK
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA, scatter
 
 #: Rows of an array.
@@ -37,8 +38,8 @@ _QUIET_QUANTILE = 0.1
 #: Variance of a row less the cubic through two neighbours on either side at even times, over that of a row: their
 #: weights are -1/6, 4/6, 4/6 and -1/6.
 _EVEN_GAIN = 1.0 + (2.0 * 4.0**2 + 2.0) / 36.0
-#: Rows that are searched for outliers at a time; chosen: their arrays stay in a core's cache.
-_CHUNK_ROWS = 1 << 18
+#: [cycles] Distance from its phase up to which a motion goes on; chosen: another start meets it once in ten times.
+SAME_PHASE = 0.05
 #: [ln of a period] Difference from which neighbouring cycles are not of one run; chosen: far beyond that of a step.
 _SAME_PERIOD = 0.1
 #: [ln of a range] Difference from which neighbouring cycles are not of one run; chosen: far beyond that of a step.
@@ -179,8 +180,8 @@ def lone_outliers(time: Floats, values: Floats) -> NDArray[np.bool_]:
     """
     outliers = np.zeros(values.size, dtype=bool)
     least = least_prominence(values)
-    for start in range(0, values.size - 4, _CHUNK_ROWS):
-        rows = slice(start, start + _CHUNK_ROWS + 4)
+    for start in range(0, values.size - 4, CHUNK):
+        rows = slice(start, start + CHUNK + 4)
         own, clock = values[rows], time[rows]
         stop = own.size - 4
         near = [own[place : stop + place] for place in (0, 1, 3, 4)]

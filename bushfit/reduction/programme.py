@@ -16,17 +16,15 @@ from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError
 from bushfit.reading.measurement import Floats, Loop, Part, rebuild_time
-from bushfit.reduction.cycles import least_prominence, lone_outliers, middle_crossings, turning_points
+from bushfit.reduction.cycles import SAME_PHASE, least_prominence, lone_outliers, middle_crossings, turning_points
 
 #: Rows that are enough to find the parts.
 _ENOUGH_ROWS = 200_000
-#: Relative difference of the ranges of two strokes up to which they are alike; chosen: rigs keep theirs better, and
-#: steps of a programme are larger.
+#: Relative difference of the ranges of two strokes that are alike; chosen: rigs keep theirs better, and step by more.
 _SAME_RANGE = 0.03
 #: The same beyond noise, as a share of what a turning point stands out by, which is ten standard deviations.
 _NOISE_OF_RANGE = 0.3
-#: Relative difference of two half cycles up to which they are alike; chosen: rigs keep theirs better, and rates differ
-#: by more.
+#: Relative difference of two half cycles that are alike; chosen: rigs keep theirs better, and rates differ by more.
 _SAME_RATE = 0.08
 #: Strokes over which range and rate of a part are constant: two cycles.
 _STEADY_STROKES = 4
@@ -44,8 +42,6 @@ _CHANGING = 0.3
 _SAME_AMPLITUDE = 0.08
 #: Cycles between two parts alike up to which they are one that was disturbed; chosen: an outlier disturbs no more.
 _DISTURBED = 3.1
-#: Distance from its phase [cycles] up to which a motion goes on.
-_SAME_PHASE = 0.05
 #: Difference from the motion a period on up to which a part goes on at its ends, relative to its range.
 _SAME_MOTION = 0.05
 #: Share of a cycle from either end of the record up to which a part reaches to it.
@@ -56,8 +52,7 @@ _THREE = 2.95
 _TWO = 1.95
 #: Softening from which on it is told; chosen: less does not matter to a fit.
 _LEAST_SOFTENING = 0.02
-#: The same relative to the loss factor, for a part that begins from rest; chosen: the memory of a springpot and of
-#: friction makes up to 0.6 of it.
+#: The same over the loss factor, for a part from rest; chosen: memory of springpot and friction makes up to 0.6 of it.
 _MEMORY_FROM_REST = 0.75
 #: The same for a part after other cycles; chosen: there they make up to 0.15 of it.
 _MEMORY = 0.25
@@ -101,7 +96,7 @@ class _Span:
     def goes_on(self, other: _Span) -> bool:
         """Whether the part after it is the same one, which a disturbance broke off."""
         gap = (other.begin - self.end) / self.period
-        return self.like(other) and gap < _DISTURBED and abs(2.0 * gap - round(2.0 * gap)) < 2.0 * _SAME_PHASE
+        return self.like(other) and gap < _DISTURBED and abs(2.0 * gap - round(2.0 * gap)) < 2.0 * SAME_PHASE
 
 
 def programme(loop: Loop, **keywords: Any) -> tuple[Loop, ...]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from bushfit.errors import MeasurementError
 from bushfit.reading.measurement import Complex, Floats, Sweep
 from bushfit.reading.resonance import ResonanceTest
+from bushfit.reading.sweeps import LEAST_LOSS_FACTOR
 
 #: Points that a test is thinned to; chosen: some twenty lie within the resonance, and a fit has no use for more.
 MOST_POINTS = 100
@@ -24,8 +25,6 @@ MOST_POINTS = 100
 LARGEST_ERROR = 0.2
 #: Share of the information in a test that has to lie on one side of zero loss, for the sign of the phases to show.
 _CLEAR_SHARE = 0.8
-#: [-] Mean loss factor below which the phases show no loss; chosen: a tenth of what little-damping rubber has.
-_LEAST_LOSS_FACTOR = 0.005
 #: Points about which a smooth curve is laid, at least; chosen: twice the four terms that it has.
 _FEWEST_POINTS = 8
 #: Neighbours whose scatter gives the error of a point; chosen: enough for a median, few enough to be local.
@@ -209,7 +208,7 @@ def _is_turned(test: ResonanceTest) -> bool:
     weight /= max(float(weight.sum()), np.finfo(float).tiny)
     share = float(np.sum(weight[flexibility.imag < 0.0]))
     loss = -float(np.sum(weight * np.sin(np.angle(flexibility))))
-    if max(share, 1.0 - share) < _CLEAR_SHARE or abs(loss) < _LEAST_LOSS_FACTOR:
+    if max(share, 1.0 - share) < _CLEAR_SHARE or abs(loss) < LEAST_LOSS_FACTOR:
         raise _refused(
             test,
             "the phases show no loss, whichever way they count",

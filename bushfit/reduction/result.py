@@ -13,7 +13,7 @@ from bushfit.geometry import Place
 from bushfit.units import for_people, number
 
 #: Relative distance of an amplitude from its level that is told; chosen: |K| may then be 1 % off.
-_MISSED_LEVEL = 0.03
+MISSED_LEVEL = 0.03
 #: Rows a cycle below which a warning is due; chosen: that many tell overtones up to the sixth apart.
 _FEW_ROWS_PER_CYCLE = 12
 #: Harmonic distortion of the displacement from which a warning is due; chosen: rigs in order have less.
@@ -117,7 +117,7 @@ def _warnings(reduction: Reduction) -> Iterator[str]:
     slope = _amplitude_slope(steps)
     for level in sorted({step.level for step in steps}):
         off = np.array([step.amplitude / level - 1.0 for step in steps if step.level == level])
-        if np.abs(off).max() > _MISSED_LEVEL:
+        if np.abs(off).max() > MISSED_LEVEL:
             low, high = (factor * level * (1.0 + end) for end in (off.min(), off.max()))
             yield (
                 f"the rig reached {low:.4g} to {high:.4g} {unit} at the level of {factor * level:.4g} {unit}: |K| "

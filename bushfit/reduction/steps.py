@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
 from bushfit.reading.measurement import Complex, Floats, Loop
-from bushfit.reduction.cycles import Cycles, keeps_changing, lone_outliers, mean_from_steady, pieces
+from bushfit.reduction.cycles import SAME_PHASE, Cycles, keeps_changing, lone_outliers, mean_from_steady, pieces
 from bushfit.reduction.harmonics import HarmonicFit
 from bushfit.reduction.result import Reduction, Skipped, Step
 
@@ -33,8 +33,6 @@ _SAME_AMPLITUDE = 0.03
 _REAL_CHANGE = 4.0
 #: [cycles] Longest interruption of a sine, beyond which it has stopped: three cycles, give or take a tenth.
 _LONGEST_INTERRUPTION = 3.1
-#: [cycles] Distance from its phase up to which a sine goes on; chosen: another start meets it once in ten times.
-_SAME_PHASE = 0.05
 #: [ln of an amplitude] Gap from which amplitudes are levels of their own; chosen: rigs miss a level by less.
 _LEVEL_GAP = 0.1
 #: Relative distance up to which a step belongs to a level that is stated; chosen: rigs miss a level by less.
@@ -124,7 +122,7 @@ def _joined(found: Sequence[tuple[float, float, Step]]) -> list[Step]:
     last_end = -np.inf
     for start, end, step in found:
         gap = (start - last_end) * step.frequency
-        goes_on = gap < _LONGEST_INTERRUPTION and abs(gap - round(gap)) < _SAME_PHASE
+        goes_on = gap < _LONGEST_INTERRUPTION and abs(gap - round(gap)) < SAME_PHASE
         if goes_on and _same_point(kept[-1], step):
             kept[-1] = max(kept[-1], step, key=lambda one: one.found)
         else:

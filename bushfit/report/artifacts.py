@@ -99,9 +99,9 @@ def diagnosis_files(diagnosis: Diagnosis, title: str, formats: Collection[str]) 
     if "png" in formats:
         from bushfit.report.plots import gap_figure, to_png
 
-        figure = gap_figure(
-            before.model, after.model, before.data_sets, title, diagnosis.summary, mended=after.data_sets
-        )
+        held, words = diagnosis.holdout, f"{diagnosis.verdict}: {diagnosis.summary}"
+        words += f". Held out, {held.before:.2f} x noise before and {held.after:.2f} after" if held.parts else ""
+        figure = gap_figure(before.model, after.model, before.data_sets, title, words, mended=after.data_sets)
         files["gap.png"] = to_png(figure)
     return files
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bushfit.effects.mistakes import candidate_named
 from bushfit.geometry import STRAINING, TRANSLATION
 from bushfit.reading.measurement import loss_factor
 
@@ -24,6 +23,10 @@ if TYPE_CHECKING:
     from bushfit.reduction.result import Reduction
 
 
+#: End of the headers, and name of the line, of what holds where an unresolved effect belongs to the rig.
+IF_RIGS = "if it is the rig's"
+
+
 def words(place: Place) -> tuple[str, str, str]:
     """What headers call amplitude, force and stiffness at a place; a modulus test has other words."""
     if place.motion is not STRAINING:
@@ -33,29 +36,31 @@ def words(place: Place) -> tuple[str, str, str]:
 
 
 def prediction_table(prediction: Prediction) -> pd.DataFrame:
-    """The table of `predict`: six columns, then low and high of the last four."""
+    """The table of `predict`: six columns, then low and high of the last four; where something is unresolved these four
+    if it is the rig's; and where sweeps are known what they measured at each point."""
     import pandas as pd
 
     (length, length_factor), _, (stiffness, factor) = prediction.direction.display
     moved, _, resisted = words(prediction.direction)
-    bands = {
-        f"{resisted} [{stiffness}]": (prediction.stiffness, factor),
-        "loss factor [-]": (prediction.loss_factor, 1.0),
-        f"storage {resisted} [{stiffness}]": (prediction.storage_stiffness, factor),
-        f"loss {resisted} [{stiffness}]": (prediction.loss_stiffness, factor),
+    force = f"{resisted} [{stiffness}]"
+    names, scales = (force, "loss factor [-]", f"storage {force}", f"loss {force}"), (factor, 1.0, factor, factor)
+
+    def values(of: Prediction, end: str = "value") -> list[Array]:
+        bands = of.stiffness, of.loss_factor, of.storage_stiffness, of.loss_stiffness
+        return [getattr(band, end) * scale for band, scale in zip(bands, scales, strict=True)]
+
+    ends = zip(names, values(prediction, "low"), values(prediction, "high"), strict=True)
+    columns = {
+        "frequency [Hz]": prediction.frequency,
+        f"{moved} [{length}]": prediction.amplitude * length_factor,
+        **dict(zip(names, values(prediction), strict=True)),
+        **{f"{name}, {end}": of for name, low, high in ends for end, of in (("low", low), ("high", high))},
     }
-    return pd.DataFrame(
-        {
-            "frequency [Hz]": prediction.frequency,
-            f"{moved} [{length}]": prediction.amplitude * length_factor,
-            **{name: band.value * scale for name, (band, scale) in bands.items()},
-            **{
-                f"{name}, {end}": getattr(band, end) * scale
-                for name, (band, scale) in bands.items()
-                for end in ("low", "high")
-            },
-        }
-    )
+    if prediction.if_rigs:
+        columns |= {f"{name}, {IF_RIGS}": of for name, of in zip(names, values(prediction.if_rigs), strict=True)}
+    if (measured := prediction.measured) is not None:
+        columns |= {f"measured {names[0]}": np.abs(measured) * factor, f"measured {names[1]}": loss_factor(measured)}
+    return pd.DataFrame(columns)
 
 
 def shaken_table(found: PredictedResonance) -> pd.DataFrame:
@@ -63,7 +68,7 @@ def shaken_table(found: PredictedResonance) -> pd.DataFrame:
     import pandas as pd
 
     (length, length_factor), _, (stiffness, factor) = found.place.display
-    return pd.DataFrame(
+    table = pd.DataFrame(
         {
             "frequency [Hz]": found.frequency,
             "transmissibility [-]": np.abs(found.transmissibility),
@@ -73,6 +78,10 @@ def shaken_table(found: PredictedResonance) -> pd.DataFrame:
             "loss factor [-]": loss_factor(found.stiffness),
         }
     )
+    if found.if_rigs:
+        other = shaken_table(found.if_rigs).iloc[:, 1:].add_suffix(f", {IF_RIGS}")
+        table = pd.concat([table, other], axis=1)
+    return table
 
 
 def loops_table(model: Model, data_sets: Sequence[LoopData]) -> pd.DataFrame:
@@ -141,8 +150,8 @@ def gap_table(
         columns: dict[str, Any] = {"test": data_set.name, "kind": data_set.kind, "direction": str(data_set.direction)}
         columns |= data_set.columns()
         for name, model, test in (("before", before, data_set), ("after", after, later)):
-            parts = test.components(test.residual(model))
-            columns |= {f"{part} {name} [noise]": values for part, values in parts.items()}
+            parts = zip(test.components, np.split(test.misfit(model), test.parts), strict=True)
+            columns |= {f"{part} {name} [noise]": values for part, values in parts}
         return pd.DataFrame(columns)
 
     return pd.concat([rows(*pair) for pair in zip(data_sets, mended or data_sets, strict=True)], ignore_index=True)
@@ -152,10 +161,12 @@ def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """Every effect of the library, judged: score, gain, BIC, held-out gap, parameters, and why it won or lost."""
     import pandas as pd
 
+    from bushfit.diagnosis.record import level_of
+
     rows = [
         {
             "effect": judged.name,
-            "level": str(candidate_named(judged.name).level),
+            "level": level_of(judged.name),
             "score": judged.score,
             "chi-square gain": judged.gain,
             "BIC gain": judged.bic,

@@ -9,16 +9,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.random import Generator
 
+from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.diagnosis.evidence import fit
 from bushfit.diagnosis.search import footprint
 from bushfit.effects import BASE, LIBRARY, Effect, effect_named, qualified
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import DataSet, loop_data, sweep_data
+from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import DataSet
 from bushfit.geometry import Bushing, Direction
 from bushfit.model import rig
 from bushfit.model.model import Model
@@ -27,12 +30,35 @@ from bushfit.simulation import Simulated, Undisturbed, measure, undisturbed
 
 #: Disturbances that the library does not have.
 OUTSIDE = ("spot_disturbance", "mislabelled_level", "velocity_weakening_slip")
+#: Effects of the family `effects`, in turn: those of its first card, so that a seed makes the same card ever after.
+FIRST = (
+    "viscous",
+    "maxwell",
+    "strain_stiffening",
+    "asymmetry",
+    "second_friction",
+    "mullins_softening",
+    "rate_dependent_friction",
+    "coupled_breakdown",
+    "self_heating",
+    "clearance",
+    "interface_slip",
+    "bump_stop",
+    "stiffness_factor.radial",
+    "rig_compliance",
+    "inertia",
+    "fixture_resonance",
+    "delay",
+    "amplitude_rolloff",
+    "force_gain",
+    "force_offset",
+)
 #: Least and largest size of what stays visible, relative to |K| or half a loop's force range: hardly seen to plain.
 _VISIBLE = (0.015, 0.12)
 #: Least and largest scatter of a sweep point, relative to |K|: good rigs.
-_NOISE = (0.003, 0.006)
+NOISE = (0.003, 0.006)
 #: Least and largest scatter of a loop's force, relative to half its range.
-_FORCE_NOISE = (0.002, 0.004)
+FORCE_NOISE = (0.002, 0.004)
 #: Scatter of a loop's displacement, relative to its amplitude.
 _DISPLACEMENT_NOISE = 2e-4
 #: Gain error that a block shares, relative to |K|, where it shares one.
@@ -41,12 +67,14 @@ _SHARED_GAIN = 0.004
 _SHARED_PHASE = float(np.radians(0.2))
 #: Frequencies of every sweep [Hz], the paper's.
 _FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
+#: Least and largest temperature of a test where an effect of it is hidden [K]: within 12 K of the laboratory's.
+_TEMPERATURES = (285.0, 308.0)
 #: Levels of a sweep, relative to the largest, as in the paper.
 _LEVELS = np.array([0.2, 0.4, 1.0])
 #: Bushings tried until one shows the effect at a size in range; chosen: the worst effect needs a dozen.
 _TRIES = 30
 #: Time steps of a cycle: their error is a tenth of the noise.
-_STEPS = 1024
+STEPS = 1024
 #: Times its typical size that an effect has at most.
 _LARGEST = 30.0
 #: Loss factor that a bushing has at most, hidden effect and all.
@@ -65,7 +93,7 @@ class Sealed:
 
     Args:
         outside, without: what the library does not have, or ""; effects that it is made to lack.
-        visible: largest misfit of the plain model without noise, relative.
+        visible: largest misfit of the plain model without noise, relative; of a recipe the size it was asked for.
         shared: whether blocks share gain and phase errors.
     """
 
@@ -87,6 +115,7 @@ def hidden_campaign(
     hidden: Sequence[str],
     outside: str = "",
     directions: Sequence[Direction] = (Direction.AXIAL, Direction.RADIAL),
+    visible: tuple[float, float] = _VISIBLE,
 ) -> tuple[Simulated, Sealed]:
     """One hidden campaign; the same seed makes the same.
 
@@ -94,20 +123,23 @@ def hidden_campaign(
         seed: of everything random.
         hidden, outside: effects of the library to hide, none for a clean campaign; one of OUTSIDE, or "".
         directions: of the two sweeps.
+        visible: least and largest size of what stays visible of each effect, relative.
     """
     random = np.random.default_rng([seed, 7])
     for _ in range(_TRIES):
         plain = random_bushing(random)
-        plan = _plan(plain, random, seed, directions)
+        plan = plan_of(plain, random, seed, directions)
+        if any("temperature" in effect_named(name).under for name in hidden):
+            plan = _at_temperatures(plan, random)
         with suppress(_OutOfReachError):
-            model, visible = _with_hidden(plain, hidden, plan, random)
+            model, least = _with_hidden(plain, hidden, plan, random, visible)
             break
     else:
         raise RuntimeError(f"no visible size of {', '.join(hidden)} was found for seed {seed}")
-    clean = undisturbed(model, plan, steps_per_cycle=_STEPS)
+    clean = undisturbed(model, plan, steps_per_cycle=STEPS)
     if outside:
         clean = _disturbed(clean, outside, random)
-    sealed = Sealed(tuple(hidden), outside, (), dict(model.values), visible, plan.gain_error > 0.0, seed)
+    sealed = Sealed(tuple(hidden), outside, (), dict(model.values), least, plan.gain_error > 0.0, seed)
     return measure(clean, plan), sealed
 
 
@@ -129,7 +161,12 @@ def random_bushing(random: Generator) -> Model:
     )
 
 
-def _plan(plain: Model, random: Generator, seed: int, directions: Sequence[Direction]) -> SimulateSettings:
+def plan_of(
+    plain: Model,
+    random: Generator,
+    seed: int,
+    directions: Sequence[Direction] = (Direction.AXIAL, Direction.RADIAL),
+) -> SimulateSettings:
     """Two directions at three levels of like strain, two axial loops, three repeats."""
     top = random.uniform(0.03, 0.06)
     axial, second = (float(f"{top / plain.unit_strain(direction):.2g}") for direction in directions)
@@ -137,8 +174,8 @@ def _plan(plain: Model, random: Generator, seed: int, directions: Sequence[Direc
     return SimulateSettings(
         seed=seed,
         repeats=3,
-        noise=random.uniform(*_NOISE),
-        force_noise=random.uniform(*_FORCE_NOISE),
+        noise=random.uniform(*NOISE),
+        force_noise=random.uniform(*FORCE_NOISE),
         displacement_noise=_DISPLACEMENT_NOISE,
         gain_error=_SHARED_GAIN if shared else 0.0,
         phase_error=_SHARED_PHASE if shared else 0.0,
@@ -150,19 +187,33 @@ def _plan(plain: Model, random: Generator, seed: int, directions: Sequence[Direc
     )
 
 
-def _with_hidden(plain: Model, hidden: Sequence[str], plan: SimulateSettings, random: Generator) -> tuple[Model, float]:
+def _at_temperatures(plan: SimulateSettings, random: Generator) -> SimulateSettings:
+    """The plan with each of its tests at a temperature of its own."""
+    loops = tuple(replace(test, temperature=random.uniform(*_TEMPERATURES)) for test in plan.loops)
+    sweeps = tuple(replace(test, temperature=random.uniform(*_TEMPERATURES)) for test in plan.sweeps)
+    return replace(plan, loops=loops, sweeps=sweeps)
+
+
+def _with_hidden(
+    plain: Model, hidden: Sequence[str], plan: SimulateSettings, random: Generator, visible: tuple[float, float]
+) -> tuple[Model, float]:
     """The plain model with effects of random visible size, and the least size."""
     model, sizes = plain, []
     for name in hidden:
-        wanted = float(np.exp(random.uniform(*np.log(_VISIBLE))))
-        sized, size = _sized(plain, effect_named(name), wanted, plan, random)
+        wanted = float(np.exp(random.uniform(*np.log(visible))))
+        sized, size = _sized(plain, effect_named(name), wanted, plan, random, visible)
         model = model.with_effect(name, sized)
         sizes.append(size)
     return model, min(sizes, default=0.0)
 
 
 def _sized(
-    plain: Model, effect: Effect, wanted: float, plan: SimulateSettings, random: Generator
+    plain: Model,
+    effect: Effect,
+    wanted: float,
+    plan: SimulateSettings,
+    random: Generator,
+    visible: tuple[float, float],
 ) -> tuple[dict[str, float], float]:
     """Values of an effect of which about the wanted size stays visible after a plain fit, and that size."""
     values = {
@@ -170,15 +221,16 @@ def _sized(
         for parameter in effect.parameters
         if parameter.neutral is None
     }
-    amount = effect.amount
-    name, share = qualified(effect, amount), 1.0
+    amount, share = effect.amount, 1.0
+    amounts = {qualified(effect, each): each for each in effect.parameters if each.neutral is not None}
     if amount.bounds[0] < amount.sized(0.0) and random.random() < 0.5:
         share = -share
     size = 0.0
     for _ in range(_SIZING_STEPS):
         if not (amount.bounds[0] <= amount.sized(share) <= amount.bounds[1] and abs(share) <= _LARGEST):
             raise _OutOfReachError
-        model = plain.with_effect(effect.name, {**values, name: amount.sized(share)})
+        values |= {name: each.sized(share) for name, each in amounts.items()}
+        model = plain.with_effect(effect.name, values)
         if not _plausible(model, plan):
             share *= 0.3
             continue
@@ -186,19 +238,22 @@ def _sized(
         if size <= 0.0 or abs(np.log(size / wanted)) < _NEAR:
             break
         share *= float(np.clip(wanted / size, 0.1, 10.0))
-    if not 0.7 * _VISIBLE[0] < size < 2.0 * _VISIBLE[1]:
+    if not 0.7 * visible[0] < size < 2.0 * visible[1]:
         raise _OutOfReachError
-    return {**values, name: amount.sized(share)}, size
+    return values | {name: each.sized(share) for name, each in amounts.items()}, size
 
 
 def _shape(plain: Model, plan: SimulateSettings, scale: str | None, typical: float, random: Generator) -> float:
     """A random value of a parameter that has no neutral one, on the scale of the tests."""
     amplitudes = plan.sweeps[0].amplitudes
+    largest = max(float(np.max(np.abs(plain.stiffness(t.direction, *_points(t))) * _points(t)[1])) for t in plan.sweeps)
     ranges = {
         "period": (1.0 / (2.0 * np.pi * 300.0), 1.0 / (2.0 * np.pi * 10.0)),
         "frequency": (190.0, 400.0),
         "displacement": (1.2 * amplitudes[1], 0.9 * amplitudes[2]),
+        "force": (0.4 * largest, 0.9 * largest),
         "strain": tuple(x * plain.values["eps_half"] for x in (0.02, 0.1)),
+        "order": (0.45, 0.85),
         None: (0.7 * typical, 1.4 * typical),
     }
     return float(np.exp(random.uniform(*np.log(ranges[scale]))))
@@ -227,15 +282,20 @@ def _visible(plain: Model, model: Model, plan: SimulateSettings) -> float:
 def _noise_free_data(model: Model, plan: SimulateSettings) -> list[DataSet]:
     """The plan's tests as the model's own closed form has them: used for the choice of a size, never as data."""
     swept = [(test.direction, *_points(test)) for test in plan.sweeps]
-    sweeps = [Sweep(str(points[0]), *points, model.stiffness(*points), noise=5e-3) for points in swept]
+    sweeps = [
+        Sweep(str(points[0]), *points, model.stiffness(*points), noise=5e-3, temperature=test.temperature)
+        for test, points in zip(plan.sweeps, swept, strict=True)
+    ]
     phase = np.arange(600) / 200.0
     motions = [(test, test.amplitude * np.sin(2.0 * np.pi * phase)) for test in plan.loops]
     loops = [
-        Loop(str(number), test.direction, phase / test.frequency, motion, motion)
+        Loop(str(number), test.direction, phase / test.frequency, motion, motion, temperature=test.temperature)
         for number, (test, motion) in enumerate(motions)
     ]
-    silent = [data_set.noise_free(model).with_noise(3e-3) for data_set in loop_data(loops)]
-    return [*silent, *sweep_data(sweeps)]
+    campaign = Campaign("plan", Path("plan"), model.bushing, tuple(loops), tuple(sweeps))
+    data = Data.of(campaign)
+    silent = [loop.noise_free(model).with_noise(3e-3) for loop in data.loops]
+    return [*silent, *(sweep.noise_free(model) for sweep in data.sweeps)]
 
 
 def _disturbed(clean: Undisturbed, outside: str, random: Generator) -> Undisturbed:
@@ -266,7 +326,7 @@ def _mislabelled(clean: Undisturbed, random: Generator) -> tuple[tuple[Simulated
         test.direction,
         np.array(test.frequencies),
         np.full(len(test.frequencies), factor * test.amplitudes[level]),
-        steps_per_cycle=_STEPS,
+        steps_per_cycle=STEPS,
     )
     return tuple((t, wrong if i == which else k) for i, (t, k) in enumerate(clean.sweeps))
 
@@ -296,5 +356,8 @@ def _weakening_slip(clean: Undisturbed, size: float, random: Generator) -> Undis
 
 
 def hideable() -> list[str]:
-    """Effects that the tests of a hidden campaign can show."""
-    return [name for name in LIBRARY if name not in BASE]
+    """Effects of the library of today that the rig can make and the tests of a hidden campaign can show."""
+    out_of_reach = {
+        name for name, effect in LIBRARY.items() if effect.harmonic_only or effect.after not in (None, *BASE)
+    }
+    return [name for name in LIBRARY if name not in {*BASE, *out_of_reach}]

@@ -33,9 +33,10 @@ from bushfit.fitting.procedures import STATIC, fit_dynamic, fit_joint, fit_two_s
 from bushfit.fitting.solve import Coordinates, jacobian, residual, solve
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction
+from bushfit.jobs.grid import PAPER_AMPLITUDES, PAPER_FREQUENCIES
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
-from bushfit.prediction import PAPER_AMPLITUDES, PAPER_FREQUENCIES, predict
+from bushfit.prediction import predict
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.scorecard.hidden import hidden_campaign
 

@@ -326,7 +326,7 @@ USAGE = [
     ("simulate|model.json|--effect|inertia.mass=-1 kg", "inertia.mass: impossible value", "0 to 100 kg (moving mass)"),
     ("simulate|model.json|--effect|=", "unknown effect", "one of elastic, springpot, friction, viscous, maxwell, strain_stiffening, asymmetry,"),
     ("scorecard|--campaigns|1", "Invalid value for '--campaigns': 1 is not in the range x>=5."),
-    ("scorecard|--family|faults", "Invalid value for '--family': 'faults' is not one of 'effects', 'mistakes', 'amplitude_sweeps'."),
+    ("scorecard|--family|fault", "Invalid value for '--family': 'fault' is not one of 'effects', 'mistakes', 'amplitude_sweeps', 'awkward', 'faults', 'outside', 'library', 'all'."),
     ("scorecard|--jobs|0", "Invalid value for '--jobs': 0 is not in the range x>=1."),
     ("scorecard|--seed|one", "Invalid value for '--seed': 'one' is not a valid integer range."),
     ("scorecard|extra", "Got unexpected extra argument (extra)"),

@@ -63,3 +63,11 @@ def test_predict_repeats_three_warnings_of_the_fit_and_counts_the_rest(
     done = bushfit("predict", str(tmp_path / "m.json"), "--no-plots", "-o", str(tmp_path / "x"))
     told = [line.partition("of the fit: ")[2] for line in done.stderr.splitlines() if ": of the fit: " in line]
     assert told == ["odd 0", "odd 1", "odd 2", f"5 more, under warnings in {tmp_path / 'm.json'}"]
+
+
+def test_predict_at_a_temperature_needs_a_model_that_knows_one(bushfit: Run, tmp_path: Path) -> None:
+    at = ("predict", "model/model.json", "--no-plots", "-o", str(tmp_path / "x"))
+    for temperature, said in (("40 degC", "the model knows no temperature"), ("warm", "--temperature")):
+        done = bushfit(*at, "--temperature", temperature)
+        assert done.returncode == 2
+        assert said in done.stderr

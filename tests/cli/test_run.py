@@ -79,11 +79,11 @@ def test_the_line_on_two_steps_counts_no_meaningless_errors(
 def test_run_with_an_effect_shows_what_diagnose_shows(root: Path, tmp_path: Path) -> None:
     done = call(root, "run", "configs/mystery_mount.toml", "-o", str(tmp_path / "x"), "--no-plots")
     assert done.returncode == 0, done.stderr
-    for words in ("Mystery mount: named", "rig_compliance (instrument)", "held out", "7.7 x noise:", "next test:"):
+    for words in ("Mystery mount: named", "sleeve_compliance (", "  held out  ", "7.9 x noise:", "next test:"):
         assert done.stderr.count(words) == 1
     assert "model with what was added" in done.stderr
     assert "was not fitted, and the model misses it" not in done.stderr, "of the joint fit, which is not the one to use"
-    assert f"{tmp_path / 'x/model.json'}, with rig_compliance; joint.json is without" in done.stderr
+    assert f"{tmp_path / 'x/model.json'}, with sleeve_compliance; joint.json is without" in done.stderr
 
 
 def test_one_loop_alone_is_fitted_and_what_it_leaves_open_is_named(work: Path, tmp_path: Path) -> None:

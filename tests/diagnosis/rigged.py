@@ -12,8 +12,12 @@ from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSetti
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects.contract import Array
+from bushfit.effects.history import History
 from bushfit.geometry import Direction
+from bushfit.model.model import Model
+from bushfit.model.rig import Record
 from bushfit.reading.measurement import Sweep
+from bushfit.simulation import Undisturbed
 
 BOTH = [Direction.AXIAL, Direction.RADIAL]
 FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
@@ -34,6 +38,22 @@ Effects = Mapping[str, Mapping[str, float]]
 Measured = Callable[..., Campaign]
 Diagnosed = Callable[..., Diagnosis]
 Fitted = Callable[..., Evidence]
+
+
+def in_closed_form(truth: Model, plan: SimulateSettings) -> Undisturbed:
+    """What the closed form that fits use has of a model in its steady state: for effects that the rig cannot make."""
+    phase = np.arange(1000) / 1000
+    loops = []
+    for test in plan.loops:
+        motion = test.amplitude * np.tile(np.sin(2.0 * np.pi * phase), test.cycles)
+        steady = History.steady(motion, test.frequency, test.cycles)
+        force = truth.force(test.direction, steady, kind="loop")
+        loops.append((test, Record(steady.step * np.arange(motion.size), motion, force)))
+    sweeps = [
+        (test, truth.stiffness(test.direction, np.array(test.frequencies), np.array(test.amplitudes)[:, None]))
+        for test in plan.sweeps
+    ]
+    return Undisturbed(truth, tuple(loops), tuple(sweeps))
 
 
 def cut(sweep: Sweep, kept: Array) -> Sweep:

@@ -92,3 +92,15 @@ def test_levels_may_have_different_points(measured: Measured, fitted: Fitted) ->
     sweeps = (cut(campaign.sweeps[0], ~gone), campaign.sweeps[1])
     found = locate(fitted(replace(campaign, sweeps=sweeps)))
     assert "the square of frequency" in one(found, "axial", "storage").reading
+
+
+def test_a_region_that_lies_on_either_side_of_the_model_says_so(measured: Measured, fitted: Fitted) -> None:
+    """One level above, another below: the sentence names both, as the map shows them."""
+    campaign = measured(plan=SHARED)
+    amplitude = campaign.sweeps[1].amplitude
+    off = np.where(amplitude == LEVELS[0], 1.06, np.where(amplitude == LEVELS[2], 0.95, 1.0))
+    reading = one(locate(fitted(changed(campaign, 1, off))), "radial", "storage").reading
+    print(reading)
+    assert "above the model" in reading
+    assert "most at 0.1 mm, there much the same at every frequency" in reading
+    assert reading.endswith("; below it at 0.5 mm")

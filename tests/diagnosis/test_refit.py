@@ -19,7 +19,7 @@ def plain(measured: Measured, fitted: Fitted) -> Evidence:
 
 @pytest.fixture(scope="module")
 def proposed(plain: Evidence) -> list[Proposal]:
-    return proposals(plain, ())[:6]
+    return proposals(plain, (), ())[:6]
 
 
 def test_the_best_is_fitted_to_its_end_and_those_far_behind_are_not(plain: Evidence, proposed: list[Proposal]) -> None:

@@ -82,7 +82,7 @@ def test_clean_campaigns_pass_the_thresholds_at_the_stated_rates(
         columns = contrasts(evidence)
         questions = ScoreTest(evidence, columns, [np.arange(len(columns))], PATTERN_LEFT)
         smooth.append(questions.gains()[0] > questions.largest_by_chance(LEVEL))
-        proposed = proposals(evidence, ())
+        proposed = proposals(evidence, (), ())
         candidates.append(max(proposal.score for proposal in proposed) > critical_gain(evidence, proposed))
     print(f"{SEEDS} clean campaigns: smooth misfit above its {100 * LEVEL:.0f} % threshold in {np.mean(smooth):.1%}")
     print(f"best candidate above its 99.5 % threshold in {np.mean(candidates):.1%}")
@@ -93,7 +93,7 @@ def test_clean_campaigns_pass_the_thresholds_at_the_stated_rates(
 
 def blocks(evidence: Evidence) -> list[Array]:
     """Indices of the residuals of each run."""
-    return [block for _, _, own in evidence.rigs for block in own]
+    return [block for _, _, own, _ in evidence.rigs for block in own]
 
 
 def blockwise(evidence: Evidence) -> tuple[Array, list[Array]]:
@@ -115,7 +115,7 @@ def test_drawn_noise_passes_the_threshold_at_the_stated_rate(clean: Evidence, fr
         for block in blocks(clean):
             noise[:, block] += (scale - 1.0) * noise[:, block].mean(axis=1)[:, None]
     evidence = with_freedom(clean, freedom)
-    assert max(freedoms.shared for freedoms, _, _ in evidence.rigs) == freedom
+    assert max(freedoms.shared for freedoms, _, _, _ in evidence.rigs) == freedom
     threshold = ScoreTest(evidence, *blockwise(clean), PATTERN_LEFT).largest_by_chance(LEVEL)
     drawn = (ScoreTest(with_residual(evidence, row), *blockwise(clean), PATTERN_LEFT) for row in noise)
     share = float(np.mean([max(one.gains()) > threshold for one in drawn]))
@@ -154,7 +154,7 @@ def test_the_sense_of_a_question_is_that_of_its_answer(clean: Evidence) -> None:
 
 
 def test_more_candidates_cost_a_higher_threshold(clean: Evidence) -> None:
-    proposed = proposals(clean, ())
+    proposed = proposals(clean, (), ())
     one, every = critical_gain(clean, proposed[:1]), critical_gain(clean, proposed)
     print(f"one candidate {one:.1f}, all {len(proposed)} {every:.1f}")
     assert every > one + 2.0

@@ -10,7 +10,21 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from bushfit.effects import BASE, LIBRARY, Effect, History, Level, Modifier, Parameter, qualified
+from bushfit.effects import (
+    BASE,
+    LIBRARY,
+    Effect,
+    History,
+    Level,
+    Modifier,
+    Parameter,
+    at_places,
+    effect_named,
+    qualified,
+    twins_of,
+)
+from bushfit.effects.contract import Circumstances
+from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import Model
@@ -19,10 +33,17 @@ from bushfit.model.rig import lock_in, record
 from bushfit.model.sensitivity import force_jacobian, stiffness_jacobian
 
 ADDED = tuple(name for name in LIBRARY if name not in BASE)
+#: Of these there is no law in time.
+TIMELESS = tuple(name for name in ADDED if LIBRARY[name].harmonic_only)
 #: Work can come out of these: a late force channel is no passive system.
 ACTIVE = {"delay"}
 #: The reversal of dry friction falls on a sample only to the accuracy of the sampling.
 SAMPLES = 2**14
+#: A warm test, late in the session and after a large strain.
+UNDER = Circumstances(temperature=303.0, turn=0.7, strained=0.08)
+#: Effects made of parts that set in one after the other: the slope jumps there, by so much, and no rule of differences
+#: over both sides meets it.
+KINKED = {"sliders": 5e-3}
 
 
 def random_model(rng: np.random.Generator) -> Model:
@@ -46,8 +67,16 @@ def sized(model: Model, name: str, direction: Direction, amplitude: float, rng: 
         "interface_slip.force": 0.05 * stiffness * amplitude,
         "bump_stop.gap": 0.6 * amplitude,
         "bump_stop.stiffness": 0.3 * stiffness,
+        "guide_friction.force": 0.05 * stiffness * amplitude,
+        "one_sided_stop.gap": 0.6 * amplitude,
+        "one_sided_stop.stiffness": 0.3 * stiffness,
+        "force_saturation.level": 0.6 * stiffness * amplitude,
         "clearance.delta": 0.1 * amplitude,
+        "fixture_play.delta": 0.1 * amplitude,
         "rig_compliance.compliance": 0.1 / stiffness,
+        "sleeve_compliance.compliance": 0.1 / stiffness,
+        "rig_compliance.radial": 0.1 / stiffness,
+        "sleeve_compliance.radial": 0.1 / stiffness,
         "inertia.mass": 0.05 * stiffness / (2.0 * np.pi * 155.0) ** 2,
         "fixture_resonance.mass": 0.05 * stiffness / (2.0 * np.pi * 155.0) ** 2,
         "self_heating.beta": 0.1 / (100.0 * stiffness * amplitude**2),
@@ -59,6 +88,12 @@ def sized(model: Model, name: str, direction: Direction, amplitude: float, rng: 
         share = rng.uniform(0.5, 1.5)
         values[key] = by_hand[key] * share if key in by_hand else parameter.sized(share)
     return model.with_effect(name, values)
+
+
+def beside(plain: Model, name: str) -> Model:
+    """The model that an effect is added to: without the branch that it replaces."""
+    kept = [other for other in plain.effects if other != LIBRARY[name].replaces]
+    return Model.started(plain.bushing, kept, plain.values)
 
 
 def operating_point(model: Model, rng: np.random.Generator) -> tuple[Direction, float, float]:
@@ -77,9 +112,9 @@ def steady_sine(amplitude: float, frequency: float, samples: int = SAMPLES) -> H
 
 def harmonic_gap(model: Model, direction: Direction, frequency: float, amplitude: float) -> float:
     """First harmonic of the steady time face against the frequency face, relative."""
-    force = model.force(direction, steady_sine(amplitude, frequency))
+    force = model.force(direction, steady_sine(amplitude, frequency), under=UNDER)
     timed = 2.0 * np.fft.rfft(force)[..., 1] / (SAMPLES * amplitude)
-    return float(np.ravel(np.abs(timed / model.stiffness(direction, frequency, amplitude) - 1.0))[0])
+    return float(np.ravel(np.abs(timed / model.stiffness(direction, frequency, amplitude, under=UNDER) - 1.0))[0])
 
 
 def harmonic_error(model: Model) -> float:
@@ -104,7 +139,7 @@ def test_record_is_complete(effect: Effect) -> None:
     assert effect.sentence.endswith(".")
     assert effect.equation
     assert effect.source
-    assert sum(parameter.neutral is not None for parameter in effect.parameters) == 1
+    assert any(parameter.neutral is not None for parameter in effect.parameters)
     for parameter in effect.parameters:
         low, high = parameter.bounds
         assert low < parameter.sized(1.0) < high
@@ -115,7 +150,8 @@ def test_record_is_complete(effect: Effect) -> None:
 
 def test_neutral_value_gives_the_plain_model_back(effect: Effect, rng: np.random.Generator) -> None:
     plain = random_model(rng)
-    neutral = plain.with_effect(effect.name)
+    neutral = plain.with_effect(effect.name, {qualified(effect, effect.amount): effect.amount.sized(0.0)})
+    plain = beside(plain, effect.name)
     frequency, amplitude = np.meshgrid([0.1, 5.0, 155.0, 900.0], [0.0, 1e-6, 2e-4, 1e-3])
     triangle = 1e-3 * np.concatenate([np.linspace(-1.0, 1.0, 300), np.linspace(1.0, -1.0, 300)[1:-1]])
     histories = [
@@ -125,10 +161,10 @@ def test_neutral_value_gives_the_plain_model_back(effect: Effect, rng: np.random
     ]
     for direction, kind in itertools.product(Direction, ("sweep", "loop")):
         expected = plain.stiffness(direction, frequency, amplitude, kind=kind)
-        assert np.array_equal(neutral.stiffness(direction, frequency, amplitude, kind=kind), expected)
+        assert np.array_equal(neutral.stiffness(direction, frequency, amplitude, kind=kind, under=UNDER), expected)
         for history in histories:
             expected = plain.force(direction, history, kind=kind)
-            assert np.array_equal(neutral.force(direction, history, kind=kind), expected)
+            assert np.array_equal(neutral.force(direction, history, kind=kind, under=UNDER), expected)
 
 
 def test_first_harmonic_of_the_time_face_is_the_frequency_face(effect: Effect, rng: np.random.Generator) -> None:
@@ -142,7 +178,7 @@ def test_first_harmonic_of_the_time_face_is_the_frequency_face(effect: Effect, r
     assert worst <= effect.harmonic_error + 1e-6
 
 
-@pytest.mark.parametrize("name", [name for name in ADDED if name != "fixture_resonance"])
+@pytest.mark.parametrize("name", [name for name in ADDED if name not in {"fixture_resonance", *TIMELESS}])
 def test_the_rig_from_rest_finds_the_frequency_face(name: str, rng: np.random.Generator) -> None:
     """To the errors of the rig: Gruenwald-Letnikov is first order in the step, and friction takes cycles to settle."""
     plain = random_model(rng)
@@ -151,10 +187,32 @@ def test_the_rig_from_rest_finds_the_frequency_face(name: str, rng: np.random.Ge
     model = sized(plain, name, direction, amplitude, rng)
     errors = []
     for each in (plain, model):
-        measured = record(each, direction, frequency, amplitude, cycles=1, run_in=12, steps_per_cycle=2048)
-        errors.append(lock_in(measured, frequency) / np.ravel(each.stiffness(direction, frequency, amplitude))[0] - 1.0)
+        measured = record(each, direction, frequency, amplitude, cycles=1, run_in=12, steps_per_cycle=2048, under=UNDER)
+        closed = np.ravel(each.stiffness(direction, frequency, amplitude, under=UNDER))[0]
+        errors.append(lock_in(measured, frequency) / closed - 1.0)
     print(f"{name}: from rest {abs(errors[1]):.1e}, without it {abs(errors[0]):.1e}")
     assert abs(errors[1] - errors[0]) <= LIBRARY[name].harmonic_error + 3e-4
+
+
+@pytest.mark.parametrize("name", TIMELESS)
+def test_what_has_no_law_in_time_answers_the_first_harmonic_and_the_rig_refuses_it(
+    name: str, rng: np.random.Generator
+) -> None:
+    plain = random_model(rng)
+    direction, frequency, amplitude = operating_point(plain, rng)
+    model, plain = sized(plain, name, direction, amplitude, rng), beside(plain, name)
+    phase = np.arange(512) / 512
+    motion = amplitude * (0.3 + np.cos(2.0 * np.pi * phase) + 0.2 * np.cos(6.0 * np.pi * phase))
+    cycles = [History.steady(np.tile(motion, count), frequency, cycles=count) for count in (1, 3)]
+    extra = [model.force(direction, each) - plain.force(direction, each) for each in cycles]
+    spectrum = np.abs(np.fft.rfft(extra[0]))
+    assert np.max(np.delete(spectrum, 1)) < 1e-9 * spectrum[1]
+    np.testing.assert_allclose(extra[1], np.tile(extra[0], 3), atol=1e-9 * np.ptp(extra[0]))
+    started = History(np.tile(motion, 2), 1.0 / (512 * frequency), periodic=False, frequency=frequency)
+    late = model.force(direction, started) - plain.force(direction, started)
+    np.testing.assert_allclose(late, np.tile(extra[0], 2), atol=1e-9 * np.ptp(extra[0]))
+    with pytest.raises(ModelError, match="no law"):
+        record(model, direction, frequency, amplitude, cycles=1)
 
 
 def random_cycle(rng: np.random.Generator, amplitude: float) -> History:
@@ -175,7 +233,7 @@ def test_passive_effects_dissipate_in_any_closed_cycle(name: str, rng: np.random
         direction, frequency, amplitude = operating_point(plain, rng)
         model = sized(plain, name, direction, amplitude, rng)
         if not isinstance(LIBRARY[name], Modifier):
-            model = model.with_values({"m": 0.0, "sigma_fmax": 0.0})
+            model = model.with_values({key: 0.0 for key in ("m", "sigma_fmax") if key in model.values})
         history = random_cycle(rng, amplitude)
         force = model.force(direction, history, kind="loop")
         velocity = np.fft.irfft(1j * history.harmonics * np.fft.rfft(history.value), n=history.value.size)
@@ -204,21 +262,73 @@ def test_sensitivities_match_finite_differences(effect: Effect, rng: np.random.G
     names = list(model.parameters)
     frequency = np.array([5.0, 60.0, 155.0])
     amplitudes = amplitude * np.array([0.91, 1.07, 2.1])
-    loop = steady_sine(amplitude, 0.1, 512)
-    swept = stiffness_jacobian(model, direction, frequency, amplitudes, names, kind="loop")
-    looped = force_jacobian(model, direction, loop, names)
+    loop, swept_at = steady_sine(amplitude, 0.1, 512), (direction, frequency, amplitudes)
+    swept = stiffness_jacobian(model, direction, frequency, amplitudes, names, kind="loop", under=UNDER)
+    looped = force_jacobian(model, direction, loop, names, UNDER)
     worst = 0.0
     for i, key in enumerate(names):
         size = spread(model.parameters[key], model.values[key], 1.0)
-        stiffness = five_point(model, key, lambda m: m.stiffness(direction, frequency, amplitudes, kind="loop"))
-        force = five_point(model, key, lambda m: m.force(direction, loop, kind="loop"))
+        stiffness = five_point(model, key, lambda m: m.stiffness(*swept_at, kind="loop", under=UNDER))
+        force, wider = (
+            five_point(model, key, lambda m: m.force(direction, loop, kind="loop", under=UNDER), step)
+            for step in (2e-3, 3e-3)
+        )
+        largest = np.max(np.abs(model.force(direction, loop)))
+        smooth = np.abs(force - wider) * size < 1e-6 * largest  # the force does not bend within these steps
+        assert np.mean(smooth) > 0.9
         for found, expected, scale in (
-            (swept[i], stiffness, model.stiffness(direction, frequency, amplitudes)),
-            (looped[i], force, model.force(direction, loop)),
+            (swept[i], stiffness, np.max(np.abs(model.stiffness(direction, frequency, amplitudes)))),
+            (looped[i][smooth], force[smooth], largest),
         ):
-            worst = max(worst, float(np.max(np.abs(found - expected)) * size / np.max(np.abs(scale))))
+            worst = max(worst, float(np.max(np.abs(found - expected)) * size / scale))
     print(f"{effect.name}: sensitivities within {worst:.1e} of the response per relative change")
-    assert worst < 2e-6
+    assert worst < KINKED.get(effect.name, 2e-6)
+
+
+def test_twins_answer_alike_in_both_faces_and_only_the_bushings_is_proposed(rng: np.random.Generator) -> None:
+    sets = [twins_of(name) for name, each in LIBRARY.items() if each.twins]
+    assert len(sets) == 5
+    proposed = at_places(["radial", "axial", "mount", "torsion"])
+    for names in (
+        *sets,
+        twins_of("stiffness_factor.mount"),
+        twins_of("sleeve_compliance.axial"),
+    ):
+        assert all(twins_of(name) == names for name in names)
+        assert [name for name in names if name in proposed] == [names[0]]
+        levels = [effect_named(name).level for name in names]
+        assert levels[0] is Level.COMPONENT
+        assert Level.INSTRUMENT in levels
+    for name, *twins in sets:
+        plain = random_model(rng).with_effect("inertia", {"inertia.mass": 0.02})
+        _, frequency, amplitude = operating_point(plain, rng)
+        model = sized(plain, name, Direction.RADIAL, amplitude, rng)
+        motion = amplitude * np.sin(2.0 * np.pi * np.arange(600) / 200)
+        for twin in twins:
+            other = model.with_twin(twin)
+            assert (set(other.effects) ^ set(model.effects)) == {name, twin}
+            for direction, kind in itertools.product(Direction, ("sweep", "loop")):
+                at = (direction, frequency, amplitude * np.array([0.8, 1.0, 2.0]))
+                assert np.array_equal(other.stiffness(*at, kind=kind), model.stiffness(*at, kind=kind))
+                for history in (
+                    History.steady(motion[:200], 5.0),
+                    History(motion, 1e-3, periodic=False, frequency=5.0),
+                ):
+                    expected = model.force(direction, history, kind=kind)
+                    assert np.array_equal(other.force(direction, history, kind=kind), expected)
+
+
+def test_a_late_displacement_is_an_early_force(rng: np.random.Generator) -> None:
+    """From rest the force runs ahead of the record, to its very end."""
+    model = random_model(rng).with_effect("delay", {"delay.tau": -1e-4})
+    plain = model.with_values({"delay.tau": 0.0})
+    time = np.arange(1, 40 * 500 + 1) / (500 * 100.0)
+    history = History(2e-4 * np.sin(2.0 * np.pi * 100.0 * time), time[0], periodic=False, frequency=100.0)
+    early, prompt = (each.force(Direction.AXIAL, history) for each in (model, plain))
+    np.testing.assert_allclose(early[:-5], prompt[5:], rtol=1e-9)
+    np.testing.assert_allclose(early[-5:], prompt[-500:-495], rtol=1e-9)
+    loss = [m.stiffness(Direction.AXIAL, 100.0, 2e-4) for m in (model, plain)]
+    assert np.angle(loss[0]) - np.angle(loss[1]) == pytest.approx(2.0 * np.pi * 100.0 * 1e-4)
 
 
 def stacked(models: list[Model]) -> Mapping[str, np.ndarray]:
@@ -234,19 +344,25 @@ def test_a_stack_of_values_equals_one_after_the_other(effect: Effect, rng: np.ra
         for _ in range(3)
     ]
     frequency, amplitudes = np.array([0.1, 40.0, 155.0, 155.0]), amplitude * np.array([1.0, 0.5, 1.5, 0.0])
-    both = model.stiffness(direction, frequency, amplitudes, kind="loop", values=stacked(models))
+    turns = np.linspace(0.0, 1.0, 4)
+    each_point = Circumstances(295.0 + turns, turns, 0.1 * turns)
+    both = model.stiffness(direction, frequency, amplitudes, kind="loop", values=stacked(models), under=each_point)
     assert both.shape == (3, 4)
     for row, each in zip(both, models, strict=True):
-        np.testing.assert_allclose(row, each.stiffness(direction, frequency, amplitudes, kind="loop"), rtol=1e-12)
+        for i, one in enumerate(row):
+            under = each_point.at(i)
+            alone = each.stiffness(direction, frequency[i], amplitudes[i], kind="loop", under=under)
+            np.testing.assert_allclose(one, alone, rtol=1e-12)
     phase = np.arange(600) / 200
     motion = amplitude * np.sin(2.0 * np.pi * phase)
     for history in (
         History.steady(motion, 5.0, cycles=3),
         History(motion, 1e-3, periodic=False, frequency=5.0),
     ):
-        both = np.broadcast_to(model.force(direction, history, kind="loop", values=stacked(models)), (3, 600))
+        answer = model.force(direction, history, kind="loop", values=stacked(models), under=UNDER)
+        both = np.broadcast_to(answer, (3, 600))
         for row, each in zip(both, models, strict=True):
-            expected = each.force(direction, history, kind="loop")
+            expected = each.force(direction, history, kind="loop", under=UNDER)
             np.testing.assert_allclose(row, expected, rtol=1e-10, atol=1e-10 * np.ptp(expected))
 
 
@@ -260,8 +376,8 @@ def test_any_two_compose(effect: Effect, rng: np.random.Generator) -> None:
         both = sized(model, other, direction, amplitude, rng)
         turned = plain.with_effect(other).with_effect(effect.name).with_values(both.values)
         at = (direction, frequency, amplitude)
+        assert np.array_equal(both.stiffness(*at, under=UNDER), turned.stiffness(*at, under=UNDER))
         assert both.records == turned.records
-        assert np.array_equal(both.stiffness(*at), turned.stiffness(*at))
         gap = harmonic_gap(both, *at)
         assert gap <= 2.0 * harmonic_error(both) + 1e-6, (other, gap)
 
@@ -272,7 +388,10 @@ def test_any_three_compose(rng: np.random.Generator) -> None:
         plain = random_model(rng)
         direction, frequency, amplitude = operating_point(plain, rng)
         model = plain
-        for name in rng.choice(ADDED, size=3, replace=False):
+        chosen = rng.choice(ADDED, size=3, replace=False)
+        if sum(name.startswith("rig_compliance") for name in chosen) > 1:
+            continue  # a compliance within another takes its rounds in every round
+        for name in chosen:
             model = sized(model, str(name), direction, amplitude, rng)
         gap = harmonic_gap(model, direction, frequency, amplitude)
         worst = max(worst, gap)
@@ -295,7 +414,8 @@ def test_a_model_survives_files_and_processes(effect: Effect, rng: np.random.Gen
 def test_prediction_leaves_the_instrument_out(rng: np.random.Generator) -> None:
     plain = random_model(rng)
     model = plain
-    for name in ADDED:
+    added = [name for name in ADDED if not LIBRARY[name].replaces]
+    for name in added:
         model = sized(model, name, Direction.AXIAL, 2e-4, rng)
     kept = {effect.name for effect in model.without(Level.INSTRUMENT).records}
-    assert kept == {name for name, effect in LIBRARY.items() if effect.level is not Level.INSTRUMENT}
+    assert kept == {name for name in (*BASE, *added) if LIBRARY[name].level is not Level.INSTRUMENT}

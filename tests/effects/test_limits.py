@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import mpmath
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
 from bushfit.effects import BASE, LIBRARY, Effect, History, qualified
+from bushfit.effects.contract import Circumstances
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
-from bushfit.effects.maxwell import relaxed
+from bushfit.effects.maxwell import relax
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
+from bushfit.units import CELSIUS
 
 PLAIN = Model(
     Bushing("CMP 15 961", 0.010, 0.018, 0.034),
@@ -181,7 +186,7 @@ def test_a_delay_shifts_the_record() -> None:
 def test_relaxation_of_a_ramp_is_exact() -> None:
     step, tau = 1e-3, 7e-3
     time = step * np.arange(200)
-    np.testing.assert_allclose(relaxed(tau, 3.0 * time, step), 3.0 * tau * -np.expm1(-time / tau), rtol=1e-12)
+    np.testing.assert_allclose(relax(1.0 / tau, 3.0 * time, step), 3.0 * tau * -np.expm1(-time / tau), rtol=1e-12)
 
 
 @pytest.mark.parametrize("ratio", [1e-6, 0.1, 0.499999, 0.500001, 0.9, 1.0 - 1e-6, 1.0 - 1e-12])
@@ -231,3 +236,70 @@ def test_what_corrects_a_formula_scales_that_direction_and_no_other(effect: Effe
         ratio = model.stiffness(direction, FREQUENCY, AMPLITUDE) / PLAIN.stiffness(direction, FREQUENCY, AMPLITUDE)
         assert np.ptp(np.abs(ratio)) < 1e-12, "a factor"
         assert (abs(ratio[0] - 1.0) > 1e-6) == (direction == effect.corrects)
+
+
+WARM = Circumstances(temperature=33.0 + CELSIUS, turn=0.5, strained=0.1)
+
+
+def test_warm_rubber_is_softer_and_faster() -> None:
+    """At 33 degC with 0.3 % and 3 % a kelvin: moduli times exp(-0.03), the springpot's also times exp(-0.3 alpha)."""
+    softer, faster = np.exp(-0.03), np.exp(-0.3 * PLAIN.values["alpha"])
+    by_hand = {"mu": softer, "m": softer * faster, "sigma_fmax": softer}
+    expected = PLAIN.with_values({name: factor * PLAIN.values[name] for name, factor in by_hand.items()})
+    warm = PLAIN.with_effect("temperature", {"temperature.softening": 3e-3, "temperature.shift": 0.03})
+    stiffness = warm.stiffness("axial", FREQUENCY, AMPLITUDE, under=WARM)
+    np.testing.assert_allclose(stiffness, expected.stiffness("axial", FREQUENCY, AMPLITUDE), rtol=1e-12)
+    np.testing.assert_allclose(warm.force("axial", LOOP, under=WARM), expected.force("axial", LOOP), rtol=1e-9)
+    same(warm, PLAIN, 0.0)
+
+
+def test_a_time_shift_of_the_springpot_is_one_of_frequency() -> None:
+    """Where the springpot stands alone, 10 K at a shift of 3 % a kelvin are a frequency lower by exp(-0.3)."""
+    alone = PLAIN.with_values({"mu": 1e-3, "sigma_fmax": 1e-3})
+    warm = alone.with_effect("temperature", {"temperature.softening": 0.0, "temperature.shift": 0.03})
+    stiffness = warm.stiffness("axial", FREQUENCY, AMPLITUDE, under=WARM)
+    np.testing.assert_allclose(stiffness, alone.stiffness("axial", FREQUENCY * np.exp(-0.3), AMPLITUDE), rtol=1e-6)
+
+
+def test_drift_is_in_proportion_to_the_turn() -> None:
+    drifting = PLAIN.with_effect("drift", {"drift.gain": 0.04})
+    turns = Circumstances(turn=np.array([0.0, 0.5, 1.0]))
+    ratio = drifting.stiffness("axial", FREQUENCY, AMPLITUDE, under=turns) / PLAIN.stiffness(
+        "axial", FREQUENCY, AMPLITUDE
+    )
+    np.testing.assert_allclose(ratio, [1.0, 1.02, 1.04], rtol=1e-12)
+    same(drifting, PLAIN, 0.0)
+
+
+def test_mullins_softens_below_the_largest_strain_so_far_and_not_there() -> None:
+    softened = PLAIN.with_effect("mullins_levels", {"mullins_levels.share": 0.2})
+    strain = AMPLITUDE * PLAIN.unit_strain(Direction.AXIAL)
+    under = Circumstances(strained=np.full(3, strain[1]))
+    ratio = softened.stiffness("axial", FREQUENCY, AMPLITUDE, under=under) / PLAIN.stiffness(
+        "axial", FREQUENCY, AMPLITUDE
+    )
+    assert np.all(np.abs(ratio.imag) < 1e-12)
+    assert ratio.real[0] == pytest.approx(1.0 - 0.2 * math.erf(0.75))
+    np.testing.assert_allclose(ratio[1:], 1.0, rtol=1e-12)
+    same(softened, PLAIN, 0.0)
+
+
+def test_a_loop_clock_that_runs_slow_is_a_faster_loop() -> None:
+    off = PLAIN.with_effect("loop_clock", {"loop_clock.rate": math.log(10.0)})
+    expected = PLAIN.stiffness("axial", 10.0 * FREQUENCY, AMPLITUDE)
+    np.testing.assert_allclose(off.stiffness("axial", FREQUENCY, AMPLITUDE, kind="loop"), expected, rtol=1e-12)
+    fast = replace(LOOP, step=LOOP.step / 10.0, frequency=10.0 * LOOP.frequency)
+    np.testing.assert_allclose(off.force("axial", LOOP, kind="loop"), PLAIN.force("axial", fast), rtol=1e-12)
+    same(off, PLAIN, 0.0)
+
+
+def test_circumstances_of_each_point_reach_the_rubber_through_a_bent_waveform() -> None:
+    """Play asks for whole cycles of the bushing below it, a row for each operating point."""
+    values = {"clearance.delta": 2e-5, "drift.gain": 0.1, "mullins_levels.share": 0.1, "temperature.softening": 0.01}
+    model = Model.started(PLAIN.bushing, (*BASE, "clearance", "drift", "mullins_levels", "temperature"), {})
+    model = model.with_values({**PLAIN.values, **values})
+    under = Circumstances(np.array([290.0, 300.0, 305.0]), np.array([0.0, 0.3, 1.0]), np.array([0.0, 0.02, 0.05]))
+    together = model.stiffness("axial", FREQUENCY, AMPLITUDE, under=under)
+    points = enumerate(zip(FREQUENCY, AMPLITUDE, strict=True))
+    alone = [model.stiffness("axial", f, x, under=under.at(i)) for i, (f, x) in points]
+    np.testing.assert_allclose(together, alone, rtol=1e-12)

@@ -148,3 +148,20 @@ def test_usable_is_asked_of_a_solution(campaign: Campaign) -> None:
     best = solve(Model.started(campaign.bushing, ("elastic", "springpot", "friction"), {}), sets, FIVE)
     assert [place.place for place in usable(best, sets)] == ["axial"]
     assert [place.place for place in usable(best, sets, data.sweeps[1:])] == ["axial", "radial"]
+
+
+def test_what_is_held_out_is_white_by_the_error_of_its_prediction() -> None:
+    """A slope that the rest hardly tells: in units of noise the prediction is far off, by its own error it is not."""
+    random = np.random.default_rng(5)
+    time = np.linspace(-1.0, 1.0, 60)
+    out, clusters = time > 0.0, np.repeat(np.arange(20), 3)
+    found = []
+    for _ in range(200):
+        slopes = np.array([np.ones(60), np.where(out, 30.0, 1.0) * time])
+        whole = LeaveOut.of(slopes, random.standard_normal(60))
+        found.append([np.mean(np.square(gap)) for gap in whole.predicted(out, clusters)])
+    plain, white = np.mean(found, axis=0)
+    error = 1.96 * np.std(found, axis=0)[1] / np.sqrt(200)
+    print(f"mean square {plain:.1f} in units of noise, {white:.2f} +- {error:.2f} with the prediction's error")
+    assert plain > 10.0
+    assert 0.9 < white < 1.1

@@ -69,6 +69,7 @@ def test_a_model_that_misses_the_data_is_told_and_one_that_does_not_is_not(measu
     assert reduced is not None
     assert reduced > 2.0
     (sentence,) = misfit(off, data_sets, 5, ", and so on")
+    assert "intervals are invalid" in sentence
     assert sentence.endswith("standard errors are scaled up, and so on")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,8 +18,12 @@ from bushfit.model.result import Result
 from bushfit.prediction import Band, predict
 
 SEEDS = 300
+#: Campaigns whose loop noise is correlated from row to row.
+FILTERED_SEEDS = 150
 #: Three standard errors of a share of 95 % over that many campaigns.
 CHANCE = 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
+
+Rig = Callable[..., Campaign]
 
 
 def covered(result: Result, truth: Mapping[str, float]) -> list[bool]:
@@ -46,6 +51,39 @@ def bands_covered(result: Result, truth: Model) -> np.ndarray:
     return np.array(shares)
 
 
+def coverage(rig: Rig, truth: Model, noise: SimulateSettings, seeds: int) -> tuple[np.ndarray, np.ndarray]:
+    """Per seed whether each parameter's interval, (seeds, 5), and the share of each band, hold the truth."""
+    results = [fit_joint(Data.of(rig(truth, noise, seed))) for seed in range(seeds)]
+    inside = np.array([covered(result, truth.values) for result in results])
+    return inside, np.array([bands_covered(result, truth) for result in results])
+
+
+def told(shares: np.ndarray) -> str:
+    """A mean share with its 95 % interval, from the shares of each campaign, (seeds, ...)."""
+    by_seed = shares.reshape(len(shares), -1).mean(axis=1)
+    return f"{by_seed.mean():.3f} +- {1.96 * by_seed.std() / np.sqrt(len(by_seed)):.3f}"
+
+
+@pytest.mark.parametrize(
+    ("correlation", "seeds"),
+    [
+        (0.98, 20),
+        *(pytest.param(correlation, FILTERED_SEEDS, marks=pytest.mark.slow) for correlation in (0.0, 0.9, 0.98)),
+    ],
+)
+def test_intervals_cover_where_the_noise_of_a_loop_is_filtered(
+    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, correlation: float, seeds: int
+) -> None:
+    inside, banded = coverage(rig, paper_model, replace(paper_noise, force_correlation=correlation), seeds)
+    print(
+        f"rows of a loop correlated by {correlation}, {seeds} simulated campaigns: of all intervals "
+        f"{told(inside)} hold the truth, of each parameter {inside.mean(axis=0).round(3)}; of all bands {told(banded)}"
+    )
+    widest = 0.03 if seeds == FILTERED_SEEDS else 0.10
+    assert abs(inside.mean() - 0.95) <= widest
+    assert abs(banded.mean() - 0.95) <= widest
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "shared"),
@@ -59,7 +97,7 @@ def bands_covered(result: Result, truth: Model) -> np.ndarray:
     ],
 )
 def test_95_percent_intervals_and_bands_cover(
-    rig: Callable[..., Campaign],
+    rig: Rig,
     paper_noise: SimulateSettings,
     shared_noise: SimulateSettings,
     paper_model: Model,
@@ -68,11 +106,7 @@ def test_95_percent_intervals_and_bands_cover(
     shared: bool,
 ) -> None:
     truth = {"paper": paper_model, **other_models}[name]
-    inside, banded = [], []
-    for seed in range(SEEDS):
-        result = fit_joint(Data.of(rig(truth, shared_noise if shared else paper_noise, seed)))
-        inside.append(covered(result, truth.values))
-        banded.append(bands_covered(result, truth))
+    inside, banded = coverage(rig, truth, shared_noise if shared else paper_noise, SEEDS)
     each, bands = np.mean(inside, axis=0), np.mean(banded, axis=0)
     print(
         f"{name}, {SEEDS} seeds, block errors {shared}: all parameters {np.mean(inside):.3f}, "

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bushfit.campaign.schema import RigSettings
 from bushfit.fitting.noise import ASSUMED_SHARED, sweep_noise
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
@@ -71,6 +72,47 @@ def test_a_noisier_level_keeps_noise_of_its_own(noisy_sweep: Callable[..., Sweep
     assert random["sweep", 1e-4][0] == pytest.approx(1e-3, rel=0.4)
     same = sweep_noise([quiet]).random
     assert len(set(same.values())) == 1
+
+
+def test_scatter_with_few_differences_is_not_too_small(noisy_sweep: Callable[..., Sweep]) -> None:
+    """Three frequencies: few differences are no sign of calm, and none is taken for an outlier."""
+    found = []
+    for seed in range(200):
+        whole = noisy_sweep(seed)
+        kept = np.isin(whole.frequency, [5.0, 75.0, 155.0])
+        columns = ("frequency", "amplitude", "stiffness", "repeat")
+        found.append(sweep_noise([replace(whole, **{name: getattr(whole, name)[kept] for name in columns})]))
+    squares = [np.square(list(noise.random.values())).mean() for noise in found]
+    print(
+        f"three frequencies: scatter {np.sqrt(np.mean(squares)):.2e}, least {np.sqrt(np.min(squares)):.2e}, true 5e-3"
+    )
+    assert {noise.scatter_freedom for noise in found} == {12}
+    assert {len(set(noise.random.values())) for noise in found} == {1}
+    np.testing.assert_allclose(np.sqrt(np.mean(squares)), 5e-3, rtol=0.03)
+
+
+def test_scatter_grows_towards_low_frequency_where_repeats_show_it(noisy_sweep: Callable[..., Sweep]) -> None:
+    flat = [sweep_noise([noisy_sweep(seed)]) for seed in range(200)]
+    assert sum(bool(noise.slopes) for noise in flat) <= 2
+    found = []
+    for seed in range(50):
+        clean, scattered = noisy_sweep(seed, 0.0), noisy_sweep(seed)
+        error = np.log(scattered.stiffness / clean.stiffness) * (clean.frequency / 100.0) ** -0.6
+        noise = sweep_noise([replace(clean, stiffness=clean.stiffness * np.exp(error))])
+        ends = noise.scatter("sweep", np.full(2, 1e-4), np.array([5.0, 155.0]))
+        found.append(ends.mean(axis=0) / (5e-3 * (np.array([5.0, 155.0]) / 100.0) ** -0.6))
+    mean, spread = np.mean(found, axis=0), np.std(found, axis=0)
+    print(f"scatter over the true one at 5 and 155 Hz: {mean}, spread {spread}")
+    np.testing.assert_allclose(mean, 1.0, rtol=0.2)  # without growth they are 0.3 and 2.4
+
+
+def test_the_class_of_a_rig_is_an_error_of_each_level(noisy_sweep: Callable[..., Sweep]) -> None:
+    rig = RigSettings(gain_error=3e-3, displacement_error=4e-3)
+    repeated, single = (sweep_noise([noisy_sweep(0, repeats=repeats)], rig) for repeats in (3, 1))
+    assert repeated.level == pytest.approx((5e-3, 0.0))
+    assert single.level == (0.0, 0.0)
+    assert single.shared == pytest.approx((5e-3, ASSUMED_SHARED[1]))
+    assert "[rig]" in single.describe()
 
 
 def test_repeats_without_a_common_frequency() -> None:

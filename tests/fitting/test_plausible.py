@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.diagnosis.workflow import diagnose
+from bushfit.effects import BASE
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint, fit_two_step
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
-from bushfit.reading.measurement import Loop, Source, Sweep
+from bushfit.reading.measurement import Loop, Sweep
+from bushfit.units import CELSIUS
 
 BAND = (5.0, 15.0, 45.0, 100.0, 155.0)
 
@@ -66,12 +67,17 @@ def test_kilonewtons_taken_for_newtons_are_told(campaign: Campaign) -> None:
     assert f"times the modulus of {axial[0].name}, which no rubber does: check the units" in told
 
 
+def mixed(campaign: Campaign, warm: float) -> Campaign:
+    """The loop at 23 degC, the axial sweep at another temperature [degC]."""
+    (loop,), (sweep,) = campaign.loops, without(campaign, Direction.RADIAL)
+    cold, hot = replace(loop, temperature=23.0 + CELSIUS), replace(sweep, temperature=warm + CELSIUS)
+    return replace(campaign, loops=(cold,), sweeps=(hot,))
+
+
 @pytest.mark.parametrize(("warm", "told"), [(25.9, 0), (60.0, 1)])
 def test_tests_at_other_temperatures_are_told_by_fit_and_diagnose(campaign: Campaign, warm: float, told: int) -> None:
     (loop,), (sweep,) = campaign.loops, without(campaign, Direction.RADIAL)
-    cold, hot = (Source(Path(f"{degrees}.csv"), "", {"temperature_degC": degrees}) for degrees in (23.0, warm))
-    mixed = replace(campaign, loops=(replace(loop, source=cold),), sweeps=(replace(sweep, source=hot),))
-    data = Data.of(mixed)
+    data = Data.of(mixed(campaign, warm))
     results = fit_joint(data), fit_two_step(data).result, diagnose(data).result
     for result in results:
         lines = [line for line in result.warnings if "degC" in line]
@@ -81,6 +87,15 @@ def test_tests_at_other_temperatures_are_told_by_fit_and_diagnose(campaign: Camp
             assert lines[0].startswith(
                 f"{sweep.name} was tested at 60 degC and {loop.name} at 23 degC, 37 degC apart: "
             )
+
+
+@pytest.mark.parametrize(("warm", "told"), [(37.0, 0), (60.0, 1)])
+def test_the_effect_of_temperature_is_good_for_some_kelvin(campaign: Campaign, warm: float, told: int) -> None:
+    result = fit_joint(Data.of(mixed(campaign, warm)), effects=(*BASE, "temperature"))
+    lines = [line for line in result.warnings if "degC" in line]
+    print(*lines)
+    assert len(lines) == told
+    assert all("holds within 15 K of 23 degC" in line for line in lines)
 
 
 def test_a_modulus_of_no_rubber_is_told(campaign: Campaign) -> None:

@@ -61,6 +61,13 @@ def test_there_and_back(result: Result, document: dict[str, Any]) -> None:
     assert {**again, "provenance": None} == {**document, "provenance": None}
 
 
+def test_what_is_unresolved_stays_so(result: Result) -> None:
+    unresolved = replace(result, model=result.model.with_effect("clearance"), unresolved=("clearance",))
+    document = json.loads(json.dumps(to_document(unresolved)))
+    assert document["unresolved"] == ["clearance"]
+    assert from_document(document).unresolved == ("clearance",)
+
+
 def test_a_file_that_does_not_say_which_directions_were_fitted_is_read(
     result: Result, document: dict[str, Any]
 ) -> None:

@@ -61,7 +61,9 @@ def sweeps_figure(model: Model, data_sets: Sequence[SweepData], title: str) -> F
         else:
             points, held = means(mine), held_beside(kind.axis)
             levels = np.unique(getattr(points, held))
-            draw(pair, kind.place, _model_lines(model, kind.place, points, kind.axis), points, kind.axis, levels)
+            as_measured = means([sweep.noise_free(model) for sweep in mine]) if model.knows_circumstances else None
+            lines = as_measured or _model_lines(model, kind.place, points, kind.axis)
+            draw(pair, kind.place, lines, points, kind.axis, levels)
         _draw_residuals(pair, strips, model, mine, kind)
     outlying = any((data_set.weights == 0.0).any() for data_set in data_sets)
     style.explain(figure, "Lines: model.", points_note(data_sets), _RESIDUALS, _OUTLIERS * outlying)
@@ -151,10 +153,10 @@ def _draw_over_phase(axes: Axes, model: Model, data_sets: Sequence[LoopData]) ->
     """Residuals of one direction's loops over the phase of the cycle, and their means."""
     style.dress(axes, "phase after the upper turn [deg]", "residual / noise")
     for data_set, look in zip(data_sets, style.styles(len(data_sets), "loop"), strict=True):
-        rows, residual = _drawn_rows(data_set), data_set.residual(model)
+        rows, residual = _drawn_rows(data_set), data_set.misfit(model)
         axes.plot(turn(data_set)[rows], residual[rows], ".", color=look.color, alpha=0.4, **style.DOT)
-        middle, mean, _ = over_sectors(data_set, residual)
-        axes.plot(middle, mean, color=look.color, ls=look.dashes, lw=1.4)
+        middle, shares = over_sectors(data_set)
+        axes.plot(middle, shares @ residual, color=look.color, ls=look.dashes, lw=1.4)
     style.noise_band(axes)
     axes.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
 

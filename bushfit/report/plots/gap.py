@@ -226,7 +226,7 @@ def _head(row: Sequence[Axes], sides: Sequence[Side]) -> None:
     legend = row[0].get_legend()
     height = legend.get_window_extent().height * 72.0 / row[0].figure.dpi if legend else 0.0
     for axes, side in zip(row, sides, strict=True):
-        lines = [*textwrap.wrap(side.title, _COLUMN_LETTERS * (3 - len(sides))), f"gap {side.gap:.2f} x noise"]
+        lines = [*textwrap.wrap(side.title, _COLUMN_LETTERS * (3 - len(sides))), f"data fitted {side.gap:.2f} x noise"]
         axes.set_title(
             "\n".join(lines), fontsize=style.TEXT, color=style.INK, weight="bold", pad=height + 7.0, parse_math=False
         )

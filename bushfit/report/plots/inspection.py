@@ -9,11 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 
-from bushfit.effects.contract import Array
 from bushfit.inspection.record import Inspected
-from bushfit.reading.measurement import Floats, Loop, Sweep
+from bushfit.reading.measurement import Loop, Sweep
 from bushfit.report.plots import style
-from bushfit.report.plots.points import BINS, Kind, held_beside, ranges
+from bushfit.report.plots.points import BINS, Kind, Repeats, held_beside, ranges
 from bushfit.report.plots.prediction import axis_label
 from bushfit.units import for_people
 
@@ -48,7 +47,8 @@ def inspection_figure(files: Sequence[Inspected]) -> Figure:
 
 
 def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bool) -> Axes:
-    """Both channels over time, and force over displacement where it is a loop; the first panel is returned."""
+    """Both channels over time, long ones as the range in each bin, and force over displacement where it is a loop; the
+    first panel is returned."""
     (length, to_length), unit_force, _ = history.direction.display
     force, to_force = for_people(*unit_force, float(np.abs(history.force).max()))
     names = history.direction.motion.words
@@ -59,7 +59,10 @@ def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bo
     for axes, values, label in zip(
         over_time, (motion, load), (f"{names[0]}\n[{length}]", f"{names[1]}\n[{force}]"), strict=True
     ):
-        _draw_over_time(axes, history.time, values)
+        if history.time.size <= 2 * BINS:
+            axes.plot(history.time, values, lw=0.8, color=_COLOR)
+        else:
+            axes.fill_between(*ranges(history.time, values), step="post", color=_COLOR, lw=0.6)
         style.dress(axes, "time [s]" if history.timed else "time rebuilt [s]", label)
     figure.align_ylabels(over_time)
     over_time[0].tick_params(labelbottom=False)
@@ -71,14 +74,6 @@ def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bo
     axes.plot(motion[::step], load[::step], ".", ms=1.2, mew=0, color=_COLOR, alpha=0.7)
     style.dress(axes, f"{names[0]} [{length}]", f"{names[1]} [{force}]")
     return axes
-
-
-def _draw_over_time(axes: Axes, time: Floats, values: Floats) -> None:
-    """A channel over time, long ones as the range in each bin of time."""
-    if time.size <= 2 * BINS:
-        axes.plot(time, values, lw=0.8, color=_COLOR)
-    else:
-        axes.fill_between(*ranges(time, values), step="post", color=_COLOR, lw=0.6)
 
 
 def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
@@ -100,7 +95,8 @@ def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
     for axes, (values, label) in zip(pair, kinds, strict=True):
         for level, look in zip(levels, drawn, strict=True):
             at = at_level == level
-            axes.plot(*_means(x[at], values[at]), color=look.color, ls=look.dashes, lw=0.8)
+            points = Repeats.at(x[at], at_level[at])
+            axes.plot(points.along, points.mean(values[at]), color=look.color, ls=look.dashes, lw=0.8)
             axes.plot(x[at], values[at], look.marker, color=look.color, alpha=0.75, **style.POINT)
         style.dress(axes, axis_label(sweep.direction, axis), label)
         style.readable(axes, x)
@@ -108,9 +104,3 @@ def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
     if sweep.stepped:
         style.name_levels(pair[-1], labels, held, [True] * levels.size)
     return pair[0]
-
-
-def _means(x: Array, values: Array) -> tuple[Array, Array]:
-    """The distinct x and the mean of the values at each."""
-    distinct, place = np.unique(x, return_inverse=True)
-    return distinct, np.bincount(place, weights=values) / np.bincount(place)

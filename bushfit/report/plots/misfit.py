@@ -59,10 +59,11 @@ def columns(before: Model, after: Model, later: Mapping[DataSet, DataSet]) -> li
     """
     if all(np.array_equal(test.residual(before), mended.residual(after)) for test, mended in later.items()):
         return [(before, "nothing added")]
+    if added := [name for name in after.effects if name not in before.effects]:
+        return [(before, "before"), (after, f"after adding {' and '.join(added)}")]
     if any(test is not mended for test, mended in later.items()):
         return [(before, "the tests as they are"), (after, "if the record is mistaken")]
-    added = [name for name in after.effects if name not in before.effects]
-    return [(before, "before"), (after, f"after adding {' and '.join(added)}" if added else "after")]
+    return [(before, "before"), (after, "after")]
 
 
 def side_of(
@@ -73,10 +74,11 @@ def side_of(
     loops: Mapping[Place, Sequence[LoopData]],
 ) -> Side:
     """What is drawn of a model against all tests, each in place of the one that `later` has it for."""
-    residuals = np.concatenate([data_set.residual(model) for data_set in later.values()])
+    squares = sum(np.square(data_set.residual(model)).sum() for data_set in later.values())
+    gap = float(np.sqrt(squares / max(sum(data_set.counted for data_set in later.values()), 1)))
     maps = {kind: _map(model, kind, [cast("SweepData", later[test]) for test in each]) for kind, each in sweeps.items()}
     curves = {place: [_curve(model, cast("LoopData", later[test])) for test in each] for place, each in loops.items()}
-    return Side(name, float(np.sqrt(np.mean(np.square(residuals)))), maps, curves)
+    return Side(name, gap, maps, curves)
 
 
 def _map(model: Model, kind: Kind, data_sets: Sequence[SweepData]) -> Map:
@@ -121,8 +123,8 @@ def map_rows(held: Array) -> Array:
 
 def _curve(model: Model, data_set: LoopData) -> Curve:
     """Mean residual of each sector of a loop's cycle over the noise of that mean."""
-    phase, mean, count = over_sectors(data_set, -data_set.residual(model))
-    return Curve(phase, mean * np.sqrt(count))
+    phase, shares = over_sectors(data_set)
+    return Curve(phase, -shares @ data_set.misfit(model) / data_set.drive.row_noise.error_of_sums(shares))
 
 
 def has_holes(points: Repeats) -> bool:

@@ -147,8 +147,8 @@ def turn(data_set: LoopData) -> Array:
     return 360.0 * ((drive.phase + np.angle(drive.coefficients[1]) / (2.0 * np.pi)) % 1.0)
 
 
-def over_sectors(data_set: LoopData, residual: Array) -> tuple[Array, Array, Array]:
-    """Middle [deg] of each sector of the cycle that holds rows, mean residual there, and number of rows."""
+def over_sectors(data_set: LoopData) -> tuple[Array, Array]:
+    """Middle [deg] of each sector of the cycle that holds rows, (k,), and the share of each row in its mean, (k, n)."""
     sector = (turn(data_set) * (SECTORS / 360.0)).astype(int) % SECTORS
     filled, count = np.unique(sector, return_counts=True)
-    return (filled + 0.5) * (360.0 / SECTORS), np.bincount(sector, residual)[filled] / count, count
+    return (filled + 0.5) * (360.0 / SECTORS), (sector == filled[:, None]) / count[:, None]

@@ -18,7 +18,7 @@ from bushfit.reading.measurement import loss_factor
 from bushfit.reading.runs import nominal
 from bushfit.report.plots import style
 from bushfit.report.plots.points import Axis, Points, held_beside, means
-from bushfit.report.tables import spread, words
+from bushfit.report.tables import IF_RIGS, spread, words
 from bushfit.units import for_people
 
 #: Points of a model's line: chosen, no corner is seen at the size of a panel.
@@ -33,6 +33,10 @@ _LINE = 1.3
 _STROKE = 14.0
 #: Width of a line with the rig's effects [point].
 _THIN = 0.6
+#: Width of the white core that makes a line of the other reading a double one [point].
+_CORE = 0.7
+#: Width of such a line [point].
+_DOUBLE = 2.4
 #: A measured point belongs to a predicted level if it, or the level it shares with other tests, is as near as this,
 #: relative: a rig that misses its set point.
 _SAME = 0.01
@@ -97,13 +101,15 @@ def prediction_figure(
     figure = style.new_figure(title, height * style.ROW)
     grid = figure.subplots(height, 2, squeeze=False)
     pairs = zip(grid[bool(free) :], rows, strict=True)
-    drawn = [draw(pair, prediction.direction, lines, points, *row, rig) for pair, row in pairs]
+    drawn = [draw(pair, prediction.direction, lines, points, *row, rig, lines.if_rigs) for pair, row in pairs]
     laid = any(drawn)
     if free and model:
         draw_as_it_came(grid[0], prediction.direction, model, free)
     banded = np.any(lines.stiffness.high > lines.stiffness.low)
     shade = "; shaded: its 95 % band, where that is wider than the line" if banded else ""
     through = " Thin lines: the same with what belongs to the rig, as the points were measured." if laid and rig else ""
+    if lines.if_rigs:
+        through += f" Double lines: the same {IF_RIGS}, and not the bushing's; the band spans both."
     if amplitudes.size > _MOST_AMPLITUDES:
         through += f" Over frequency some of the {amplitudes.size} amplitudes are drawn."
     style.explain(figure, f"Lines: model{shade}.{through}", points_note(every) if laid or free else "", note)
@@ -125,11 +131,12 @@ def draw(
     axis: Axis,
     levels: Array,
     rig: Prediction | None = None,
+    if_rigs: Prediction | None = None,
 ) -> bool:
     """Draw stiffness left and loss factor right, a line and its points per level, and say whether there were points.
 
     `levels` are what is held, (k,): amplitudes [m or rad] or frequencies [Hz]; `rig` is the model with what belongs to
-    the rig, as thin lines where there are points.
+    the rig, as thin lines where there are points; `if_rigs` the other reading of what is unresolved, as double lines.
     """
     held, units = held_beside(axis), direction.display
     scales = {"frequency": ("Hz", 1.0), "amplitude": units.displacement}
@@ -147,6 +154,10 @@ def draw(
         for look, level, spots in zip(looks, levels, marked, strict=True):
             at = getattr(lines, held) == level
             _draw_line(axes, look, x, line, at)
+            if if_rigs is not None:
+                other = factor * getattr(if_rigs, kind).value[at]
+                axes.plot(x[at], other, color=look.color, lw=_DOUBLE)
+                axes.plot(x[at], other, color="white", lw=_CORE)
             if spots.any():
                 if rig is not None:
                     axes.plot(x[at], factor * getattr(rig, kind).value[at], color=look.color, lw=_THIN)
@@ -154,15 +165,17 @@ def draw(
         style.dress(axes, axis_label(direction, axis), name)
         style.readable(axes, x)
         style.least_span(axes, _LEAST_STIFFNESS_SPAN * line.high.max() if kind == "stiffness" else _LEAST_LOSS_SPAN)
-    besides = {
-        "bushing": Line2D([], [], color=style.INK, lw=_LINE),
-        "with the rig": Line2D([], [], color=style.INK, lw=_THIN, marker="o", **style.POINT),
-    }
+    bushing = Line2D([], [], color=style.INK, lw=_LINE)
+    besides: dict[str, Line2D | tuple[Line2D, ...]] = {}
+    if laid and rig:
+        thin = Line2D([], [], color=style.INK, lw=_THIN, marker="o", **style.POINT)
+        besides = {"bushing": bushing, "with the rig": thin}
+    if if_rigs:
+        double = tuple(Line2D([], [], color=color, lw=lw) for color, lw in ((style.INK, _DOUBLE), ("white", _CORE)))
+        besides |= {"bushing": bushing, IF_RIGS: double}
     unit, scale = scales[held]
     called = [f"{scale * level:.3g} {unit}" for level in levels]
-    style.name_levels(
-        pair[-1], called, held, [bool(spots.any()) for spots in marked], besides if laid and rig else None
-    )
+    style.name_levels(pair[-1], called, held, [bool(spots.any()) for spots in marked], besides)
     return laid
 
 

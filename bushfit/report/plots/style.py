@@ -173,7 +173,7 @@ def legend(
     labels: Sequence[str],
     title: str,
     *,
-    besides: Mapping[str, Line2D] | None = None,
+    besides: Mapping[str, Line2D | tuple[Line2D, ...]] | None = None,
     **place: Any,
 ) -> None:
     """Name the lines of a panel; of more than eight name eight, spread from first to last, and say how many more.
@@ -194,7 +194,7 @@ def name_levels(
     levels: Sequence[str],
     what: str,
     marked: Sequence[bool],
-    besides: Mapping[str, Line2D] | None = None,
+    besides: Mapping[str, Line2D | tuple[Line2D, ...]] | None = None,
 ) -> None:
     """Say which line is which level: by a legend, the stiffest on top, or of more than eight by a colour bar.
 

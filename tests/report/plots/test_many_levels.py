@@ -14,9 +14,10 @@ from matplotlib.figure import Figure
 from bushfit.fitting.data_sets import LoopData, SweepData, loop_data, sweep_data
 from bushfit.geometry import Direction
 from bushfit.inspection.record import Inspected, Looked
+from bushfit.jobs.grid import default_grid
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.prediction import default_grid, predict
+from bushfit.prediction import predict
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reduction.steps import Reduction, Step
 from bushfit.report.plots import (

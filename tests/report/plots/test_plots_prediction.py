@@ -11,9 +11,10 @@ from matplotlib.figure import Figure
 
 from bushfit.fitting.data_sets import sweep_data
 from bushfit.geometry import Direction
+from bushfit.jobs.grid import default_grid
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
-from bushfit.prediction import default_grid, predict
+from bushfit.prediction import predict
 from bushfit.reading.measurement import Sweep
 from bushfit.report.artifacts import prediction_files
 from bushfit.report.plots import loops_figure, prediction_figure, to_png
@@ -98,6 +99,22 @@ def test_points_lie_on_lines_with_the_rig_and_the_bushing_stands_apart(
     assert "Radial: not fitted; its band holds the scatter of the axial tests" in note
     assert "hin lines" not in axial.get_supxlabel()
     assert legend(axial.axes[1]) == ["0.1 mm", "0.2 mm", "0.5 mm"]
+
+
+def test_what_may_be_the_rigs_has_a_double_line_that_the_legend_names(paper_model: Model, swept: Swept) -> None:
+    flexing = paper_model.with_effect("sleeve_compliance", {"sleeve_compliance.compliance": 2e-8})
+    result = replace(fitted(flexing), unresolved=("sleeve_compliance",))
+    curves = predict(result, Direction.RADIAL, FREQUENCIES, AMPLITUDES)
+    figure = prediction_figure(curves, [swept(flexing, Direction.RADIAL)], "")
+    for axes, count in zip(figure.axes[::2], (3, 4), strict=True):
+        drawn = ([line for line in lines(axes) if line.get_linewidth() == width] for width in (1.3, 2.4, 0.7))
+        own, double, core = drawn
+        assert len(own) == len(double) == len(core) == count
+        for bushing, other, white in zip(own, double, core, strict=True):
+            assert np.all(other.get_ydata() > 1.02 * bushing.get_ydata())
+            np.testing.assert_array_equal(other.get_ydata(), white.get_ydata())
+    assert legend(figure.axes[1])[3:] == ["bushing", "if it is the rig's"]
+    assert "Double lines: the same if it is the rig's" in " ".join(figure.get_supxlabel().split())
 
 
 def test_one_amplitude_or_one_frequency_leaves_one_row(paper_model: Model) -> None:

@@ -1,0 +1,69 @@
+"""Kinds of values in a campaign file: pydantic checks them, texts such as "10 mm" become SI."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, Field
+
+from bushfit.errors import CampaignError
+from bushfit.geometry import TRANSLATION, Place
+from bushfit.units import quantity, temperature
+from bushfit.validation import converted
+
+#: Steps of a range of frequencies at most: more than any sweep has, and quick to predict.
+_LARGEST_GRID = 100_000
+#: Relative width by which a range of frequencies is widened, so that rounding does not drop its last step.
+_ROUNDING = 1e-9
+#: Repeats or cycles at most: more than any rig runs.
+_LARGEST_COUNT = 1_000_000
+#: Mass [kg], acceleration [m/s^2] and frequency [Hz] of a resonance test at most, and their inverse at least; chosen:
+#: far beyond every shaker, and numbers stay finite.
+LARGEST_SHAKEN = 1e6
+#: Ends the check of a list at its first error: those of a hundred thousand would fill the memory.
+FIRST_ERROR = Field(fail_fast=True)
+
+
+def si(*units: str) -> BeforeValidator:
+    """A validator that takes a text with any of these units, and gives SI."""
+    return converted(lambda raw, _: quantity(raw, *units))
+
+
+def motion(per: str = "") -> BeforeValidator:
+    """A validator as `si("m")`, but by the motion of the table's direction: [rad], or a strain; "/s" for a speed."""
+
+    def unit(direction: object) -> str:
+        return (direction.motion if isinstance(direction, Place) else TRANSLATION).displacement_unit + per
+
+    return converted(lambda raw, info: quantity(raw, unit(info.data.get("direction"))))
+
+
+def table(convert: Callable[[dict[str, Any]], Any]) -> BeforeValidator:
+    """A validator that converts a table; what is none it leaves to pydantic."""
+    return converted(lambda raw, _: convert(raw) if isinstance(raw, dict) else raw)
+
+
+def _frequencies(raw: dict[str, Any]) -> list[str]:
+    """A list of frequencies as texts from { start, stop, step }, with both ends."""
+    expected = '{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }, or a list such as ["5 Hz", "15 Hz"]'
+    if set(raw) != {"start", "stop", "step"}:
+        raise CampaignError("this is no range of frequencies", found=str(raw), expected=expected)
+    start, stop, step = (quantity(raw[key], "Hz") for key in ("start", "stop", "step"))
+    if not (0.0 < start <= stop and step > 0.0 and (stop - start) / step < _LARGEST_GRID):
+        raise CampaignError("this is no range of frequencies", found=str(raw), expected="0 < start <= stop, step > 0")
+    count = int((stop - start) / step * (1.0 + _ROUNDING)) + 1
+    return [f"{value!r} Hz" for value in (start + step * np.arange(count)).tolist()]
+
+
+Temperature = Annotated[float, converted(lambda raw, _: temperature(raw))]
+Length = Annotated[float, si("m"), Field(gt=0)]
+Angle = Annotated[float, si("rad"), Field(gt=0)]
+Strain = Annotated[float, si("1"), Field(gt=0)]
+Frequency = Annotated[float, si("Hz"), Field(gt=0)]
+Frequencies = Annotated[tuple[Frequency, ...], FIRST_ERROR, table(_frequencies), Field(min_length=1)]
+Displacement = Annotated[float, motion(), Field(gt=0)]
+SHAKEN = Field(ge=1.0 / LARGEST_SHAKEN, le=LARGEST_SHAKEN)
+Share = Annotated[float, si("1"), Field(ge=0, lt=1)]
+Count = Annotated[int, Field(strict=True, ge=1, le=_LARGEST_COUNT)]

@@ -1,0 +1,76 @@
+"""The session of a campaign: in which turn each point was measured, at which temperature, and after which strains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulatedTest
+from bushfit.effects.contract import Array, Circumstances
+from bushfit.geometry import Bushing, Place, Specimen, unit_strain
+from bushfit.reading.measurement import Loop, Sweep
+
+
+class Visit(NamedTuple):
+    """One test as the session sees it.
+
+    Args:
+        place: direction of the bushing, or specimen.
+        amplitude: zero-to-peak [m or rad] of its points as they were measured, (n,); a loop has one.
+        temperature: [K], a number or (n,); None where it is not stated.
+        order: number in the session, where the campaign states it; else its place in the list, from 1.
+    """
+
+    place: Place
+    amplitude: Array
+    temperature: Array | float | None = None
+    order: float | None = None
+
+
+def measured_session(bushing: Bushing | None, tests: Sequence[Loop | Sweep]) -> list[Circumstances]:
+    """What the rows of each measured test were made under; a loop has one turn. Its `order` is a stated condition."""
+
+    def visit(test: Loop | Sweep) -> Visit:
+        order = test.source.conditions.get("order") if test.source else None
+        reached = test.amplitude_reached if isinstance(test, Sweep) else np.array([np.ptp(test.displacement) / 2.0])
+        return Visit(test.direction, reached, test.temperature, None if order is None else float(order))
+
+    return session(bushing, [visit(test) for test in tests])
+
+
+def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], repeats: int) -> list[Circumstances]:
+    """What the points of each planned test are measured under, in the order of a sweep's rows; one per part of a loop.
+
+    The strains of a resonance test are not known beforehand and count as none.
+    """
+
+    def amplitudes(test: SimulatedTest) -> Array:
+        if isinstance(test, SimulatedSweep):
+            return np.repeat(test.points[1], repeats, axis=0).ravel()
+        if isinstance(test, SimulatedLoop):
+            return np.array([amplitude for _, amplitude in test.parts])
+        assert isinstance(test, SimulatedResonance)
+        return np.zeros(repeats * len(test.frequencies))
+
+    return session(bushing, [Visit(test.direction, amplitudes(test), test.temperature) for test in tests])
+
+
+def session(bushing: Bushing | None, visits: Sequence[Visit]) -> list[Circumstances]:
+    """What the points of each test were made under, (n,) each: every body has a session of its own.
+
+    Every point of a sweep and every loop takes one turn; turns go from 0 to 1.
+    """
+    numbers = [place if visit.order is None else visit.order for place, visit in enumerate(visits, start=1)]
+    bodies = [visit.place if isinstance(visit.place, Specimen) else None for visit in visits]
+    found: dict[int, Circumstances] = {}
+    for body in dict.fromkeys(bodies):
+        mine = sorted((i for i, own in enumerate(bodies) if own == body), key=numbers.__getitem__)
+        strains = [visits[i].amplitude * unit_strain(bushing, visits[i].place) for i in mine]
+        ends = np.cumsum([strain.size for strain in strains])
+        turn = np.arange(ends[-1]) / max(float(ends[-1]) - 1.0, 1.0)
+        strained = np.maximum.accumulate(np.concatenate([[0.0], *strains]))[:-1]
+        for i, turns, before in zip(mine, np.split(turn, ends[:-1]), np.split(strained, ends[:-1]), strict=True):
+            found[i] = Circumstances(visits[i].temperature, turns, before)
+    return [found[i] for i in range(len(visits))]

@@ -1,0 +1,54 @@
+"""Does the same name come out again where a part of the tests is not there?
+
+Notes:
+    A wrong effect may shrink the gap where it was fitted and where it was not; which effect does so best seldom stays
+    the same with every part left out, unless it is the true one, or nearly equal to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from bushfit.diagnosis.evidence import fit
+from bushfit.diagnosis.holdout import HoldOut, parts
+from bushfit.diagnosis.search import Search, Step
+from bushfit.errors import FitError, ModelError
+
+
+@dataclass(frozen=True)
+class Again:
+    """What the search makes of the tests without a part.
+
+    Args:
+        came_again: whether every effect that was named leads a set, or stands in one.
+        others: effects that lead a set in place of one that was named.
+    """
+
+    part: str
+    came_again: bool
+    others: tuple[str, ...]
+
+
+def searched_again(search: Search, steps: Sequence[Step], held: HoldOut) -> list[Again]:
+    """The search made anew without each part that was held out, with the same noise, and what comes of it.
+
+    It adds as many effects as were named and looks for no more: what a part less brings beside them is not asked.
+    """
+    named, told = {step.name for step in steps}, {part.part for part in held.parts}
+    known = {name for step in steps for name in (step.name, *(rival.name for rival in step.richer))}
+    settings, found = replace(search.settings, max_effects=len(steps)), []
+    for part in parts(search.base.data_sets):
+        if part.name not in told:
+            continue
+        try:
+            rest = fit(search.base.model, part.rest(search.base.data_sets), search.held, search.bounds)
+            anew = Search.begin(rest, settings, search.start, search.held, search.bounds)
+            again = anew.reconsider(*anew.grow())[1]
+        except (FitError, ModelError):
+            continue
+        sets = [{step.name, *(rival.name for rival in (*step.rivals, *step.richer))} for step in again]
+        every = all(any(name in members for members in sets) for name in named)
+        others = () if every else tuple(step.name for step, own in zip(again, sets, strict=True) if not own & known)
+        found.append(Again(part.name, every, others))
+    return found

@@ -1,0 +1,123 @@
+"""What has no name, described: a smooth correction where it stands, and the power law that it is like."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from bushfit.diagnosis.correction import Correction, correct
+from bushfit.diagnosis.evidence import Evidence, fit_from
+from bushfit.diagnosis.fingerprint import Fingerprint, fingerprint
+from bushfit.diagnosis.locate import contrasts, locate
+from bushfit.diagnosis.record import Description
+from bushfit.effects.unnamed import NAME
+from bushfit.errors import FitError
+from bushfit.fitting.data_sets import parted
+from bushfit.fitting.solve import Bounds, jacobian, residual
+from bushfit.model.covariance import Z95
+from bushfit.units import number
+
+#: Evaluations of the model in its refit at most: a correction is of what the best parameters leave, so it has to end.
+_EVALUATIONS = 400
+
+
+@dataclass(frozen=True, eq=False)
+class Described:
+    """A gap without a name.
+
+    Args:
+        after: the model with its correction, and the tests as far as it can answer them.
+        fingerprint: the nearest power law; None where these tests show none.
+        form_excess: misfit of the loop that it meets worst beyond noise, in units of noise, all harmonics counted; 0
+            where it meets them all.
+    """
+
+    after: Evidence
+    correction: Correction
+    fingerprint: Fingerprint | None
+    form_excess: float
+
+    @property
+    def description(self) -> Description | None:
+        """The power law, where the gap is one."""
+        found = self.fingerprint
+        if found is None or not found.is_power_law:
+            return None
+        return Description(found.phase_deg, found.frequency_power, found.amplitude_power, found.words)
+
+    @property
+    def words(self) -> str:
+        """What the gap is like, for people."""
+        if self.fingerprint is None:
+            return "nothing is told of its form"
+        no_law = "" if self.fingerprint.is_power_law else "it is no power law of frequency and amplitude; nearest: "
+        return no_law + self.fingerprint.words
+
+    @property
+    def size(self) -> str:
+        """How large the gap is, for people."""
+        shares = self.correction.data.largest, Z95 * self.correction.band
+        largest, band = (number(100.0 * share, 2) for share in shares)
+        return f"up to {largest} % of |K|, known within {band} % of itself"
+
+    @property
+    def evidence(self) -> str:
+        """Where the correction may be trusted, for people."""
+        where = "; ".join(
+            f"{', '.join(patch.directions)} {_span(patch.frequency_Hz)} Hz, {_span(patch.strain, 100.0)} % strain"
+            for patch in self.correction.data.patches
+        )
+        return f"to be trusted between these tests alone ({where}){self._of_loops}, and of this bushing"
+
+    @property
+    def _of_loops(self) -> str:
+        """What the correction does not say of loops, and by how much their form stays off."""
+        if not parted(self.after.data_sets)[0]:
+            return ""
+        off = self.form_excess
+        stays = f" (their form stays off by {number(off, 2)} times the noise)" if off else ""
+        return f", of loops the first harmonic only{stays}"
+
+
+def _span(values: Sequence[float], factor: float = 1.0) -> str:
+    """The least and the largest value."""
+    return " to ".join(number(factor * end, 2) for end in (min(values), max(values)))
+
+
+def describe(
+    evidence: Evidence, chance_level: float, start: Mapping[str, float], held: Sequence[str], bounds: Bounds
+) -> Described | None:
+    """A smooth correction of a fitted model and its fingerprint; None where no correction stands the hold-out.
+
+    The parameters are fitted again with each loop standing on its first harmonic, because nothing is known of the law
+    in time of what has no name.
+
+    Args:
+        chance_level: probability with which noise alone stays below the threshold of what a power law leaves.
+        start: values of the model's parameters read off the data, for a model that the gap has bent too far.
+        held, bounds: parameters that do not move, and limits of the others inside their own.
+    """
+    if NAME in evidence.model.effects:
+        return None
+    try:
+        base = _refitted(evidence, held, bounds)
+        base = _refitted(base, (*held, *base.solution.at_bound), bounds)
+    except FitError:  # too few points are left for the parameters
+        return None
+    correction = correct(base)
+    if correction is None or not correction.kept:
+        return None
+    effects = (*base.model.effects, NAME)
+    model, names = replace(base.model, effects=effects, unnamed=correction.data), base.solution.coordinates.names
+    left, rows = residual(model, base.data_sets), jacobian(model, base.data_sets, names)
+    after = Evidence(replace(base.solution, model=model, residual=left, jacobian=rows), base.data_sets)
+    whole = replace(after.solution, residual=residual(model, evidence.data_sets))
+    forms = [where.excess for where in locate(Evidence(whole, evidence.data_sets)) if where.kind == "loop"]
+    like = fingerprint(base, contrasts(base), chance_level, start, bounds)
+    return Described(after, correction, like, max(forms, default=0.0))
+
+
+def _refitted(evidence: Evidence, held: Sequence[str], bounds: Bounds) -> Evidence:
+    """The model fitted to each sweep and to the first harmonic of each loop, to the end."""
+    data_sets = tuple(data_set.timeless() for data_set in evidence.data_sets)
+    return Evidence(fit_from(evidence.model, data_sets, held, bounds).finished(_EVALUATIONS).solution, data_sets)

@@ -1,0 +1,58 @@
+"""Force saturation: the force channel of the sweeps gives less than it should beyond a level.
+
+Slow loops have a range of their own, and are cut flat for all to see where that is too small.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bushfit.effects.clearance import FIRST, SAMPLES
+from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Values
+from bushfit.effects.dead_zone import dead_zone, first_harmonic
+from bushfit.effects.history import History
+
+
+def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
+    """K - share (K N(level/(|K| X)) + what the bent waveform of the force makes of it) [N/m].
+
+    Notes:
+        The first term is exact for a force that is a sine (N of `dead_zone.first_harmonic`). The second is the first
+        harmonic of what one steady cycle of the force has beyond the level, less the first term from as many samples.
+    """
+    inside = below(omega, amplitude)
+    if setting.kind != "sweep" or not np.any(p["share"]):
+        return inside
+    level, wave = np.asarray(p["level"])[..., None], np.exp(2j * np.pi * np.arange(SAMPLES) / SAMPLES)
+    motion = np.broadcast_to(amplitude, inside.shape)[..., None]
+    sine = dead_zone((inside[..., None] * motion * wave).real, level)
+    beyond = dead_zone(below.cycle(omega, motion * wave.real), level)
+    rest = (beyond - sine) @ FIRST / np.where(amplitude > 0.0, amplitude, 1.0)
+    return inside - p["share"] * (inside * first_harmonic(np.abs(inside) * amplitude, p["level"]) + rest)
+
+
+def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
+    """F, less a share of what of it lies beyond +-level [N]; the torque cell is another one, so not in torsion."""
+    felt = below(history)
+    return felt - p["share"] * dead_zone(felt, p["level"]) if setting.kind == "sweep" else felt
+
+
+EFFECT = Layer(
+    name="force_saturation",
+    sentence="The force channel saturates: a sweep's stiffness falls where force is largest, at whatever amplitude.",
+    equation="K (1 - share N(level/(|K| X))), N of the bent waveform, sweeps only",
+    level=Level.INSTRUMENT,
+    parameters=(
+        Parameter(
+            "level", "N", (1e-3, 1e7), None, 1e3, log=True, meaning="force from which on it saturates", scale="force"
+        ),
+        Parameter("share", "1", (0.0, 1.0), 0.0, 0.2, meaning="share lost of the force beyond; 1 where it is clipped"),
+    ),
+    source="A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B",
+    confirmed_by="hang known weights on the load cell up to the largest force; its waveform is cut flat at both ends, "
+    "and the stiffer direction is cut at smaller amplitudes, as no softening of the rubber does",
+    harmonic_error=1e-3,
+    turns=False,
+    stiffness=stiffness,
+    force=force,
+)

@@ -1,0 +1,51 @@
+"""High-pass: the charge amplifier of a piezoelectric load cell lets a slow force leak away.
+
+Such a cell serves the sweeps; the loops, as slow as the leak, go by one that holds its force.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
+from bushfit.effects.history import History
+from bushfit.effects.maxwell import relax
+
+
+def _leak(p: Values, omega: Array) -> Value:
+    """-1/(1 + i omega T), 1/T = 2 pi corner: what is missing of the force; all of its mean, unless the corner is 0."""
+    rate = 2.0 * np.pi * p["corner"] + 0j
+    total = rate + 1j * np.asarray(omega)
+    return -rate / np.where(total == 0.0, 1.0, total)
+
+
+def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
+    """K i omega T/(1 + i omega T) of a sweep [N/m]."""
+    return below(omega, amplitude) * (1.0 + (_leak(p, omega) if setting.kind == "sweep" else 0.0))
+
+
+def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
+    """y of T dy/dt + y = T dF/dt [N]: exact in every harmonic of a steady cycle, for straight lines from rest."""
+    felt = below(history)
+    if setting.kind != "sweep":
+        return felt
+    if history.periodic:
+        leaked = _leak(p, history.harmonics) * np.fft.rfft(felt)
+        return felt + np.fft.irfft(leaked, n=felt.shape[-1])
+    return relax(2.0 * np.pi * p["corner"], felt, history.step) if np.any(p["corner"]) else felt
+
+
+EFFECT = Layer(
+    name="high_pass",
+    sentence="The charge amplifier leaks: the slowest of a sweep loses stiffness and gains loss, as 1/frequency.",
+    equation="K i omega T/(1 + i omega T), T = 1/(2 pi corner), sweeps only",
+    level=Level.INSTRUMENT,
+    parameters=(
+        Parameter("corner", "Hz", (0.0, 10.0), 0.0, 0.05, meaning="frequency at which half of the power is lost"),
+    ),
+    source="first-order high-pass of a charge amplifier; G. Gautschi, Piezoelectric Sensorics, 2002, ch. 11",
+    confirmed_by="hang a weight on the load cell: its reading must fall off; a slow maxwell arm "
+    "shows in the loops, too",
+    stiffness=stiffness,
+    force=force,
+)

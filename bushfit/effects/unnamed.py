@@ -1,0 +1,193 @@
+"""Unnamed: a smooth correction over log frequency and log strain for what no effect of the library explains.
+
+It is a share of the stiffness. Its data are values at some nodes; between these it is what a Gaussian process with a
+Matern 5/2 kernel makes of them (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, Eqs. 2.25, 2.26
+and 4.17). Beyond their range it fades to 0 within the size of what it corrects. Standard deviations at the nodes go
+over from node to node just as smoothly: errors of neighbours are nearly one, their covariance would add little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from bushfit import geometry
+from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Setting, StiffnessBelow, Values, harmonic_response
+from bushfit.effects.history import History
+from bushfit.errors import ModelError
+from bushfit.validation import Name, Number
+
+#: The name in files and reports.
+NAME = "unnamed"
+#: Variance, relative to the kernel's, that keeps its matrix invertible; far below what tests show.
+_JITTER = 1e-8
+
+#: Length, in ln frequency and ln strain, over which a correction fades beyond its nodes: chosen, all but gone at a
+#: fourfold frequency, because nothing was measured there.
+_FADES = 0.5
+#: Standard deviations beyond the nodes that make up the size of the gap; chosen: a band of 95 % then holds what was
+#: corrected where the tests end.
+_DEVIATIONS = 2.0
+
+Row = tuple[Number, ...]
+
+
+def kernel(one: Array, other: Array) -> Array:
+    """Matern 5/2 correlation of points in units of the kernel's lengths, (..., n, 2) and (m, 2) -> (..., n, m)."""
+    distance = np.sqrt(5.0) * np.linalg.norm(one[..., :, None, :] - other, axis=-1)
+    return (1.0 + distance + np.square(distance) / 3.0) * np.exp(-distance)
+
+
+def correlation(nodes: Array) -> Array:
+    """Correlation of nodes, in units of the kernel's lengths, (m, 2) -> (m, m), invertible."""
+    return kernel(nodes, nodes) + _JITTER * np.eye(len(nodes))
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A correction in some directions, as values at nodes.
+
+    Args:
+        directions: that share it, by name.
+        frequency_Hz: of the nodes, (m,).
+        strain: of the nodes, equivalent, zero-to-peak, (m,).
+        in_phase, in_quadrature: shares of the stiffness at the nodes, (m,) each.
+        in_phase_error, in_quadrature_error: standard deviations of these, (m,) each.
+    """
+
+    directions: tuple[Name, ...]
+    frequency_Hz: Row  # noqa: N815
+    strain: Row
+    in_phase: Row
+    in_quadrature: Row
+    in_phase_error: Row
+    in_quadrature_error: Row
+
+    def __post_init__(self) -> None:
+        lists = (self.frequency_Hz, self.strain, self.in_phase, self.in_quadrature)
+        sizes = {len(each) for each in (*lists, self.in_phase_error, self.in_quadrature_error)}
+        if len(sizes) > 1 or sizes == {0}:
+            found = f"lists of {' and '.join(map(str, sorted(sizes)))} values"
+            raise ValueError(ModelError("no values at nodes", found=found, expected="one value a node, and a node"))
+        if min(*self.frequency_Hz, *self.strain) <= 0.0:
+            raise ValueError(ModelError("a node without motion", expected="frequency_Hz and strain above 0"))
+        if min(*self.in_phase_error, *self.in_quadrature_error) < 0.0:
+            raise ValueError(ModelError("a negative standard deviation", expected="errors of 0 or more"))
+
+    @cached_property
+    def nodes(self) -> Array:
+        """Logarithms of frequency and strain of the nodes, (m, 2)."""
+        return np.log(np.stack((self.frequency_Hz, self.strain), axis=-1))
+
+
+@dataclass(frozen=True)
+class Unnamed:
+    """A smooth correction of the stiffness, as a share of it.
+
+    Args:
+        size: standard deviation between nodes that lie far apart.
+        lengths: over which it changes, in ln frequency and ln strain.
+        patches: by direction; what is in none has no correction, within the size of the gap.
+    """
+
+    size: Number
+    lengths: tuple[Number, Number]
+    patches: tuple[Patch, ...]
+
+    def __post_init__(self) -> None:
+        if min(self.size, *self.lengths) <= 0.0:
+            raise ValueError(ModelError("a correction of no size or length", expected="size and lengths above 0"))
+
+    @property
+    def largest(self) -> float:
+        """The size of the gap: the largest correction at a node, as a share of the stiffness."""
+        return max(float(np.hypot(each.in_phase, each.in_quadrature).max()) for each in self.patches)
+
+    @property
+    def beyond(self) -> float:
+        """Standard deviation of each part of the correction where nothing was measured."""
+        return self.largest / _DEVIATIONS
+
+    def at(self, setting: Setting, omega: Array, amplitude: Array) -> tuple[Array, Array, Array]:
+        """The correction, complex (..., n), the standard deviations of its two parts, (2, ..., n), and what share of it
+        stands, (..., n): 1 among the nodes, 0 far beyond.
+
+        Angular frequencies are in rad/s, amplitudes in m or rad.
+        """
+        strain = amplitude * geometry.unit_strain(setting.bushing, setting.direction)
+        points = np.log(np.stack(np.broadcast_arrays(omega / (2.0 * np.pi), strain), axis=-1))
+        patch = next((patch for patch in self.patches if str(setting.direction) in patch.directions), None)
+        if patch is None:
+            nothing = np.zeros(points.shape[:-1])
+            return nothing.astype(complex), np.full((2, *nothing.shape), self.beyond), nothing
+        inside = np.clip(points, patch.nodes.min(axis=0), patch.nodes.max(axis=0))
+        stays = kernel((points - inside) / _FADES, np.zeros((1, 2)))[..., 0]
+        nodes = patch.nodes / self.lengths
+        near = kernel(inside / self.lengths, nodes)
+        weight = near @ np.linalg.inv(correlation(nodes))
+        value = weight @ (np.array(patch.in_phase) + 1j * np.array(patch.in_quadrature))
+        open_to = np.square(self.size) * np.maximum(1.0 - np.sum(weight * near, axis=-1), 0.0)
+        at_nodes = np.array([patch.in_phase_error, patch.in_quadrature_error])
+        between = [np.clip(weight @ error, error.min(), error.max()) for error in at_nodes]
+        known = open_to + np.square(between)
+        variance = np.square(stays) * known + (1.0 - np.square(stays)) * np.square(self.beyond)
+        return stays * value, np.sqrt(np.maximum(variance, 0.0)), stays
+
+
+def _correction(setting: Setting, omega: Array, amplitude: Array) -> Array:
+    assert setting.unnamed is not None  # a model with this effect has its data
+    return setting.unnamed.at(setting, omega, amplitude)[0]
+
+
+def response(values: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
+    """K (1 + c), complex (..., n) [N/m or N m/rad]."""
+    return below(omega, amplitude) * (1.0 + _correction(setting, omega, amplitude))
+
+
+def first_harmonic(values: Values, below: ForceBelow, displacement: History, setting: Setting) -> Array:
+    """The force below, and the correction's share of its first harmonic, (..., n) [N or N m]."""
+    force = below(displacement)
+    share = _correction(setting, np.atleast_1d(displacement.omega), displacement.amplitude)
+    return force + harmonic_response(share, displacement.with_value(force))
+
+
+def nodes_among(points: Array, most: int) -> Array:
+    """Some of the points, (n, 2), that lie farthest apart: their indices, at most so many, (m,)."""
+    chosen, distance = [0], np.full(len(points), np.inf)
+    while len(chosen) < most:
+        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
+        if distance.max() <= 0.0:
+            break
+        chosen.append(int(np.argmax(distance)))
+    return np.array(chosen)
+
+
+def patches_of(
+    directions: Sequence[Sequence[str]], nodes: Sequence[Array], mean: Array, error: Array
+) -> tuple[Patch, ...]:
+    """Patches from the values at all nodes, all in phase, then all in quadrature, and their errors, (2 m,) each."""
+    count, begin, made = mean.size // 2, 0, []
+    for names, own in zip(directions, nodes, strict=True):
+        parts = [slice(first + begin, first + begin + len(own)) for first in (0, count)]
+        values = [tuple(of[part].tolist()) for of in (mean, error) for part in parts]
+        axes = [tuple(axis.tolist()) for axis in np.exp(own.T)]
+        made.append(Patch(tuple(names), *axes, *values))
+        begin += len(own)
+    return tuple(made)
+
+
+EFFECT = Layer(
+    name=NAME,
+    sentence="What no effect of the library explains, as a smooth correction over frequency and amplitude.",
+    equation="(1 + c(ln f, ln X)) K",
+    level=Level.COMPONENT,
+    parameters=(),
+    source="Gaussian process orthogonal to the parameters: Kennedy and O'Hagan (2001), Plumlee and Joseph (2018)",
+    confirmed_by="test between the levels and frequencies of these tests, and on another bushing of the compound",
+    harmonic_only=True,
+    stiffness=response,
+    force=first_harmonic,
+)

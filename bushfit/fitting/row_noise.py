@@ -1,0 +1,207 @@
+"""How the noise of a loop's rows depends from row to row: an autoregressive model, estimated where no physics is.
+
+A load cell's amplifier filters its noise, so that neighbouring rows err alike. A prediction-error filter, which takes
+from each row what the rows before it tell, turns such noise into independent numbers of unit variance.
+
+Notes:
+    The model is fitted by the likelihood of the periodogram (Whittle 1953, Brockwell and Davis 1991, eq. 10.8.9) at
+    the frequencies between the cycle's harmonics, which no periodic motion makes: by the Yule-Walker equations, with
+    the power at harmonics taken from that between them, and the power below the lowest frequency seen from the model
+    (expectation and maximisation, Dempster, Laird and Rubin 1977), flat from half of it down. Rows count by their
+    number: an uneven clock changes nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import toeplitz
+
+from bushfit.effects.contract import Array
+
+#: Orders of the autoregressive model that are tried; chosen: 1 is a plain filter, 8 a steep one with its corner.
+_ORDERS = (0, 1, 2, 3, 4, 6, 8)
+#: Floor under the spectrum, over the noise's variance; chosen: without it the whitening of noise that a filter has
+#: taken away at high frequency would magnify what the model and its interpolation err there.
+_FLOOR = 3e-4
+#: Frequencies behind each coefficient of the model at least.
+_FEWEST = 4
+#: Orders in a row that do not better the model, after which no higher one is tried.
+_IN_VAIN = 2
+#: Lowest frequencies seen whose power is where filling in those below begins.
+_LOWEST = 3
+#: Rounds of filling these in at most; nearly all take ten.
+_ROUNDS = 60
+#: Relative change of what is filled in below which these rounds have settled.
+_SETTLED = 1e-3
+#: Harmonics of one cycle up to which cycles may differ by settling or drift, and so not by noise alone.
+_SLOW = 3.5
+#: Power between these harmonics up to which it counts as noise, over the most that a filter of one pole makes there.
+_MOST_SLOW = 4.0
+#: First even harmonic of a lone cycle that counts as noise; chosen: what resists alike both ways makes odd ones only,
+#: and what does not shows in the second.
+_FIRST_EVEN = 4
+
+
+@dataclass(frozen=True, eq=False)
+class RowNoise:
+    """Noise of unit variance a row, each row's dependent on those before it; by default they are independent.
+
+    Args:
+        filter: prediction-error filter b, (p + 1,): sum of b_k times the k-th row before is white of unit variance.
+        starts: what turns the first p rows, correlated as they are, into independent numbers, (p, p).
+        error: standard errors of the logarithm of the variance, and of b_k/b_0, as independent columns, (p + 1, p + 1);
+            None where they are not estimated.
+        share: of the whitened rows' variance that is there; the rest is the floor under the spectrum.
+        size: standard deviation of a row of unit weight over the noise of a recorded row, which is above 1 for bins
+            of rows that depend on one another.
+    """
+
+    filter: Array = field(default_factory=lambda: np.ones(1))
+    starts: Array = field(default_factory=lambda: np.ones((0, 0)))
+    error: Array | None = None
+    share: float = 1.0
+    size: float = 1.0
+
+    @property
+    def order(self) -> int:
+        """Rows before a row that tell of its noise."""
+        return self.filter.size - 1
+
+    @property
+    def rows_as_one(self) -> float:
+        """So many rows tell as much as an independent one about what is slow, at least 1."""
+        return max(1.0 / float(np.sum(self.filter)) ** 2, 1.0)
+
+    def told(self, weight: Array) -> Array:
+        """Which whitened rows count, (n,) bool: those that have weight, as all have that their noise is told from."""
+        counts = weight > 0.0
+        told = counts.copy()
+        for k in range(1, self.order + 1):
+            told[k:] &= counts[:-k]
+        told[: self.order] = counts[: self.order].all()
+        return told
+
+    def whiten(self, rows: Array) -> Array:
+        """Rows in units of noise, (..., n), as independent numbers of unit variance."""
+        white = self.filter[0] * rows
+        for k in range(1, self.order + 1):
+            white[..., k:] += self.filter[k] * rows[..., :-k]
+        white[..., : self.order] = rows[..., : self.order] @ self.starts.T
+        return white
+
+    def unsure(self, influence: Array) -> list[Array]:
+        """As `DataSet.unsure`, one per parameter of the noise, (k, n) each.
+
+        Notes:
+            Of V = L^-1 L^-T, L the filter, the whitened derivative is -(G + G^T) with G = dL L^-1.
+        """
+        if self.error is None:
+            return []
+        moves = [influence]
+        for k in range(1, self.order + 1):
+            ahead, behind = (self._coloured(influence[..., ::way], k)[..., ::way] for way in (1, -1))
+            moves.append(-(ahead + behind))
+        return list(np.tensordot(self.error.T, np.array(moves), axes=1))
+
+    def _coloured(self, rows: Array, delay: int = 0) -> Array:
+        """Independent numbers as the noise, over b_0, that they stand for, so many rows late."""
+        from scipy.signal import lfilter
+
+        return lfilter(np.eye(delay + 1)[delay], self.filter / self.filter[0], rows)
+
+    def error_of_sums(self, shares: Array) -> Array:
+        """Standard deviation of sums over rows in units of noise, each row with its share, (..., n) -> (...)."""
+        if not self.order:
+            return np.linalg.norm(shares, axis=-1)
+        before = np.zeros((*shares.shape[:-1], shares.shape[-1]))
+        late = np.concatenate((shares[..., ::-1], before), axis=-1)
+        return np.linalg.norm(self._coloured(late), axis=-1) / self.filter[0]
+
+
+class _Model(NamedTuple):
+    """An autoregressive model: its polynomial, (p + 1,), and its correlations at lags 0 to p, (p + 1,)."""
+
+    polynomial: Array
+    correlations: Array
+
+    def spectrum(self, waves: Array) -> Array:
+        """Power at frequencies whose waves, (lags, m), have a row per lag, (m,)."""
+        variance = self.polynomial @ self.correlations
+        return variance / np.abs(self.polynomial @ waves[: self.polynomial.size]) ** 2
+
+
+def row_noise(residual: Array, settled: Array, cycles: int) -> tuple[RowNoise, float]:
+    """The noise of a loop's rows, and the standard deviation of one row [N or N m].
+
+    Args:
+        residual: force less its harmonics; of a lone cycle less its mean, its first three and all odd ones, (n,).
+        settled: the same less what changes slowly from one cycle to the next, (n,).
+        cycles: whole cycles that the rows make up.
+    """
+    number = np.arange(residual.size // 2 + 1)
+    between = number % cycles > 0 if cycles > 1 else of_a_lone_cycle(number)
+    fast = between & (number > _SLOW * cycles)
+    waves = np.exp(-2j * np.pi / residual.size * np.outer(np.arange(_ORDERS[-1] + 1), number))
+    used, power = fast, _periodogram(settled)
+    model = _fitted(power, waves, used)
+    slow = between & ~fast
+    # a drift less its harmonics leaves a step per cycle
+    turn = np.arange(residual.size) * cycles // residual.size - (cycles - 1) / 2.0
+    whole = _periodogram(residual - turn * (turn @ residual) / max(turn @ turn, 1.0))
+    first = int(np.argmax(fast))
+    steepest = model.spectrum(waves[:, first : first + 1]) * np.square(first / np.maximum(number, 1))
+    if slow.any() and np.mean(whole[slow] / steepest[slow]) < _MOST_SLOW:
+        used, power, model = between, whole, _fitted(whole, waves, between)
+    return _noise_of(model, power[used], waves[:, used]), float(np.sqrt(model.correlations[0]))
+
+
+def of_a_lone_cycle(number: Array) -> Array:
+    """Which harmonics of a lone cycle are noise, (n,) bool."""
+    return (number % 2 == 0) & (number >= _FIRST_EVEN)
+
+
+def _periodogram(rows: Array) -> Array:
+    power = np.abs(np.fft.rfft(rows)) ** 2 / rows.size
+    return np.maximum(power, np.finfo(float).eps * power.mean())  # of cycles that repeat exactly, rounding
+
+
+def _fitted(power: Array, waves: Array, used: Array) -> _Model:
+    """The autoregressive model, of the order that Schwarz's criterion prefers, of a periodogram where it is used."""
+    ends = np.ones(power.size)
+    ends[[0, -1]] = 0.5
+    cosines, seen = waves.real * (ends / ends.sum()), np.flatnonzero(used)
+    lowest = int(seen[0])
+    filled = np.interp(np.arange(power.size), seen, power[seen])
+    filled[:lowest] = power[seen[:_LOWEST]].mean()
+    models, prices = [], []
+    for order in (order for order in _ORDERS if order * _FEWEST <= seen.size):
+        for _ in range(_ROUNDS):
+            correlations = cosines[: order + 1] @ filled
+            correlations[0] *= 1.0 + _FLOOR
+            predictor = -np.linalg.solve(toeplitz(correlations[:-1]), correlations[1:])
+            model = _Model(np.append(1.0, predictor), correlations)
+            before = filled[:lowest].copy()
+            filled[:lowest] = model.spectrum(waves[:, np.maximum(np.arange(lowest), (lowest + 1) // 2)])
+            if np.allclose(filled[:lowest], before, rtol=_SETTLED):
+                break
+        spectrum = model.spectrum(waves)[used]
+        models.append(model)
+        prices.append(2.0 * np.sum(np.log(spectrum) + power[used] / spectrum) + order * np.log(spectrum.size))
+        if len(prices) > _IN_VAIN and min(prices[-_IN_VAIN:]) > min(prices):
+            break
+    return models[int(np.argmin(prices))]
+
+
+def _noise_of(model: _Model, power: Array, waves: Array) -> RowNoise:
+    """The noise of a model, its errors and its share from the power, (m,), and waves it was fitted to, (lags, m)."""
+    polynomial, correlations = model
+    order, lags = polynomial.size - 1, waves[1 : polynomial.size]
+    slopes = np.vstack((np.ones(waves.shape[1]), -2.0 * (lags / (polynomial @ waves[: order + 1])).real))
+    starts = np.linalg.inv(np.linalg.cholesky(toeplitz(correlations[:order] / correlations[0])))
+    innovation = polynomial @ correlations / correlations[0]
+    error = np.linalg.cholesky(np.linalg.inv(slopes @ slopes.T))
+    share = min(float(np.mean(power / model.spectrum(waves))), 1.0) if order else 1.0
+    return RowNoise(polynomial / np.sqrt(innovation), starts, error, share)

@@ -1,0 +1,98 @@
+"""The grid of a prediction where none is asked for: that of the sweeps, or the paper's as far as it was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Place, Specimen
+from bushfit.model.result import Result
+from bushfit.prediction import MARGIN
+from bushfit.reading.measurement import Sweep
+from bushfit.reading.runs import nominal
+
+#: Frequencies of the paper's tables [Hz].
+PAPER_FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
+#: Amplitudes of the paper's tables [m].
+PAPER_AMPLITUDES = (1e-4, 2e-4, 5e-4)
+#: Amplitudes of each kind of motion where none were measured: those of torsion [rad], which the paper did not measure,
+#: and of the material's strain [1] are chosen so that strains are like the paper's.
+_AMPLITUDES_OF = {
+    TRANSLATION: PAPER_AMPLITUDES,
+    ROTATION: tuple(float(np.radians(x)) for x in (0.5, 1.0, 2.0)),
+    STRAINING: (0.01, 0.02, 0.05),
+}
+#: Frequencies of a grid where the paper's were not measured.
+_FREQUENCIES = 9
+#: Amplitudes of a grid where the paper's were not measured.
+_AMPLITUDES = 3
+#: Values of a grid at most of what was stepped through as it came: tables stay readable, and lines smooth.
+_MOST_STEPS = 10
+
+
+def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ()) -> tuple[Array, Array]:
+    """Frequencies [Hz] and amplitudes [m or rad] to predict at where none are asked for, rising.
+
+    They are those of the sweeps at this place, so that prediction and measurement stand side by side, a level that
+    several sweeps reached more or less counting once; of amplitudes that were stepped, and of what swings free, at most
+    ten over their range. Without any sweep they are the paper's as far as they lie in the measured range, or an even
+    grid over that range where fewer than two do.
+    """
+    mine = [sweep for sweep in sweeps if sweep.direction == direction]
+    if mine:
+        return _measured(mine, "frequency"), _measured(_levelled(mine), "amplitude")
+    amplitudes = np.array(_AMPLITUDES_OF[direction.motion])
+    frequencies = np.array(PAPER_FREQUENCIES)
+    if result.measured is None:
+        return frequencies, amplitudes
+    low, high = result.measured.frequency
+    inside = frequencies[(frequencies >= low * (1 - MARGIN)) & (frequencies <= high * (1 + MARGIN))]
+    if inside.size < 2:
+        inside = _distinct(np.geomspace(low, high, _FREQUENCIES))
+    if direction.is_rotation:
+        return inside, amplitudes
+    per_displacement = result.model.unit_strain(direction if isinstance(direction, Specimen) else Direction.AXIAL)
+    least, most = (strain / per_displacement for strain in result.measured.strain)
+    reached = amplitudes[(amplitudes >= least * (1 - MARGIN)) & (amplitudes <= most * (1 + MARGIN))]
+    if reached.size < 2:
+        reached = _even(least, most, _AMPLITUDES)
+    return inside, reached
+
+
+def _levelled(sweeps: Sequence[Sweep]) -> list[Sweep]:
+    """Sweeps of one place in which amplitudes of one level, as each sweep has it, are the same."""
+    held = [sweep for sweep in sweeps if sweep.stepped]
+    points = np.hstack([np.empty((2, 0)), *(np.stack((sweep.amplitude, sweep.frequency)) for sweep in held)])
+    amplitude = np.unique(points, axis=1)[0]  # each point once, however often it was repeated
+    level = dict(zip(amplitude, nominal(amplitude), strict=True))
+    changed = (replace(sweep, amplitude=np.array([level[each] for each in sweep.amplitude])) for sweep in held)
+    return [*changed, *(sweep for sweep in sweeps if not sweep.stepped)]
+
+
+def _measured(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitude"]) -> Array:
+    """The values of some sweeps, rising; in place of many that were taken as they came, some that span them."""
+    parts: tuple[list[Array], list[Array]] = [], []
+    for sweep in sweeps:
+        as_it_came = sweep.stepped is None or sweep.stepped == axis == "amplitude"
+        parts[as_it_came].append(getattr(sweep, axis))
+    planned, came = (_distinct(np.concatenate([np.empty(0), *part])) for part in parts)
+    spanned = came if came.size <= _MOST_STEPS else _even(came[0], came[-1], _MOST_STEPS)
+    return _distinct(np.concatenate([planned, spanned]))
+
+
+def _even(least: float, most: float, count: int) -> Array:
+    """So many values of three digits, in equal ratios from the least to the most."""
+    return _distinct(np.array([float(f"{x:.3g}") for x in np.geomspace(least, most, count)]))
+
+
+def _distinct(values: Array) -> Array:
+    """The values, rising, each further above the last than a rig that misses its set point would be."""
+    kept: list[float] = []
+    for value in np.unique(values):
+        if not kept or value > kept[-1] * (1.0 + MARGIN):
+            kept.append(float(value))
+    return np.array(kept)

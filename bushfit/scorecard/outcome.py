@@ -1,0 +1,139 @@
+"""What a task of the score card is, and what the workflow said of it beside the truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bushfit.scorecard.hidden import Sealed
+
+#: The verdict of the reader, where it does not take a file with a mistake.
+REFUSED = "refused"
+#: Names in a set at most, for the truth in it to count as named.
+_LARGEST_SET = 3
+#: Verdicts under which every name stays in the model.
+_KEEPING = ("named", "partly")
+
+
+@dataclass(frozen=True)
+class Task:
+    """One hidden campaign to make and to diagnose.
+
+    Args:
+        hidden: effects; of a kind "mistake" the mistake.
+        outside: what the library does not have; the name of a recipe, where the campaign is made by one.
+        without: effects that the library is made to lack.
+    """
+
+    kind: str
+    seed: int
+    hidden: tuple[str, ...]
+    outside: str = ""
+    without: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the workflow said of one campaign, and the truth.
+
+    Args:
+        named: effects it named or that lead a set.
+        sets: all members of each set, leader first.
+        richer: effects that contain what was named as a limit, and their twins.
+        gain: chi-square that the best single effect takes off, whether it was added or not.
+        heldout: gap on held-out data after, in units of noise; None where nothing was held out.
+        covered: per hidden effect that was added, or per parameter of a swept campaign: whether the 95 % interval of
+            its amount holds the truth.
+        seconds: processor time of the diagnosis, whatever else the machine does.
+        matters: of a mistake, whether it leaves more than the tolerance for a plain model, and more than 2 % of |K| or
+            of a parameter.
+        error: what went wrong, or "".
+        twins: per set, the names that the same data give its members at other levels.
+        before: gap on held-out data before, as `heldout`.
+        again: in how many parts the name came out again, and of how many; None where it was not searched again.
+    """
+
+    task: Task
+    sealed: Sealed | None
+    verdict: str
+    named: tuple[str, ...] = ()
+    sets: tuple[tuple[str, ...], ...] = ()
+    richer: tuple[str, ...] = ()
+    gain: float = 0.0
+    heldout: float | None = None
+    covered: tuple[bool, ...] = ()
+    seconds: float = 0.0
+    matters: bool = False
+    error: str = ""
+    twins: tuple[tuple[str, ...], ...] = ()
+    before: float | None = None
+    again: tuple[int, int] | None = None
+
+    @property
+    def truths(self) -> set[str]:
+        """All names that say what was done."""
+        return {*self.task.hidden, *(self.sealed.hidden if self.sealed else ())}
+
+    def _is_true(self, *names: str) -> bool:
+        """Whether one of the names says what was done; a family says it for all its places."""
+        return any(name in self.truths or name.partition(".")[0] in self.truths for name in names)
+
+    @property
+    def _claims(self) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
+        """Each set with the twins of its leader."""
+        return list(zip(self.sets, self.twins or ((),) * len(self.sets), strict=True))
+
+    @property
+    def truth_in_sets(self) -> bool:
+        """Whether every hidden effect was named alone, or as a twin, or in a set of at most three."""
+        told = {name for members, twins in self._claims if len(members) <= _LARGEST_SET for name in (*members, *twins)}
+        return set(self.task.hidden) <= told | set(self.richer)
+
+    @property
+    def wrong_kept(self) -> tuple[str, ...]:
+        """Names that stay in the model, under whatever verdict, and are not the truth, a twin or a limit of it."""
+        if self._is_true(*self.richer):
+            return ()
+        return tuple(
+            members[0]
+            for members, twins in self._claims
+            if (self.verdict in _KEEPING or (self.verdict == "ambiguous" and len(members) == 1))
+            and not self._is_true(members[0], *twins)
+        )
+
+    @property
+    def wrong_set(self) -> bool:
+        """Whether a set of look-alikes was given that the truth is not in."""
+        return self.verdict == "ambiguous" and any(
+            len(members) > 1 and not self._is_true(*members, *twins) for members, twins in self._claims
+        )
+
+    @property
+    def halved(self) -> bool:
+        """Whether the excess of the held-out gap over the noise is at least halved."""
+        if self.before is None or self.heldout is None:
+            return False
+        return self.heldout - 1.0 <= 0.5 * (self.before - 1.0)
+
+    @property
+    def mistake_told(self) -> bool:
+        """Whether the mistake, in the tests in which it was made, was named, stands in a set of at most three, or had
+        its file refused by the reader."""
+        hidden = set(self.sealed.hidden) if self.sealed else set()
+        claims = [set(self.named), *(set(other.split(" + ")) for members in self.sets for other in members[1:])]
+        small = all(len(members) <= _LARGEST_SET for members in self.sets)
+        return self.verdict == REFUSED or (hidden in claims and small)
+
+    @property
+    def mistake_alone(self) -> bool:
+        """Whether the mistake alone was named, in just the tests in which it was made."""
+        return self.verdict == "named" and self.sealed is not None and set(self.named) == set(self.sealed.hidden)
+
+    @property
+    def single_wrong(self) -> bool:
+        """A confident name (verdict named) that is neither the truth nor said to be a limit of it."""
+        return self.verdict == "named" and bool(self.wrong_kept)
+
+    @property
+    def exact(self) -> bool:
+        """Exactly the hidden effects named, each alone."""
+        return self.verdict == "named" and set(self.named) == set(self.task.hidden)

@@ -1,0 +1,162 @@
+"""Noise of a loop's rows: its correlation found between the cycle's harmonics, and whitened. All data are simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import SimulateSettings
+from bushfit.fitting.data_sets import LoopData
+from bushfit.fitting.drive import drive_of
+from bushfit.fitting.row_noise import RowNoise, row_noise
+from bushfit.model.model import Model
+from bushfit.reading.measurement import Loop
+
+Rig = Callable[..., Campaign]
+ROWS = 3000
+
+
+def filtered(random: np.random.Generator, rows: int, correlation: float) -> np.ndarray:
+    """Noise of unit variance, each row's correlated with the next."""
+    noise = random.standard_normal(rows)
+    for row in range(1, rows):
+        noise[row] = correlation * noise[row - 1] + np.sqrt(1.0 - correlation**2) * noise[row]
+    return noise
+
+
+def low_passed(random: np.random.Generator, rows: int) -> np.ndarray:
+    """Noise behind a second-order Butterworth filter at a twentieth of the sampling rate, unit variance."""
+    from scipy.signal import butter, lfilter
+
+    numerator, denominator = butter(2, 0.1)
+    noise = lfilter(numerator, denominator, random.standard_normal(rows + 1000))[1000:]
+    response = lfilter(numerator, denominator, np.eye(1, 1000)[0])
+    return noise / np.linalg.norm(response)
+
+
+def cycles_of(loop: Loop, cycles: int, noise: np.ndarray) -> Loop:
+    """The second cycle of a loop so many times over, with noise on its force in 0.3 % of half its range."""
+    once = slice(1000, 2000)
+    force = np.tile(loop.force[once], cycles)
+    return replace(
+        loop,
+        time=loop.time[: force.size],
+        displacement=np.tile(loop.displacement[once], cycles),
+        force=force + 3e-3 * np.ptp(force) / 2.0 * noise,
+    )
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9, 0.98])
+def test_the_rig_s_filter_is_found_and_taken_out(
+    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, correlation: float
+) -> None:
+    noise = replace(paper_noise, force_correlation=correlation)
+    found = [LoopData(drive_of(rig(paper_model, noise, seed).loops[0])) for seed in range(15)]
+    rows = np.array([data_set.drive.row_noise.rows_as_one for data_set in found])
+    true = (1.0 + correlation) / (1.0 - correlation)
+    print(
+        f"correlation {correlation}: one in {true:.3g} rows counts, found {rows.mean():.3g}, scatter {rows.std():.2g}"
+    )
+    assert rows.mean() == pytest.approx(true, rel=0.15)
+    assert np.mean([data_set.relative_noise for data_set in found]) == pytest.approx(3e-3, rel=0.06)
+    assert found[0].independent == pytest.approx(found[0].counted / rows[0])
+    white = [data_set.residual(paper_model)[data_set.residual(paper_model) != 0.0] for data_set in found]
+    assert np.mean([each @ each / data_set.counted for each, data_set in zip(white, found, strict=True)]) == (
+        pytest.approx(1.0, abs=0.03)
+    )
+    assert abs(np.mean([np.corrcoef(each[1:], each[:-1])[0, 1] for each in white])) < 0.02
+    if not correlation:
+        assert np.mean([data_set.drive.row_noise.order > 0 for data_set in found]) < 0.15
+        assert found[0].drive.correlated == ""
+    if correlation == 0.9:
+        assert found[0].drive.correlated.startswith(", correlated over about ")
+
+
+@pytest.mark.parametrize(("kind", "cycles"), [("low-passed", 3), ("filtered", 2), ("filtered", 1)])
+def test_smooth_misfit_is_judged_by_the_noise_it_stands_in(
+    rig: Rig, paper_model: Model, kind: str, cycles: int
+) -> None:
+    """The harmonics of pure noise, whitened, scatter by one: of low-passed noise too, and of a lone cycle's."""
+    (clean,), random = rig(paper_model).loops, np.random.default_rng(1)
+    squares = []
+    for _ in range(25):
+        rows = 1000 * cycles
+        noise = low_passed(random, rows) if kind == "low-passed" else filtered(random, rows, 0.9)
+        data_set = LoopData(drive_of(cycles_of(clean, cycles, noise)))
+        columns = data_set.contrasts()
+        basis = np.linalg.qr(columns.T)[0]
+        squares.append(np.mean(np.square(data_set.residual(paper_model) @ basis)))
+    mean, error = np.mean(squares), np.std(squares) / np.sqrt(len(squares))
+    print(f"{kind}, {cycles} cycles: mean square of the harmonics {mean:.2f} +- {1.96 * error:.2f}, 1 if right")
+    assert 0.75 < mean < 1.35
+
+
+def test_a_row_left_out_tells_nothing(rig: Rig, paper_noise: SimulateSettings, paper_model: Model) -> None:
+    (loop,) = rig(paper_model, replace(paper_noise, force_correlation=0.9), 2).loops
+    data_set = LoopData(drive_of(loop))
+    weight = np.ones(data_set.size)
+    weight[400:420] = 0.0
+    light = data_set.weighted(weight)
+    wild = replace(light, drive=replace(light.drive, force=np.where(weight > 0.0, light.drive.force, 1e6)))
+    assert np.array_equal(wild.residual(paper_model), light.residual(paper_model))
+    assert np.all(light.residual(paper_model)[400:421] == 0.0)
+    assert light.misfit(paper_model)[420] != 0.0
+
+
+def test_derivatives_are_whitened_as_residuals_are(rig: Rig, paper_noise: SimulateSettings, paper_model: Model) -> None:
+    data_set = LoopData(drive_of(rig(paper_model, replace(paper_noise, force_correlation=0.98), 2).loops[0]))
+    value = paper_model.values["sigma_fmax"]
+    high, low = (data_set.residual(paper_model.with_values({"sigma_fmax": value * (1.0 + s)})) for s in (1e-5, -1e-5))
+    slope = data_set.jacobian(paper_model, ["sigma_fmax"])[0]
+    np.testing.assert_allclose(slope, (high - low) / (2e-5 * value), atol=1e-4 * np.abs(slope).max())
+
+
+def test_whitening_is_exact_from_the_first_row_on() -> None:
+    found, size = row_noise(*2 * [2.0 * low_passed(np.random.default_rng(0), ROWS)], 3)
+    assert size == pytest.approx(2.0, rel=0.1)
+    whitening = found.whiten(np.eye(ROWS)[:200]).T[:200]
+    covariance = np.linalg.inv(whitening) @ np.linalg.inv(whitening).T
+    np.testing.assert_allclose(np.diag(covariance), 1.0, rtol=1e-6)
+    np.testing.assert_allclose(np.diag(covariance, 3), covariance[0, 3], atol=1e-6)
+    shares = np.zeros((1, 200))
+    shares[0, 50:60] = 0.1
+    np.testing.assert_allclose(found.error_of_sums(shares), np.sqrt(covariance[50:60, 50:60].mean()), rtol=1e-3)
+
+
+def test_noise_that_a_filter_took_away_has_a_floor() -> None:
+    """No frequency weighs more than the floor of 3e-4 of the variance lets it: 58 times a white row's."""
+    found, _ = row_noise(*2 * [low_passed(np.random.default_rng(0), ROWS)], 3)
+    gain = np.abs(np.fft.rfft(found.filter, 4096))
+    assert 10.0 < gain.max() < 80.0
+
+
+def test_how_an_unsure_filter_moves_the_covariance() -> None:
+    noise, _ = row_noise(*2 * [filtered(np.random.default_rng(0), ROWS, 0.9)], 3)
+    assert noise.order == 1
+    assert noise.error is not None
+    influence = np.cos(np.arange(ROWS) / 40.0)[None]
+
+    def variance(coefficient: float) -> float:
+        """Of the influence on rows that the found filter whitens, where the true one has another coefficient."""
+        true = RowNoise(noise.filter[0] * np.array([1.0, coefficient]), np.ones((1, 1)))
+        impulse = true._coloured(np.eye(1, ROWS)[0]) / true.filter[0]
+        share = noise.filter @ np.stack([influence[0], np.append(influence[0][1:], 0.0)])
+        return float(np.sum(np.square(np.convolve(share[::-1], impulse)[:ROWS])))
+
+    coefficient, step = noise.filter[1] / noise.filter[0], 1e-4
+    expected = (variance(coefficient + step) - variance(coefficient - step)) / (2.0 * step)
+    by_coefficient = noise.unsure(influence)[1] / noise.error[1, 1]
+    assert float(by_coefficient[0] @ influence[0]) == pytest.approx(expected, rel=0.03)
+
+
+def test_settling_is_no_noise(rig: Rig, paper_model: Model) -> None:
+    (clean,) = rig(paper_model).loops
+    loop = cycles_of(clean, 3, np.random.default_rng(1).standard_normal(ROWS))
+    settled = replace(loop, force=loop.force * (1.0 + 0.02 * np.exp(-loop.time / 10.0)))
+    drifting = replace(loop, force=loop.force + 0.06 * np.ptp(loop.force) * loop.time / loop.time[-1])
+    for changed in (settled, drifting):
+        assert drive_of(changed).row_noise.order == 0

@@ -1,0 +1,81 @@
+"""What counts as right and as wrong on a card."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from bushfit.scorecard.card import card
+from bushfit.scorecard.hidden import Sealed
+from bushfit.scorecard.outcome import Outcome, Task
+
+
+def said(
+    verdict: str, *sets: tuple[str, ...], truths: tuple[str, ...] = (), kind: str = "fault", **more: Any
+) -> Outcome:
+    hidden = truths if kind in ("alone", "two") else ()
+    sealed = Sealed(truths, "", (), {}, more.pop("visible", 0.05), False, 1)
+    return Outcome(Task(kind, 1, hidden), sealed, verdict, tuple(names[0] for names in sets), sets, **more)
+
+
+@pytest.mark.parametrize(
+    ("outcome", "kept", "wrong_set"),
+    [
+        (said("named", ("delay",), truths=("delay",)), (), False),
+        (said("named", ("delay",)), ("delay",), False),
+        (said("partly", ("delay",), ("inertia",), truths=("delay",)), ("inertia",), False),
+        (said("unexplained", ("delay",)), (), False),
+        (said("described", ("unnamed",)), (), False),
+        (said("ambiguous", ("delay", "viscous"), truths=("viscous",)), (), False),
+        (said("ambiguous", ("delay", "viscous"), truths=("inertia",)), (), True),
+        (said("ambiguous", ("delay", "viscous"), ("inertia",), truths=("viscous",)), ("inertia",), False),
+        (said("named", ("stiffness_factor.radial",), truths=("stiffness_factor",)), (), False),
+        (said("named", ("interface_slip",), truths=("guide",), twins=(("guide",),)), (), False),
+        (said("named", ("viscous",), truths=("maxwell",), richer=("maxwell",)), (), False),
+    ],
+)
+def test_every_wrong_name_counts(outcome: Outcome, kept: tuple[str, ...], wrong_set: bool) -> None:
+    assert (outcome.wrong_kept, outcome.wrong_set) == (kept, wrong_set)
+    assert outcome.single_wrong == (outcome.verdict == "named" and bool(kept))
+
+
+def test_a_level_that_stays_open_counts_as_told() -> None:
+    twin = said("named", ("interface_slip",), truths=("guide",), kind="alone", twins=(("guide",),))
+    assert twin.truth_in_sets
+    assert not said("named", ("interface_slip",), truths=("guide",), kind="alone").truth_in_sets
+
+
+def test_a_target_is_met_once_the_interval_is_narrow_too() -> None:
+    clean = said("consistent", kind="awkward")
+    for count, alarms, met in ((60, 0, None), (130, 0, True), (60, 3, False), (400, 4, True)):
+        outcomes = [clean] * (count - alarms) + [said("unexplained", kind="awkward")] * alarms
+        row = card(outcomes, "awkward")[0]
+        print(row)
+        assert (row.over, row.met) == (count, met)
+
+
+def test_the_card_of_what_the_library_lacks() -> None:
+    halved = said("described", ("unnamed",), kind="law", before=3.0, heldout=1.5)
+    whole = said("unexplained", kind="law", before=3.0, heldout=3.0)
+    silent = said("consistent", kind="law", before=1.02, heldout=1.02)
+    wrong = said("partly", ("delay",), kind="three", before=2.0, heldout=1.1, truths=("inertia",))
+    rows = {row.measure: row for row in card([halved, whole, silent, wrong], "outside")}
+    assert rows["physics the library lacks: a wrong name or part kept"].figure.startswith("25.0 %")
+    closed = rows["excess of the held-out gap at least halved, where it shows"]
+    assert (closed.figure[:6], closed.over) == ("66.7 %", 3)
+
+
+def test_the_card_of_the_library_asks_of_what_is_visible_alone() -> None:
+    named = said("named", ("delay",), truths=("delay",), kind="alone")
+    missed = said("unexplained", truths=("delay", "inertia"), kind="two")
+    unseen = said("consistent", truths=("delay",), kind="alone", visible=0.01)
+    rows = {row.measure: row for row in card([named, missed, unseen], "library")}
+    told = rows["where visible: named, level unresolved, or in a set of three"]
+    assert (told.figure[:6], told.over) == ("50.0 %", 2)
+
+
+def test_time_is_told_apart_where_the_name_is_searched_again() -> None:
+    outcomes = [said("consistent", seconds=0.5), said("named", ("delay",), seconds=9.0, again=(4, 5))]
+    rows = card(outcomes, "faults")[-2:]
+    assert [(row.figure, row.met) for row in rows] == [("0.5 s / 0.5 s", True), ("9.0 s / 9.0 s", True)]
