@@ -35,7 +35,7 @@ class Order:
 
 @dataclass(frozen=True, eq=False)
 class Exported:
-    """The files of an export by name, and sentences on what the format could not carry and the error that this costs."""
+    """The files of an export by name, what it could not carry, and the error that this costs."""
 
     files: Mapping[str, bytes]
     losses: tuple[str, ...] = ()
