@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -45,6 +46,7 @@ class Campaign:
     Args:
         name: of the campaign; default the name of the bushing, or of the first specimen.
         path: the campaign file.
+        sha256: of its bytes; empty where there is no such file.
         bushing: None where specimens alone were tested.
         simulate: None where the file has no such table.
     """
@@ -59,6 +61,7 @@ class Campaign:
     simulate: SimulateSettings | None = None
     specimens: tuple[Specimen, ...] = ()
     rig: RigSettings = field(default_factory=RigSettings)
+    sha256: str = ""
 
     @property
     def slug(self) -> str:
@@ -108,6 +111,7 @@ def load_campaign(path: str | Path) -> Campaign:
         content.simulate,
         specimens,
         content.rig,
+        hashlib.sha256(path.read_bytes()).hexdigest(),
     )
 
 

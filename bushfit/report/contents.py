@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from bushfit.report.folder import to_json
@@ -12,17 +13,25 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    #: JSON documents by name.
+    Documents = Mapping[str, Mapping[str, Any]]
+    #: Tables by name.
+    Tables = Mapping[str, pd.DataFrame]
+    #: What makes the text of a page of documents and tables.
+    Page = Callable[[Documents, Tables], str]
+
 
 @dataclass(frozen=True)
 class Kinds:
-    """The names, without endings, of the documents, tables and pictures that a result will hold."""
+    """The names, without endings, of the documents, tables, pictures and pages that a result will hold."""
 
     documents: tuple[str, ...] = ()
     tables: tuple[str, ...] = ()
     pictures: tuple[str, ...] = ()
+    pages: tuple[str, ...] = ()
 
     def __add__(self, other: Kinds) -> Kinds:
-        return Kinds(self.documents + other.documents, self.tables + other.tables, self.pictures + other.pictures)
+        return Kinds(*(getattr(self, each.name) + getattr(other, each.name) for each in fields(Kinds)))
 
     @classmethod
     def shown(cls, names: Iterable[str]) -> Kinds:
@@ -33,42 +42,52 @@ class Kinds:
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """Documents, tables and pictures by their names without endings; tables and pictures are made when asked for."""
+    """Documents, tables, pictures and pages by their names without endings; all but documents are made when asked for.
+
+    A page is made of the documents and tables, and of nothing else: those that were read back give the same.
+    """
 
     documents: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     tables: Mapping[str, Callable[[], pd.DataFrame]] = field(default_factory=dict)
     pictures: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)
+    pages: Mapping[str, Page] = field(default_factory=dict)
 
     def __or__(self, other: Contents) -> Contents:
-        return Contents(
-            {**self.documents, **other.documents},
-            {**self.tables, **other.tables},
-            {**self.pictures, **other.pictures},
-        )
+        return Contents(*({**getattr(self, each.name), **getattr(other, each.name)} for each in fields(Contents)))
+
+    def reported(self) -> Contents:
+        """The same with `report`, the page of all that it holds."""
+        return replace(self, pages={**self.pages, "report": _report})
 
     @property
     def kinds(self) -> Kinds:
         """The names of all that it holds."""
-        return Kinds(tuple(self.documents), tuple(self.tables), tuple(self.pictures))
+        return Kinds(*(tuple(getattr(self, each.name)) for each in fields(Kinds)))
 
 
 @dataclass(frozen=True)
 class Formats:
-    """How results are written: whether with tables, and with pictures."""
+    """How results are written: whether with tables, with pictures, and with pages."""
 
     tables: bool = True
     pictures: bool = True
+    pages: bool = True
 
     def names(self, kinds: Kinds) -> list[str]:
         """The files of what has these names: documents first, then each table beside its picture."""
-        return [*(f"{name}.json" for name in kinds.documents), *(".".join(each) for each in self._shown(kinds))]
+        pages = [f"{name}.html" for name in kinds.pages if self.pages]
+        return [*(f"{name}.json" for name in kinds.documents), *(".".join(each) for each in self._shown(kinds)), *pages]
 
     def files(self, contents: Contents) -> dict[str, bytes]:
         """The bytes of each file of a result, by its name."""
         files = {f"{name}.json": to_json(document) for name, document in contents.documents.items()}
+        tables = {name: cache(make) for name, make in contents.tables.items()}
         for name, ending in self._shown(contents.kinds):
-            made = _table(contents.tables[name]) if ending == "csv" else _picture(contents.pictures[name])
+            made = _table(tables[name]) if ending == "csv" else _picture(contents.pictures[name])
             files[f"{name}.{ending}"] = made
+        for name, page in contents.pages.items() if self.pages else ():
+            made = {name: make() for name, make in tables.items()}
+            files[f"{name}.html"] = page(contents.documents, made).encode("utf-8", "replace")
         return files
 
     def _shown(self, kinds: Kinds) -> list[tuple[str, str]]:
@@ -76,6 +95,12 @@ class Formats:
         wanted = {"csv": kinds.tables if self.tables else (), "png": kinds.pictures if self.pictures else ()}
         names = dict.fromkeys((*kinds.tables, *kinds.pictures))
         return [(name, ending) for name in names for ending, those in wanted.items() if name in those]
+
+
+def _report(documents: Documents, tables: Tables) -> str:
+    from bushfit.report.page import report_page
+
+    return report_page(documents, tables)
 
 
 def _table(make: Callable[[], pd.DataFrame]) -> bytes:

@@ -1,0 +1,207 @@
+"""What a page tells of a result, in the order in which its reader asks: what was tested, the verdict, the numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Bushing, Specimen
+from bushfit.model.result import Misfit, Result
+from bushfit.report.page.drawings import gap_panels, loop_panels, tested_panels
+from bushfit.report.page.gathered import columns_of, places_of
+from bushfit.report.page.schema import Checked, Found, Test
+from bushfit.report.parameters import interval_kind, parameter_rows
+from bushfit.report.tables import spread
+from bushfit.units import alike, for_people, number
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from bushfit.report.contents import Tables
+
+#: How a verdict is coloured: nothing to do, something to know, something to do.
+_TONES = {"consistent": "good", "named": "good", "unexplained": "bad"}
+#: Conditions of tests, as a campaign has them, and what a page calls them.
+_CONDITIONS = {
+    "temperature_degC": "Temperature",
+    "preload": "Preload",
+    "date": "Date of tests",
+    "operator": "Operator",
+    "specimen_number": "Specimen no.",
+}
+#: Correlation between two parameters from which on it is shown: they trade off against each other.
+_CLOSE = 0.9
+#: Frequencies and amplitudes of a place whose predicted values are tabled.
+_FREQUENCIES, _AMPLITUDES = 3, 2
+#: Warnings, regions, and tests that a page lists at most: the documents have all.
+_MOST = 12
+#: Units of amplitudes, by SI, as people read them.
+_DISPLAYS = {motion.displacement_unit: motion.display.displacement for motion in (TRANSLATION, ROTATION, STRAINING)}
+
+
+def story(found: Checked, tables: Tables) -> dict[str, Any]:
+    """All that the template of a report asks for."""
+    result, diagnosis, about = found.result, found.diagnosis, found.about
+    tests = about.tests if about else ()
+    warnings = list(dict.fromkeys((*(diagnosis.warnings if diagnosis else ()), *result.warnings)))
+    return {
+        "name": about.name if about else result.name,
+        "subject": "rubber bushing" if result.model.bushing else "rubber compound",
+        "facts": [*_bodies(result), *_conditions(tests)],
+        "tests": [_tested(test, result.tests) for test in tests[:_MOST]],
+        "more_tests": max(0, len(tests) - _MOST),
+        "diagnosis": diagnosis,
+        "tone": _TONES.get(diagnosis.verdict, "fair") if diagnosis else "fair",
+        "effects": [_effect(effect) for effect in diagnosis.effects] if diagnosis else [],
+        "usable": [_usable(place) for place in result.usable],
+        "rows": list(parameter_rows(result)),
+        "interval": interval_kind(result),
+        "plain": _plain(found),
+        "quality": _quality(result),
+        "correlations": [f"{one}/{other} {size:+.2f}" for one, other, size in result.covariance.correlations() if abs(size) > _CLOSE],
+        "equation": result.model.equation().splitlines()[0],
+        "places": tested_panels(result, tables, tests),
+        "tabled": [table for name, place in places_of(result, tables).items() for table in _corners(tables.get(name), place)],
+        "loops": loop_panels(result, tables, tests),
+        "gap": gap_panels(result, tables, tests),
+        "gaps": _gaps(found),
+        "warnings": warnings[:_MOST],
+        "more_warnings": max(0, len(warnings) - _MOST),
+        "unresolved": result.unresolved,
+        "outliers": len(result.outliers),
+        "about": about,
+        "files": list(dict.fromkeys((str(source.file), source.sha256) for source in result.inputs)),
+        "versions": found.versions,
+    }
+
+
+def _bodies(result: Result) -> Iterator[tuple[str, str]]:
+    """What was tested, and its sizes."""
+    if bushing := result.model.bushing:
+        yield "Bushing", _tube(bushing)
+    for specimen in result.specimens:
+        yield f"Specimen {specimen}", _specimen(specimen)
+
+
+def _tube(bushing: Bushing) -> str:
+    inner, outer, length = (number(1e3 * size, 4) for size in (2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length))
+    formulas = "; radial formulas corrected by finite elements" if bushing.shape == "calibrated" else ""
+    return f"rubber tube, inner diameter {inner} mm, outer diameter {outer} mm, length {length} mm{formulas}"
+
+
+def _specimen(specimen: Specimen) -> str:
+    if specimen.area is None or specimen.thickness is None:
+        return f"modulus of the compound, {specimen.strain} strain"
+    blocks = "one block" if specimen.elements == 1 else f"{specimen.elements} blocks in parallel"
+    return f"{blocks} in shear, {number(1e6 * specimen.area, 4)} mm² each, {number(1e3 * specimen.thickness, 4)} mm thick"
+
+
+def _conditions(tests: Sequence[Test]) -> Iterator[tuple[str, str]]:
+    """Conditions of all tests: each value once; of three that every report has, too, that they are not stated."""
+    for key, name in _CONDITIONS.items():
+        values = list(dict.fromkeys(test.conditions[key] for test in tests if key in test.conditions))
+        if key == "temperature_degC" and values:
+            degrees = sorted(float(value) for value in values)
+            yield name, " to ".join(dict.fromkeys(f"{number(end, 3)} °C" for end in (degrees[0], degrees[-1])))
+        elif values:
+            yield name, ", ".join(str(value) for value in values)
+        elif key in ("temperature_degC", "preload", "date"):
+            yield name, "not stated"
+
+
+def _tested(test: Test, misfits: Sequence[Misfit]) -> dict[str, str]:
+    """A test in a row of a table: its range, and how well the model meets it."""
+    unit, factor = _DISPLAYS[test.unit]
+    met = next((misfit for misfit in misfits if misfit.test == test.test and misfit.held is None), None)
+    stated = [
+        f"{number(float(value), 3)} °C" if key == "temperature_degC" else f"{_CONDITIONS.get(key, key)} {value}"
+        for key, value in test.conditions.items()
+        if key in ("temperature_degC", "preload", "order")
+    ]
+    return {
+        "test": test.test,
+        "kind": {"loop": "hysteresis loop", "sweep": "sweep"}.get(test.kind, test.kind),
+        "place": test.place,
+        "frequency": _ends(test.frequency_Hz, 1.0, "Hz"),
+        "amplitude": _ends(test.amplitude, factor, unit),
+        "rows": f"{test.rows}",
+        "conditions": ", ".join(stated),
+        "nrmse": f"{number(100 * met.nrmse, 2)} %" if met else "",
+        "chi": number(met.reduced_chi_square, 2) if met else "",
+        "fitted": "" if met is None or met.fitted else "not fitted",
+    }
+
+
+def _ends(ends: tuple[float, float], factor: float, unit: str) -> str:
+    return " to ".join(dict.fromkeys(number(end * factor, 3) for end in ends)) + f" {unit}"
+
+
+def _usable(place: Any) -> dict[str, str]:
+    return {
+        "place": place.place,
+        "stiffness": f"{number(100 * place.stiffness, 2)} %",
+        "loss": number(place.loss_factor, 2),
+        "points": f"{place.points}",
+        "how": "each predicted from other runs" if place.held_out else "as fitted",
+    }
+
+
+def _effect(effect: Found) -> dict[str, Any]:
+    """An effect that was named, with its sizes as people read them."""
+    sizes = []
+    for name, size in effect.parameters.items():
+        unit, factor = for_people(size.unit, 1.0, size.value)
+        value, *ends = alike([factor * x for x in (size.value, *(size.ci95 or ()))], 4, least=2)
+        sizes.append({"name": name, "value": f"{value} {unit}".removesuffix(" -"), "interval": " to ".join(ends)})
+    return {"found": effect, "sizes": sizes}
+
+
+def _plain(found: Checked) -> dict[str, str]:
+    """Values of the plain fit by parameter, where another model is to be used."""
+    rows = parameter_rows(found.plain) if found.plain else ()
+    return {row.name: f"{row.value} {row.unit}".removesuffix(" -") for row in rows}
+
+
+def _quality(result: Result) -> dict[str, str]:
+    quality = result.quality
+    if quality is None:
+        return {}
+    return {
+        "nrmse": f"{number(100 * quality.nrmse, 2)} %",
+        "chi": number(quality.reduced_chi_square, 3),
+        "points": f"{quality.points}",
+        "noise": f"{number(100 * quality.noise, 2)} %",
+    }
+
+
+def _gaps(found: Checked) -> list[tuple[str, str, str]]:
+    """Root mean square of what is left, in units of noise: held out first."""
+    if found.diagnosis is None:
+        return []
+    gap = found.diagnosis.gap
+    held = ("not testable", "") if gap.heldout is None else (f"{gap.heldout.before:.2f}", f"{gap.heldout.after:.2f}")
+    fitted = f"{gap.calibration.before:.2f}", f"{gap.calibration.after:.2f}"
+    return [("held out, predicted from the other tests", *held), ("data fitted", *fitted)]
+
+
+def _corners(table: pd.DataFrame | None, place: Any) -> Iterator[dict[str, Any]]:
+    """Predicted values with their bands at some corners of the grid of a place, and what was measured there."""
+    amplitude, stiffness, _ = columns_of(place)
+    names = (stiffness, "loss factor [-]")
+    if table is None or not {amplitude, *names, *(f"{name}, low" for name in names)} <= set(table):
+        return
+    rows = []
+    levels = np.unique(table[amplitude])
+    for level in levels[spread(levels.size, _AMPLITUDES)]:
+        mine = table[table[amplitude] == level].sort_values("frequency [Hz]")
+        for _, row in mine.iloc[spread(len(mine), _FREQUENCIES)].iterrows():
+            cells = [number(float(row["frequency [Hz]"]), 4), number(float(level), 3)]
+            for name in names:
+                value, low, high = alike([float(row[name]), float(row[f"{name}, low"]), float(row[f"{name}, high"])], 4, least=2)
+                measured = float(row.get(f"measured {name}", np.nan))
+                cells += [value, f"{low} to {high}", "" if np.isnan(measured) else alike([measured], 4)[0]]
+            rows.append(cells)
+    heads = ["frequency [Hz]", amplitude]
+    yield {"place": str(place), "heads": heads, "names": names, "rows": rows}
