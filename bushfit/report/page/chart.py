@@ -10,11 +10,12 @@ from markupsafe import Markup
 
 from bushfit.effects.contract import Array
 from bushfit.report.page.svg import GREY, Axis, axes, dots, path, picture, tag, text
+from bushfit.report.tables import spread
 
 #: Width of a picture [pixels]: two stand side by side on a screen, and on paper.
 WIDTH = 460.0
 #: Height of the panel of a chart [pixels].
-_PANEL = 190.0
+_PANEL = 168.0
 #: Left of a panel: ticks and the label of the axis [pixels].
 _LEFT = 62.0
 #: Right of a panel [pixels].
@@ -25,8 +26,8 @@ _BELOW = 42.0
 _LINE = 17.0
 #: Width of a letter in a legend, and of its swatch [pixels].
 _LETTER, _SWATCH = 6.4, 34.0
-#: Colours of levels, dark to light, all with a contrast of 3 to 1 and more on white: viridis without its yellow end.
-COLORS = ("#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#3b8f3e", "#7d7f10", "#a8570a")
+#: Colours of levels, from cold to warm, each with a contrast of 4 to 1 and more on white.
+_COLORS = ("#2d1160", "#1f4e9c", "#0a7399", "#0d7f62", "#4b7f1b", "#85690a", "#b4500c", "#a11d4a")
 #: Dashes of levels, one after the other: they tell lines apart in a print without colours.
 DASHES = ("", "6 2", "2 2", "9 2 2 2", "4 4", "1 3", "12 3", "6 2 2 2")
 #: Colour of limits.
@@ -40,6 +41,11 @@ _ABOVE = ("#ececec", "#f9c4ab", "#ee8f6c", "#d1493e", "#9f1330", "#5d0a26")
 _BELOW_MODEL = ("#ececec", "#bfdcec", "#7fb8d8", "#3984be", "#1f5290", "#0b2a56")
 #: From this colour outward a cell below the model bears a bar: red and blue are one grey in a print without colours.
 _BARRED = 2
+
+
+def colors(count: int) -> list[str]:
+    """So many colours, as far apart as there are."""
+    return [_COLORS[place % len(_COLORS)] for place in ([0, 6] if count == 2 else spread(len(_COLORS), max(count, 1)))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,13 +159,13 @@ class Cells:
 
 def maps(title: str, heads: Sequence[str], shown: Sequence[Cells], alt: str) -> Markup:
     """Maps below each other, before and after side by side, one scale for all."""
-    left = 104.0
+    left = 96.0
     width = (WIDTH - left - _RIGHT - 12.0 * (len(heads) - 1)) / len(heads)
     drawn = [text(4, 14, title, font_weight="bold", font_size=13)]
     starts = [left + side * (width + 12.0) for side in range(len(heads))]
     for start, head in zip(starts, heads, strict=True):
         drawn.append(text(start + width / 2, 34, head, text_anchor="middle", fill=GREY))
-    top = 42.0
+    top = 48.0
     for cells in shown:
         size = min(_CELL, _MOST_MAP / len(cells.rows))
         height = size * len(cells.rows)
@@ -174,9 +180,8 @@ def maps(title: str, heads: Sequence[str], shown: Sequence[Cells], alt: str) -> 
             if row % every == 0:
                 at = top + height - (row + 0.5) * size + 4
                 drawn.append(text(left - 6, at, label, text_anchor="end", font_size=11))
-        middle = f"translate(13 {top + height / 2:.0f}) rotate(-90)" if height > 40 else f"translate(30 {top - 4:.0f})"
-        drawn.append(text(0, 0, cells.name, text_anchor="middle", fill=GREY, transform=middle))
-        top += height + 32.0
+        drawn.append(text(4, top - 6, cells.name, font_weight="bold", font_size=11))
+        top += height + 36.0
     return picture(WIDTH, top + 30.0, alt, *drawn, *_scale(top))
 
 
@@ -210,6 +215,6 @@ def _scale(top: float) -> list[Markup]:
     ends = (*(-edge for edge in EDGES[::-1]), *EDGES)
     for place, edge in enumerate(ends, start=1):
         drawn.append(text(left + place * width, top + 22, f"{edge:g}", text_anchor="middle", font_size=10))
-    drawn.append(text(left - 8, top + 9, "measured below, %", text_anchor="end", font_size=11, fill=GREY))
+    drawn.append(text(left - 8, top + 9, "measured below", text_anchor="end", font_size=11, fill=GREY))
     drawn.append(text(left + width * len(colors) + 8, top + 9, "above, %", font_size=11, fill=GREY))
     return drawn

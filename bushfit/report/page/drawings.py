@@ -12,7 +12,7 @@ from markupsafe import Markup
 from bushfit.effects.contract import Array
 from bushfit.geometry import Place
 from bushfit.model.result import Result
-from bushfit.report.page.chart import COLORS, DASHES, Cells, Series, chart, maps
+from bushfit.report.page.chart import DASHES, Cells, Rule, Series, chart, colors, maps
 from bushfit.report.page.gathered import (
     Curve,
     LoopCurve,
@@ -74,9 +74,10 @@ def _notes(kinds: Sequence[Sweeps], most: int) -> list[str]:
     """What a reader has to know of the pictures of a place."""
     notes = []
     if any(sweeps.predicted for sweeps in kinds):
-        notes.append("Lines with 95 % bands: prediction, of the bushing alone. Points: measured, mean of the repeats.")
-    else:
-        notes.append("Lines: the model at the measured points. Points: measured, mean of the repeats.")
+        notes.append("Lines with 95 % bands: prediction, without effects of the rig.")
+    if any(not sweeps.predicted for sweeps in kinds):
+        notes.append("Lines without bands: the model at the measured points.")
+    notes.append("Points: measured, mean of the repeats.")
     if any(curve.rigs is not None for sweeps in kinds for curve in sweeps.curves):
         notes.append("Broken grey lines: the same if what was added is the rig's; the bands span both.")
     if left := sum(sweeps.left_out for sweeps in kinds):
@@ -93,20 +94,20 @@ def _sweeps(sweeps: Sweeps) -> Iterator[Markup]:
     stiffness = columns_of(sweeps.place)[1]
     for row, label in enumerate((stiffness, "loss factor [-]"), start=1):
         what = label.partition(" [")[0]
-        series = [each for place, curve in enumerate(sweeps.curves) for each in _series(curve, row, place, sweeps.predicted)]
+        looks = zip(sweeps.curves, colors(len(sweeps.curves)), DASHES, strict=False)
+        series = [each for curve, *look in looks for each in _series(curve, row, *look)]
         title = f"{sweeps.place}: {what}"
         yield chart(title, (sweeps.x_label, label), series, _described(sweeps, row, what, label), log=log)
 
 
-def _series(curve: Curve, row: int, place: int, predicted: bool) -> Iterator[Series]:
+def _series(curve: Curve, row: int, color: str, dashes: str) -> Iterator[Series]:
     """One level in a chart of |K| (row 1) or loss factor (row 2), and the same if it is the rig's."""
     x, values = curve.model[0], curve.model[row]
-    color = COLORS[place % len(COLORS)]
     points = curve.measured[0], curve.measured[row]
     if curve.rigs is not None:
         yield Series("", "#777777", "3 3", line=(x, curve.rigs[row - 1]))
     band = None if curve.band is None else (x, curve.band[2 * row - 2], curve.band[2 * row - 1])
-    yield Series(curve.name, color, DASHES[place % len(DASHES)] if predicted else "", (x, values), band, points)
+    yield Series(curve.name, color, "" if curve.band is None else dashes, (x, values), band, points)
 
 
 def _described(sweeps: Sweeps, row: int, what: str, label: str) -> str:
@@ -140,20 +141,26 @@ def loop_panels(result: Result, tables: Tables, tests: Sequence[Test]) -> list[P
             notes = ["The last cycle of each loop. Points: measured" + (f", every {every}th row" if every > 1 else "") + ". Lines: model."]
             if left := rows["test"].nunique() - len(loops):
                 notes.append(f"{left} further loops are left out of the picture; loops.csv has all.")
-            found.append(Panel(str(place), [_loops(place, loops)], notes))
+            found.append(Panel(str(place), _loops(place, loops), notes))
     return found
 
 
-def _loops(place: Place, loops: Sequence[LoopCurve]) -> Markup:
-    """Hysteresis loops of a place."""
+def _loops(place: Place, loops: Sequence[LoopCurve]) -> list[Markup]:
+    """Hysteresis loops of a place, and what of them is left."""
     moved, resisting, _ = place.motion.words
     labels = f"{moved} [{place.display.displacement.name}]", f"{resisting} [{place.display.force.name}]"
-    series = [
-        Series(loop.name, COLORS[2 * at % len(COLORS)], line=(loop.rows[0], loop.rows[2]), points=(loop.rows[0], loop.rows[1]))
-        for at, loop in enumerate(loops)
-    ]
+    looks = list(zip(loops, colors(len(loops)), strict=True))
+    series = [Series(loop.name, color, line=tuple(loop.rows[[0, 2]]), points=tuple(loop.rows[:2])) for loop, color in looks]
+    left = [Series(loop.name, color, points=(loop.rows[0], loop.rows[1] - loop.rows[2])) for loop, color in looks]
     spans = "; ".join(f"{loop.name}: measured {_span(loop.rows[1])} {place.display.force.name}, model {_span(loop.rows[2])}" for loop in loops)
-    return chart(f"{place}: hysteresis", labels, series, f"{labels[1]} over {labels[0]}, measured and model; {spans}", dot=2.6)
+    off = "; ".join(f"{each.name}: {_span(each.points[1])} {place.display.force.name}" for each in left if each.points)
+    return [
+        chart(f"{place}: hysteresis", labels, series, f"{labels[1]} over {labels[0]}, measured and model; {spans}", dot=2.6),
+        chart(
+            f"{place}: measured less model", labels, left, f"{resisting}, measured less model, over {moved}; {off}", dot=2.6,
+            rules=[Rule(0.0, "")],
+        ),
+    ]
 
 
 def gap_panels(result: Result, tables: Tables, tests: Sequence[Test]) -> list[Panel]:
@@ -168,7 +175,7 @@ def gap_panels(result: Result, tables: Tables, tests: Sequence[Test]) -> list[Pa
             heads = ("before", "after") if max(len(cells.sides) for cells in shown) > 1 else ("model and tests",)
             shown = [Cells(each.name, each.rows, each.along, (*each.sides, *each.sides)[: len(heads)]) for each in shown]
             title = f"{place}: measured less model, %"
-            found.append(Panel(str(place), [maps(title, heads, shown, _mapped(place, heads, shown))], ()))
+            found.append(Panel(str(place), [maps(title, heads, shown, _mapped(place, heads, shown))], []))
     return found
 
 

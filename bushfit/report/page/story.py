@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Bushing, Specimen
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Bushing, Place, Specimen
 from bushfit.model.result import Misfit, Result
-from bushfit.report.page.drawings import gap_panels, loop_panels, tested_panels
+from bushfit.report.page.drawings import MOST_PLACES, gap_panels, loop_panels, tested_panels
 from bushfit.report.page.gathered import columns_of, places_of
 from bushfit.report.page.schema import Checked, Found, Test
 from bushfit.report.parameters import interval_kind, parameter_rows
@@ -35,6 +35,10 @@ _CONDITIONS = {
 _CLOSE = 0.9
 #: Frequencies and amplitudes of a place whose predicted values are tabled.
 _FREQUENCIES, _AMPLITUDES = 3, 2
+#: Letters from which on two warnings, of the fit and of the diagnosis, say the same with other figures.
+_SAME_LETTERS = 40
+#: Rows of predicted values of all places together.
+_ROWS = 12
 #: Warnings, regions, and tests that a page lists at most: the documents have all.
 _MOST = 12
 #: Units of amplitudes, by SI, as people read them.
@@ -45,12 +49,14 @@ def story(found: Checked, tables: Tables) -> dict[str, Any]:
     """All that the template of a report asks for."""
     result, diagnosis, about = found.result, found.diagnosis, found.about
     tests = about.tests if about else ()
-    warnings = list(dict.fromkeys((*(diagnosis.warnings if diagnosis else ()), *result.warnings)))
+    said = (*result.warnings, *(diagnosis.warnings if diagnosis else ()))
+    warnings = list({line[:_SAME_LETTERS]: line for line in reversed(said)}.values())[::-1]
     return {
         "name": about.name if about else result.name,
         "subject": "rubber bushing" if result.model.bushing else "rubber compound",
         "facts": [*_bodies(result), *_conditions(tests)],
         "tests": [_tested(test, result.tests) for test in tests[:_MOST]],
+        "conditioned": any(test.conditions for test in tests),
         "more_tests": max(0, len(tests) - _MOST),
         "diagnosis": diagnosis,
         "tone": _TONES.get(diagnosis.verdict, "fair") if diagnosis else "fair",
@@ -63,16 +69,17 @@ def story(found: Checked, tables: Tables) -> dict[str, Any]:
         "correlations": [f"{one}/{other} {size:+.2f}" for one, other, size in result.covariance.correlations() if abs(size) > _CLOSE],
         "equation": result.model.equation().splitlines()[0],
         "places": tested_panels(result, tables, tests),
-        "tabled": [table for name, place in places_of(result, tables).items() for table in _corners(tables.get(name), place)],
+        "tabled": _tabled(result, tables),
         "loops": loop_panels(result, tables, tests),
         "gap": gap_panels(result, tables, tests),
-        "gaps": _gaps(found),
+        "gaps": (gaps := _gaps(found)),
+        "added": any(before != after for _, before, after in gaps if after),
         "warnings": warnings[:_MOST],
         "more_warnings": max(0, len(warnings) - _MOST),
         "unresolved": result.unresolved,
         "outliers": len(result.outliers),
         "about": about,
-        "files": list(dict.fromkeys((str(source.file), source.sha256) for source in result.inputs)),
+        "files": _files(found),
         "versions": found.versions,
     }
 
@@ -161,7 +168,7 @@ def _effect(effect: Found) -> dict[str, Any]:
 def _plain(found: Checked) -> dict[str, str]:
     """Values of the plain fit by parameter, where another model is to be used."""
     rows = parameter_rows(found.plain) if found.plain else ()
-    return {row.name: f"{row.value} {row.unit}".removesuffix(" -") for row in rows}
+    return {row.name: row.value for row in rows}
 
 
 def _quality(result: Result) -> dict[str, str]:
@@ -176,6 +183,14 @@ def _quality(result: Result) -> dict[str, str]:
     }
 
 
+def _files(found: Checked) -> list[tuple[str, str]]:
+    """Every file behind the result with its hash: the campaign, its tests, fitted or not, and what else was fitted."""
+    about = found.about
+    named = [(about.file, about.sha256), *((test.file, test.sha256) for test in about.tests)] if about else []
+    inputs = ((str(source.file), source.sha256) for source in found.result.inputs)
+    return list(dict.fromkeys((file, sha256) for file, sha256 in (*named, *inputs) if file and sha256))
+
+
 def _gaps(found: Checked) -> list[tuple[str, str, str]]:
     """Root mean square of what is left, in units of noise: held out first."""
     if found.diagnosis is None:
@@ -186,22 +201,28 @@ def _gaps(found: Checked) -> list[tuple[str, str, str]]:
     return [("held out, predicted from the other tests", *held), ("data fitted", *fitted)]
 
 
-def _corners(table: pd.DataFrame | None, place: Any) -> Iterator[dict[str, Any]]:
-    """Predicted values with their bands at some corners of the grid of a place, and what was measured there."""
+def _tabled(result: Result, tables: Tables) -> list[tuple[str, ...]]:
+    """Predicted values at some corners of the grid of each place, their bands, and what was measured there."""
+    places = [(tables[name], place) for name, place in places_of(result, tables).items() if name in tables]
+    frequencies = min(max(_ROWS // max(_AMPLITUDES * len(places), 1), 1), _FREQUENCIES)
+    return [row for table, place in places[:MOST_PLACES] for row in _corners(table, place, frequencies)]
+
+
+def _corners(table: pd.DataFrame, place: Place, frequencies: int) -> Iterator[tuple[str, ...]]:
+    """Rows of cells: place, frequency, amplitude; then of |K| and loss factor the value, its band, and as measured."""
     amplitude, stiffness, _ = columns_of(place)
     names = (stiffness, "loss factor [-]")
-    if table is None or not {amplitude, *names, *(f"{name}, low" for name in names)} <= set(table):
+    if not {amplitude, *names, *(f"{name}, {end}" for name in names for end in ("low", "high"))} <= set(table):
         return
-    rows = []
+    (length, _), _, (unit, _) = place.display
     levels = np.unique(table[amplitude])
     for level in levels[spread(levels.size, _AMPLITUDES)]:
-        mine = table[table[amplitude] == level].sort_values("frequency [Hz]")
-        for _, row in mine.iloc[spread(len(mine), _FREQUENCIES)].iterrows():
-            cells = [number(float(row["frequency [Hz]"]), 4), number(float(level), 3)]
-            for name in names:
-                value, low, high = alike([float(row[name]), float(row[f"{name}, low"]), float(row[f"{name}, high"])], 4, least=2)
-                measured = float(row.get(f"measured {name}", np.nan))
-                cells += [value, f"{low} to {high}", "" if np.isnan(measured) else alike([measured], 4)[0]]
-            rows.append(cells)
-    heads = ["frequency [Hz]", amplitude]
-    yield {"place": str(place), "heads": heads, "names": names, "rows": rows}
+        mine = table[table[amplitude] == level].sort_values("frequency [Hz]").to_dict("records")
+        for at in spread(len(mine), frequencies):
+            row = mine[at]
+            cells = [str(place), f"{number(row['frequency [Hz]'], 4)} Hz", f"{number(float(level), 3)} {length}"]
+            for name, of in zip(names, (f" {unit}", ""), strict=True):
+                value, *ends = alike([row[name], row[f"{name}, low"], row[f"{name}, high"]], 4, least=2)
+                measured = row.get(f"measured {name}", np.nan)
+                cells += [value + of, " to ".join(ends), "" if np.isnan(measured) else alike([measured], 4)[0]]
+            yield tuple(cells)
