@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import time
@@ -27,8 +28,9 @@ from bushfit.batch.work import Orders, given_up, work
 from bushfit.effects.contract import Array
 from bushfit.errors import OutputError
 from bushfit.reduction.scatter import scatter
+from bushfit.report.contents import pages_of
 from bushfit.report.folder import check_free as check_writable
-from bushfit.report.folder import write_files
+from bushfit.report.folder import to_json, write_files
 
 #: Layout of the summary as JSON.
 SCHEMA = "bushfit/batch/1"
@@ -36,13 +38,19 @@ SCHEMA = "bushfit/batch/1"
 TABLE = "batch.csv"
 #: File of the picture, in the batch's folder.
 PICTURE = "batch.png"
+#: File of what is said of the whole batch, in the batch's folder.
+SUMMARY = "batch.json"
+#: Page of the batch, in the batch's folder.
+INDEX = "index.html"
+#: All that is written of the whole batch.
+WRITTEN = (TABLE, PICTURE, SUMMARY, INDEX)
 #: Bushings that must have a quantity for it to be drawn: fewer show no scatter.
 _LEAST_DRAWN = 3
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A batch: its title, rows, what all rows share, limits, a JUnit file on request, whether to draw."""
+    """A batch: its title, rows, what all rows share, limits, a JUnit file on request, whether to draw, and a page."""
 
     title: str
     rows: Sequence[Row]
@@ -50,6 +58,7 @@ class Plan:
     limits: Limits | None
     junit: Path | None
     picture: bool
+    page: bool = True
 
 
 @dataclass
@@ -118,6 +127,16 @@ class Summary:
             "seconds": self.seconds,
         }
 
+    def to_file(self, title: str, judge: Judge | None) -> dict[str, Any]:
+        """The same as a file: with its title, and of each quantity its column, its limits and its scatter there."""
+        quantities = {}
+        for quantity, (middle, spread) in self.scatter.items():
+            allowed = judge.allowed.get(quantity.name, ()) if judge else ()
+            ends = [end * quantity.factor if math.isfinite(end) else None for end in allowed]
+            quantities[quantity.header] = {"median": middle, "sigma": spread, "allowed": ends or [None, None]}
+        told = {key: value for key, value in self.to_document().items() if key not in ("seconds", "kept", "scatter")}
+        return {**told, "title": title, "quantities": quantities}
+
 
 def check_free(plan: Plan, *, force: bool) -> None:
     """Refuse to replace results that stand, unless asked to go on or to replace.
@@ -126,8 +145,8 @@ def check_free(plan: Plan, *, force: bool) -> None:
         OutputError: the folder cannot be written or holds a batch, or the report cannot be written.
     """
     output, over = plan.orders.output, force or plan.orders.resume
-    check_writable(output, [TABLE, PICTURE], force=True)
-    found = [name for name in (TABLE, PICTURE, ledger.ROWS) if (output / name).exists()]
+    check_writable(output, list(WRITTEN), force=True)
+    found = [name for name in (*WRITTEN, ledger.ROWS) if (output / name).exists()]
     if found and not over:
         raise OutputError(
             "results stand there already",
@@ -138,7 +157,7 @@ def check_free(plan: Plan, *, force: bool) -> None:
     if plan.junit:
         with _blamed_on(plan.junit):
             place, own = plan.junit.resolve(), output.resolve()
-            if place in (own / TABLE, own / PICTURE) or own / ledger.ROWS in (place, *place.parents):
+            if place in {own / name for name in WRITTEN} or own / ledger.ROWS in (place, *place.parents):
                 raise OutputError("the report cannot stand among the results of the rows, nor in place of the table")
             check_writable(plan.junit.parent, [plan.junit.name], force=over)
 
@@ -155,7 +174,7 @@ def _blamed_on(junit: Path) -> Iterator[None]:
 
 
 def run(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Summary:
-    """Do every row, then write batch.csv, batch.png and the JUnit report.
+    """Do every row, then write batch.csv, batch.png, batch.json, index.html and the JUnit report.
 
     Args:
         plan, workers: the batch, and where its rows are done.
@@ -168,7 +187,7 @@ def run(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Summary:
     begin, output = time.perf_counter(), plan.orders.output
     try:
         with ledger.held(output), closing(Spool(output / ledger.ASIDE / "records", len(plan.rows))) as spool:
-            for name in (TABLE, PICTURE):  # from here on they tell of results that are replaced
+            for name in WRITTEN:  # from here on they tell of results that are replaced
                 (output / name).unlink(missing_ok=True)
             strays = ledger.strays(output, plan.rows)
             fate = "are still in bushings/ (--force removes them)"
@@ -223,6 +242,11 @@ def _report(plan: Plan, spool: Spool, summary: Summary) -> None:
     scattered = {quantity: scatter(sizes[np.isfinite(sizes)]) for quantity, sizes in values.items()}
     summary.scatter = {q: (middle * q.factor, spread * q.factor) for q, (middle, spread) in scattered.items()}
     summary.notes += [*(judge.notes if judge else ()), *_notes(summary)]
+    write_files(plan.orders.output, {SUMMARY: to_json(summary.to_file(plan.title, judge))}, force=True)
+    if plan.page:
+        from bushfit.report.page.index import read_batch
+
+        write_files(plan.orders.output, pages_of(read_batch(plan.orders.output)), force=True)
 
 
 def _notes(summary: Summary) -> Iterator[str]:

@@ -21,6 +21,7 @@ _COMMANDS = {
     "fit": ("fit.fit", "Loops and sweeps -> all five parameters together: the fit to use."),
     "predict": ("predict", "Model -> axial and radial stiffness tables and plots."),
     "diagnose": ("diagnose", "Where do model and tests disagree? What is missing? Add it, show the gap shrink."),
+    "report": ("report", "A folder of results -> one page to show, to print and to mail."),
     "batch": ("batch", "Many campaigns at once -> one table, limits, a report for CI."),
     "scorecard": ("scorecard", "How often is diagnose right? Judged on hidden campaigns."),
     "inspect": ("inspect", "Test files: how they are understood, what is in them, what is odd."),

@@ -90,11 +90,12 @@ class Options:
     as_json: bool
     plots: bool
     force: bool
+    report: bool = True
 
     @property
     def formats(self) -> Formats:
         """How results are written."""
-        return Formats(pictures=self.plots)
+        return Formats(pictures=self.plots, pages=self.report)
 
     def folder(self, name: str) -> Path:
         """Where results go: --output, or results/<name>."""
@@ -211,6 +212,17 @@ def campaign_options(function: F, soft_l1: str = "points far off pull less, outl
         campaign = _only(kwargs.pop("campaigns"))
         task = Task(campaign, kwargs.pop("loss"), kwargs.pop("max_nrmse"), options)
         return function(*args, task=task, **kwargs)
+
+    return wrapped  # type: ignore[return-value]
+
+
+def report_option(function: F) -> F:
+    """--no-report of a command with a `task` that writes a report."""
+
+    @click.option("--no-report", is_flag=True, help="Write no report.html.")
+    @wraps(function)
+    def wrapped(*args: Any, task: Task, no_report: bool, **kwargs: Any) -> Any:
+        return function(*args, task=replace(task, options=replace(task.options, report=not no_report)), **kwargs)
 
     return wrapped  # type: ignore[return-value]
 

@@ -85,16 +85,20 @@ class Formats:
         for name, ending in self._shown(contents.kinds):
             made = _table(tables[name]) if ending == "csv" else _picture(contents.pictures[name])
             files[f"{name}.{ending}"] = made
-        for name, page in contents.pages.items() if self.pages else ():
-            made = {name: make() for name, make in tables.items()}
-            files[f"{name}.html"] = page(contents.documents, made).encode("utf-8", "replace")
-        return files
+        return files | (pages_of(replace(contents, tables=tables)) if self.pages else {})
 
     def _shown(self, kinds: Kinds) -> list[tuple[str, str]]:
         """The name and the ending of each table and picture that is written."""
         wanted = {"csv": kinds.tables if self.tables else (), "png": kinds.pictures if self.pictures else ()}
         names = dict.fromkeys((*kinds.tables, *kinds.pictures))
         return [(name, ending) for name in names for ending, those in wanted.items() if name in those]
+
+
+def pages_of(contents: Contents) -> dict[str, bytes]:
+    """The bytes of the pages of a result alone, by the names of their files."""
+    tables = {name: make() for name, make in contents.tables.items()} if contents.pages else {}
+    made = {name: page(contents.documents, tables) for name, page in contents.pages.items()}
+    return {f"{name}.html": text.encode("utf-8", "replace") for name, text in made.items()}
 
 
 def _report(documents: Documents, tables: Tables) -> str:

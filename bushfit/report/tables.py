@@ -25,9 +25,18 @@ if TYPE_CHECKING:
 
 
 #: Headers of what was measured and of the model beside it, in the tables of loops and sweeps.
-_MEASURED = re.compile(r"(strain amplitude|(model )?(displacement|rotation|strain|force|moment|stress|stiffness|modulus|loss factor)) \[")
+_MEASURED = re.compile(
+    r"(strain amplitude|(model )?(displacement|rotation|strain|force|moment|stress|stiffness|modulus|loss factor)) \["
+)
 #: Columns of all tables that hold texts; the others hold numbers.
-TEXTS = frozenset({"loop", "sweep", "test", "kind", "direction", "fitted", "effect", "level", "parameters", "why"})
+TEXTS = frozenset(
+    (
+        *("loop", "sweep", "test", "kind", "direction", "fitted"),
+        *("effect", "level", "parameters", "why"),
+        *("name", "campaign", "folder", "status", "error", "limits", "out of limits", "on the edge", "verdict"),
+        *("named effects", "cannot be told from", "on a bound", "warnings"),
+    )
+)
 #: End of the headers, and name of the line, of what holds where an unresolved effect belongs to the rig.
 IF_RIGS = "if it is the rig's"
 

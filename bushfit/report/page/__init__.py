@@ -30,13 +30,15 @@ def report_page(documents: Documents, tables: Tables) -> str:
     from bushfit.report.page.story import story
 
     same = {name: canonical(table) for name, table in tables.items()}
-    return _rendered("report.html", story(checked(documents), same))
+    return rendered("report.html", story(checked(documents), same))
 
 
-def _rendered(template: str, context: dict[str, Any]) -> str:
+def rendered(template: str, context: dict[str, Any]) -> str:
     """A template with its context; no style or script but the page's own may run, and nothing may be loaded."""
-    style, script = (Markup((_TEMPLATES / name).read_text(encoding="utf-8")) for name in ("style.css", "script.js"))  # noqa: S704
-    allowed = f"default-src 'none'; style-src {_hash(style)}; script-src {_hash(script)}; base-uri 'none'; form-action 'none'"
+    style, script = (Markup((_TEMPLATES / name).read_text(encoding="utf-8")) for name in ("style.css", "script.js"))
+    allowed = (
+        f"default-src 'none'; style-src {_hash(style)}; script-src {_hash(script)}; base-uri 'none'; form-action 'none'"
+    )
     page = _environment().get_template(template).render(style=style, script=script, allowed=allowed, **context)
     return page + "\n"
 

@@ -70,11 +70,12 @@ class Series:
 
 @dataclass(frozen=True)
 class Rule:
-    """A level line across a chart: its value, its name, whether it is a limit."""
+    """A level line across a chart: its value, its name, whether it is a limit, and its dashes."""
 
     value: float
     name: str
     limit: bool = False
+    dashes: str = ""
 
 
 def chart(
@@ -97,8 +98,8 @@ def chart(
     drawn = [_drawn(each, x, y, dot) for each in series]
     across = np.array([x.first, x.last])
     for rule in rules:
-        dashes = {"stroke_dasharray": "6 3"} if rule.limit else {}
-        drawn.append(path(across, y([rule.value, rule.value]), stroke=LIMIT if rule.limit else GREY, **dashes))
+        dashes: dict[str, object] = {"stroke_dasharray": rule.dashes} if rule.dashes else {}
+        drawn.append(path(across, y(np.full(2, rule.value)), stroke=LIMIT if rule.limit else GREY, **dashes))
     heading = text(4, 14, title, font_weight="bold", font_size=13)
     data = {"data_x": x.described, "data_y": y.described}
     return picture(WIDTH, top + _PANEL + _BELOW, alt, heading, *legend, *axes(x, y), *drawn, **data)
@@ -110,7 +111,10 @@ def _drawn(series: Series, x: Axis, y: Axis, dot: float) -> Markup:
     if series.band is not None:
         along, low, high = series.band
         there = np.isfinite(low) & np.isfinite(high)
-        around = x(np.concatenate([along[there], along[there][::-1]])), y(np.concatenate([low[there], high[there][::-1]]))
+        around = (
+            x(np.concatenate([along[there], along[there][::-1]])),
+            y(np.concatenate([low[there], high[there][::-1]])),
+        )
         d = "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(*around, strict=True))
         parts.append(tag("path", d=f"M{d}Z", fill=series.color, fill_opacity=0.18) if d else Markup())
     if series.line is not None:
@@ -132,11 +136,8 @@ def _legend(series: Sequence[Series], rules: Sequence[Rule]) -> tuple[list[Marku
             left, line = 4.0, line + 1
         at = 14.0 + _LINE * line
         across, level = np.array([left, left + _SWATCH - 8.0]), np.full(2, at - 4.0)
-        if isinstance(each, Rule):
-            color, dashes = (LIMIT, "6 3") if each.limit else (GREY, "")
-        else:
-            color, dashes = each.color, each.dashes
-        own = {"stroke_dasharray": dashes} if dashes else {}
+        color = each.color if isinstance(each, Series) else LIMIT if each.limit else GREY
+        own = {"stroke_dasharray": each.dashes} if each.dashes else {}
         if isinstance(each, Rule) or each.line is not None:
             drawn.append(path(across, level, stroke=color, stroke_width=1.5, **own))
         if isinstance(each, Series) and each.points is not None:
@@ -173,7 +174,9 @@ def maps(title: str, heads: Sequence[str], shown: Sequence[Cells], alt: str) -> 
             drawn += _cells(values, start, top, width / values.shape[1], size)
             low, name, high = cells.along
             drawn.append(text(start, top + height + 13, low, font_size=11))
-            drawn.append(text(start + width / 2, top + height + 13, name, text_anchor="middle", font_size=11, fill=GREY))
+            drawn.append(
+                text(start + width / 2, top + height + 13, name, text_anchor="middle", font_size=11, fill=GREY)
+            )
             drawn.append(text(start + width, top + height + 13, high, text_anchor="end", font_size=11))
         every = max(1, round(12.0 / size))
         for row, label in enumerate(cells.rows):

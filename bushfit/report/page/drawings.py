@@ -54,7 +54,7 @@ def tested_panels(result: Result, tables: Tables, tests: Sequence[Test]) -> list
     table, places = tests_of(tables, "sweep"), places_of(result, tables)
     if table is None:
         return []
-    found = []
+    found: list[Panel] = []
     most = max(_FEWEST, _MOST_POINTS // max(1, _curves(table)))
     for name, place in places.items():
         rows = table[table["direction"] == str(place)]
@@ -131,14 +131,18 @@ def loop_panels(result: Result, tables: Tables, tests: Sequence[Test]) -> list[P
     table = tests_of(tables, "loop")
     if table is None:
         return []
-    found = []
+    found: list[Panel] = []
     most = max(_FEWEST, _MOST_ROWS // max(1, min(table["test"].nunique(), 8 * MOST_PLACES)))
     for place in places_of(result, tables).values():
         rows = table[table["direction"] == str(place)]
         if len(rows) and len(found) < MOST_PLACES:
             loops = loops_at(place, rows, tests, most)
             every = max(loop.every for loop in loops)
-            notes = ["The last cycle of each loop. Points: measured" + (f", every {every}th row" if every > 1 else "") + ". Lines: model."]
+            notes = [
+                "The last cycle of each loop. Points: measured"
+                + (f", every {every}th row" if every > 1 else "")
+                + ". Lines: model."
+            ]
             if left := rows["test"].nunique() - len(loops):
                 notes.append(f"{left} further loops are left out of the picture; loops.csv has all.")
             found.append(Panel(str(place), _loops(place, loops), notes))
@@ -150,14 +154,29 @@ def _loops(place: Place, loops: Sequence[LoopCurve]) -> list[Markup]:
     moved, resisting, _ = place.motion.words
     labels = f"{moved} [{place.display.displacement.name}]", f"{resisting} [{place.display.force.name}]"
     looks = list(zip(loops, colors(len(loops)), strict=True))
-    series = [Series(loop.name, color, line=tuple(loop.rows[[0, 2]]), points=tuple(loop.rows[:2])) for loop, color in looks]
+    series = [
+        Series(loop.name, color, line=tuple(loop.rows[[0, 2]]), points=tuple(loop.rows[:2])) for loop, color in looks
+    ]
     left = [Series(loop.name, color, points=(loop.rows[0], loop.rows[1] - loop.rows[2])) for loop, color in looks]
-    spans = "; ".join(f"{loop.name}: measured {_span(loop.rows[1])} {place.display.force.name}, model {_span(loop.rows[2])}" for loop in loops)
+    spans = "; ".join(
+        f"{loop.name}: measured {_span(loop.rows[1])} {place.display.force.name}, model {_span(loop.rows[2])}"
+        for loop in loops
+    )
     off = "; ".join(f"{each.name}: {_span(each.points[1])} {place.display.force.name}" for each in left if each.points)
     return [
-        chart(f"{place}: hysteresis", labels, series, f"{labels[1]} over {labels[0]}, measured and model; {spans}", dot=2.6),
         chart(
-            f"{place}: measured less model", labels, left, f"{resisting}, measured less model, over {moved}; {off}", dot=2.6,
+            f"{place}: hysteresis",
+            labels,
+            series,
+            f"{labels[1]} over {labels[0]}, measured and model; {spans}",
+            dot=2.6,
+        ),
+        chart(
+            f"{place}: measured less model",
+            labels,
+            left,
+            f"{resisting}, measured less model, over {moved}; {off}",
+            dot=2.6,
             rules=[Rule(0.0, "")],
         ),
     ]
@@ -166,14 +185,16 @@ def _loops(place: Place, loops: Sequence[LoopCurve]) -> list[Markup]:
 def gap_panels(result: Result, tables: Tables, tests: Sequence[Test]) -> list[Panel]:
     """What is left of each place before and after, measured less model in %."""
     gap = tables.get("gap")
-    if gap is None or not any(name.endswith("before [%]") for name in gap):
+    if gap is None or not any(str(name).endswith("before [%]") for name in gap):
         return []
-    found = []
+    found: list[Panel] = []
     for place in list(places_of(result, tables).values())[:MOST_PLACES]:
         shown = list(cells_at(place, gap, tests))
         if shown:
             heads = ("before", "after") if max(len(cells.sides) for cells in shown) > 1 else ("model and tests",)
-            shown = [Cells(each.name, each.rows, each.along, (*each.sides, *each.sides)[: len(heads)]) for each in shown]
+            shown = [
+                Cells(each.name, each.rows, each.along, (*each.sides, *each.sides)[: len(heads)]) for each in shown
+            ]
             title = f"{place}: measured less model, %"
             found.append(Panel(str(place), [maps(title, heads, shown, _mapped(place, heads, shown))], []))
     return found
@@ -183,6 +204,9 @@ def _mapped(place: Place, heads: Sequence[str], shown: Sequence[Cells]) -> str:
     """Maps in words: the root mean square of what is left."""
     parts = []
     for cells in shown:
-        sizes = (f"{head} {number(float(np.sqrt(np.nanmean(np.square(side)))), 2)} %" for head, side in zip(heads, cells.sides, strict=True))
+        sizes = (
+            f"{head} {number(float(np.sqrt(np.nanmean(np.square(side)))), 2)} %"
+            for head, side in zip(heads, cells.sides, strict=True)
+        )
         parts.append(f"{cells.name}: {', '.join(sizes)}")
     return f"Measured less model, {place}, root mean square of the cells; {'; '.join(parts)}"

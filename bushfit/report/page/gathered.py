@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.errors import ModelError
 from bushfit.geometry import Direction, Place
 from bushfit.model.result import Result
 from bushfit.report.artifacts import place_names
@@ -93,7 +94,9 @@ def tests_of(tables: Tables, kind: str) -> pd.DataFrame | None:
     if (table := tables.get(f"{kind}s")) is not None:
         return table.rename(columns={kind: "test"})
     gap = tables.get("gap")
-    return None if gap is None else gap[gap["kind"] == kind]
+    if gap is None or not any(str(name).startswith("model ") for name in gap):  # an older version's
+        return None
+    return gap[gap["kind"] == kind]
 
 
 def columns_of(place: Place) -> tuple[str, str, str]:
@@ -103,88 +106,97 @@ def columns_of(place: Place) -> tuple[str, str, str]:
     return f"{moved} [{length}]", f"{resisted} [{stiffness}]", f"{resisting} [{force}]"
 
 
-def sweeps_at(place: Place, rows: pd.DataFrame, tests: Sequence[Test], predicted: pd.DataFrame | None, most: int) -> Iterator[Sweeps]:
+def numbers(rows: pd.DataFrame, *headers: str) -> Array:
+    """Columns of a table, (k, n).
+
+    Raises:
+        ModelError: one of them is not there.
+    """
+    for header in headers:
+        if header not in rows:
+            hint = "write the results anew, or take the table away: the page then goes without it"
+            raise ModelError("a column of a table is missing", expected=header, hint=hint)
+    return rows[list(headers)].to_numpy(dtype=float).T
+
+
+def sweeps_at(
+    place: Place, rows: pd.DataFrame, tests: Sequence[Test], predicted: pd.DataFrame | None, most: int
+) -> Iterator[Sweeps]:
     """The sweeps of a place by what they step through, of each curve at most so many points."""
-    stepped = _stepped(rows, place, tests)
-    amplitude, stiffness, _ = columns_of(place)
-    for kind in dict.fromkeys(stepped.values()):
-        mine = rows[rows["test"].isin([test for test, own in stepped.items() if own == kind])]
-        along, held = (amplitude, "frequency [Hz]") if kind == "amplitude" else ("frequency [Hz]", amplitude)
-        if kind is None:
-            yield _as_it_came(place, mine, along, stiffness, most)
-            continue
-        headers = [along, stiffness, "loss factor [-]", f"model {stiffness}", "model loss factor [-]"]
-        levels = np.unique(mine[held])
-        drawn = levels[spread(levels.size, MOST_LEVELS)]
-        unit = held.partition("[")[2].rstrip("]")
+    stiffness = columns_of(place)[1]
+    names = stiffness, "loss factor [-]"
+    for stepped, along, held, mine in _by_kind(place, rows, tests):
+        headers = [along, *names, *(f"model {name}" for name in names)]
+        numbers(mine, *headers)  # they are there
+        levels = list(dict.fromkeys(mine[held])) if stepped is None else np.unique(mine[held]).tolist()
         curves = []
-        for level in drawn:
-            there = mine[mine[held] == level].groupby(along, as_index=False)[headers[1:]].mean()
-            points = there[headers].to_numpy(dtype=float).T[:, _thin(len(there), most)]
-            line = _predicted(predicted, along, held, float(level), stiffness)
+        for level in (levels[at] for at in spread(len(levels), MOST_LEVELS)):
+            there = mine[mine[held] == level].sort_values(along)
+            if stepped:
+                there = there.groupby(along, as_index=False)[headers[1:]].mean()
+            points = numbers(there, *headers)[:, _thin(len(there), most)]
+            line = _predicted(predicted, along, held, level, names) if stepped else None
             model, band, rigs = (points[[0, 3, 4]], None, None) if line is None else line
-            curves.append(Curve(f"{number(float(level), 3)} {unit}", points[:3], model, band, rigs))
+            curves.append(Curve(_level(level, held), points[:3], model, band, rigs))
         lined = all(curve.band is not None for curve in curves)
-        yield Sweeps(place, kind, along, curves, lined, levels.size - drawn.size)
+        yield Sweeps(place, stepped, along, curves, lined, len(levels) - len(curves))
 
 
-def _as_it_came(place: Place, rows: pd.DataFrame, along: str, stiffness: str, most: int) -> Sweeps:
-    """Sweeps in which nothing was held: a curve a test."""
-    names = list(dict.fromkeys(rows["test"]))
-    drawn = [names[at] for at in spread(len(names), MOST_LEVELS)]
-    headers = [along, stiffness, "loss factor [-]", f"model {stiffness}", "model loss factor [-]"]
-    curves = []
-    for name in drawn:
-        there = rows[rows["test"] == name].sort_values(along)[headers].to_numpy(dtype=float).T
-        there = there[:, _thin(there.shape[1], most)]
-        curves.append(Curve(name, there[:3], there[[0, 3, 4]]))
-    return Sweeps(place, None, along, curves, False, len(names) - len(drawn))
+def _by_kind(
+    place: Place, rows: pd.DataFrame, tests: Sequence[Test]
+) -> Iterator[tuple[str | None, str, str, pd.DataFrame]]:
+    """Sweeps that step through the same: what it is, the headers of what lies along x and of what is held (the test,
+    where nothing is), and the rows."""
+    said, amplitude, frequency = {test.test: test.stepped for test in tests}, columns_of(place)[0], "frequency [Hz]"
+    steps: dict[str | None, list[str]] = {}
+    for test in dict.fromkeys(rows["test"]):
+        levels = (np.unique(values).size for values in numbers(rows[rows["test"] == test], frequency, amplitude))
+        by_count = "frequency" if next(levels) >= next(levels) else "amplitude"
+        steps.setdefault(said.get(test, by_count), []).append(test)
+    for stepped, names in steps.items():
+        along, held = (amplitude, frequency) if stepped == "amplitude" else (frequency, amplitude)
+        yield stepped, along, held if stepped else "test", rows[rows["test"].isin(names)]
+
+
+def _level(level: float | str, held: str) -> str:
+    """A held value as people read it, with the unit of its header; the name of a test as it is."""
+    return level if isinstance(level, str) else f"{number(level, 3)} {held.partition('[')[2].rstrip(']')}"
 
 
 def _predicted(
-    table: pd.DataFrame | None, along: str, held: str, level: float, stiffness: str
+    table: pd.DataFrame | None, along: str, held: str, level: float, names: tuple[str, str]
 ) -> tuple[Array, Array, Array | None] | None:
-    """The prediction at a level: x, |K| and loss factor, their band, and both if they are the rig's; None where it has
-    none."""
-    if table is None or not {along, held} <= set(table):
+    """The prediction at a level: x, |K| and loss factor; their band; and both if they are the rig's; None where there
+    is no such prediction."""
+    if table is None:
         return None
-    near = table[np.abs(table[held] / level - 1.0) < _SAME_LEVEL].sort_values(along)
+    (at,) = numbers(table, held)
+    near = table[np.abs(at / level - 1.0) < _SAME_LEVEL].sort_values(along)
     if near.empty:
         return None
-    names = (stiffness, "loss factor [-]")
     rigs = [f"{name}, {IF_RIGS}" for name in names]
     band = [f"{name}, {end}" for name in names for end in ("low", "high")]
-    values = near[[along, *names]].to_numpy(dtype=float).T, near[band].to_numpy(dtype=float).T
-    return *values, near[rigs].to_numpy(dtype=float).T if rigs[0] in near else None
-
-
-def _stepped(rows: pd.DataFrame, place: Place, tests: Sequence[Test]) -> dict[str, str | None]:
-    """What each test steps through; of a result that does not say it, what takes more values."""
-    said = {test.test: test.stepped for test in tests}
-    amplitude = columns_of(place)[0]
-
-    def told(test: str) -> str | None:
-        mine = rows[rows["test"] == test]
-        return "amplitude" if mine[amplitude].nunique() > mine["frequency [Hz]"].nunique() else "frequency"
-
-    return {test: said[test] if test in said else told(test) for test in dict.fromkeys(rows["test"])}
+    return numbers(near, along, *names), numbers(near, *band), numbers(near, *rigs) if rigs[0] in near else None
 
 
 def loops_at(place: Place, rows: pd.DataFrame, tests: Sequence[Test], most: int) -> list[LoopCurve]:
     """The loops of a place, at most eight, each with at most so many rows of its last cycle."""
-    resisting = columns_of(place)[2]
-    moved = f"{place.motion.words[0]} [{place.display.displacement.name}]"
-    frequency = {test.test: test.frequency_Hz[0] for test in tests}
+    resisting, frequency = columns_of(place)[2], {test.test: test.frequency_Hz[0] for test in tests}
     names = list(dict.fromkeys(rows["test"]))
     curves = []
     for name in (names[at] for at in spread(len(names), MOST_LEVELS)):
         mine = rows[rows["test"] == name]
-        time = mine["time [s]"].to_numpy(dtype=float)
+        (time,) = numbers(mine, "time [s]")
         period = 1.0 / frequency[name] if frequency.get(name) else np.inf
-        last = mine[time >= time[-1] - period * (1.0 + 1e-6)]
-        every = max(1, -(-len(last) // most))
-        curves.append(LoopCurve(name, last[[moved, resisting, f"model {resisting}"]].to_numpy(dtype=float).T[:, ::every], every))
+        last = numbers(mine, _moved(place), resisting, f"model {resisting}")[:, time >= time[-1] - period]
+        every = max(1, -(-last.shape[1] // most))
+        curves.append(LoopCurve(name, last[:, ::every], every))
     return curves
+
+
+def _moved(place: Place) -> str:
+    """The header of displacement, rotation or strain in the tables of a place."""
+    return f"{place.motion.words[0]} [{place.display.displacement.name}]"
 
 
 def _thin(count: int, most: int) -> slice:
@@ -195,57 +207,44 @@ def _thin(count: int, most: int) -> slice:
 def cells_at(place: Place, gap: pd.DataFrame, tests: Sequence[Test]) -> Iterator[Cells]:
     """Maps of a place: measured less model in %, of sweeps storage and loss, of loops the force."""
     mine = gap[gap["direction"] == str(place)]
-    sweeps, loops = mine[mine["kind"] == "sweep"], mine[mine["kind"] == "loop"]
-    if len(sweeps):
-        stepped = _stepped(sweeps, place, tests)
-        amplitude = columns_of(place)[0]
-        for kind in dict.fromkeys(stepped.values()):
-            chosen = sweeps[sweeps["test"].isin([test for test, own in stepped.items() if own == kind])]
-            along, held = (amplitude, "frequency [Hz]") if kind == "amplitude" else ("frequency [Hz]", amplitude)
-            unit = held.partition("[")[2].rstrip("]")
-            rows = chosen["test"] if kind is None else chosen[held]
-            label = (lambda test: _name(str(test))) if kind is None else (lambda level, unit=unit: f"{number(float(level), 3)} {unit}")
-            x = chosen[along].to_numpy(dtype=float)
-            ends = number(float(x.min()), 3), along.partition(" [")[0], f"{number(float(x.max()), 3)} {along.partition('[')[2].rstrip(']')}"
-            for part in ("storage", "loss"):
-                yield _map(part, rows.to_numpy(), x, chosen, part, label, ends)
+    for stepped, along, held, rows in _by_kind(place, mine[mine["kind"] == "sweep"], tests):
+        (x,), (name, unit) = numbers(rows, along), along.rstrip("]").split(" [")
+        ends = number(float(x.min()), 3), name, f"{number(float(x.max()), 3)} {unit}"
+        for part in ("storage", "loss"):
+            yield _map(part, rows, held if stepped else "test", x, ends)
+    loops = mine[mine["kind"] == "loop"]
     if len(loops):
-        phase = np.concatenate([_phase(place, loops[loops["test"] == test]) for test in dict.fromkeys(loops["test"])])
-        sector = np.floor(phase * _SECTORS)
-        yield _map("force", loops["test"].to_numpy(), sector, loops, "force", lambda test: _name(str(test)), ("upper turn", "cycle", "360 deg"))
+        each = (loops[loops["test"] == test] for test in dict.fromkeys(loops["test"]))
+        turned = np.concatenate([_phase(place, rows) for rows in each])
+        yield _map("force", loops, "test", np.floor(turned * _SECTORS), ("upper turn", "cycle", "360 deg"))
 
 
 def _phase(place: Place, rows: pd.DataFrame) -> Array:
     """Phase of the rows of a loop after the upper turn of its motion, in cycles, (n,)."""
-    phase = rows["time [s]"].to_numpy(dtype=float) * rows["frequency [Hz]"].to_numpy(dtype=float)
-    moved = rows[f"{place.motion.words[0]} [{place.display.displacement.name}]"].to_numpy(dtype=float)
-    first = np.mean((moved - moved.mean()) * np.exp(-2j * np.pi * phase))
-    return (phase + np.angle(first) / (2.0 * np.pi)) % 1.0
+    time, frequency, moved = numbers(rows, "time [s]", "frequency [Hz]", _moved(place))
+    first = np.mean((moved - moved.mean()) * np.exp(-2j * np.pi * time * frequency))
+    return (time * frequency + np.angle(first) / (2.0 * np.pi)) % 1.0
 
 
-def _map(name: str, rows: Array, along: Array, table: pd.DataFrame, part: str, label: object, ends: tuple[str, str, str]) -> Cells:
+def _map(part: str, table: pd.DataFrame, held: str, along: Array, ends: tuple[str, str, str]) -> Cells:
     """One map: means over the rows of the table that fall into a cell, before and after."""
-    row, labels = _binned(rows, _MOST_ROWS)
-    column, columns = _binned(along, _MOST_COLUMNS)
-    place = row * columns.size + column
-    count = np.bincount(place, minlength=labels.size * columns.size).astype(float)
+    (row, levels), (column, columns) = _binned(table[held].to_numpy(), _MOST_ROWS), _binned(along, _MOST_COLUMNS)
+    cell, size = row * len(columns) + column, len(levels) * len(columns)
+    count = np.bincount(cell, minlength=size)
     sides = []
-    for when in ("before", "after"):
-        off = -table[f"{part} {when} [%]"].to_numpy(dtype=float)
-        with np.errstate(invalid="ignore"):
-            mean = np.bincount(place, off, minlength=count.size) / count
-        sides.append(mean.reshape(labels.size, columns.size))
-    same = bool(np.array_equal(sides[0], sides[1], equal_nan=True))
-    return Cells(name, [label(each) for each in labels], ends, sides[:1] if same else sides)
+    for off in numbers(table, *(f"{part} {when} [%]" for when in ("before", "after"))):
+        sums = np.bincount(cell, -off, minlength=size)
+        sides.append(np.where(count > 0, sums / np.maximum(count, 1), np.nan).reshape(len(levels), -1))
+    same = np.array_equal(sides[0], sides[1], equal_nan=True)
+    return Cells(part, [_short(_level(level, held)) for level in levels], ends, sides[:1] if same else sides)
 
 
-def _binned(values: Array, most: int) -> tuple[Array, Array]:
-    """Number of the bin of each value, and a value for each of at most so many bins of neighbours."""
+def _binned(values: Any, most: int) -> tuple[Array, list[Any]]:
+    """Number of the bin of each value, and the first value of each of at most so many bins of neighbours."""
     levels, place = np.unique(values, return_inverse=True)
-    bins = np.minimum(np.arange(levels.size) * most // max(levels.size, most), most - 1) if levels.size > most else np.arange(levels.size)
-    _, first = np.unique(bins, return_index=True)
-    return bins[place], levels[first]
+    bins = np.arange(levels.size) * min(most, levels.size) // levels.size
+    return bins[place], levels[np.unique(bins, return_index=True)[1]].tolist()
 
 
-def _name(test: str) -> str:
+def _short(test: str) -> str:
     return test if len(test) <= _LETTERS else f"{test[: _LETTERS - 6]}…{test[-5:]}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -45,18 +45,18 @@ def read_results(folder: Path) -> Contents:
         raise ModelError("a folder of results is needed", file=folder, found=found, expected="as bushfit run writes it")
     files = {name: folder / f"{name}.json" for name in _DOCUMENTS if (folder / f"{name}.json").exists()}
     if not set(files) & set(MODELS):
-        names = sorted(path.name for path in folder.iterdir())[:8]
+        standing = sorted(path.name for path in folder.iterdir())[:8]
         raise ModelError(
             "there is no model in this folder",
             file=folder,
-            found=", ".join(names) or "nothing",
+            found=", ".join(standing) or "nothing",
             expected=" or ".join(f"{name}.json" for name in MODELS),
             hint=f"bushfit run CAMPAIGN -o {folder} makes one",
         )
     documents = {name: read_document(file) for name, file in files.items()}
     result = checked(documents, files).result
     names = (*_TABLES, *place_names([*Direction, *result.specimens]))
-    tables = {name: table for name in names if (table := _read_table(folder, name)) is not None}
+    tables = {name: table for name in names if (table := read_table(folder, name)) is not None}
     return Contents(documents, {name: _given(table) for name, table in tables.items()}).reported()
 
 
@@ -78,7 +78,7 @@ def _given(table: pd.DataFrame) -> Callable[[], pd.DataFrame]:
     return lambda: table
 
 
-def _read_table(folder: Path, name: str) -> pd.DataFrame | None:
+def read_table(folder: Path, name: str) -> pd.DataFrame | None:
     """A table in whichever form it stands, CSV first; None where it does not.
 
     Raises:
@@ -116,7 +116,9 @@ def _csv(file: Path) -> pd.DataFrame:
 
     data = read_utf8(file, ModelError, largest=_LARGEST)
     mark = re.search("[,;]", data.partition(b"\n")[0].decode("utf-8-sig"))
-    return pd.read_csv(io.BytesIO(data), sep=mark[0] if mark else ",", dtype=str, keep_default_na=False, encoding="utf-8-sig")
+    return pd.read_csv(
+        io.BytesIO(data), sep=mark[0] if mark else ",", dtype=str, keep_default_na=False, encoding="utf-8-sig"
+    )
 
 
 def _workbook(file: Path) -> pd.DataFrame:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -66,7 +66,9 @@ def story(found: Checked, tables: Tables) -> dict[str, Any]:
         "interval": interval_kind(result),
         "plain": _plain(found),
         "quality": _quality(result),
-        "correlations": [f"{one}/{other} {size:+.2f}" for one, other, size in result.covariance.correlations() if abs(size) > _CLOSE],
+        "correlations": [
+            f"{one}/{other} {size:+.2f}" for one, other, size in result.covariance.correlations() if abs(size) > _CLOSE
+        ],
         "equation": result.model.equation().splitlines()[0],
         "places": tested_panels(result, tables, tests),
         "tabled": _tabled(result, tables),
@@ -93,7 +95,9 @@ def _bodies(result: Result) -> Iterator[tuple[str, str]]:
 
 
 def _tube(bushing: Bushing) -> str:
-    inner, outer, length = (number(1e3 * size, 4) for size in (2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length))
+    inner, outer, length = (
+        number(1e3 * size, 4) for size in (2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length)
+    )
     formulas = "; radial formulas corrected by finite elements" if bushing.shape == "calibrated" else ""
     return f"rubber tube, inner diameter {inner} mm, outer diameter {outer} mm, length {length} mm{formulas}"
 
@@ -102,7 +106,9 @@ def _specimen(specimen: Specimen) -> str:
     if specimen.area is None or specimen.thickness is None:
         return f"modulus of the compound, {specimen.strain} strain"
     blocks = "one block" if specimen.elements == 1 else f"{specimen.elements} blocks in parallel"
-    return f"{blocks} in shear, {number(1e6 * specimen.area, 4)} mm² each, {number(1e3 * specimen.thickness, 4)} mm thick"
+    return (
+        f"{blocks} in shear, {number(1e6 * specimen.area, 4)} mm² each, {number(1e3 * specimen.thickness, 4)} mm thick"
+    )
 
 
 def _conditions(tests: Sequence[Test]) -> Iterator[tuple[str, str]]:
