@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Bushing, Place, Specimen
-from bushfit.model.result import Misfit, Result
+from bushfit.model.result import Misfit, Result, Usable
 from bushfit.report.page.drawings import MOST_PLACES, gap_panels, loop_panels, tested_panels
 from bushfit.report.page.gathered import columns_of, places_of
 from bushfit.report.page.schema import Checked, Found, Test
@@ -151,13 +151,13 @@ def _ends(ends: tuple[float, float], factor: float, unit: str) -> str:
     return " to ".join(dict.fromkeys(number(end * factor, 3) for end in ends)) + f" {unit}"
 
 
-def _usable(place: Any) -> dict[str, str]:
+def _usable(place: Usable) -> dict[str, Any]:
     return {
         "place": place.place,
         "stiffness": f"{number(100 * place.stiffness, 2)} %",
         "loss": number(place.loss_factor, 2),
         "points": f"{place.points}",
-        "how": "each predicted from other runs" if place.held_out else "as fitted",
+        "held_out": place.held_out,
     }
 
 
