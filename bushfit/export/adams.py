@@ -1,8 +1,8 @@
 """Adams Car: bushing property files (.bus), a force over displacement and a damping in each of six directions.
 
 The curve is the storage stiffness at the lowest frequency times each amplitude, so that it softens as the rubber does.
-The damping is one number: in `bushing_car.bus` a viscous damper, in `bushing_ride.bus` the loss angle that the frequency
-bushing of Adams Car Ride reads there. Both are those of the middle frequency and amplitude of the grid. A file states
+The damping is one number: in `bushing_car.bus` a viscous damper, in `bushing_ride.bus` the loss angle that the bushing
+of Adams Car Ride reads there. Both are those of the middle frequency and amplitude of the grid. A file states
 its units, which Adams converts; they are mm, newton, deg and sec.
 
 Source: Adams Car Ride help, "Frequency Bushing" (damping coefficients are interpreted as loss angles); Altair TeimOrbit

@@ -51,7 +51,7 @@ def parameters_table(result: Result) -> pd.DataFrame:
     import pandas as pd
 
     model, rows = result.model, []
-    for name, value in model.values.items():
+    for name, value in model.values.items():  # noqa: PD011  # no frame
         parameter, (low, high) = model.parameters[name], result.interval(name) or (None, None)
         rows.append(
             {
