@@ -10,7 +10,7 @@ from bushfit.export.contract import Exported, Order
 from bushfit.export.losses import NO_LOOPS
 from bushfit.reading.csvfile import to_csv
 from bushfit.reading.xlsxfile import to_xlsx
-from bushfit.report.artifacts import place_files
+from bushfit.report.artifacts import place_names
 from bushfit.report.tables import prediction_table, wide_table
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def xlsx(order: Order) -> Exported:
 def _tables(order: Order) -> dict[str, pd.DataFrame]:
     """All tables by name: two for each place, the parameters, and the provenance."""
     found = {"parameters": parameters_table(order.result), "provenance": _provenance(order)}
-    for name, prediction in zip(place_files(order.places), order.predictions, strict=True):
+    for name, prediction in zip(place_names(order.places), order.predictions, strict=True):
         display = order.units.display(prediction.direction.motion) if order.units else None
         while {name, f"{name} wide"} & found.keys():  # a specimen may have any name
             name += "_"
