@@ -5,9 +5,9 @@ The damping is one number: in `bushing_car.bus` a viscous damper, in `bushing_ri
 of Adams Car Ride reads there. Both are those of the middle frequency and amplitude of the grid. A file states
 its units, which Adams converts; they are mm, newton, degrees and second.
 
-Source: Adams Car Ride help, "Frequency Bushing" (damping coefficients are interpreted as loss angles); blocks, attributes
-and units as in the public fixture `fixture.bus` of the package suspension_multibody, which reads them; Altair TeimOrbit
-format and AutoBush, which reads the same files.
+Source: Adams Car Ride help, "Frequency Bushing" (damping coefficients are interpreted as loss angles); blocks,
+attributes and units as in the public fixture `fixture.bus` of the package suspension_multibody, which reads them;
+Altair TeimOrbit format and AutoBush, which reads the same files.
 """
 
 from __future__ import annotations

@@ -103,7 +103,7 @@ def test_the_compound_of_abaqus_is_the_model_at_that_strain(order: Order, paper_
 
 
 def test_adams_holds_curve_and_damping(order: Order, known: pd.DataFrame) -> None:
-    """In mm, newton, degrees and second: storage force at each amplitude, damper or loss angle in the middle of the grid."""
+    """Storage force at each amplitude, damper or loss angle in the middle of the grid; mm, newton, degrees, second."""
     exported = adams.export(order)
     factors = {"x": (1e3, 1.0), "ax": (np.degrees(1.0), 1e3)}
     for kind in ("car", "ride"):
