@@ -14,6 +14,7 @@ from bushfit.geometry import Place
 from bushfit.model.result import Result
 from bushfit.report.page.chart import DASHES, Cells, Rule, Series, chart, colors, maps
 from bushfit.report.page.gathered import (
+    MOST_LEVELS,
     Curve,
     LoopCurve,
     Sweeps,
@@ -55,7 +56,7 @@ def tested_panels(result: Result, tables: Tables, tests: Sequence[Test]) -> list
     if table is None:
         return []
     found: list[Panel] = []
-    most = max(_FEWEST, _MOST_POINTS // max(1, _curves(table)))
+    most = max(_FEWEST, _MOST_POINTS // (MOST_LEVELS * min(len(places), MOST_PLACES) or 1))
     for name, place in places.items():
         rows = table[table["direction"] == str(place)]
         if len(rows) and len(found) < MOST_PLACES:
@@ -63,11 +64,6 @@ def tested_panels(result: Result, tables: Tables, tests: Sequence[Test]) -> list
             pictures = [picture for sweeps in kinds for picture in _sweeps(sweeps)]
             found.append(Panel(str(place), pictures, _notes(kinds, most)))
     return found
-
-
-def _curves(table: object) -> int:
-    """How many curves are drawn at most: tests, and levels of each."""
-    return min(64, 8 * len(set(table["test"])))  # type: ignore[index]
 
 
 def _notes(kinds: Sequence[Sweeps], most: int) -> list[str]:
@@ -132,7 +128,8 @@ def loop_panels(result: Result, tables: Tables, tests: Sequence[Test]) -> list[P
     if table is None:
         return []
     found: list[Panel] = []
-    most = max(_FEWEST, _MOST_ROWS // max(1, min(table["test"].nunique(), 8 * MOST_PLACES)))
+    drawn = table.groupby("direction")["test"].nunique().clip(upper=MOST_LEVELS).nlargest(MOST_PLACES).sum()
+    most = max(_FEWEST, _MOST_ROWS // max(1, int(drawn)))
     for place in places_of(result, tables).values():
         rows = table[table["direction"] == str(place)]
         if len(rows) and len(found) < MOST_PLACES:
@@ -140,7 +137,7 @@ def loop_panels(result: Result, tables: Tables, tests: Sequence[Test]) -> list[P
             every = max(loop.every for loop in loops)
             notes = [
                 "The last cycle of each loop. Points: measured"
-                + (f", every {every}th row" if every > 1 else "")
+                + (f", one row in {every}" if every > 1 else "")
                 + ". Lines: model."
             ]
             if left := rows["test"].nunique() - len(loops):
