@@ -45,7 +45,7 @@ def test_a_row_is_the_single_command_to_the_last_digit(typed: Callable[..., Any]
     assert tree(shop / "all/bushings/b0") == tree(shop / "one/0")
     assert tree(shop / "all/bushings/two ways") == tree(shop / "one/1")
     typed("fit", b2, "-o", "one/joint", "--no-plots")
-    typed("diagnose", b2, "-o", "one/2", "--no-plots")
+    typed("diagnose", b2, "-o", "one/2", "--no-plots", "--no-report")
     typed("predict", "one/2/model.json", "--campaign", b2, "-o", "one/2", "--no-plots", "--force")
     single, joint = tree(shop / "one/2"), tree(shop / "one/joint")
     single["joint.json"] = joint.pop("model.json")
@@ -61,7 +61,7 @@ def test_a_row_may_be_the_whole_chain(typed: Callable[..., Any], shop: Path) -> 
     done = typed("batch", "m.toml", "-o", "all", "--tables", "-q")
     assert (done.returncode, done.stderr) == (0, "")
     for name, campaign in zip(("b0", "b1"), both, strict=True):
-        typed("run", campaign, "-o", f"one/{name}", "--no-plots")
+        typed("run", campaign, "-o", f"one/{name}", "--no-plots", "--no-report")
         assert tree(shop / "all/bushings" / name) == tree(shop / "one" / name)
     assert {"static.json", "dynamic.json", "joint.json", "diagnosis.json"} <= tree(shop / "one/b1").keys()
     clean, heavy = rows(shop / "all")

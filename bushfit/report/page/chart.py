@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -98,11 +99,17 @@ def chart(
     drawn = [_drawn(each, x, y, dot) for each in series]
     across = np.array([x.first, x.last])
     for rule in rules:
-        dashes: dict[str, object] = {"stroke_dasharray": rule.dashes} if rule.dashes else {}
-        drawn.append(path(across, y(np.full(2, rule.value)), stroke=LIMIT if rule.limit else GREY, **dashes))
+        drawn.append(
+            path(across, y(np.full(2, rule.value)), stroke=LIMIT if rule.limit else GREY, **_dashed(rule.dashes))
+        )
     heading = text(4, 14, title, font_weight="bold", font_size=13)
     data = {"data_x": x.described, "data_y": y.described}
     return picture(WIDTH, top + _PANEL + _BELOW, alt, heading, *legend, *axes(x, y), *drawn, **data)
+
+
+def _dashed(dashes: str) -> dict[str, Any]:
+    """The attribute of a dashed line; none of a whole one."""
+    return {"stroke_dasharray": dashes} if dashes else {}
 
 
 def _drawn(series: Series, x: Axis, y: Axis, dot: float) -> Markup:
@@ -118,9 +125,8 @@ def _drawn(series: Series, x: Axis, y: Axis, dot: float) -> Markup:
         d = "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(*around, strict=True))
         parts.append(tag("path", d=f"M{d}Z", fill=series.color, fill_opacity=0.18) if d else Markup())
     if series.line is not None:
-        dashes = {"stroke_dasharray": series.dashes} if series.dashes else {}
         line = x(series.line[0]), y(series.line[1])
-        parts.append(path(*line, stroke=series.color, stroke_width=1.5, data_of="model", **dashes))
+        parts.append(path(*line, stroke=series.color, stroke_width=1.5, data_of="model", **_dashed(series.dashes)))
     if series.points is not None:
         parts.append(dots(x(series.points[0]), y(series.points[1]), series.color, dot))
     return tag("g", *parts, data_series=series.name)
@@ -137,9 +143,8 @@ def _legend(series: Sequence[Series], rules: Sequence[Rule]) -> tuple[list[Marku
         at = 14.0 + _LINE * line
         across, level = np.array([left, left + _SWATCH - 8.0]), np.full(2, at - 4.0)
         color = each.color if isinstance(each, Series) else LIMIT if each.limit else GREY
-        own = {"stroke_dasharray": each.dashes} if each.dashes else {}
         if isinstance(each, Rule) or each.line is not None:
-            drawn.append(path(across, level, stroke=color, stroke_width=1.5, **own))
+            drawn.append(path(across, level, stroke=color, stroke_width=1.5, **_dashed(each.dashes)))
         if isinstance(each, Series) and each.points is not None:
             middle = tag("circle", cx=left + (_SWATCH - 8.0) / 2, cy=at - 4.0, r=2.5, fill=color)
             drawn.append(middle)
