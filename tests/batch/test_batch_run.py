@@ -189,7 +189,7 @@ def test_limits_on_what_a_row_does_not_have(typed: Callable[..., Any], shop: Pat
     again = typed("batch", "m.csv", "-o", "all", "--force", "--no-plots")
     assert again.returncode == 0
     assert not (shop / "all/batch.png").exists(), "a picture of another run"
-    assert "wrote batch.csv, bushings/ to" in again.stderr
+    assert "wrote batch.csv, batch.json, index.html, bushings/ to" in again.stderr
 
 
 def test_results_that_stand_are_refused_resumed_or_replaced(typed: Callable[..., Any], shop: Path) -> None:
@@ -239,8 +239,11 @@ def test_only_what_changed_or_is_torn_is_done_again(typed: Callable[..., Any], s
     assert json.loads(again.stdout)["kept"] == 1
     kept = {name for name, stamp in stamps(place).items() if before.get(name) == stamp}
     assert {Path(name).parent.name for name in kept} == {"b4"}
-    for row in ("b0", "b1", "b3"):
+    for row in ("b0", "b1"):
         assert (place / row / "model.json").read_bytes() == files[f"bushings/{row}/model.json"]
+    old, new = (json.loads(text) for text in (files["bushings/b3/model.json"], (place / "b3/model.json").read_bytes()))
+    assert old.pop("campaign") != new.pop("campaign"), "the campaign's own hash"
+    assert old == new
     other = typed("batch", PATTERN, "-o", "all", "--resume", "--json", "-q", "--effect", "inertia")
     assert json.loads(other.stdout)["kept"] == 0
 

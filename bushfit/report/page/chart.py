@@ -98,10 +98,10 @@ def chart(
     y = Axis.over(labels[1], ys, top + _PANEL, top)
     drawn = [_drawn(each, x, y, dot) for each in series]
     across = np.array([x.first, x.last])
-    for rule in rules:
-        drawn.append(
-            path(across, y(np.full(2, rule.value)), stroke=LIMIT if rule.limit else GREY, **_dashed(rule.dashes))
-        )
+    drawn += [
+        path(across, y(np.full(2, rule.value)), stroke=LIMIT if rule.limit else GREY, **_dashed(rule.dashes))
+        for rule in rules
+    ]
     heading = text(4, 14, title, font_weight="bold", font_size=13)
     data = {"data_x": x.described, "data_y": y.described}
     return picture(WIDTH, top + _PANEL + _BELOW, alt, heading, *legend, *axes(x, y), *drawn, **data)

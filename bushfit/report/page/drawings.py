@@ -20,6 +20,7 @@ from bushfit.report.page.gathered import (
     Sweeps,
     cells_at,
     columns_of,
+    gap_of,
     loops_at,
     places_of,
     sweeps_at,
@@ -60,9 +61,9 @@ def tested_panels(result: Result, tables: Tables, tests: Sequence[Test]) -> list
     for name, place in places.items():
         rows = table[table["direction"] == str(place)]
         if len(rows) and len(found) < MOST_PLACES:
-            kinds = list(sweeps_at(place, rows, tests, tables.get(name), most))
+            kinds = [sweeps for sweeps in sweeps_at(place, rows, tests, tables.get(name), most) if sweeps.curves]
             pictures = [picture for sweeps in kinds for picture in _sweeps(sweeps)]
-            found.append(Panel(str(place), pictures, _notes(kinds, most)))
+            found += [Panel(str(place), pictures, _notes(kinds, most))] if kinds else []
     return found
 
 
@@ -134,6 +135,8 @@ def loop_panels(result: Result, tables: Tables, tests: Sequence[Test]) -> list[P
         rows = table[table["direction"] == str(place)]
         if len(rows) and len(found) < MOST_PLACES:
             loops = loops_at(place, rows, tests, most)
+            if not loops:
+                continue
             every = max(loop.every for loop in loops)
             notes = [
                 "The last cycle of each loop. Points: measured"
@@ -181,7 +184,7 @@ def _loops(place: Place, loops: Sequence[LoopCurve]) -> list[Markup]:
 
 def gap_panels(result: Result, tables: Tables, tests: Sequence[Test]) -> list[Panel]:
     """What is left of each place before and after, measured less model in %."""
-    gap = tables.get("gap")
+    gap = gap_of(tables)
     if gap is None or not any(str(name).endswith("before [%]") for name in gap):
         return []
     found: list[Panel] = []

@@ -84,7 +84,7 @@ class LoopCurve:
 def places_of(result: Result, tables: Tables) -> dict[str, Place]:
     """Every place of which there are tests or predictions, directions first, by the name of its table."""
     every: list[Place] = [*(Direction if result.model.bushing else ()), *result.specimens]
-    tested = {place for table in tables.values() if "direction" in table for place in table["direction"]}
+    tested = {place for table in tables.values() if "direction" in table for place in table["direction"].unique()}
     named = zip(place_names(every), every, strict=True)
     return {name: place for name, place in named if name in tables or str(place) in tested}
 
@@ -92,11 +92,17 @@ def places_of(result: Result, tables: Tables) -> dict[str, Place]:
 def tests_of(tables: Tables, kind: str) -> pd.DataFrame | None:
     """All points of sweeps, or rows of loops: their own table, else the rows of that kind of the gap's."""
     if (table := tables.get(f"{kind}s")) is not None:
-        return table.rename(columns={kind: "test"})
-    gap = tables.get("gap")
+        return required(table.rename(columns={kind: "test"}), "test", "direction")
+    gap = gap_of(tables)
     if gap is None or not any(str(name).startswith("model ") for name in gap):  # an older version's
         return None
     return gap[gap["kind"] == kind]
+
+
+def gap_of(tables: Tables) -> pd.DataFrame | None:
+    """The table of what is left before and after a diagnosis, where there is one."""
+    gap = tables.get("gap")
+    return None if gap is None else required(gap, "test", "kind", "direction")
 
 
 def columns_of(place: Place) -> tuple[str, str, str]:
@@ -112,11 +118,25 @@ def numbers(rows: pd.DataFrame, *headers: str) -> Array:
     Raises:
         ModelError: one of them is not there.
     """
+    return required(rows, *headers)[list(headers)].to_numpy(dtype=float).T
+
+
+def required(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
+    """A table that has these columns.
+
+    Raises:
+        ModelError: one of them is not there.
+    """
     for header in headers:
         if header not in rows:
             hint = "write the results anew, or take the table away: the page then goes without it"
             raise ModelError("a column of a table is missing", expected=header, hint=hint)
-    return rows[list(headers)].to_numpy(dtype=float).T
+    return rows
+
+
+def complete(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
+    """The rows of a table in which all these numbers are known."""
+    return rows.iloc[np.flatnonzero(np.isfinite(numbers(rows, *headers)).all(axis=0))]
 
 
 def sweeps_at(
@@ -127,7 +147,7 @@ def sweeps_at(
     names = stiffness, "loss factor [-]"
     for stepped, along, held, mine in _by_kind(place, rows, tests):
         headers = [along, *names, *(f"model {name}" for name in names)]
-        numbers(mine, *headers)  # they are there
+        mine = complete(mine, *headers)
         levels = list(dict.fromkeys(mine[held])) if stepped is None else np.unique(mine[held]).tolist()
         curves = []
         for level in (levels[at] for at in spread(len(levels), MOST_LEVELS)):
@@ -148,6 +168,7 @@ def _by_kind(
     """Sweeps that step through the same: what it is, the headers of what lies along x and of what is held (the test,
     where nothing is), and the rows."""
     said, amplitude, frequency = {test.test: test.stepped for test in tests}, columns_of(place)[0], "frequency [Hz]"
+    rows = complete(rows, frequency, amplitude)
     steps: dict[str | None, list[str]] = {}
     for test in dict.fromkeys(rows["test"]):
         levels = (np.unique(values).size for values in numbers(rows[rows["test"] == test], frequency, amplitude))
@@ -170,25 +191,27 @@ def _predicted(
     is no such prediction."""
     if table is None:
         return None
-    (at,) = numbers(table, held)
-    near = table[np.abs(at / level - 1.0) < _SAME_LEVEL].sort_values(along)
-    if near.empty:
-        return None
     rigs = [f"{name}, {IF_RIGS}" for name in names]
     band = [f"{name}, {end}" for name in names for end in ("low", "high")]
+    known = complete(table, along, held, *names, *band)
+    near = known[np.abs(known[held] - level) < _SAME_LEVEL * abs(level)].sort_values(along)
+    if near.empty:
+        return None
     return numbers(near, along, *names), numbers(near, *band), numbers(near, *rigs) if rigs[0] in near else None
 
 
 def loops_at(place: Place, rows: pd.DataFrame, tests: Sequence[Test], most: int) -> list[LoopCurve]:
     """The loops of a place, at most eight, each with at most so many rows of its last cycle."""
     resisting, frequency = columns_of(place)[2], {test.test: test.frequency_Hz[0] for test in tests}
+    headers = _moved(place), resisting, f"model {resisting}"
+    rows = complete(rows, "time [s]", *headers)
     names = list(dict.fromkeys(rows["test"]))
     curves = []
     for name in (names[at] for at in spread(len(names), MOST_LEVELS)):
         mine = rows[rows["test"] == name]
         (time,) = numbers(mine, "time [s]")
         period = 1.0 / frequency[name] if frequency.get(name) else np.inf
-        last = numbers(mine, _moved(place), resisting, f"model {resisting}")[:, time >= time[-1] - period]
+        last = numbers(mine, *headers)[:, time >= time.max() - period]
         every = max(1, -(-last.shape[1] // most))
         curves.append(LoopCurve(name, last[:, ::every], every))
     return curves
@@ -213,6 +236,7 @@ def cells_at(place: Place, gap: pd.DataFrame, tests: Sequence[Test]) -> Iterator
         for part in ("storage", "loss"):
             yield _map(part, rows, held if stepped else "test", x, ends)
     loops = mine[mine["kind"] == "loop"]
+    loops = complete(loops, "time [s]", "frequency [Hz]", _moved(place)) if len(loops) else loops
     if len(loops):
         each = (loops[loops["test"] == test] for test in dict.fromkeys(loops["test"]))
         turned = np.concatenate([_phase(place, rows) for rows in each])
@@ -233,7 +257,7 @@ def _map(part: str, table: pd.DataFrame, held: str, along: Array, ends: tuple[st
     count = np.bincount(cell, minlength=size)
     sides = []
     for off in numbers(table, *(f"{part} {when} [%]" for when in ("before", "after"))):
-        sums = np.bincount(cell, -off, minlength=size)
+        sums = np.bincount(cell, -np.nan_to_num(off), minlength=size)
         sides.append(np.where(count > 0, sums / np.maximum(count, 1), np.nan).reshape(len(levels), -1))
     same = np.array_equal(sides[0], sides[1], equal_nan=True)
     return Cells(part, [_short(_level(level, held)) for level in levels], ends, sides[:1] if same else sides)

@@ -14,6 +14,7 @@ from bushfit.errors import ModelError
 from bushfit.model.file import read_document
 from bushfit.reading.csvfile import undefused
 from bushfit.reading.files import read_utf8, view_bytes
+from bushfit.reading.source import LARGEST_VALUE
 from bushfit.report.artifacts import place_names
 from bushfit.report.page.schema import MODELS, PLAIN, checked
 from bushfit.report.tables import TEXTS
@@ -107,7 +108,11 @@ def _column(header: str, cells: pd.Series[str]) -> object:
     """Texts as they were, or numbers, of which an empty cell is none."""
     if header in TEXTS:
         return [undefused(cell) for cell in cells]
-    return np.array([float(cell.replace(",", ".")) if cell else np.nan for cell in cells])
+    values = np.array([float(cell.replace(",", ".")) if cell else 0.0 for cell in cells], dtype=float)
+    for cell, size in zip(cells, np.abs(values), strict=True):
+        if not (size < LARGEST_VALUE and (size == 0.0 or size > 1.0 / LARGEST_VALUE)):
+            raise ValueError(f"{header}: {cell}")
+    return np.where(cells == "", np.nan, values)
 
 
 def _csv(file: Path) -> pd.DataFrame:

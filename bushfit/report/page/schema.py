@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from bushfit.errors import ModelError
 from bushfit.model.file import from_document
 from bushfit.model.result import Result
+from bushfit.reading.measurement import Stepped
 from bushfit.validation import Number, WholeNumber, check_tables
 
 #: Documents that hold a model, the one to use first.
@@ -31,13 +32,13 @@ class Test:
     place: str
     frequency_Hz: Pair  # noqa: N815
     amplitude: Pair
-    unit: str
+    unit: Literal["m", "rad", "1"]
     rows: WholeNumber
     repeats: WholeNumber = 1
-    stepped: str | None = None
+    stepped: Stepped | None = None
     file: str | None = None
     sha256: str | None = None
-    conditions: Mapping[str, str | float] = field(default_factory=dict)
+    conditions: Mapping[str, str | Number] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

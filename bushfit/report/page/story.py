@@ -10,7 +10,7 @@ import numpy as np
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Bushing, Place, Specimen
 from bushfit.model.result import Misfit, Result, Usable
 from bushfit.report.page.drawings import MOST_PLACES, gap_panels, loop_panels, tested_panels
-from bushfit.report.page.gathered import columns_of, places_of
+from bushfit.report.page.gathered import columns_of, complete, places_of
 from bushfit.report.page.schema import Checked, Found, Test
 from bushfit.report.parameters import interval_kind, parameter_rows
 from bushfit.report.tables import spread
@@ -115,11 +115,11 @@ def _conditions(tests: Sequence[Test]) -> Iterator[tuple[str, str]]:
     """Conditions of all tests: each value once; of three that every report has, too, that they are not stated."""
     for key, name in _CONDITIONS.items():
         values = list(dict.fromkeys(test.conditions[key] for test in tests if key in test.conditions))
-        if key == "temperature_degC" and values:
-            degrees = sorted(float(value) for value in values)
-            yield name, " to ".join(dict.fromkeys(f"{number(end, 3)} °C" for end in (degrees[0], degrees[-1])))
+        if degrees := sorted(value for value in values if not isinstance(value, str)):
+            unit = " °C" if key == "temperature_degC" else ""
+            yield name, " to ".join(dict.fromkeys(f"{number(end, 3)}{unit}" for end in (degrees[0], degrees[-1])))
         elif values:
-            yield name, ", ".join(str(value) for value in values)
+            yield name, ", ".join(map(str, values))
         elif key in ("temperature_degC", "preload", "date"):
             yield name, "not stated"
 
@@ -129,9 +129,9 @@ def _tested(test: Test, misfits: Sequence[Misfit]) -> dict[str, str]:
     unit, factor = _DISPLAYS[test.unit]
     met = next((misfit for misfit in misfits if misfit.test == test.test and misfit.held is None), None)
     stated = [
-        f"{number(float(value), 3)} °C" if key == "temperature_degC" else f"{_CONDITIONS.get(key, key)} {value}"
-        for key, value in test.conditions.items()
-        if key in ("temperature_degC", "preload", "order")
+        f"{value if isinstance(value, str) else number(value, 3)}{unit}"
+        for key, unit in (("temperature_degC", " °C"), ("preload", " preload"), ("order", ". in the session"))
+        if (value := test.conditions.get(key)) is not None
     ]
     return {
         "test": test.test,
@@ -218,8 +218,8 @@ def _corners(table: pd.DataFrame, place: Place, frequencies: int) -> Iterator[tu
     """Rows of cells: place, frequency, amplitude; then of |K| and loss factor the value, its band, and as measured."""
     amplitude, stiffness, _ = columns_of(place)
     names = (stiffness, "loss factor [-]")
-    if not {amplitude, *names, *(f"{name}, {end}" for name in names for end in ("low", "high"))} <= set(table):
-        return
+    band = [f"{name}, {end}" for name in names for end in ("low", "high")]
+    table = complete(table, "frequency [Hz]", amplitude, *names, *band)
     (length, _), _, (unit, _) = place.display
     levels = np.unique(table[amplitude])
     for level in levels[spread(levels.size, _AMPLITUDES)]:

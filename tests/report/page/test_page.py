@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 import shutil
@@ -18,6 +19,7 @@ from hypothesis import strategies as st
 from reading_html import loads, parsed
 
 from bushfit.campaign.campaign import load_campaign
+from bushfit.errors import BushfitError
 from bushfit.fitting.data import Data
 from bushfit.jobs.diagnose import Diagnose
 from bushfit.report.contents import Formats, pages_of
@@ -312,6 +314,52 @@ def test_spoiled_folders_are_one_clear_error(
     for words in says:
         assert words in done.stderr
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+@pytest.fixture(scope="module")
+def thinned(results: Results, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results with one row in 40 of each table, so that a page of them takes no time."""
+    folder = tmp_path_factory.mktemp("thinned") / "x"
+    shutil.copytree(results("mystery_mount"), folder, ignore=shutil.ignore_patterns("report.html"))
+    for file in folder.glob("*.csv"):
+        header, *rows = file.read_text(encoding="utf-8").splitlines()
+        file.write_text("\n".join([header, *rows[::40]]) + "\n", encoding="utf-8")
+    return folder
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_any_cell_may_be_spoiled(thinned: Path, tmp_path_factory: Any, data: st.DataObject) -> None:
+    """It is one error, or a page all the same; never another exception."""
+    folder = tmp_path_factory.mktemp("x") / "y"
+    shutil.copytree(thinned, folder)
+    file = folder / data.draw(st.sampled_from(["axial.csv", "sweeps.csv", "loops.csv", "gap.csv", "radial.csv"]))
+    lines = file.read_text(encoding="utf-8").splitlines()[: data.draw(st.sampled_from([1, 2, 40, None]))]
+    row = data.draw(st.integers(0, len(lines) - 1))
+    cells = next(csv.reader([lines[row]]))
+    column = data.draw(st.integers(0, len(cells) - 1))
+    cells[column] = data.draw(st.sampled_from(["", "nan", "inf", "-1", "0", "x", "1e300", "1e-300", "axial", "'=1"]))
+    lines[row] = ",".join(f'"{cell}"' for cell in cells)
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    try:
+        page = pages_of(read_results(folder))["report.html"].decode()
+    except BushfitError:
+        return
+    parsed(page)
+    assert not re.search(r' (d|data-[xy])="[^"]*(nan|inf)', page)
+
+
+def test_results_of_older_versions_have_a_page(root: Path, tmp_path: Path) -> None:
+    """Without what a model says of its campaign, and with a gap of residuals alone."""
+    folder = tmp_path / "x"
+    shutil.copytree(root / "data/reports/mystery_mount", folder)
+    change(folder / "model.json", campaign=None)
+    (folder / "gap.csv").write_text("test,kind,direction,force before [noise]\na,loop,axial,1\n")
+    text = parsed(pages_of(read_results(folder))["report.html"].decode()).text
+    assert "Mystery mount" in text
+    assert "axial: stiffness" in text
+    (folder / "sweeps.csv").unlink()
+    assert "Lines" not in parsed(pages_of(read_results(folder))["report.html"].decode()).text
 
 
 def change(file: Path, **keys: object) -> None:
