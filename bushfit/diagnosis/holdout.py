@@ -125,6 +125,12 @@ def hold_out(before: Evidence, after: Evidence, bounds: Bounds) -> HoldOut:
     Args:
         bounds: of parameters, where a model has to be fitted to the rest.
     """
+    return HoldOut.of(*predicted_parts(before, after, bounds))
+
+
+def predicted_parts(before: Evidence, after: Evidence, bounds: Bounds) -> tuple[dict[str, Array], list[Skipped]]:
+    """The residuals of each part that both models can predict from the rest, (2, plain and whitened, n), by its name,
+    and the parts that one of them cannot; as `hold_out`."""
     models = [_Fitted.of(evidence) for evidence in dict.fromkeys((before, after))]
     told, skipped = dict[str, Array](), list[Skipped]()
     for part in parts(after.data_sets):
@@ -135,7 +141,7 @@ def hold_out(before: Evidence, after: Evidence, bounds: Bounds) -> HoldOut:
                 break
         else:
             told[part.name] = np.array([predictions[0], predictions[-1]])
-    return HoldOut.of(told, skipped)
+    return told, skipped
 
 
 def _figures(pair: Array) -> tuple[float, float, tuple[float, float]]:

@@ -173,6 +173,8 @@ class Effect:
         twins: names of effects, of the rig above all, with the same equation for all tests. Of such twins the one that
             belongs to the bushing, which is this one, is proposed; its size is then known, its level is not.
         replaces: the branch of the paper that it stands in place of; None where it is added to the others.
+        variant_of: the branch of the paper whose law it changes without standing in its place, where both together are
+            a model of their own in the literature; None of what comes on top of the model.
         frees: mistakes of the record that are single values of it; where one explains the tests as well, it stands.
         under: what of a test's circumstances it depends on, by the names of `Circumstances`.
         taken: what a prediction takes of these where they are not known, for its user; none of the rig's effects.
@@ -194,6 +196,7 @@ class Effect:
     corrects: str | None = None
     twins: tuple[str, ...] = ()
     replaces: str | None = None
+    variant_of: str | None = None
     frees: tuple[str, ...] = ()
     under: tuple[Literal["temperature", "turn", "strained"], ...] = ()
     taken: str = ""

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 #: Directions that are predicted where none is asked for: those of the paper.
 _DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
 #: Keys of [predict] that have the amplitudes of each motion.
-_AMPLITUDES = {TRANSLATION: "amplitudes", ROTATION: "torsion_amplitudes", STRAINING: "strain_amplitudes"}
+AMPLITUDES = {TRANSLATION: "amplitudes", ROTATION: "torsion_amplitudes", STRAINING: "strain_amplitudes"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class Predicted:
 
     @property
     def document(self) -> Mapping[str, Any]:
-        tables = {str(p.direction): _filled(prediction_table(p)) for p in self.predictions}
+        tables = {str(p.direction): filled(prediction_table(p)) for p in self.predictions}
         shaken = {f"{found.place}_resonance": shaken_table(found).to_dict(orient="list") for found in self.resonances}
         return {**tables, **shaken, "warnings": self.warnings}
 
@@ -93,7 +93,7 @@ class Predicted:
         return self.contents | measured_contents(self.result, *self._parted)
 
 
-def _filled(table: pd.DataFrame) -> dict[str, list[float | None]]:
+def filled(table: pd.DataFrame) -> dict[str, list[float | None]]:
     """The columns of a table, None where a cell is empty."""
     return {str(name): [None if x != x else x for x in column.tolist()] for name, column in table.items()}
 
@@ -155,7 +155,7 @@ class Predict:
         predictions = []
         for place in self.places(result, campaign):
             frequencies, amplitudes = default_grid(result, place, sweeps)
-            asked = getattr(settings, _AMPLITUDES[place.motion]) or amplitudes
+            asked = getattr(settings, AMPLITUDES[place.motion]) or amplitudes
             grid = settings.frequencies or frequencies, asked
             beside = known if campaign else None
             predictions.append(predict(result, place, *grid, sweeps=beside, temperature=self.temperature))

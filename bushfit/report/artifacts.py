@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from bushfit.comparison import Comparison
+    from bushfit.diagnosis.families import FittedFamily
     from bushfit.diagnosis.record import Diagnosis
     from bushfit.fitting.data_sets import LoopData, SweepData
     from bushfit.geometry import Place
@@ -106,6 +108,23 @@ def diagnosis_contents(diagnosis: Diagnosis, title: str) -> Contents:
     gap = partial(tables.gap_table, before.model, after.model, before.data_sets, after.data_sets)
     found = {"gap": gap, "candidates": partial(tables.candidates_table, diagnosis)}
     return Contents({}, found, {"gap": picture})
+
+
+def comparison_contents(
+    labels: Sequence[str], names: Sequence[str], comparisons: Sequence[Comparison], families: Sequence[FittedFamily]
+) -> Contents:
+    """`parameters`, `differences` and, of families, `families`, tables; and one picture, `compare`."""
+
+    def picture() -> Figure:
+        from bushfit.report.plots import comparison_figure
+
+        return comparison_figure(labels, names, comparisons)
+
+    pairs = zip(labels[1:], comparisons, strict=True)
+    contrasts = [(label, found, each) for label, found in pairs for each in found.contrasts]
+    found = {"parameters": partial(tables.parameters_table, labels, comparisons)}
+    found |= {"families": partial(tables.families_table, labels, families)} if families else {}
+    return Contents({}, found | {"differences": partial(tables.differences_table, contrasts)}, {"compare": picture})
 
 
 def place_names(places: Sequence[Place]) -> list[str]:
