@@ -163,7 +163,7 @@ def _cells(row: ParameterContrast) -> list[str]:
     unit, factor = for_people(row.unit, 1.0, row.reference)
     values = [number(value * factor, _DIGITS) for value in (row.reference, row.other)]
     if row.difference is None or row.interval is None or row.holm is None:
-        return [row.name, *values, row.note, "", "", unit]
+        return [row.name, *values, "", row.note, "", unit]
     scale, percent = (100.0, " %") if row.relative else (factor, "")
     low, high = (scale * end for end in row.interval)
     shown, *ends = (_signed(value * scale, high - low) for value in (row.difference, *row.interval))

@@ -9,12 +9,14 @@ from itertools import combinations
 from string import ascii_uppercase
 from typing import TYPE_CHECKING, Any
 
+from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
 from bushfit.comparison import Comparison, compare, holm, with_holm
 from bushfit.diagnosis.evidence import result_of
 from bushfit.diagnosis.families import FittedFamily, fit_families, known_families
 from bushfit.errors import ModelError
 from bushfit.fitting.assess import lack_of_fit
+from bushfit.fitting.data import Data
 from bushfit.geometry import Direction, Specimen
 from bushfit.jobs.fits import Fit
 from bushfit.jobs.grid import common_grid
@@ -26,7 +28,6 @@ from bushfit.report.contents import Contents, Kinds
 from bushfit.report.tables import differences_table
 
 if TYPE_CHECKING:
-    from bushfit.fitting.data import Data
     from bushfit.geometry import Place
     from bushfit.model.result import Result
     from bushfit.reading.measurement import Sweep
@@ -68,12 +69,12 @@ class Compared:
 
     @cached_property
     def words(self) -> list[str]:
-        """What differs, a sentence an entry and place; of families also which is nearer to what was held out."""
+        """Which family is nearer to what was held out, and what differs, a sentence an entry and place."""
         first, *others = self.labels
         pairs = list(zip(others, self.comparisons, strict=True))
         said = [f"{label} against {first}, {line}" for label, found in pairs for line in found.words()]
         judged = zip(self.labels[1:], self.families[1:], strict=True) if self.families else ()
-        return [*said, *(f"{label}, {family.name}: {family.words}" for label, family in judged)]
+        return [*(f"{label}, {family.name}: {family.words}" for label, family in judged), *said]
 
     @cached_property
     def warnings(self) -> list[str]:
@@ -185,10 +186,12 @@ class Compare:
         tables = ("parameters", *(["families"] if families else []), "differences")
         return Kinds(("compare",), tables, ("compare",))
 
-    def entry(self, data: Data, source: str) -> Entry:
-        """A campaign, fitted as `bushfit fit` does."""
-        result = Fit(self.asked.directions or ()).run(data).result
-        return Entry(data.campaign.name, source, result, data.campaign.sweeps)
+    def entry(self, opened: Campaign | Result, source: str) -> Entry:
+        """A result, or that of a campaign, which is fitted as `bushfit fit` does."""
+        if not isinstance(opened, Campaign):
+            return Entry(opened.name, source, opened)
+        result = Fit(self.asked.directions or ()).run(Data.of(opened)).result
+        return Entry(opened.name, source, result, opened.sweeps)
 
     def run(
         self, entries: Sequence[Entry], families: Sequence[FittedFamily] = (), notes: Sequence[str] = ()
@@ -207,14 +210,14 @@ class Compare:
         ]
         return Compared(entries, with_holm(found), families, tuple(notes))
 
-    def run_families(self, data: Data, source: str, names: Sequence[str] = ()) -> Compared:
+    def run_families(self, campaign: Campaign, source: str, names: Sequence[str] = ()) -> Compared:
         """Families on one campaign, the model of its [fit] first; all that the library knows unless named.
 
         Raises:
             FitError: data that cannot support the fit of one.
             ModelError: an unknown effect, or one that the model has already.
         """
-        campaign = data.campaign
+        data = Data.of(campaign)
         data_sets = [data_set.standing() for data_set in data.chosen(self.asked.directions)]
         model = Model.started(campaign.bushing, data.effects, data.start(data_sets, {}))
         held = [name for name, setting in campaign.fit.parameters.items() if not setting.vary]

@@ -1,8 +1,8 @@
-"""Several results over one grid, stiffness and loss factor with their bands, and below how far each is off the first."""
+"""Several results over one grid: stiffness and loss factor with bands, and below how far each is off the first."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,6 +24,8 @@ _LINE = 1.3
 _DASHES = ("-", (0, (4, 1.5)))
 #: Strength of a band: those of several results lie on each other.
 _BAND = 0.18
+#: Markers on a line, or fewer: they tell lines apart in grey print.
+_MARKS = 5
 #: Least span of the axis of relative differences [%], and of the differences of loss factor [-].
 _LEAST_SPANS = (1.0, 0.005)
 
@@ -34,28 +36,29 @@ def comparison_figure(labels: Sequence[str], names: Sequence[str], comparisons: 
     Drawn over frequency at the smallest and the largest amplitude, or over amplitude where there is one frequency.
     """
     places = len(comparisons[0].contrasts)
-    title = " against ".join([labels[0], ", ".join(labels[1:])])
+    title = f"{', '.join(labels[1:])} against {labels[0]}"
     figure = style.new_figure(title, 2 * places * style.ROW)
     grid = figure.subplots(2 * places, 2, squeeze=False)
     looks = style.styles(len(labels), "loop")
     for i in range(places):
         contrasts = [found.contrasts[i] for found in comparisons]
-        held = _draw_place(grid[2 * i : 2 * i + 2], contrasts, looks)
-        lines = [Line2D([], [], color=look.color, lw=_LINE) for look in looks]
+        held = _draw_place(grid[2 * i : 2 * i + 2], contrasts, looks, labels[0])
+        lines = [Line2D([], [], color=look.color, lw=_LINE, marker=look.marker, **style.POINT) for look in looks]
         dashes = [Line2D([], [], color=style.INK, lw=_LINE, ls=dash) for dash, _ in zip(_DASHES, held, strict=False)]
         besides = dict(zip(held, dashes, strict=True))
         called = [f"{label}: {style.file_name(name)}" for label, name in zip(labels, names, strict=True)]
         style.legend(grid[2 * i, 1], lines, called, "", besides=besides)
-    first = labels[0]
     style.explain(
         figure,
-        f"Shaded: 95 % bands. Lower panels: less {first}, band of each point by itself; "
+        "Shaded: 95 % bands. Lower panels: the band of each point by itself; "
         "compare.json and the terminal say what holds at all points at once.",
     )
     return figure
 
 
-def _draw_place(panels: Sequence[Sequence[Axes]], contrasts: Sequence[Contrast], looks: list[style.Style]) -> list[str]:
+def _draw_place(
+    panels: Iterable[Sequence[Axes]], contrasts: Sequence[Contrast], looks: list[style.Style], first: str
+) -> list[str]:
     """Draw one place into its four panels; gives what its lines are held at, in words."""
     (top, bottom), place, shown = panels, contrasts[0].place, contrasts[0].reference
     axis: Axis = "frequency" if np.unique(shown.frequency).size > 1 else "amplitude"
@@ -74,7 +77,7 @@ def _draw_place(panels: Sequence[Sequence[Axes]], contrasts: Sequence[Contrast],
         _draw(bottom[1], look, along, each.loss_factor, spots, np.asarray)
     _dress(top, place, axis, along, titles)
     resisted = place.motion.words[2]
-    _dress(bottom, place, axis, along, (f"difference of {resisted} [%]", "difference of loss factor [-]"))
+    _dress(bottom, place, axis, along, (f"{resisted} less {first}'s [%]", f"loss factor less {first}'s [-]"))
     for axes, least in zip(bottom, _LEAST_SPANS, strict=True):
         axes.axhline(0.0, color=looks[0].color, lw=_LINE)
         style.least_span(axes, least)
@@ -88,7 +91,9 @@ def _draw(
     """The lines of one result, one a value that is held, each with its band."""
     for at, dashes in zip(spots, _DASHES, strict=False):
         low, value, high = (shown(of[at]) for of in (band.low, band.value, band.high))
-        axes.plot(along[at], value, color=look.color, ls=dashes, lw=_LINE, marker="_" if at.sum() == 1 else "")
+        each = max(int(at.sum()) // _MARKS, 1)
+        drawn = {"color": look.color, "ls": dashes, "lw": _LINE, "marker": look.marker, "markevery": each}
+        axes.plot(along[at], value, **drawn, **style.POINT)
         axes.fill_between(along[at], low, high, color=look.color, alpha=_BAND, lw=0)
 
 
