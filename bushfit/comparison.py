@@ -30,6 +30,8 @@ _DRAWS = 20_000
 _LEAST_EIGENVALUE = 1e-10
 #: Digits of a difference at most, however small its error.
 _MOST_DIGITS = 4
+#: Decimals of a difference without an error at most: those that follow are rounding.
+_MOST_DECIMALS = 6
 #: The parameter that the unit of another has as its exponent: alpha in Pa*s^alpha.
 _EXPONENT = re.compile(r"\^([a-z]\w*)$")
 
@@ -308,7 +310,7 @@ def _told(band: Band, unit: str, at: Contrast) -> str:
         return f"{shown[0]}{unit} ({shown[1]} to {shown[2]}) {word}"
 
     if not len(band.root):
-        ends = (number(end, 3, "+") for end in (band.value.min(), band.value.max()))
+        ends = (number(round(end, _MOST_DECIMALS), 3, "+") for end in (band.value.min(), band.value.max()))
         return f"{' to '.join(dict.fromkeys(ends))}{unit} by value, of unknown error"
     parts = []
     for sure, word in ((band.low > 0.0, "higher"), (band.high < 0.0, "lower")):

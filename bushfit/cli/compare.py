@@ -10,7 +10,7 @@ import click
 
 from bushfit.cli.common import Options, example, open_model, option_of, place_option, shared_options
 from bushfit.cli.show import new_table, warn
-from bushfit.errors import ModelError
+from bushfit.errors import ModelError, naming
 from bushfit.units import for_people, number
 
 if TYPE_CHECKING:
@@ -83,6 +83,7 @@ def command(
     from bushfit.campaign.naming import folder_name
     from bushfit.campaign.schema import PredictSettings
     from bushfit.cli.grids import parse_grid
+    from bushfit.effects import effect_named
     from bushfit.jobs.compare import MOST, Compare
 
     if families is None and not 2 <= len(sources) <= MOST:
@@ -92,10 +93,13 @@ def command(
     asked = {name: parse_grid(grids[name], option_of(name), unit) for name, unit in _GRIDS.items()}
     job = Compare(PredictSettings(directions=directions or None, **asked))
     if families is not None:
+        names = () if families == _ALL else tuple(name.replace(" ", "") for name in families.split(","))
+        with naming(place="--families"):
+            for name in names:
+                all(map(effect_named, name.split("+")))
         campaign = load_campaign(sources[0])
         folder = options.folder(f"{campaign.slug} families")
         options.require_free(folder, options.formats.names(job.kinds(families=True)))
-        names = () if families == _ALL else tuple(name.strip() for name in families.split(","))
         outcome = job.run_families(campaign, str(sources[0]), names)
     else:
         opened = [(_opened(source), str(source)) for source in sources]
@@ -125,7 +129,7 @@ def _opened(source: Path) -> Campaign | Result:
 
 
 def _tell(options: Options, outcome: Compared) -> None:
-    """Who is who, the parameters side by side, the families, and what differs in words."""
+    """Who is who, and what differs: of families, how they meet the tests; parameters and stiffness with -v."""
     for label, entry in zip(outcome.labels, outcome.entries, strict=True):
         options.say(f"{label}: {entry.name} ({entry.source})")
     if options.verbose or not outcome.families:
@@ -136,7 +140,7 @@ def _tell(options: Options, outcome: Compared) -> None:
         for label, entry, family in zip(outcome.labels, outcome.entries, outcome.families, strict=True):
             table.add_row(f"{label}: {family.name}", *_figures(entry, family, outcome.families[0]))
         options.console.print(table)
-    for line in outcome.words:
+    for line in (*outcome.judged, *(outcome.words if options.verbose or not outcome.families else ())):
         options.say(line)
     shown = outcome.warnings if options.verbose else outcome.warnings[:_MOST_WARNINGS]
     warn(options, shown)
@@ -173,7 +177,8 @@ def _cells(row: ParameterContrast) -> list[str]:
 def _signed(value: float, width: float) -> str:
     """A difference with the decimals that two digits of its interval need."""
     decimals = max(1 - math.floor(math.log10(width)), 0) if width > 0.0 else _DIGITS
-    return f"{value:+.{min(decimals, _MOST_DECIMALS)}f}"
+    decimals = min(decimals, _MOST_DECIMALS)
+    return f"{round(value, decimals) + 0.0:+.{decimals}f}"
 
 
 def _chance(p: float) -> str:

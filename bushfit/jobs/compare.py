@@ -69,12 +69,16 @@ class Compared:
 
     @cached_property
     def words(self) -> list[str]:
-        """Which family is nearer to what was held out, and what differs, a sentence an entry and place."""
+        """What differs, a sentence an entry and place."""
         first, *others = self.labels
-        pairs = list(zip(others, self.comparisons, strict=True))
-        said = [f"{label} against {first}, {line}" for label, found in pairs for line in found.words()]
-        judged = zip(self.labels[1:], self.families[1:], strict=True) if self.families else ()
-        return [*(f"{label}, {family.name}: {family.words}" for label, family in judged), *said]
+        pairs = zip(others, self.comparisons, strict=True)
+        return [f"{label} against {first}, {line}" for label, found in pairs for line in found.words()]
+
+    @property
+    def judged(self) -> list[str]:
+        """Of each family but the first, whether it is nearer to what was held out."""
+        pairs = list(zip(self.labels, self.families, strict=False))
+        return [f"{label}, {family.name}: {family.words}" for label, family in pairs[1:]]
 
     @cached_property
     def warnings(self) -> list[str]:
@@ -117,7 +121,7 @@ class Compared:
             "compared": compared,
             "pairs": pairs,
             "families": families or None,
-            "words": self.words,
+            "words": [*self.judged, *self.words],
             "warnings": self.warnings,
         }
 
@@ -139,6 +143,7 @@ class Compared:
     @property
     def contents(self) -> Contents:
         names = [entry.name for entry in self.entries]
+        names = names if len({*names}) == len(names) else [entry.source for entry in self.entries]
         tables = comparison_contents(self.labels, names, self.comparisons, self.families)
         return Contents({"compare": self.document}) | tables
 
