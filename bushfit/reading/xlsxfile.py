@@ -62,7 +62,7 @@ def _text(text: str) -> str:
 
 def _sheet_name(title: str, taken: set[str]) -> str:
     """A name that Excel takes and no other sheet has, its capitals aside; it joins those that are taken."""
-    plain = _text(_UNSAFE_IN_SHEETS.sub("_", title))[:_LONGEST_SHEET].strip(" '") or "table"
+    plain = _UNSAFE_IN_SHEETS.sub("_", _text(title))[:_LONGEST_SHEET].strip(" '") or "table"
     name, count = plain, 1
     while name.lower() in taken or name.lower() == _RESERVED:
         count += 1
