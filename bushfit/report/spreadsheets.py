@@ -10,7 +10,7 @@ from bushfit.export.contract import Exported, Order
 from bushfit.export.losses import NO_LOOPS
 from bushfit.reading.csvfile import to_csv
 from bushfit.reading.xlsxfile import to_xlsx
-from bushfit.report.artifacts import place_files
+from bushfit.report.artifacts import place_names
 from bushfit.report.tables import prediction_table, wide_table
 
 if TYPE_CHECKING:
@@ -25,7 +25,8 @@ _OF_ALL = ("parameters", "provenance")
 
 def csv(order: Order) -> Exported:
     """A file for each table."""
-    files = {f"{name.replace(' ', '_')}.csv": to_csv(table) for name, table in _tables(order).items()}
+    named = {f"{name.replace(' ', '_')}.csv": table for name, table in _tables(order).items()}
+    files = {name: to_csv(table, decimal_comma=order.decimal_comma) for name, table in named.items()}
     return Exported(files, (NO_LOOPS,))
 
 
@@ -37,7 +38,7 @@ def xlsx(order: Order) -> Exported:
 def _tables(order: Order) -> dict[str, pd.DataFrame]:
     """All tables by name: two for each place, the parameters, and the provenance."""
     found = {"parameters": parameters_table(order.result), "provenance": _provenance(order)}
-    for name, prediction in zip(place_files(order.places), order.predictions, strict=True):
+    for name, prediction in zip(place_names(order.places), order.predictions, strict=True):
         display = order.units.display(prediction.direction.motion) if order.units else None
         while {name, f"{name} wide"} & found.keys():  # a specimen may have any name
             name += "_"
