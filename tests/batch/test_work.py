@@ -13,6 +13,7 @@ from bushfit.batch.work import Orders, given_up, work
 from bushfit.errors import BatchError
 from bushfit.geometry import Direction
 from bushfit.model.file import load_result
+from bushfit.report.contents import Formats
 
 POINT = parse_point("axial 25 Hz 0.1 mm")
 
@@ -30,7 +31,7 @@ def rows(shop: Path) -> list[Row]:
 def orders(shop: Path) -> Orders:
     for name in ("bushings", ".aside"):
         (shop / "out" / name).mkdir(parents=True)
-    return Orders(shop / "out", (POINT,), ("csv",), resume=True)
+    return Orders(shop / "out", (POINT,), Formats(tables=True, pictures=False), resume=True)
 
 
 def test_a_record_holds_the_numbers_of_the_files_beside_it(rows: list[Row], orders: Orders) -> None:
