@@ -134,7 +134,8 @@ _FORMS = {
         metavar="FORM",
         default=Formats.table_form,
         envvar="BUSHFIT_TABLE_FORMAT",
-        help="csv, decimal-comma (CSV as German Excel has it) or xlsx [$BUSHFIT_TABLE_FORMAT, or csv].",
+        show_envvar=True,
+        help="csv, decimal-comma (for a German Excel), xlsx [csv].",
     ),
     "pictures": click.option(
         "--plot-format",
@@ -143,7 +144,8 @@ _FORMS = {
         multiple=True,
         default=Formats.picture_forms,
         envvar="BUSHFIT_PLOT_FORMAT",
-        help="png, svg or pdf; may be given again [$BUSHFIT_PLOT_FORMAT, or png].",
+        show_envvar=True,
+        help="png, svg, pdf; may be given again [png].",
     ),
 }
 

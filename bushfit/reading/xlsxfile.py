@@ -105,13 +105,12 @@ def streamed(file: Path, headers: Iterable[str]) -> Iterator[Sheet]:
 
 @contextmanager
 def _book(stream: IO[bytes], **options: object) -> Iterator[Workbook]:
-    """A workbook that is whole in the end."""
+    """A workbook that is whole in the end; also after an error, so that no file of its rows stays."""
     from xlsxwriter import Workbook
 
-    book = Workbook(stream, options)
-    book.set_properties({"created": _MADE})
-    yield book
-    book.close()
+    with Workbook(stream, options) as book:
+        book.set_properties({"created": _MADE})
+        yield book
 
 
 def _text(text: str) -> str:
