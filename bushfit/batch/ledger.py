@@ -42,7 +42,13 @@ Record = dict[str, Any]
 
 def key(row: Row, points: tuple[Point, ...], formats: Formats) -> str:
     """Hash of a row's settings, of what is asked of it, and of the version that answers."""
-    asked = {"settings": asdict(row.settings), "points": [str(point) for point in points], "formats": asdict(formats)}
+    asked = {
+        "settings": asdict(row.settings),
+        "points": [str(point) for point in points],
+        "tables": formats.tables,
+        "table_form": formats.table_form if formats.tables or row.settings.predicted else None,
+        "pictures": formats.picture_forms if formats.pictures else (),
+    }
     return hashlib.sha256(json.dumps([__version__, SCHEMA, asked], sort_keys=True).encode()).hexdigest()
 
 

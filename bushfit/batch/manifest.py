@@ -90,6 +90,11 @@ class Settings:
         return replace(other, **{key: value for key, value in vars(self).items() if value is not None})
 
     @property
+    def predicted(self) -> bool:
+        """Whether the row is predicted, of which the tables are always written."""
+        return not {"run", "predict"}.isdisjoint(self.commands or ())
+
+    @property
     def diagnosed(self) -> bool:
         """Whether a row with these ends in a verdict."""
         return not {"run", "diagnose"}.isdisjoint(self.commands or ())

@@ -40,7 +40,7 @@ _FAMILIES = ("effects", "mistakes", "amplitude_sweeps", "awkward", "faults", "ou
     help="What is hidden, or awkward, in the campaigns.",
 )
 @click.option("--keep", is_flag=True, help="Keep the campaigns and the sealed truths, in -o/campaigns.")
-@partial(shared_options, where="nothing is written")
+@partial(shared_options, where="nothing is written", forms=())
 def command(campaigns: int, seed: int, jobs: int, family: str, keep: bool, options: Options) -> None:
     """Judge `diagnose` on hidden campaigns of random bushings, and print how often it is right.
 

@@ -17,10 +17,11 @@ from bushfit.jobs.grid import default_grid
 from bushfit.prediction import PredictedResonance, Prediction, caveats, predict, predict_resonance
 from bushfit.report.artifacts import (
     measured_contents,
+    names_of_more,
     place_names,
     prediction_contents,
     resonance_contents,
-    resonance_names,
+    wide_contents,
 )
 from bushfit.report.contents import Contents, Kinds
 from bushfit.report.tables import prediction_table, shaken_table
@@ -43,7 +44,8 @@ _AMPLITUDES = {TRANSLATION: "amplitudes", ROTATION: "torsion_amplitudes", STRAIN
 class Predicted:
     """The outcome of a prediction: one table a place, and a resonance, where a mass was asked for.
 
-    `measured` are the sweeps of places that the model can predict; `notes`, what else a user must know.
+    `measured` are the sweeps of places that the model can predict; `notes`, what else a user must know; `wide`, whether
+    the tables are written with amplitudes across, too.
     """
 
     result: Result
@@ -51,6 +53,7 @@ class Predicted:
     measured: Sequence[SweepData]
     notes: tuple[str, ...] = ()
     resonances: Sequence[PredictedResonance] = ()
+    wide: bool = False
 
     @property
     def document(self) -> Mapping[str, Any]:
@@ -85,6 +88,7 @@ class Predicted:
     @property
     def contents(self) -> Contents:
         found = prediction_contents(self.result, self.predictions, self.measured, self.notes)
+        found |= wide_contents(self.predictions if self.wide else ())
         return found | resonance_contents(self.resonances)
 
     @property
@@ -103,13 +107,14 @@ class Predict:
     """Dynamic stiffness over a grid: the one asked for, else the campaign's [predict], else that of its sweeps.
 
     With a mass [kg] and the acceleration of its base [m/s^2], its resonance at each place, too. All at a temperature
-    [K], where the model has an effect of it.
+    [K], where the model has an effect of it. `wide` tables have amplitudes across.
     """
 
     asked: PredictSettings = field(default_factory=PredictSettings)
     mass: float | None = None
     base_acceleration: float | None = None
     temperature: float | None = None
+    wide: bool = False
 
     def places(self, result: Result | None, campaign: Campaign | None) -> list[Place]:
         """Those asked for, else the paper's directions where there is a bushing, and all specimens.
@@ -127,9 +132,11 @@ class Predict:
         return [*(_DIRECTIONS if bodies[0][0] or not specimens else ()), *specimens.values()]
 
     def kinds(self, result: Result | None, campaign: Campaign | None) -> Kinds:
-        """The tables and pictures of each place."""
+        """The tables and pictures of each place, and the further tables asked for."""
         places = self.places(result, campaign)
-        return Kinds.shown(place_names(places)) + Kinds(tables=tuple(resonance_names(places) if self.mass else ()))
+        more = [what for what, wanted in (("wide", self.wide), ("resonance", self.mass)) if wanted]
+        tables = tuple(name for what in more for name in names_of_more(places, what))
+        return Kinds.shown(place_names(places)) + Kinds(tables=tables)
 
     def run(self, result: Result, campaign: Campaign | None, notes: tuple[str, ...] = ()) -> Predicted:
         """One prediction a place.
@@ -166,7 +173,7 @@ class Predict:
             for place in self.places(result, campaign)
             if self.mass and self.base_acceleration
         ]
-        return Predicted(result, predictions, known, notes, resonances)
+        return Predicted(result, predictions, known, notes, resonances, self.wide)
 
     def _settings(self, campaign: Campaign | None) -> PredictSettings:
         given = {key: value for key, value in vars(self.asked).items() if value is not None}
