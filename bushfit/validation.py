@@ -13,8 +13,8 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, cast, get_args, get_type_hints
 
-from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, ValidationInfo
-from pydantic_core import ErrorDetails, PydanticUndefined
+from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, ValidationInfo, WithJsonSchema
+from pydantic_core import ErrorDetails
 
 from bushfit.errors import BushfitError, CampaignError, did_you_mean
 
@@ -66,10 +66,12 @@ def unknown_key(key: str, known: Collection[str]) -> CampaignError:
     return CampaignError("unknown key", found=f'"{key}"', expected=expected, hint=hint)
 
 
-def converted(convert: Callable[[Any, ValidationInfo], Any], written: Any = PydanticUndefined) -> BeforeValidator:
+def converted(
+    convert: Callable[[Any, ValidationInfo], Any], written: Mapping[str, Any] | None = None
+) -> BeforeValidator:
     """A pydantic validator that calls convert(raw value, info); what it raises keeps its words.
 
-    `written` is the type of what stands in the file, for its JSON Schema; without it, that of the converted value.
+    `written` is the JSON Schema of what stands in the file; without it, it is that of the converted value.
     """
 
     def run(raw: Any, info: ValidationInfo) -> Any:
@@ -78,7 +80,9 @@ def converted(convert: Callable[[Any, ValidationInfo], Any], written: Any = Pyda
         except BushfitError as error:
             raise ValueError(error) from error
 
-    return BeforeValidator(run, json_schema_input_type=written)
+    if written is None:
+        return BeforeValidator(run)
+    return BeforeValidator(run, json_schema_input_type=Annotated[Any, WithJsonSchema(dict(written))])
 
 
 def standing_in_table(keys: Callable[[], Iterable[str]]) -> Mapping[str, Any]:

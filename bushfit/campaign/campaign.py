@@ -9,16 +9,15 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from bushfit.campaign.files import LoopFile, SweepFile
 from bushfit.campaign.naming import folder_name
 from bushfit.campaign.places import place_tested
 from bushfit.campaign.schema import (
     CampaignFile,
     FitSettings,
-    LoopFile,
     PredictSettings,
     RigSettings,
     SimulateSettings,
-    SweepFile,
 )
 from bushfit.campaign.toml import read_toml
 from bushfit.effects import place_of

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from bushfit.geometry import Place
     from bushfit.model.result import Misfit, Result, Usable
 
+#: Tables by place, the columns of each by header, null where a cell is empty; and "warnings".
+PredictionDocument = dict[str, dict[str, list[float | None]] | list[str]]
 #: Directions that are predicted where none is asked for: those of the paper.
 _DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
 #: Keys of [predict] that have the amplitudes of each motion.

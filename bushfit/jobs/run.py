@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Required
 
+from typing_extensions import TypedDict
+
+from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.errors import FitError
 from bushfit.fitting.procedures import TwoStep, fit_two_step
 from bushfit.jobs.diagnose import Diagnose, Diagnosed
 from bushfit.jobs.fits import Fit, FitStatic, Fitted, files_of_tests, tests_of
 from bushfit.jobs.predict import Predict, Predicted
+from bushfit.model.document import ModelFile
 from bushfit.model.file import to_document
 from bushfit.model.model import FIVE
 from bushfit.report.artifacts import artifact_names, diagnosis_files
@@ -21,6 +25,24 @@ if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
     from bushfit.fitting.data import Data
     from bushfit.model.result import Result
+
+
+class RunDocument(TypedDict, total=False):
+    """What the whole chain found.
+
+    Args:
+        static: the fit of the loops; where there are loops.
+        dynamic: the paper's two steps; where there are loops and sweeps.
+        joint: the joint fit; where the model to use is another.
+        model: the model to use: the joint fit, or the model with what diagnose added.
+        diagnosis: where model and tests disagree; where a parameter is free.
+    """
+
+    static: ModelFile
+    dynamic: ModelFile
+    joint: ModelFile
+    model: Required[ModelFile]
+    diagnosis: DiagnosisFile
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,7 +60,9 @@ class Misfit:
     """How well a model meets one test, or one run of it.
 
     Args:
+        test: by its name.
         place: direction, or specimen by its name.
+        fitted: whether the model was fitted to it.
         held: what the run holds; None of the whole test.
         value: at which it is held.
         unit: of the value, SI: "m", "rad" or "1" of an amplitude, "Hz".
@@ -106,6 +108,7 @@ class Outlier:
     """A point that lies farther off than noise explains, beside neighbours that do not.
 
     Args:
+        test: by its name.
         file: it came from, as the campaign names it; None for a test that came from no file.
         row: of its data, from 1; header, comments and blank lines do not count.
         column: displacement, force or stiffness.
