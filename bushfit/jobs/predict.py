@@ -41,7 +41,7 @@ _DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
 _AMPLITUDES = {TRANSLATION: "amplitudes", ROTATION: "torsion_amplitudes", STRAINING: "strain_amplitudes"}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Predicted:
     """The outcome of a prediction: one table a place, and a resonance, where a mass was asked for.
 
@@ -53,6 +53,9 @@ class Predicted:
     measured: Sequence[SweepData]
     notes: tuple[str, ...] = ()
     resonances: Sequence[PredictedResonance] = ()
+
+    def __repr__(self) -> str:
+        return f"Prediction of {self.result.name}: {', '.join(str(found.direction) for found in self.predictions)}"
 
     @property
     def document(self) -> Mapping[str, Any]:

@@ -45,7 +45,7 @@ class RunDocument(TypedDict, total=False):
     diagnosis: DiagnosisFile
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Ran:
     """The outcome of the whole chain.
 
@@ -60,6 +60,9 @@ class Ran:
     joint: Fitted
     diagnosed: Diagnosed | None
     predicted: Predicted
+
+    def __repr__(self) -> str:
+        return "\n".join(repr(found) for found in (self.diagnosed, self.result) if found)
 
     @property
     def result(self) -> Result:
