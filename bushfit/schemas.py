@@ -23,7 +23,7 @@ class Described:
     Args:
         files: by their names, and commands whose `--json` prints the same.
         type: module of bushfit and name of the type of a whole file.
-        way: whether people or older versions write it, which leave out what has a default; or this version alone does.
+        way: "validation" where what has a default may be left out; "serialization" where every key is written.
     """
 
     files: str
@@ -39,7 +39,7 @@ DESCRIBED = {
         "validation",
     ),
     "diagnosis": Described("diagnosis.json; --json of diagnose", "diagnosis.document.DiagnosisFile", "serialization"),
-    "run": Described("--json of run", "jobs.run.RunDocument", "serialization"),
+    "run": Described("--json of run", "jobs.run.RunDocument", "validation"),
     "prediction": Described("--json of predict", "jobs.predict.PredictionDocument", "serialization"),
     "batch": Described("--json of batch", "batch.document.BatchSummary", "serialization"),
     "row": Described("bushings/<name>/row.json of batch", "batch.document.Record", "serialization"),
