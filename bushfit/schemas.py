@@ -23,12 +23,13 @@ class Described:
     Args:
         files: by their names, and commands whose `--json` prints the same.
         type: module of bushfit and name of the type of a whole file.
-        way: "validation" where what has a default may be left out; "serialization" where every key is written.
+        way: "written" where every key is there; "read" where what has a default may be left out, as in older files;
+            "toml" where people write it, and there is no null.
     """
 
     files: str
     type: str
-    way: Literal["validation", "serialization"]
+    way: Literal["written", "read", "toml"]
 
 
 #: Every schema by its name.
@@ -36,21 +37,19 @@ DESCRIBED = {
     "model": Described(
         "model.json, static.json, dynamic.json, joint.json, truth.json of simulate; --json of the fits",
         "model.document.ModelFile",
-        "validation",
+        "read",
     ),
-    "diagnosis": Described("diagnosis.json; --json of diagnose", "diagnosis.document.DiagnosisFile", "serialization"),
-    "run": Described("--json of run", "jobs.run.RunDocument", "validation"),
-    "prediction": Described("--json of predict", "jobs.predict.PredictionDocument", "serialization"),
-    "batch": Described("--json of batch", "batch.document.BatchSummary", "serialization"),
-    "row": Described("bushings/<name>/row.json of batch", "batch.document.Record", "serialization"),
-    "scorecard": Described("scorecard.json; --json of scorecard", "scorecard.document.Scorecard", "serialization"),
-    "outcome": Described("a line of outcomes.jsonl of scorecard", "scorecard.document.Line", "serialization"),
-    "sealed": Described(
-        "campaigns/sealed/<campaign>.json of scorecard --keep", "scorecard.hidden.Sealed", "serialization"
-    ),
-    "campaign": Described("a campaign, in TOML", "campaign.schema.CampaignFile", "validation"),
-    "manifest": Described("a list of campaigns for batch, in TOML", "batch.manifest.ManifestFile", "validation"),
-    "limits": Described("--limits of batch, in TOML", "batch.limits.Limits", "validation"),
+    "diagnosis": Described("diagnosis.json; --json of diagnose", "diagnosis.document.DiagnosisFile", "written"),
+    "run": Described("--json of run", "jobs.run.RunDocument", "read"),
+    "prediction": Described("--json of predict", "jobs.predict.PredictionDocument", "written"),
+    "batch": Described("--json of batch", "batch.document.BatchSummary", "written"),
+    "row": Described("bushings/<name>/row.json of batch", "batch.document.Record", "written"),
+    "scorecard": Described("scorecard.json; --json of scorecard", "scorecard.document.Scorecard", "written"),
+    "outcome": Described("a line of outcomes.jsonl of scorecard", "scorecard.document.Line", "written"),
+    "sealed": Described("campaigns/sealed/<campaign>.json of scorecard --keep", "scorecard.hidden.Sealed", "written"),
+    "campaign": Described("a campaign, in TOML", "campaign.schema.CampaignFile", "toml"),
+    "manifest": Described("a list of campaigns for batch, in TOML", "batch.manifest.ManifestFile", "toml"),
+    "limits": Described("--limits of batch, in TOML", "batch.limits.Limits", "toml"),
 }
 #: Keywords that pydantic leaves beside the type of a text that becomes a number; JSON Schema does not know them.
 _NO_KEYWORDS = frozenset({"gt", "ge", "lt", "le"})
@@ -78,7 +77,9 @@ def schema(name: str) -> dict[str, Any]:
     asked = DESCRIBED[name]
     module, _, kind = asked.type.rpartition(".")
     adapter = TypeAdapter[Any](getattr(importlib.import_module(f"bushfit.{module}"), kind))
-    made = adapter.json_schema(mode=asked.way, schema_generator=_generator())
+    made = adapter.json_schema(
+        mode="serialization" if asked.way == "written" else "validation", schema_generator=_generator(asked.way)
+    )
     head = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": f"urn:bushfit:schema:{name}",
@@ -87,7 +88,7 @@ def schema(name: str) -> dict[str, Any]:
     return {**head, **{key: value for key, value in _tidied(made).items() if key != "title"}}
 
 
-def _generator() -> Any:
+def _generator(way: str) -> Any:
     """pydantic's generator, which is slow to import, with descriptions from docstrings."""
     from pydantic.json_schema import GenerateJsonSchema
 
@@ -96,8 +97,10 @@ def _generator() -> Any:
             return False  # a title made of the key says nothing that the key does not
 
         def field_is_required(self, field: Any, total: bool) -> bool:
-            written = self.mode == "serialization" and field["type"] == "dataclass-field"
-            return written or super().field_is_required(field, total)
+            return (way == "written" and field["type"] == "dataclass-field") or super().field_is_required(field, total)
+
+        def nullable_schema(self, schema: Any) -> dict[str, Any]:
+            return self.generate_inner(schema["schema"]) if way == "toml" else super().nullable_schema(schema)
 
         def dataclass_schema(self, schema: Any) -> dict[str, Any]:
             return _explained(super().dataclass_schema(schema), schema["cls"])
@@ -131,14 +134,15 @@ def _explained(made: dict[str, Any], kind: type) -> dict[str, Any]:
 
 
 def _arguments(docstring: str) -> dict[str, str]:
-    """What the docstring says of each argument."""
-    found = _ARGS.search(docstring)
+    """What the docstring says of each argument, in the words of JSON."""
+    found = _ARGS.search(re.sub(r"\bNone\b", "null", docstring))
     entries = _ARG.findall(found[1]) if found else []
     return {name: " ".join(words.split()) for names, words in entries for name in names.split(", ")}
 
 
 def _tidied(node: Any) -> Any:
-    """A schema without what is no keyword of it."""
+    """A schema without what is no keyword of it, and without defaults that say nothing."""
     if isinstance(node, Mapping):
-        return {key: _tidied(value) for key, value in node.items() if key not in _NO_KEYWORDS}
+        said = (key for key, value in node.items() if key not in _NO_KEYWORDS and (key, value) != ("default", None))
+        return {key: _tidied(node[key]) for key in said}
     return [_tidied(each) for each in node] if isinstance(node, list) else node
