@@ -107,7 +107,9 @@ def model_c(found: InTime) -> str:
     for own, lever in zip(found.fields, found.levers, strict=True):
         neutrals = {field: neutral(field) for field in known if field not in own}
         set_ = {**neutrals, **{field: reference[name] for field, name in own.items()}}
-        lines.append(f"    {{{', '.join(f'.{field} = {place}' for field, place in set_.items())}, .lever = {lever!r}}},")
+        lines.append(
+            f"    {{{', '.join(f'.{field} = {place}' for field, place in set_.items())}, .lever = {lever!r}}},"
+        )
     lines += ["};", "const Arm arms[ARMS] = {"]
     arms = found.arms or ((0, 0.0, 1.0),)
     lines += [f"    {{{part}, {share!r}, {time!r}}}," for part, share, time in arms]
@@ -116,7 +118,7 @@ def model_c(found: InTime) -> str:
 
 def description(order: Order, found: InTime, name: str, guid: str) -> bytes:
     """modelDescription.xml: what an importer is told."""
-    about = f"Rubber bushing, displacement in and force out; bushfit {__version__}, {order.source.file} {order.source.sha256}"
+    about = f"Rubber bushing, displacement in and force out, of {order.source.file} (SHA-256 {order.source.sha256})"
     root = ET.Element("fmiModelDescription", {
         "fmiVersion": "2.0", "modelName": _text(order.result.name), "guid": guid, "description": _text(about),
         "generationTool": f"bushfit {__version__}", "variableNamingConvention": "flat", "numberOfEventIndicators": "0",
@@ -150,7 +152,7 @@ def _variables(found: InTime) -> list[tuple[dict[str, str], dict[str, str]]]:
     count, displays, listed = _FIRST + len(found.values), _displays(found.places), []
     for place in found.places:
         moved, resisted, _ = place.motion.words
-        kinds = (
+        kinds: tuple[tuple[str, str, str, dict[str, str], dict[str, str]], ...] = (
             (moved, "input", place.motion.displacement_unit, {"start": "0"}, {}),
             (resisted, "output", place.motion.force_unit, {}, {"initial": "calculated"}),
         )

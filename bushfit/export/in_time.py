@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bushfit.effects import Branch, Effect, Level, Modifier, place_of, qualified
-from bushfit.errors import ModelError
-from bushfit.export.contract import Order
+from bushfit.effects import Branch, Effect, Level, Modifier, Parameter, place_of, qualified
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.errors import ModelError
+from bushfit.export.contract import Order
 from bushfit.geometry import Place
 from bushfit.model.arms import Arms, fading, model_arms, qualified_size
 from bushfit.model.model import Model
 from bushfit.prediction import Prediction
 from bushfit.units import number
 
-#: What of `Direction` in c/bushing.h each effect sets, parameter by parameter; an effect of a place by its kind and a dot.
+#: What of `Direction` in c/bushing.h each effect sets, by parameter; an effect of a place goes by its kind and a dot.
 FIELDS: Mapping[str, tuple[str, ...]] = {
     "elastic": ("mu",),
     "asymmetry": ("c2",),
@@ -41,6 +41,10 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
 _ONE = {"eps_half[0]", "eps_half[1]", "e_s", "spread", "scale", "factor", "preload"}
 #: How far below and above the frequencies of model and grid the arms go: loops are slow, and a triangle has overtones.
 _BELOW, _ABOVE = 100.0, 10.0
+#: Bounds of what a shape makes of strain and stiffness, and what these two are.
+_ANY = (1e-12, 1e12)
+_STRAIN = "equivalent strain per displacement, rotation or strain"
+_STIFFNESS = "stiffness per equivalent shear modulus"
 #: Error over the grid from which it is said: below this it is rounding.
 _TOLD = 1e-6
 
@@ -160,37 +164,44 @@ def _values(
 ) -> tuple[tuple[Value, ...], list[dict[str, str]]]:
     """All values, and for each place the name of its own by that of the parameter: where modifiers make it differ from
     place to place it is called `<parameter>.<place>`."""
-    sizes, parts = {part.size for part in arms}, {qualified_size(branch): branch for branch in fading(model)}
-    constants, settable, names = [], [], [dict[str, str]() for _ in places]
+    sizes, parts = {part.size for part in arms}, {qualified_size(branch) for branch in fading(model)}
+    constants, settable = list[Value](), list[Value]()
+    names = [dict[str, str]() for _ in places]
     for effect in model.records:
         for parameter in () if isinstance(effect, Modifier) else effect.parameters:
             name = qualified(effect, parameter)
-            of_arms = isinstance(effect, Branch) and bool(effect.size)
-            if of_arms and qualified_size(effect) not in sizes:
+            of_arms = effect.size if isinstance(effect, Branch) else None
+            if isinstance(effect, Branch) and effect.size and qualified_size(effect) not in sizes:
                 continue
             shared = len({own[name] for own in middle}) == 1
             for place, own, called in zip(places, middle, names, strict=True):
                 called[name] = name if shared else f"{name}.{place}"
                 value = Value(
-                    called[name], parameter.unit, own[name], _widened(parameter.bounds, own[name]), parameter.meaning,
+                    called[name],
+                    parameter.unit,
+                    own[name],
+                    _allowed(parameter, own[name]),
+                    parameter.meaning,
                     settable=not of_arms or name in parts,
                 )
                 target = settable if value.settable else constants
                 if value not in target:
                     target.append(value)
     for place, called in zip(places, names, strict=True):
-        for key, unit, found, meaning in (
-            ("unit_strain", f"1/{place.motion.displacement_unit}", model.unit_strain(place), "equivalent strain per motion"),
-            ("stiffness_per_modulus", "", model.stiffness_per_modulus(place), "stiffness per shear modulus"),
-        ):
-            called[key] = f"{key}.{place}"
-            settable.append(Value(called[key], unit.removesuffix("1/1"), found, (1e-12, 1e12), meaning))
+        motion = place.motion.displacement_unit
+        shape = {
+            "unit_strain": Value("", f"1/{motion}" if motion != "1" else "1", model.unit_strain(place), _ANY, _STRAIN),
+            "stiffness_per_modulus": Value("", "", model.stiffness_per_modulus(place), _ANY, _STIFFNESS),
+        }
+        called |= {key: f"{key}.{place}" for key in shape}
+        settable += [replace(value, name=called[key]) for key, value in shape.items()]
     return (*constants, *settable), names
 
 
-def _widened(bounds: tuple[float, float], value: float) -> tuple[float, float]:
-    """Bounds that hold a value which modifiers made."""
-    return min(bounds[0], value), max(bounds[1], value)
+def _allowed(parameter: Parameter, value: float) -> tuple[float, float]:
+    """The bounds of a parameter, its neutral value and what modifiers made of it included."""
+    held = (*parameter.bounds, value, value if parameter.neutral is None else parameter.neutral)
+    return min(held), max(held)
 
 
 def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Arms, ...]) -> dict[str, str]:
@@ -216,7 +227,9 @@ def _told(part: Arms) -> str:
     )
 
 
-def _lost(model: Model, held: list[str], left: list[str], prediction: Prediction, values: Mapping[str, float]) -> list[str]:
+def _lost(
+    model: Model, held: list[str], left: list[str], prediction: Prediction, values: Mapping[str, float]
+) -> list[str]:
     """What it costs in steady stiffness at a place that modifiers are held, and that some effects are left out."""
     if not (held or left):
         return []
@@ -228,6 +241,8 @@ def _lost(model: Model, held: list[str], left: list[str], prediction: Prediction
     if error < _TOLD and not left:
         return []
     (length, factor), *_ = prediction.direction.display
-    at = f"{number(_middle(prediction.frequency), 3)} Hz and {number(factor * _middle(prediction.amplitude), 3)} {length}"
-    said = [f"{', '.join(held)} held as at {at}"] * bool(held) + [f"{', '.join(left)} left out"] * bool(left)
-    return [f"{prediction.direction}: {'; '.join(said)}: stiffness off by up to {number(100.0 * error, 2)} % over the grid"]
+    frequency, amplitude = number(_middle(prediction.frequency), 3), number(factor * _middle(prediction.amplitude), 3)
+    said = [f"{', '.join(held)} held as at {frequency} Hz and {amplitude} {length}"] * bool(held)
+    said += [f"{', '.join(left)} left out"] * bool(left)
+    off = f"stiffness off by up to {number(100.0 * error, 2)} % over the grid"
+    return [f"{prediction.direction}: {'; '.join(said)}: {off}"]

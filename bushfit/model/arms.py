@@ -1,7 +1,7 @@
 """Maxwell arms in place of what fades with memory: the law of a springpot in a form that steps through time.
 
-A springpot remembers its whole past, and most programs cannot. Over a band of frequencies a few springs with dashpots in
-series do the same within a stated error.
+A springpot remembers its whole past, and most programs cannot. Over a band of frequencies a few springs with dashpots
+in series do the same within a stated error.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _ROUNDS = 25
 _WORTHWHILE = 4.0
 #: Share of a weight that stays where the error is 0.
 _KEPT = 1e-3
-#: How far relaxation times may lie beyond the band: an arm there is a spring or a dashpot within a tenth of a millionth.
+#: How far relaxation times may lie beyond the band: there an arm is a spring or a dashpot to seven digits.
 _BEYOND = 1e7
 #: Nepers by which the first relaxation times reach over the ends of the band, one try each: which is best goes by the
 #: number of arms.
@@ -102,13 +102,10 @@ def fitted_arms(
 def model_arms(model: Model, band: tuple[float, float], accuracy: float = ACCURACY) -> tuple[Arms, ...]:
     """Arms for each part of a model that fades with memory, the springpot first, at the model's values.
 
-    Effects that share a size, as the springpot and the spring in series with it, are one part. A part of no size is none.
+    Effects that share a size, as the springpot and the spring in series with it, are one part. A size of 0 is none.
     """
-    parts = []
-    for size in dict.fromkeys(qualified_size(branch) for branch in fading(model)):
-        if model.values[size]:
-            parts.append(fitted_arms(partial(_part, model, size), band, accuracy, size))
-    return tuple(parts)
+    sizes = dict.fromkeys(qualified_size(branch) for branch in fading(model))
+    return tuple(fitted_arms(partial(_part, model, size), band, accuracy, size) for size in sizes if model.values[size])
 
 
 def fading(model: Model) -> tuple[Branch, ...]:

@@ -15,17 +15,20 @@ typedef struct {
     fmi2String name;
 } Instance;
 
-#if defined(FREESTANDING) /* a compiler may ask for these two of its own */
+#if defined(FREESTANDING) /* a compiler may ask for these two of its own; all that is copied here are doubles */
 void *memcpy(void *to, const void *from, size_t count)
 {
-    for (volatile size_t k = 0; k < count; k++)
+    size_t words = count / sizeof(double);
+    for (size_t k = 0; k < words; k++)
+        ((double *)to)[k] = ((const double *)from)[k];
+    for (size_t k = words * sizeof(double); k < count; k++)
         ((char *)to)[k] = ((const char *)from)[k];
     return to;
 }
 
 void *memset(void *to, int byte, size_t count)
 {
-    for (volatile size_t k = 0; k < count; k++)
+    for (size_t k = 0; k < count; k++)
         ((char *)to)[k] = (char)byte;
     return to;
 }
