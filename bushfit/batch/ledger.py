@@ -26,6 +26,7 @@ from bushfit.batch.manifest import Row
 from bushfit.batch.points import Point
 from bushfit.errors import OutputError
 from bushfit.report import disk
+from bushfit.report.contents import Formats
 
 #: Layout of a record; records of another are done again.
 SCHEMA = "bushfit/row/2"
@@ -39,9 +40,9 @@ ASIDE = ".aside"
 Record = dict[str, Any]
 
 
-def key(row: Row, points: tuple[Point, ...], formats: tuple[str, ...]) -> str:
+def key(row: Row, points: tuple[Point, ...], formats: Formats) -> str:
     """Hash of a row's settings, of what is asked of it, and of the version that answers."""
-    asked = {"settings": asdict(row.settings), "points": [str(point) for point in points], "formats": formats}
+    asked = {"settings": asdict(row.settings), "points": [str(point) for point in points], "formats": asdict(formats)}
     return hashlib.sha256(json.dumps([__version__, SCHEMA, asked], sort_keys=True).encode()).hexdigest()
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +22,7 @@ from bushfit.fitting.data import Data
 from bushfit.model.file import load_result
 from bushfit.model.result import Result
 from bushfit.prediction import Band, predict
+from bushfit.report.contents import Formats
 
 if TYPE_CHECKING:
     from bushfit.batch.manifest import Row, Settings
@@ -39,7 +40,7 @@ class Orders:
 
     output: Path
     points: tuple[Point, ...]
-    formats: tuple[str, ...]
+    formats: Formats
     resume: bool
     version: str = __version__
 
@@ -125,21 +126,19 @@ def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Record:
     return {**found, **_numbers(result, orders.points, found.get("warnings", []))}
 
 
-def _run(campaign: Campaign, formats: Collection[str], files: dict[str, bytes]) -> tuple[Result, Diagnosed | None]:
+def _run(campaign: Campaign, formats: Formats, files: dict[str, bytes]) -> tuple[Result, Diagnosed | None]:
     """The whole chain, as `bushfit run` does it; the tables of the prediction come in any case, as of predict."""
-    from bushfit.jobs import TABLES
     from bushfit.jobs.run import Run
 
     ran = Run().run(Data.of(campaign))
-    files |= ran.files(formats) | ran.predicted.files({TABLES, *formats})
+    files |= formats.files(ran.contents) | replace(formats, tables=True).files(ran.predicted.contents)
     return ran.result, ran.diagnosed
 
 
 def _one_by_one(
-    campaign: Campaign, settings: Settings, formats: Collection[str], files: dict[str, bytes]
+    campaign: Campaign, settings: Settings, formats: Formats, files: dict[str, bytes]
 ) -> tuple[Result, Diagnosed | None]:
     """fit, diagnose and predict, as far as they are asked for, each going on from the one before."""
-    from bushfit.jobs import TABLES
     from bushfit.jobs.fits import Fit
     from bushfit.jobs.predict import Predict
 
@@ -149,17 +148,17 @@ def _one_by_one(
     diagnosed = None
     if "fit" in commands and data:
         fitted = Fit(settings.directions or (), settings.effects or ()).run(data)
-        result, made = fitted.result, fitted.files(formats)
+        result, made = fitted.result, formats.files(fitted.contents)
         if "diagnose" in commands:  # as `run` calls them: model.json is with what diagnose added
             made["joint.json"] = made.pop("model.json")
         files |= made
     if "diagnose" in commands and data:
         diagnosed = _diagnose(settings).run(data)
         result = diagnosed.result
-        files |= diagnosed.files(formats)
+        files |= formats.files(diagnosed.contents)
     assert result is not None  # the manifest has seen to it that there is a model
     if "predict" in commands:
-        files |= Predict().run(result, campaign).files_beside({TABLES, *formats})
+        files |= replace(formats, tables=True).files(Predict().run(result, campaign).contents_beside)
     return result, diagnosed
 
 

@@ -16,6 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from bushfit.cli.common import Options, example, path_option, place_option, shared_options
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import naming
+from bushfit.report.contents import Formats
 from bushfit.units import alike, for_people
 
 if TYPE_CHECKING:
@@ -107,7 +108,7 @@ def command(
         check_judged(judged_by, limits, read.rows)
     with naming(place="--at"):
         points = (*read.points, *map(parse_point, at), *(judged_by.points if judged_by else ()))
-    formats = tuple(kind for kind, wanted in (("csv", tables), ("png", plots and options.plots)) if wanted)
+    formats = Formats(tables=tables, pictures=plots and options.plots)
     output = options.folder(read.stem).absolute()
     orders = Orders(output, tuple(dict.fromkeys(points)), formats, resume)
     plan = Plan(read.stem, read.rows, orders, judged_by, junit, options.plots)

@@ -13,6 +13,7 @@ import click
 from rich.console import Console
 
 from bushfit.errors import ModelError, typed
+from bushfit.report.contents import Formats
 from bushfit.report.folder import check_free, to_json, write_files
 
 if TYPE_CHECKING:
@@ -91,9 +92,9 @@ class Options:
     force: bool
 
     @property
-    def formats(self) -> tuple[str, ...]:
-        """What to write besides JSON."""
-        return ("csv", "png") if self.plots else ("csv",)
+    def formats(self) -> Formats:
+        """How results are written."""
+        return Formats(pictures=self.plots)
 
     def folder(self, name: str) -> Path:
         """Where results go: --output, or results/<name>."""
@@ -173,10 +174,10 @@ class Task:
         if self.loss:
             loaded = replace(loaded, fit=replace(loaded.fit, loss=cast("Loss", self.loss)))
         folder = options.folder(loaded.slug)
-        options.require_free(folder, job.names(loaded, options.formats))
+        options.require_free(folder, options.formats.names(job.kinds(loaded)))
         outcome = job.run(Data.of(loaded))
         tell(options, loaded.name, outcome)
-        options.write(folder, outcome.files(options.formats))
+        options.write(folder, options.formats.files(outcome.contents))
         if last_line:
             options.say(last_line(folder, outcome))
         options.tell(outcome.document)

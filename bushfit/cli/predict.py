@@ -82,6 +82,7 @@ def command(
     from bushfit.errors import naming
     from bushfit.jobs.predict import Predict
     from bushfit.model.result import carried
+    from bushfit.report.contents import Kinds
     from bushfit.units import temperature as kelvin
 
     result, notes = open_model(model), list[str]()
@@ -101,8 +102,8 @@ def command(
         warm = None if temperature is None else kelvin(temperature)
     job = Predict(PredictSettings(directions=directions or None, **asked), *shaken, warm)
     folder = options.folder(loaded.slug if loaded else folder_name(result.name))
-    measured = ["measured.csv"] if loaded and loaded.sweeps else []
-    options.require_free(folder, [*job.names(result, loaded, options.formats), *measured])
+    measured = Kinds(tables=("measured",) if loaded and loaded.sweeps else ())
+    options.require_free(folder, options.formats.names(job.kinds(result, loaded) + measured))
     outcome = job.run(result, loaded, tuple(notes))
     tell_predictions(options, outcome)
     for found in outcome.resonances:
@@ -111,7 +112,7 @@ def command(
         options.say(f"{found.place} under {mass}, base at {base_acceleration}: {peak}")
     tell_tests(options, outcome.tests, outcome.usable)
     warn(options, of_fit)
-    options.write(folder, outcome.files_beside(options.formats))
+    options.write(folder, options.formats.files(outcome.contents_beside))
     options.tell(outcome.document)
 
 

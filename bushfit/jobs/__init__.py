@@ -6,16 +6,14 @@ outcome knows its JSON documents and makes its files.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
     from bushfit.fitting.data import Data
     from bushfit.model.result import Result
-
-#: Format of the tables that a job makes besides its JSON documents.
-TABLES = "csv"
+    from bushfit.report.contents import Contents, Kinds
 
 
 class Outcome(Protocol):
@@ -29,8 +27,9 @@ class Outcome(Protocol):
     def document(self) -> Mapping[str, Any]:
         """What `--json` prints."""
 
-    def files(self, formats: Collection[str]) -> dict[str, bytes]:
-        """Result files by name: the JSON documents, and the tables and plots that `formats` asks for."""
+    @property
+    def contents(self) -> Contents:
+        """All that is written of it: documents, tables and pictures."""
 
 
 Found = TypeVar("Found", bound=Outcome, covariant=True)
@@ -39,8 +38,8 @@ Found = TypeVar("Found", bound=Outcome, covariant=True)
 class Job(Protocol[Found]):
     """Work on one campaign."""
 
-    def names(self, campaign: Campaign, formats: Collection[str]) -> list[str]:
-        """The files that the outcome will hold, known before the work."""
+    def kinds(self, campaign: Campaign) -> Kinds:
+        """The names of all that the outcome will hold, known before the work."""
 
     def run(self, data: Data) -> Found:
         """The work.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -12,8 +12,8 @@ from bushfit.diagnosis.workflow import diagnose
 from bushfit.errors import FitError
 from bushfit.model.file import to_document
 from bushfit.model.model import Model
-from bushfit.report.artifacts import artifact_names, diagnosis_files
-from bushfit.report.folder import to_json
+from bushfit.report.artifacts import diagnosis_contents
+from bushfit.report.contents import Contents, Kinds
 
 if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
@@ -36,12 +36,10 @@ class Diagnosed:
     def document(self) -> Mapping[str, Any]:
         return self.diagnosis.to_document()
 
-    def files(self, formats: Collection[str]) -> dict[str, bytes]:
-        return {
-            "diagnosis.json": to_json(self.document),
-            "model.json": to_json(to_document(self.result)),
-            **diagnosis_files(self.diagnosis, self.name, formats),
-        }
+    @property
+    def contents(self) -> Contents:
+        documents = {"diagnosis": self.document, "model": to_document(self.result)}
+        return Contents(documents) | diagnosis_contents(self.diagnosis, self.name)
 
 
 @dataclass(frozen=True)
@@ -51,13 +49,8 @@ class Diagnose:
     settings: Settings = field(default_factory=Settings)
     model: Model | None = None
 
-    def names(self, campaign: Campaign, formats: Collection[str]) -> list[str]:
-        return [
-            "diagnosis.json",
-            "model.json",
-            *artifact_names(["gap"], formats),
-            *artifact_names(["candidates"], ["csv"]),
-        ]
+    def kinds(self, campaign: Campaign) -> Kinds:
+        return Kinds(("diagnosis", "model"), ("gap", "candidates"), ("gap",))
 
     def run(self, data: Data) -> Diagnosed:
         model = self.model or Model.started(data.campaign.bushing, data.effects, {})

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from bushfit.errors import FitError
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, given_static
 from bushfit.model.file import to_document
-from bushfit.report.artifacts import artifact_names, fit_files
-from bushfit.report.folder import to_json
+from bushfit.report.artifacts import fit_contents
+from bushfit.report.contents import Contents, Kinds
 
 if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
@@ -36,11 +36,9 @@ class Fitted:
     def document(self) -> Mapping[str, Any]:
         return to_document(self.result)
 
-    def files(self, formats: Collection[str]) -> dict[str, bytes]:
-        return {
-            f"{self.stem}.json": to_json(self.document),
-            **files_of_tests(self.data, self.result, self.kinds, formats),
-        }
+    @property
+    def contents(self) -> Contents:
+        return Contents({self.stem: self.document}) | contents_of_tests(self.data, self.result, self.kinds)
 
 
 @dataclass(frozen=True)
@@ -49,8 +47,8 @@ class FitStatic:
 
     dynamic: Result | None = None
 
-    def names(self, campaign: Campaign, formats: Collection[str]) -> list[str]:
-        return ["static.json", *artifact_names(["loops"], formats)]
+    def kinds(self, campaign: Campaign) -> Kinds:
+        return Kinds(("static",)) + Kinds.shown(["loops"])
 
     def run(self, data: Data) -> Fitted:
         result = fit_static(data, self.dynamic)
@@ -63,8 +61,8 @@ class FitDynamic:
 
     static: Result | None = None
 
-    def names(self, campaign: Campaign, formats: Collection[str]) -> list[str]:
-        return ["dynamic.json", *artifact_names(["sweeps"], formats)]
+    def kinds(self, campaign: Campaign) -> Kinds:
+        return Kinds(("dynamic",)) + Kinds.shown(["sweeps"])
 
     def run(self, data: Data) -> Fitted:
         static, reports = self.static or given_static(data), []
@@ -94,8 +92,8 @@ class Fit:
     effects: tuple[str, ...] = ()
     profile: Callable[[str, int], None] | None = None
 
-    def names(self, campaign: Campaign, formats: Collection[str]) -> list[str]:
-        return ["model.json", *artifact_names(tests_of(campaign), formats)]
+    def kinds(self, campaign: Campaign) -> Kinds:
+        return Kinds(("model",)) + Kinds.shown(tests_of(campaign))
 
     def run(self, data: Data) -> Fitted:
         effects = (*data.effects, *(name for name in self.effects if name not in data.campaign.fit.effects))
@@ -108,8 +106,8 @@ def tests_of(campaign: Campaign) -> tuple[str, ...]:
     return tuple(kind for kind in ("loops", "sweeps") if getattr(campaign, kind))
 
 
-def files_of_tests(data: Data, result: Result, kinds: Collection[str], formats: Collection[str]) -> dict[str, bytes]:
-    """Tables and plots of tests of some kinds beside a model, with the outliers that its fit left out marked."""
+def contents_of_tests(data: Data, result: Result, kinds: Collection[str]) -> Contents:
+    """Tables and pictures of tests of some kinds beside a model, with the outliers that its fit left out marked."""
     marked, title = data.without(result.outliers), result.model.name if result.model.bushing else data.campaign.name
     loops, sweeps = (getattr(marked, kind) if kind in kinds else () for kind in ("loops", "sweeps"))
-    return fit_files(result, title, loops, sweeps, formats)
+    return fit_contents(result, title, loops, sweeps)

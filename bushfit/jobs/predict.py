@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -15,8 +15,14 @@ from bushfit.fitting.data_sets import SweepData, sweep_data
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Specimen, place_named
 from bushfit.jobs.grid import default_grid
 from bushfit.prediction import PredictedResonance, Prediction, caveats, predict, predict_resonance
-from bushfit.reading.csvfile import to_csv
-from bushfit.report.artifacts import artifact_names, measured_file, place_files, prediction_files, resonance_files
+from bushfit.report.artifacts import (
+    measured_contents,
+    place_names,
+    prediction_contents,
+    resonance_contents,
+    resonance_names,
+)
+from bushfit.report.contents import Contents, Kinds
 from bushfit.report.tables import prediction_table, shaken_table
 from bushfit.units import CELSIUS
 
@@ -76,15 +82,15 @@ class Predicted:
         pairs = list(zip(self.measured, known, strict=True))
         return [sweep for sweep, old in pairs if old], [sweep for sweep, old in pairs if not old]
 
-    def files(self, formats: Collection[str]) -> dict[str, bytes]:
-        names = resonance_files([found.place for found in self.resonances])
-        tables = {name: to_csv(shaken_table(found)) for name, found in zip(names, self.resonances, strict=True)}
-        files = prediction_files(self.result, self.predictions, self.measured, formats, self.notes)
-        return files | (tables if "csv" in formats else {})
+    @property
+    def contents(self) -> Contents:
+        found = prediction_contents(self.result, self.predictions, self.measured, self.notes)
+        return found | resonance_contents(self.resonances)
 
-    def files_beside(self, formats: Collection[str]) -> dict[str, bytes]:
+    @property
+    def contents_beside(self) -> Contents:
         """The same, and the measured points beside the model's as a table."""
-        return self.files(formats) | measured_file(self.result, *self._parted, formats)
+        return self.contents | measured_contents(self.result, *self._parted)
 
 
 def _filled(table: pd.DataFrame) -> dict[str, list[float | None]]:
@@ -120,11 +126,10 @@ class Predict:
             return [place_named(name, specimens.values()) for name in names]
         return [*(_DIRECTIONS if bodies[0][0] or not specimens else ()), *specimens.values()]
 
-    def names(self, result: Result | None, campaign: Campaign | None, formats: Collection[str]) -> list[str]:
-        """The files of each place."""
+    def kinds(self, result: Result | None, campaign: Campaign | None) -> Kinds:
+        """The tables and pictures of each place."""
         places = self.places(result, campaign)
-        shaken = resonance_files(places) if self.mass and "csv" in formats else []
-        return [*artifact_names(place_files(places), formats), *shaken]
+        return Kinds.shown(place_names(places)) + Kinds(tables=tuple(resonance_names(places) if self.mass else ()))
 
     def run(self, result: Result, campaign: Campaign | None, notes: tuple[str, ...] = ()) -> Predicted:
         """One prediction a place.

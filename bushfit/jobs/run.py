@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 from bushfit.errors import FitError
 from bushfit.fitting.procedures import TwoStep, fit_two_step
 from bushfit.jobs.diagnose import Diagnose, Diagnosed
-from bushfit.jobs.fits import Fit, FitStatic, Fitted, files_of_tests, tests_of
+from bushfit.jobs.fits import Fit, FitStatic, Fitted, contents_of_tests, tests_of
 from bushfit.jobs.predict import Predict, Predicted
 from bushfit.model.file import to_document
 from bushfit.model.model import FIVE
-from bushfit.report.artifacts import artifact_names, diagnosis_files
-from bushfit.report.folder import to_json
+from bushfit.report.artifacts import diagnosis_contents
+from bushfit.report.contents import Contents, Kinds
 
 if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
@@ -56,29 +56,22 @@ class Ran:
         documents = {name: to_document(result) for name, result in results.items() if result}
         return {**documents, "diagnosis": self.diagnosed.document} if self.diagnosed else documents
 
-    def files(self, formats: Collection[str]) -> dict[str, bytes]:
-        found = self.diagnosed
-        return {
-            **{f"{name}.json": to_json(document) for name, document in self.document.items()},
-            **files_of_tests(self.data, self.result, tests_of(self.data.campaign), formats),
-            **(diagnosis_files(found.diagnosis, self.data.campaign.name, formats) if found else {}),
-            **self.predicted.files(formats),
-        }
+    @property
+    def contents(self) -> Contents:
+        campaign, found = self.data.campaign, self.diagnosed
+        of_tests = contents_of_tests(self.data, self.result, tests_of(campaign))
+        of_gap = diagnosis_contents(found.diagnosis, campaign.name) if found else Contents()
+        return Contents(self.document) | of_tests | of_gap | self.predicted.contents
 
 
 @dataclass(frozen=True)
 class Run:
     """The whole chain: the paper's two steps, all parameters together, what is missing, and the prediction."""
 
-    def names(self, campaign: Campaign, formats: Collection[str]) -> list[str]:
-        return [
-            *(["static.json"] if campaign.loops else []),
-            *(["dynamic.json"] if campaign.loops and campaign.sweeps else []),
-            "joint.json",
-            *Diagnose().names(campaign, formats),
-            *artifact_names(tests_of(campaign), formats),
-            *Predict().names(None, campaign, formats),
-        ]
+    def kinds(self, campaign: Campaign) -> Kinds:
+        steps = (("static",) if campaign.loops else ()) + (("dynamic",) if campaign.loops and campaign.sweeps else ())
+        found = Kinds((*steps, "joint")) + Diagnose().kinds(campaign)
+        return found + Kinds.shown(tests_of(campaign)) + Predict().kinds(None, campaign)
 
     def run(self, data: Data) -> Ran:
         static = FitStatic().run(data) if data.loops else None

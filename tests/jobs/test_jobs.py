@@ -21,6 +21,7 @@ from bushfit.jobs.fits import Fit, FitDynamic, FitStatic
 from bushfit.jobs.predict import Predict
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
+from bushfit.report.contents import Formats, Kinds
 
 
 @pytest.fixture(scope="module")
@@ -28,12 +29,12 @@ def campaign(root: Path) -> Campaign:
     return load_campaign(root / "configs/cmp_15961.toml")
 
 
-@pytest.mark.parametrize("formats", [("csv",), ("csv", "png")])
+@pytest.mark.parametrize("formats", [Formats(pictures=False), Formats()], ids=str)
 @pytest.mark.parametrize("job", [FitStatic(), FitDynamic(), Fit(), Diagnose()], ids=lambda job: type(job).__name__)
-def test_an_outcome_holds_the_files_that_were_named(campaign: Campaign, job: Any, formats: tuple[str, ...]) -> None:
+def test_an_outcome_holds_the_files_that_were_named(campaign: Campaign, job: Any, formats: Formats) -> None:
     outcome = job.run(Data.of(campaign))
-    files = outcome.files(formats)
-    assert sorted(files) == sorted(job.names(campaign, formats))
+    files = formats.files(outcome.contents)
+    assert list(files) == formats.names(job.kinds(campaign))
     documents = [json.loads(content) for name, content in files.items() if name.endswith(".json")]
     assert json.loads(json.dumps(outcome.document)) in documents
 
@@ -77,8 +78,7 @@ def test_a_prediction_is_over_what_was_asked_for_before_what_the_campaign_says(
     assert prediction.direction is Direction.RADIAL
     assert prediction.frequency.tolist() == [7.0, 9.0]
     assert prediction.amplitude.tolist() == [1e-4, 1e-4]
-    assert Predict().names(None, said, ("csv",)) == ["radial.csv"]
-    assert list(found.files(("csv",))) == ["radial.csv"]
+    assert Predict().kinds(None, said) == found.contents.kinds == Kinds.shown(["radial"])
 
 
 def test_a_prediction_without_a_campaign_is_axial_and_radial(paper_model: Model) -> None:

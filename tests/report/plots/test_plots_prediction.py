@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from figures import AMPLITUDES, FREQUENCIES, TORSION, Looped, Swept, fitted, labels, legend, lines, points, predicted
-from matplotlib.figure import Figure
 
 from bushfit.fitting.data_sets import sweep_data
 from bushfit.geometry import Direction
@@ -16,7 +15,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
 from bushfit.prediction import predict
 from bushfit.reading.measurement import Sweep
-from bushfit.report.artifacts import prediction_files
+from bushfit.report.artifacts import prediction_contents
 from bushfit.report.plots import loops_figure, prediction_figure, to_png
 
 
@@ -73,19 +72,15 @@ def test_points_of_a_level_that_each_file_reached_a_little_differently_are_all_d
         assert sum(len(line.get_xdata()) for line in points(axes)) == 18
 
 
-def test_points_lie_on_lines_with_the_rig_and_the_bushing_stands_apart(
-    paper_model: Model, swept: Swept, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_points_lie_on_lines_with_the_rig_and_the_bushing_stands_apart(paper_model: Model, swept: Swept) -> None:
     """As `run` draws them: a rig that gives way makes the points softer, and that is no failed fit."""
     rigged = paper_model.with_effect("rig_compliance", {"rig_compliance.compliance": 2e-8})
     result = replace(fitted(rigged), measured=Range((5.0, 155.0), (1e-3, 0.2), (Direction.AXIAL,)))
-    drawn: list[Figure] = []
-    monkeypatch.setattr("bushfit.report.plots.to_png", lambda figure: drawn.append(figure) or b"")
     predictions = [
         predict(result, direction, FREQUENCIES, AMPLITUDES) for direction in (Direction.RADIAL, Direction.AXIAL)
     ]
-    prediction_files(result, predictions, [swept(rigged, Direction.RADIAL)], {"png"})
-    radial, axial = drawn
+    pictures = prediction_contents(result, predictions, [swept(rigged, Direction.RADIAL)]).pictures
+    radial, axial = (picture() for picture in pictures.values())
     for axes, share in ((radial.axes[0], 4.0), (radial.axes[2], 4.0)):
         plain, rig = ([line for line in lines(axes) if (line.get_linewidth() < 1.0) is thin] for thin in (False, True))
         assert len(plain) == len(rig) == len(points(axes))
