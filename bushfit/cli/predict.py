@@ -50,6 +50,14 @@ _MOST_OF_FIT = 3
 @click.option("--temperature", help='Of the rubber, such as "40 degC", for a model with the effect of it [23 degC].')
 @click.option("--mass", help='Predict its resonance on each place, too: such as "1.2 kg", with --base-acceleration.')
 @click.option("--base-acceleration", help='Amplitude of the base under the mass, such as "0.1 g" or "1 m/s^2".')
+@click.option(
+    "--arms",
+    is_flag=False,
+    flag_value="1 %",
+    metavar="[ERROR]",
+    help="Write Maxwell arms in place of the springpot, too, within this error of its modulus over the frequencies "
+    'predicted, such as "0.5 %" [1 %].',
+)
 @shared_options
 def command(
     model: Path,
@@ -59,6 +67,7 @@ def command(
     temperature: str | None,
     mass: str | None,
     base_acceleration: str | None,
+    arms: str | None,
     options: Options,
     **grids: str | None,
 ) -> None:
@@ -71,6 +80,9 @@ def command(
     fitted directions, strains or frequencies.
 
     --mass shakes the base under a mass: the transmissibility over frequency, in <place>_resonance.csv.
+
+    --arms writes springs and dashpots in place of what remembers its past, for programs that step through time:
+    arms.csv, and arms.png with their error. They never give off energy.
 
     --bushing carries the compound to another shape: effects of the material are kept, those of the old bushing and its
     rig are left out, and it is said which.
@@ -100,7 +112,7 @@ def command(
     shaken = positive(mass, "--mass", "kg"), positive(base_acceleration, "--base-acceleration", "m/s^2")
     with naming(place="--temperature"):
         warm = None if temperature is None else kelvin(temperature)
-    job = Predict(PredictSettings(directions=directions or None, **asked), *shaken, warm)
+    job = Predict(PredictSettings(directions=directions or None, **asked), *shaken, warm, positive(arms, "--arms", "1"))
     folder = options.folder(loaded.slug if loaded else folder_name(result.name))
     measured = Kinds(tables=("measured",) if loaded and loaded.sweeps else ())
     options.require_free(folder, options.formats.names(job.kinds(result, loaded) + measured))
@@ -110,6 +122,8 @@ def command(
         frequency, largest = found.peak
         peak = f"resonance at {frequency:.4g} Hz, |T| {largest:.3g}"
         options.say(f"{found.place} under {mass}, base at {base_acceleration}: {peak}")
+    for part in outcome.arms:
+        options.say(part.sentence)
     tell_tests(options, outcome.tests, outcome.usable)
     warn(options, of_fit)
     options.write(folder, options.formats.files(outcome.contents_beside))

@@ -103,7 +103,7 @@ def in_time(order: Order) -> InTime:
     arms = model_arms(kept, band(order), order.accuracy)
     middle = [kept.values_at(p.direction, _middle(p.frequency), _middle(p.amplitude)) for p in order.predictions]
     values, names = _values(kept, order.places, middle, arms)
-    losses = [_told(part) for part in arms]
+    losses = [f"{part.sentence}, and fading below" for part in arms]
     if out := [effect.name for effect in rig.records if effect.level is Level.INSTRUMENT]:
         losses.append(f"left out, because they belong to the rig and not to the bushing: {', '.join(out)}")
     for prediction, own in zip(order.predictions, middle, strict=True):
@@ -216,15 +216,6 @@ def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Ar
             own = (names[qualified(effect, parameter)] for parameter in effect.parameters)
             fields |= dict(zip(FIELDS[_kind(effect)], own, strict=True))
     return fields
-
-
-def _told(part: Arms) -> str:
-    """What arms stand for, and their error."""
-    low, high = (number(end, 3) for end in part.band)
-    return (
-        f"{part.time.size} Maxwell arms stand for what goes with {part.size}: off by at most "
-        f"{number(100.0 * part.error, 2)} % of its modulus from {low} to {high} Hz, fading below"
-    )
 
 
 def _lost(

@@ -6,7 +6,7 @@ in series do the same within a stated error.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from operator import itemgetter
@@ -17,6 +17,7 @@ from bushfit.effects import Branch, qualified
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.model.model import Model, seen_by
+from bushfit.units import number
 
 #: Error that arms have at most where none is asked for, relative to the modulus: that of good tests.
 ACCURACY = 0.01
@@ -48,7 +49,8 @@ class Arms:
     """Springs with dashpots in series, side by side: mu^ = sum_k G_k i w tau_k/(1 + i w tau_k), all G_k, tau_k > 0.
 
     Args:
-        size: name of the parameter that all moduli go with, in proportion; "" where there is none.
+        stands_for: the effects in whose place they are, in words.
+        size: name of the parameter that all moduli are proportional to.
         modulus: G_k [Pa], of the shear modulus mu^, shortest relaxation time first, (k,).
         time: tau_k [s], (k,).
         band: lowest and highest frequency [Hz] at which they are judged.
@@ -57,6 +59,7 @@ class Arms:
     Notes: with no modulus and no time below zero the arms take up energy in any motion; nothing has to be checked.
     """
 
+    stands_for: str
     size: str
     modulus: Array
     time: Array
@@ -67,9 +70,21 @@ class Arms:
         """mu^ [Pa] at angular frequencies [rad/s], (n,)."""
         return _basis(omega, self.time) @ self.modulus
 
+    @property
+    def sentence(self) -> str:
+        """How many they are, what they stand for, and their error."""
+        count, (low, high) = self.time.size, (number(end, 3) for end in self.band)
+        arms = f"{count} Maxwell arm{'s' * (count > 1)} in place of the {self.stands_for}"
+        return f"{arms}: off by at most {number(100.0 * self.error, 2)} % of its modulus from {low} to {high} Hz"
+
 
 def fitted_arms(
-    modulus: Callable[[Array], Array], band: tuple[float, float], accuracy: float = ACCURACY, size: str = ""
+    modulus: Callable[[Array], Array],
+    band: tuple[float, float],
+    accuracy: float = ACCURACY,
+    *,
+    stands_for: str = "",
+    size: str = "",
 ) -> Arms:
     """The fewest arms that have a modulus [Pa], given over rad/s, within a relative error over a band [Hz].
 
@@ -82,15 +97,15 @@ def fitted_arms(
     count = max(_FEWEST, int(_PER_DECADE * np.log10(high / low)))
     omega = 2.0 * np.pi * np.geomspace(low, high, count)
     target, best = modulus(omega), np.inf
-    for number in range(1, _MOST_ARMS + 1):
-        fits = [_fit(omega, target, *start) for start in _starts(omega, target, number)]
+    for arms in range(1, _MOST_ARMS + 1):
+        fits = [_fit(omega, target, *start) for start in _starts(omega, target, arms)]
         error, moduli, times = min(fits, key=itemgetter(0))
         if error <= _WORTHWHILE * accuracy:
             error, moduli, times = _fit(omega, target, moduli, times, _ROUNDS)
         best = min(best, error)
         if error <= accuracy:
             order = np.argsort(times)
-            return Arms(size, moduli[order], times[order], band, error)
+            return Arms(stands_for, size, moduli[order], times[order], band, error)
     raise ModelError(
         "no springs and dashpots come near enough to what depends on the rate",
         found=f"an error of {100.0 * best:.3g} % with up to {_MOST_ARMS} arms",
@@ -104,8 +119,21 @@ def model_arms(model: Model, band: tuple[float, float], accuracy: float = ACCURA
 
     Effects that share a size, as the springpot and the spring in series with it, are one part. A size of 0 is none.
     """
-    sizes = dict.fromkeys(qualified_size(branch) for branch in fading(model))
-    return tuple(fitted_arms(partial(_part, model, size), band, accuracy, size) for size in sizes if model.values[size])
+    parts: dict[str, list[str]] = {}
+    for branch in fading(model):
+        parts.setdefault(qualified_size(branch), []).append(branch.name)
+    return tuple(
+        fitted_arms(partial(part_modulus, model, size), band, accuracy, stands_for=" and ".join(names), size=size)
+        for size, names in parts.items()
+        if model.values[size]
+    )
+
+
+def listed(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float]]:
+    """What each spring stands for, its modulus [Pa] and relaxation time [s]; first, without one, what is elastic."""
+    at_rest = [("elastic", model.values["mu"], np.nan)] if "mu" in model.values else []
+    every = ((part.stands_for, *pair) for part in arms for pair in zip(part.modulus, part.time, strict=True))
+    return at_rest + [(name, float(modulus), float(time)) for name, modulus, time in every]
 
 
 def fading(model: Model) -> tuple[Branch, ...]:
@@ -120,8 +148,8 @@ def qualified_size(branch: Branch) -> str:
     return own.get(branch.size, branch.size)
 
 
-def _part(model: Model, size: str, omega: Array) -> Array:
-    """The modulus [Pa] of the branches of one size, (n,)."""
+def part_modulus(model: Model, size: str, omega: Array) -> Array:
+    """mu^ [Pa] of the branches of one size at angular frequencies [rad/s], (n,)."""
     still = np.zeros_like(omega)
     own = (branch for branch in fading(model) if qualified_size(branch) == size)
     return np.asarray(sum(branch.modulus(seen_by(branch, model.values, model.values), omega, still) for branch in own))
@@ -133,14 +161,14 @@ def _basis(omega: Array, time: Array) -> Array:
     return turn / (1.0 + turn)
 
 
-def _starts(omega: Array, target: Array, number: int) -> Iterator[tuple[Array, Array]]:
+def _starts(omega: Array, target: Array, arms: int) -> Iterator[tuple[Array, Array]]:
     """Moduli and relaxation times to start from: times evenly over the band and a little more, moduli by non-negative
     least squares."""
     from scipy.optimize import nnls
 
     for overhang in _OVERHANGS:
-        ends = np.log(1.0 / omega[[-1, 0]]) + np.array([-overhang, overhang])
-        time = np.exp(np.linspace(*ends, number) if number > 1 else [ends.mean()])
+        first, last = -np.log(omega[-1]) - overhang, -np.log(omega[0]) + overhang
+        time = np.exp(np.linspace(first, last, arms) if arms > 1 else np.array([0.5 * (first + last)]))
         relative = _basis(omega, time) / target[:, None]
         moduli = nnls(np.concatenate((relative.real, relative.imag)), np.repeat([1.0, 0.0], omega.size))[0]
         yield np.maximum(moduli, _SMALLEST * moduli.max() or np.abs(target).mean()), time
@@ -154,14 +182,14 @@ def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 
     """
     from scipy.optimize import least_squares
 
-    number = time.size
+    count = time.size
     root = np.ones(omega.size)
     unit = np.abs(target).mean()
 
     def parts(x: Array) -> tuple[Array, Array]:
         """Each arm over the target, (n, k), and its slope by the logarithm of its time."""
-        basis = _basis(omega, np.exp(x[number:]))
-        arm = basis * unit * np.exp(x[:number]) / target[:, None]
+        basis = _basis(omega, np.exp(x[count:]))
+        arm = basis * unit * np.exp(x[:count]) / target[:, None]
         return arm, arm * (1.0 - basis)
 
     def residual(x: Array) -> Array:
@@ -173,13 +201,13 @@ def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 
         return np.concatenate((both.real, both.imag))
 
     ends = np.log([1.0 / (_BEYOND * omega[-1]), _BEYOND / omega[0]])
-    low, high = (np.repeat([reach, end], number) for reach, end in zip((-np.inf, np.inf), ends, strict=True))
+    low, high = (np.repeat([reach, end], count) for reach, end in zip((-np.inf, np.inf), ends, strict=True))
     x, best = np.concatenate((np.log(moduli / unit), np.log(time))), (np.inf, moduli, time)
     for _ in range(rounds):
         x = least_squares(residual, np.clip(x, low + 1e-9, high - 1e-9), slopes, bounds=(low, high), x_scale=1.0).x
         off = np.abs(parts(x)[0].sum(axis=1) - 1.0)
         if off.max() < best[0]:
-            best = off.max(), unit * np.exp(x[:number]), np.exp(x[number:])
+            best = off.max(), unit * np.exp(x[:count]), np.exp(x[count:])
         if off.max() < LEAST_ACCURACY:
             break
         root = root * np.sqrt(off / off.max() + _KEPT)
