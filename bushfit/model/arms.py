@@ -25,6 +25,12 @@ ACCURACY = 0.01
 LEAST_ACCURACY = 1e-6
 #: Arms at most: a thousandth over ten decades takes fewer.
 _MOST_ARMS = 30
+#: Share of the error that one arm more leaves at most where it counts as better.
+_BETTER = 0.95
+#: Arms in a row that may be no better: then no number of them will do.
+_PATIENCE = 3
+#: Evaluations of one least-squares fit at most: chosen, ten times what it takes from such a start.
+_EVALUATIONS = 200
 #: Frequencies per decade at which the error is judged: it ripples once an arm, and arms lie half a decade apart.
 _PER_DECADE = 30
 #: Frequencies at least, for a narrow band.
@@ -37,10 +43,12 @@ _WORTHWHILE = 4.0
 _KEPT = 1e-3
 #: How far relaxation times may lie beyond the band: there an arm is a spring or a dashpot to seven digits.
 _BEYOND = 1e7
+#: Distance from these ends at which a fit may start: it has to start inside.
+_INSIDE = 1e-9
 #: Nepers by which the first relaxation times reach over the ends of the band, one try each: which is best goes by the
 #: number of arms.
 _OVERHANGS = (0.0, 1.0, 2.0)
-#: First modulus of an arm that the start leaves without any, relative to the largest.
+#: Least modulus of an arm at the start, relative to what the arms are to be together.
 _SMALLEST = 1e-3
 
 
@@ -96,19 +104,21 @@ def fitted_arms(
     low, high = band
     count = max(_FEWEST, int(_PER_DECADE * np.log10(high / low)))
     omega = 2.0 * np.pi * np.geomspace(low, high, count)
-    target, best = modulus(omega), np.inf
-    for arms in range(1, _MOST_ARMS + 1):
+    target, best, stalled, arms = modulus(omega), np.inf, 0, 0
+    while arms < _MOST_ARMS and stalled < _PATIENCE:
+        arms += 1
         fits = [_fit(omega, target, *start) for start in _starts(omega, target, arms)]
         error, moduli, times = min(fits, key=itemgetter(0))
         if error <= _WORTHWHILE * accuracy:
             error, moduli, times = _fit(omega, target, moduli, times, _ROUNDS)
-        best = min(best, error)
         if error <= accuracy:
             order = np.argsort(times)
             return Arms(stands_for, size, moduli[order], times[order], band, error)
+        stalled = 0 if error < _BETTER * best else stalled + 1
+        best = min(best, error)
     raise ModelError(
         "no springs and dashpots come near enough to what depends on the rate",
-        found=f"an error of {100.0 * best:.3g} % with up to {_MOST_ARMS} arms",
+        found=f"an error of {100.0 * best:.3g} % with up to {arms} arms",
         expected=f"{100.0 * accuracy:.3g} % from {low:g} to {high:g} Hz",
         hint="allow a larger error",
     )
@@ -162,16 +172,17 @@ def _basis(omega: Array, time: Array) -> Array:
 
 
 def _starts(omega: Array, target: Array, arms: int) -> Iterator[tuple[Array, Array]]:
-    """Moduli and relaxation times to start from: times evenly over the band and a little more, moduli by non-negative
-    least squares."""
-    from scipy.optimize import nnls
+    """Moduli and relaxation times to start from: times evenly over the band or a little more, moduli by the loss.
 
+    Notes: arms d apart in ln tau have G = 2/pi G''(1/tau) d, where the loss modulus G'' changes little (J. D. Ferry,
+    Viscoelastic Properties of Polymers, 3rd ed., 1980, ch. 4).
+    """
     for overhang in _OVERHANGS:
         first, last = -np.log(omega[-1]) - overhang, -np.log(omega[0]) + overhang
-        time = np.exp(np.linspace(first, last, arms) if arms > 1 else np.array([0.5 * (first + last)]))
-        relative = _basis(omega, time) / target[:, None]
-        moduli = nnls(np.concatenate((relative.real, relative.imag)), np.repeat([1.0, 0.0], omega.size))[0]
-        yield np.maximum(moduli, _SMALLEST * moduli.max() or np.abs(target).mean()), time
+        apart = max(1.0, (last - first) / arms)
+        time = np.exp(first + (last - first) * (np.arange(arms) + 0.5) / arms)
+        loss = np.interp(-np.log(time), np.log(omega), target.imag)
+        yield np.maximum(2.0 / np.pi * loss * apart, _SMALLEST * np.abs(target).mean()), time
 
 
 def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 1) -> tuple[float, Array, Array]:
@@ -204,7 +215,9 @@ def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 
     low, high = (np.repeat([reach, end], count) for reach, end in zip((-np.inf, np.inf), ends, strict=True))
     x, best = np.concatenate((np.log(moduli / unit), np.log(time))), (np.inf, moduli, time)
     for _ in range(rounds):
-        x = least_squares(residual, np.clip(x, low + 1e-9, high - 1e-9), slopes, bounds=(low, high), x_scale=1.0).x
+        x = least_squares(
+            residual, np.clip(x, low + 1e-9, high - 1e-9), slopes, bounds=(low, high), max_nfev=_EVALUATIONS
+        ).x
         off = np.abs(parts(x)[0].sum(axis=1) - 1.0)
         if off.max() < best[0]:
             best = off.max(), unit * np.exp(x[:count]), np.exp(x[count:])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from running import Running, order
+from fmus import Running, order
 
 from bushfit.export.contract import Exported
 from bushfit.export.fmu import export

@@ -9,7 +9,7 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
-from running import HERE, LEVELS, Running, off, order, wandering, written
+from fmus import HERE, LEVELS, Running, off, order, wandering, written
 
 from bushfit.effects import LIBRARY, Branch, Layer, Level, qualified
 from bushfit.effects.contract import Array
