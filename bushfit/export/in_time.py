@@ -106,6 +106,7 @@ def in_time(order: Order) -> InTime:
     losses = [f"{part.sentence}, and fading below" for part in arms]
     if out := [effect.name for effect in rig.records if effect.level is Level.INSTRUMENT]:
         losses.append(f"left out, because they belong to the rig and not to the bushing: {', '.join(out)}")
+    losses += [effect.taken for effect in kept.records if effect.taken]
     for prediction, own in zip(order.predictions, middle, strict=True):
         losses += _lost(kept, held, left, prediction, own)
     return InTime(
