@@ -55,8 +55,7 @@ _MOST_OF_FIT = 3
     is_flag=False,
     flag_value="1 %",
     metavar="[ERROR]",
-    help="Write Maxwell arms in place of the springpot, too, within this error of its modulus over the frequencies "
-    'predicted, such as "0.5 %" [1 %].',
+    help="Also write arms.csv and arms.png: Maxwell arms in place of the springpot, within this error [1 %].",
 )
 @shared_options
 def command(
@@ -80,9 +79,6 @@ def command(
     fitted directions, strains or frequencies.
 
     --mass shakes the base under a mass: the transmissibility over frequency, in <place>_resonance.csv.
-
-    --arms writes springs and dashpots in place of what remembers its past, for programs that step through time:
-    arms.csv, and arms.png with their error. They never give off energy.
 
     --bushing carries the compound to another shape: effects of the material are kept, those of the old bushing and its
     rig are left out, and it is said which.

@@ -261,7 +261,7 @@ USAGE = [
     ("predict|model.json|--bushing|loop.csv", "loop.csv"),
     ("predict|model.json|--strain-amplitudes|1 mm", "--strain-amplitudes: the unit does not fit"),
     ("predict|model.json|--arms|1 mm", "--arms: the unit does not fit"),
-    ("predict|model.json|--arms|-1 %", "--arms: this is not positive"),
+    ("predict|model.json|--arms|0 %", "--arms: this is not positive"),
     ("predict|model.json|--arms|1e-9 %", "no error for arms", "0.0001 % up to 100 %"),
     ("fit|campaign.toml|--direction|torsion", "campaign.toml: no test in the directions asked for", "torsion"),
     ("fit|campaign.toml|--effect|stiffness_factor.mount", "no such direction or specimen", "one of axial, radial, torsion"),
