@@ -41,8 +41,12 @@ class ParameterContrast:
     """One parameter of both results, or a quantity that they make together.
 
     Args:
+        name: of the parameter, or of the quantity at a frequency.
+        unit: SI, of both values and of a difference that is not relative.
+        reference, other: its value in each.
         relative: whether the difference is relative to the reference, or in the unit.
-        difference: of the other less the reference, with its 95 % interval; None where it is not tested.
+        difference: of the other less the reference, ; None where it is not tested.
+        interval: of the difference, low and high with 95 %; None as of it.
         p: probability of so large a difference, or a larger one, by chance; None where it is not tested.
         holm: the same over all that are tested together (Holm, Scand. J. Statist. 6 (1979) 65).
         note: why it is not tested.

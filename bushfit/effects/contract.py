@@ -104,15 +104,19 @@ class Circumstances:
         temperature: of the rubber [K], a number or one per operating point, (n,).
         turn: when in the session a point was measured, from 0 for the first to 1 for the last, as temperature.
         strained: largest strain amplitude that the rubber had seen before [1], as temperature.
+        left: last strain amplitude before that was larger than the point's [1], as temperature; 0 where none was.
+        rested: turns since then, as temperature.
     """
 
     temperature: Array | float | None = None
     turn: Array | float | None = None
     strained: Array | float | None = None
+    left: Array | float | None = None
+    rested: Array | float | None = None
 
     def at(self, points: Any) -> Circumstances:
         """The circumstances of some operating points, by an index; numbers stay."""
-        known = (self.temperature, self.turn, self.strained)
+        known = (self.temperature, self.turn, self.strained, self.left, self.rested)
         return Circumstances(*(each[points] if isinstance(each, np.ndarray) else each for each in known))
 
 
@@ -198,7 +202,7 @@ class Effect:
     replaces: str | None = None
     variant_of: str | None = None
     frees: tuple[str, ...] = ()
-    under: tuple[Literal["temperature", "turn", "strained"], ...] = ()
+    under: tuple[Literal["temperature", "turn", "strained", "left", "rested"], ...] = ()
     taken: str = ""
     harmonic_only: bool = False
     in_place_of: Callable[[Values], dict[str, float]] | None = None
@@ -221,6 +225,8 @@ class Branch(Effect):
             differentiates numerically.
         stress_sensitivities: the same of the stress.
         uses: the paper's parameters that it reads besides its own.
+        size: of a linear branch that fades with memory, the parameter that its modulus is proportional to; Maxwell arms
+            can stand for it. None for all others.
     """
 
     modulus: Callable[[Values, Array, Array], Array]
@@ -228,6 +234,7 @@ class Branch(Effect):
     modulus_sensitivities: Callable[[Values, Array, Array], dict[str, Array]] | None = None
     stress_sensitivities: Callable[[Values, History], dict[str, Array]] | None = None
     uses: tuple[str, ...] = ()
+    size: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

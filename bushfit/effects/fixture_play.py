@@ -14,6 +14,6 @@ EFFECT = replace(
     level=Level.INSTRUMENT,
     parameters=(Parameter("delta", "m", (0.0, 1e-2), 0.0, 1e-5, meaning="play of the fixture, each way"),),
     confirmed_by="put a steel dummy in place of the bushing: play shows as a step in a slow loop",
-    harmonic_error=3e-3,  # with dry friction below, which stands still while the play is crossed
+    harmonic_error=1.2e-2,  # with slip at the sleeve below, which stands still while the play is crossed
     twins=(),
 )

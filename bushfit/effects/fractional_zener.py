@@ -67,6 +67,7 @@ EFFECT = Branch(
     confirmed_by="sweep to twice the highest frequency: the loss factor must fall there",
     variant_of="springpot",
     uses=("m", "alpha"),
+    size="m",
     modulus=modulus,
     stress=stress,
 )

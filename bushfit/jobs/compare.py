@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
@@ -18,6 +18,7 @@ from bushfit.errors import ModelError
 from bushfit.fitting.assess import lack_of_fit
 from bushfit.fitting.data import Data
 from bushfit.geometry import Direction, Specimen
+from bushfit.jobs.compare_document import ComparedEntry, ComparisonFile, Family, Pair
 from bushfit.jobs.fits import Fit
 from bushfit.jobs.grid import common_grid
 from bushfit.jobs.predict import AMPLITUDES, filled
@@ -28,6 +29,8 @@ from bushfit.report.contents import Contents, Kinds
 from bushfit.report.tables import differences_table
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from bushfit.geometry import Place
     from bushfit.model.result import Result
     from bushfit.reading.measurement import Sweep
@@ -112,7 +115,7 @@ class Compared:
         ]
 
     @cached_property
-    def document(self) -> Mapping[str, Any]:
+    def document(self) -> ComparisonFile:
         compared = [_entry(*pair) for pair in zip(self.labels, self.entries, strict=True)]
         pairs = [self._pair(*pair) for pair in zip(self.labels[1:], self.comparisons, strict=True)]
         families = [_family(*pair) for pair in zip(self.labels, self.families, strict=False)]
@@ -125,17 +128,16 @@ class Compared:
             "warnings": self.warnings,
         }
 
-    def _pair(self, label: str, found: Comparison) -> dict[str, Any]:
+    def _pair(self, label: str, found: Comparison) -> Pair:
         """The numbers of one entry against the first."""
-        joint = found.joint and {"p": found.joint[0], "parameters": found.joint[1]}
         return {
             "reference": self.labels[0],
             "other": label,
             "shared_inputs": list(found.shared),
-            "joint": joint,
-            "parameters": [asdict(row) for row in found.parameters],
+            "joint": {"p": found.joint[0], "parameters": found.joint[1]} if found.joint else None,
+            "parameters": [_plain(row) for row in found.parameters],
             "places": {
-                str(each.place): filled(differences_table([(label, found, each)]).iloc[:, 2:])
+                str(each.place): _columns(differences_table([(label, found, each)]).iloc[:, 2:])
                 for each in found.contrasts
             },
         }
@@ -148,7 +150,17 @@ class Compared:
         return Contents({"compare": self.document}) | tables
 
 
-def _entry(label: str, entry: Entry) -> dict[str, Any]:
+def _plain(record: Any) -> Any:
+    """A record as JSON has it."""
+    return asdict(record)
+
+
+def _columns(table: pd.DataFrame) -> dict[str, list[float | str | None]]:
+    """The columns of a table as JSON has them."""
+    return {name: [*column] for name, column in filled(table).items()}
+
+
+def _entry(label: str, entry: Entry) -> ComparedEntry:
     """What an entry is."""
     result = entry.result
     return {
@@ -156,13 +168,13 @@ def _entry(label: str, entry: Entry) -> dict[str, Any]:
         "name": entry.name,
         "source": entry.source,
         "effects": list(result.model.effects),
-        "reduced_chi_square": result.quality and result.quality.reduced_chi_square,
-        "nrmse": result.quality and result.quality.nrmse,
-        "measured": result.measured and asdict(result.measured),
+        "reduced_chi_square": result.quality.reduced_chi_square if result.quality else None,
+        "nrmse": result.quality.nrmse if result.quality else None,
+        "measured": result.measured and _plain(result.measured),
     }
 
 
-def _family(label: str, family: FittedFamily) -> dict[str, Any]:
+def _family(label: str, family: FittedFamily) -> Family:
     """How a family meets the tests, and what was held out of them."""
     evidence, held = family.evidence, family.held
     return {
@@ -173,10 +185,10 @@ def _family(label: str, family: FittedFamily) -> dict[str, Any]:
         "bic": evidence.bic,
         "heldout": held.after,
         "first_there": held.before,
-        "gain": family.gain and list(family.gain),
+        "gain": family.gain,
         "p": family.p,
         "parts": [{"part": part.part, "first": part.before, "heldout": part.after} for part in held.parts],
-        "skipped": [asdict(skipped) for skipped in held.skipped],
+        "skipped": [_plain(skipped) for skipped in held.skipped],
     }
 
 

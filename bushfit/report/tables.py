@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from bushfit.diagnosis.record import Diagnosis
     from bushfit.effects.contract import Array
     from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
-    from bushfit.geometry import Place
+    from bushfit.geometry import Display, Place
+    from bushfit.model.arms import Arms
     from bushfit.model.model import Model
     from bushfit.prediction import PredictedResonance, Prediction
     from bushfit.reduction.resonance import Resonance
@@ -37,12 +38,13 @@ def words(place: Place) -> tuple[str, str, str]:
     return f"{strain} amplitude", stress, modulus
 
 
-def prediction_table(prediction: Prediction) -> pd.DataFrame:
+def prediction_table(prediction: Prediction, display: Display | None = None) -> pd.DataFrame:
     """The table of `predict`: six columns, then low and high of the last four; where something is unresolved these four
-    if it is the rig's; and where sweeps are known what they measured at each point."""
+    if it is the rig's; and where sweeps are known what they measured at each point. Its units are those of the place,
+    or of `display`."""
     import pandas as pd
 
-    (length, length_factor), _, (stiffness, factor) = prediction.direction.display
+    (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     moved, _, resisted = words(prediction.direction)
     force = f"{resisted} [{stiffness}]"
     names, scales = (force, "loss factor [-]", f"storage {force}", f"loss {force}"), (factor, 1.0, factor, factor)
@@ -65,6 +67,29 @@ def prediction_table(prediction: Prediction) -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
+def wide_table(prediction: Prediction, display: Display | None = None) -> pd.DataFrame:
+    """The same with frequency down and amplitude across: a column of stiffness for each amplitude, then of loss factor.
+
+    A point that the grid lacks is an empty cell.
+    """
+    import pandas as pd
+
+    (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
+    frequency, row = np.unique(prediction.frequency, return_inverse=True)
+    amplitude, column = np.unique(prediction.amplitude, return_inverse=True)
+    parts = {
+        words(prediction.direction)[2]: (stiffness, prediction.stiffness.value * factor),
+        "loss factor": ("-", prediction.loss_factor.value),
+    }
+    headers, columns = ["frequency [Hz]"], [frequency]
+    for name, (unit, values) in parts.items():
+        grid = np.full((amplitude.size, frequency.size), np.nan)
+        grid[column, row] = values
+        headers += [f"{name} {level * length_factor:.10g} {length} [{unit}]" for level in amplitude]
+        columns += [*grid]
+    return pd.DataFrame(np.transpose(columns), columns=headers)
+
+
 def shaken_table(found: PredictedResonance) -> pd.DataFrame:
     """The table of a mass on a mount: transmissibility, deformation and stiffness over frequency."""
     import pandas as pd
@@ -84,6 +109,22 @@ def shaken_table(found: PredictedResonance) -> pd.DataFrame:
         other = shaken_table(found.if_rigs).iloc[:, 1:].add_suffix(f", {IF_RIGS}")
         table = pd.concat([table, other], axis=1)
     return table
+
+
+def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> pd.DataFrame:
+    """Maxwell arms, a row an arm, and before them the spring that stands beside: modulus, stiffness at each place,
+    relaxation time."""
+    import pandas as pd
+
+    from bushfit.model.arms import listed
+
+    names, moduli, times = zip(*listed(model, arms), strict=True)
+    modulus = np.array(moduli)
+    columns = {"in place of": names, "relaxation time [s]": times, "shear modulus [MPa]": 1e-6 * modulus}
+    for place in places:
+        *_, (unit, factor) = place.display
+        columns[f"{place} {words(place)[2]} [{unit}]"] = factor * model.stiffness_per_modulus(place) * modulus
+    return pd.DataFrame(columns)
 
 
 def loops_table(model: Model, data_sets: Sequence[LoopData]) -> pd.DataFrame:

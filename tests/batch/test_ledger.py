@@ -11,6 +11,7 @@ from bushfit.batch import ledger
 from bushfit.batch.manifest import Row, Settings, read_manifest
 from bushfit.batch.points import parse_point
 from bushfit.errors import OutputError
+from bushfit.report.contents import Formats
 
 FILES = {"model.json": b"{}", "loops.csv": b"time [s]\n1\n"}
 
@@ -25,7 +26,7 @@ def row(tmp_path: Path) -> Row:
 def kept(output: Path, row: Row, status: str = "done") -> ledger.Record:
     """A row's folder as a worker leaves it."""
     record = {
-        "key": ledger.key(row, (), ("csv",)),
+        "key": ledger.key(row, (), Formats(pictures=False)),
         "status": status,
         "inputs": {"a.toml": ledger.digest(b"campaign")},
         "files": {name: ledger.digest(content) for name, content in FILES.items()},
@@ -36,7 +37,7 @@ def kept(output: Path, row: Row, status: str = "done") -> ledger.Record:
 
 
 def standing(output: Path, row: Row) -> ledger.Record | None:
-    return ledger.standing(output, row, ledger.key(row, (), ("csv",)))
+    return ledger.standing(output, row, ledger.key(row, (), Formats(pictures=False)))
 
 
 def test_what_was_kept_stands(row: Row, tmp_path: Path) -> None:
@@ -72,13 +73,13 @@ def test_the_key_changes_with_all_that_the_answer_depends_on(row: Row) -> None:
     point = parse_point("axial 25 Hz 0.1 mm")
     other = replace(row, settings=replace(row.settings, effects=("inertia",)))
     keys = [
-        ledger.key(row, (), ("csv",)),
-        ledger.key(row, (point,), ("csv",)),
-        ledger.key(row, (), ("csv", "png")),
-        ledger.key(other, (), ("csv",)),
+        ledger.key(row, (), Formats(pictures=False)),
+        ledger.key(row, (point,), Formats(pictures=False)),
+        ledger.key(row, (), Formats()),
+        ledger.key(other, (), Formats(pictures=False)),
     ]
     assert len(set(keys)) == 4
-    assert ledger.key(row, (point,), ("csv",)) == keys[1]
+    assert ledger.key(row, (point,), Formats(pictures=False)) == keys[1]
 
 
 def test_later_results_replace_earlier_ones(row: Row, tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from bushfit.batch.work import Orders, given_up, work
 from bushfit.errors import BatchError
 from bushfit.geometry import Direction
 from bushfit.model.file import load_result
+from bushfit.report.contents import Formats
 
 POINT = parse_point("axial 25 Hz 0.1 mm")
 
@@ -30,7 +31,7 @@ def rows(shop: Path) -> list[Row]:
 def orders(shop: Path) -> Orders:
     for name in ("bushings", ".aside"):
         (shop / "out" / name).mkdir(parents=True)
-    return Orders(shop / "out", (POINT,), ("csv",), resume=True)
+    return Orders(shop / "out", (POINT,), Formats(pictures=False), resume=True)
 
 
 def test_a_record_holds_the_numbers_of_the_files_beside_it(rows: list[Row], orders: Orders) -> None:
@@ -54,7 +55,7 @@ def test_a_row_that_fails_costs_that_row_and_says_why(rows: list[Row], orders: O
 
 
 def test_a_worker_of_another_version_refuses(rows: list[Row], orders: Orders) -> None:
-    other = Orders(orders.output, (), (), resume=False, version="0.0.0")
+    other = Orders(orders.output, (), Formats(False, False), resume=False, version="0.0.0")
     with pytest.raises(BatchError, match=r"another bushfit[\s\S]*0\.0\.0"):
         work(rows, other)
 

@@ -1,0 +1,130 @@
+"""Workbooks as bushfit writes them: numbers in full, texts as texts, whatever they look like."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+from bushfit.errors import OutputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from xlsxwriter import Workbook
+    from xlsxwriter.format import Format
+
+#: Characters that the name of a sheet must not have.
+_UNSAFE_IN_SHEETS = re.compile(r"[\[\]:*?/\\\x00-\x1f]")
+#: Characters of the name of a sheet at most.
+_LONGEST_SHEET = 31
+#: The name of a sheet that Excel keeps for itself.
+_RESERVED = "history"
+#: Characters of a cell at most.
+_LONGEST_TEXT = 32_767
+#: When a workbook says it was made: that of its zip archive, so that the same tables are the same bytes.
+_MADE = datetime(1980, 1, 1, tzinfo=UTC)
+#: Widest column [characters].
+_WIDEST = 60
+#: What XlsxWriter gives back for a cell that lies beyond the last row or column of a sheet.
+_BEYOND = -1
+
+
+class Sheet:
+    """Writes rows of texts and numbers to a sheet as they come, below headers in bold that stay in sight.
+
+    Every text is written as a text: nothing is run as a formula or taken for a link or a number. Cells without a value,
+    and nan, stay empty.
+    """
+
+    def __init__(self, book: Workbook, name: str, headers: Iterable[str]) -> None:
+        self._sheet = book.add_worksheet(name)
+        self._sheet.freeze_panes(1, 0)
+        self._widths: dict[int, int] = {}
+        self._count = 0
+        self._add(headers, book.add_format({"bold": True}))
+
+    def add(self, cells: Iterable[str | float | None]) -> None:
+        """Write one row.
+
+        Raises:
+            OutputError: more rows or columns than a sheet has.
+        """
+        self._add(cells)
+
+    def _add(self, cells: Iterable[str | float | None], look: Format | None = None) -> None:
+        for place, cell in enumerate(cells):
+            if isinstance(cell, str):
+                self._widen(place, len(cell))
+                beyond = self._sheet.write_string(self._count, place, _text(cell), look) == _BEYOND
+            elif cell is not None and cell - cell == 0:  # neither nan nor infinite, which no cell holds
+                beyond = self._sheet.write_number(self._count, place, cell) == _BEYOND
+            else:
+                continue
+            if beyond:
+                raise OutputError(
+                    "a table is too large for a sheet",
+                    place=self._sheet.name,
+                    expected="at most 1,048,576 rows and 16,384 columns",
+                    hint="--table-format csv has no such limit",
+                )
+        self._count += 1
+
+    def _widen(self, place: int, letters: int) -> None:
+        """Make a column as wide as its widest text, as far as that goes."""
+        width = min(_WIDEST, letters + 1)
+        if width > self._widths.get(place, 0):
+            self._widths[place] = width
+            self._sheet.set_column(place, place, width)
+
+
+def to_xlsx(tables: Mapping[str, pd.DataFrame]) -> bytes:
+    """The bytes of a workbook with a sheet for each table, by its name, which is changed where Excel does not take it.
+
+    Raises:
+        OutputError: a table that is too large for a sheet.
+    """
+    stream, names = io.BytesIO(), set[str]()
+    with _book(stream, in_memory=True) as book:
+        for title, table in tables.items():
+            sheet = Sheet(book, _sheet_name(title, names), map(str, table.columns))
+            for cells in zip(*(column.tolist() for _, column in table.items()), strict=True):
+                sheet.add(cells)
+    return stream.getvalue()
+
+
+@contextmanager
+def streamed(file: Path, headers: Iterable[str]) -> Iterator[Sheet]:
+    """The one sheet of a new workbook, named after its file, whose rows are held in a file beside it until its end."""
+    with file.open("wb") as stream, _book(stream, constant_memory=True, tmpdir=str(file.parent)) as book:
+        yield Sheet(book, _sheet_name(file.stem, set()), headers)
+
+
+@contextmanager
+def _book(stream: IO[bytes], **options: object) -> Iterator[Workbook]:
+    """A workbook that is whole in the end; also after an error, so that no file of its rows stays."""
+    from xlsxwriter import Workbook
+
+    with Workbook(stream, options) as book:
+        book.set_properties({"created": _MADE})
+        yield book
+
+
+def _text(text: str) -> str:
+    """A text as a cell holds it."""
+    return text.encode("utf-8", "replace").decode()[:_LONGEST_TEXT]
+
+
+def _sheet_name(title: str, taken: set[str]) -> str:
+    """A name that Excel takes and no other sheet has, its capitals aside; it joins those that are taken."""
+    plain = _UNSAFE_IN_SHEETS.sub("_", _text(title))[:_LONGEST_SHEET].strip(" '") or "table"
+    name, count = plain, 1
+    while name.lower() in taken or name.lower() == _RESERVED:
+        count += 1
+        end = f"_{count}"
+        name = plain[: _LONGEST_SHEET - len(end)] + end
+    taken.add(name.lower())
+    return name
