@@ -199,17 +199,17 @@ def _left_out(result: Result, found: Prediction) -> Iterator[str]:
     place, stiffness = found.direction, found.stiffness.value
     rig, measured = rig_effects(result), found.measured
     if rig and measured is not None and not np.isnan(measured).all():
-        off = _range(stiffness / np.abs(measured))
+        off = percent_off(stiffness / np.abs(measured))
         yield f"{place}: without {' and '.join(rig)} the predicted stiffness is {off} against what was measured"
     if found.if_rigs:
         for name in result.unresolved:
             twins = " or ".join(effect_named(name).twins)
             yield f"{name} is taken as the bushing's, but these tests cannot tell it from {twins}"
-        off = _range(found.if_rigs.stiffness.value / stiffness)
+        off = percent_off(found.if_rigs.stiffness.value / stiffness)
         yield f"{place}: stiffness {off} if {' and '.join(result.unresolved)} is the rig's; low and high span both"
 
 
-def _range(ratio: Array) -> str:
+def percent_off(ratio: Array) -> str:
     """How far ratios are off 1, in words: "+1.2 to +3.4 %"."""
     ends = [number(100.0 * end - 100.0, 2, "+") for end in (np.nanmin(ratio), np.nanmax(ratio))]
     return f"{' to '.join(dict.fromkeys(ends))} %"

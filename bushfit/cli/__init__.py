@@ -20,6 +20,7 @@ _COMMANDS = {
     "fit-dynamic": ("fit.dynamic", "Smallest-amplitude sweep -> m, alpha (rate dependence)."),
     "fit": ("fit.fit", "Loops and sweeps -> all five parameters together: the fit to use."),
     "predict": ("predict", "Model -> axial and radial stiffness tables and plots."),
+    "export": ("export", "Model -> files of solvers, multibody codes and spreadsheets."),
     "diagnose": ("diagnose", "Where do model and tests disagree? What is missing? Add it, show the gap shrink."),
     "batch": ("batch", "Many campaigns at once -> one table, limits, a report for CI."),
     "scorecard": ("scorecard", "How often is diagnose right? Judged on hidden campaigns."),

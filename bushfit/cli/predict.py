@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, example, open_model, option_of, path_option, place_option, shared_options
+from bushfit.cli.common import Options, example, open_model, path_option, place_option, shared_options
+from bushfit.cli.grids import grid_options, parse_grids, positive
 from bushfit.cli.show import new_table, tell_tests, warn
 
 if TYPE_CHECKING:
@@ -15,8 +16,6 @@ if TYPE_CHECKING:
 
 #: Amplitudes of a direction that the terminal shows at most, spread from first to last; the CSV has all.
 _MOST_AMPLITUDES = 8
-#: Options of the grid, and the SI unit of each.
-_GRIDS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
 #: Warnings of the fit that a prediction repeats at most; the model file has all.
 _MOST_OF_FIT = 3
 
@@ -43,10 +42,7 @@ _MOST_OF_FIT = 3
     help="axial, radial or torsion, or a specimen's name; may be given again [axial and radial of a bushing, and all "
     "specimens].",
 )
-@click.option("--frequencies", help='Such as "5:155:10 Hz" or "20, 50, 100 Hz" [the campaign\'s].')
-@click.option("--amplitudes", help='Zero-to-peak, such as "0.1, 0.2, 0.5 mm" [the campaign\'s].')
-@click.option("--torsion-amplitudes", help='Zero-to-peak rotation, for --direction torsion ["0.5, 1, 2 deg"].')
-@click.option("--strain-amplitudes", help='Zero-to-peak strain, for specimens that give a modulus ["1, 2, 5 %"].')
+@grid_options
 @click.option("--temperature", help='Of the rubber, such as "40 degC", for a model with the effect of it [23 degC].')
 @click.option("--mass", help='Predict its resonance on each place, too: such as "1.2 kg", with --base-acceleration.')
 @click.option("--base-acceleration", help='Amplitude of the base under the mass, such as "0.1 g" or "1 m/s^2".')
@@ -86,7 +82,6 @@ def command(
     from bushfit.campaign.campaign import load_bushing, load_campaign
     from bushfit.campaign.naming import folder_name
     from bushfit.campaign.schema import PredictSettings
-    from bushfit.cli.grids import parse_grid, positive
     from bushfit.errors import naming
     from bushfit.jobs.predict import Predict
     from bushfit.model.result import carried
@@ -102,7 +97,7 @@ def command(
         notes.append(note)
         directions = directions or ("axial", "radial")
     loaded = load_campaign(campaign) if campaign else None
-    asked = {name: parse_grid(grids[name], option_of(name), unit) for name, unit in _GRIDS.items()}
+    asked = parse_grids(grids)
     if (mass is None) != (base_acceleration is None):
         raise click.UsageError("'--mass' and '--base-acceleration' go together.")
     shaken = positive(mass, "--mass", "kg"), positive(base_acceleration, "--base-acceleration", "m/s^2")

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
+from bushfit.export.systems import UnitSystem
 from bushfit.geometry import Place
 from bushfit.model.result import Result
 from bushfit.prediction import Prediction
 from bushfit.reading.measurement import Source
+
+#: Whose bulk data the format `nastran` writes: MSC and NX Nastran's, or Altair OptiStruct's.
+Dialect = Literal["nastran", "optistruct"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,12 +25,16 @@ class Order:
         source: the file it came from, with its SHA-256.
         predictions: its dynamic stiffness over the whole grid of frequencies and amplitudes, one a place.
         accuracy: largest relative error of the modulus that arms in place of a springpot may have.
+        units: of the files; None leaves them to the format: mm, t, s and N in decks, those of people in tables.
+        dialect: of the format `nastran`.
     """
 
     result: Result
     source: Source
     predictions: tuple[Prediction, ...]
     accuracy: float
+    units: UnitSystem | None = None
+    dialect: Dialect = "nastran"
 
     @property
     def places(self) -> tuple[Place, ...]:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from bushfit.diagnosis.record import Diagnosis
     from bushfit.effects.contract import Array
     from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
-    from bushfit.geometry import Place
+    from bushfit.geometry import Display, Place
     from bushfit.model.arms import Arms
     from bushfit.model.model import Model
     from bushfit.prediction import PredictedResonance, Prediction
@@ -36,12 +36,13 @@ def words(place: Place) -> tuple[str, str, str]:
     return f"{strain} amplitude", stress, modulus
 
 
-def prediction_table(prediction: Prediction) -> pd.DataFrame:
+def prediction_table(prediction: Prediction, display: Display | None = None) -> pd.DataFrame:
     """The table of `predict`: six columns, then low and high of the last four; where something is unresolved these four
-    if it is the rig's; and where sweeps are known what they measured at each point."""
+    if it is the rig's; and where sweeps are known what they measured at each point. Its units are those of the place,
+    or of `display`."""
     import pandas as pd
 
-    (length, length_factor), _, (stiffness, factor) = prediction.direction.display
+    (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     moved, _, resisted = words(prediction.direction)
     force = f"{resisted} [{stiffness}]"
     names, scales = (force, "loss factor [-]", f"storage {force}", f"loss {force}"), (factor, 1.0, factor, factor)
@@ -62,6 +63,29 @@ def prediction_table(prediction: Prediction) -> pd.DataFrame:
     if (measured := prediction.measured) is not None:
         columns |= {f"measured {names[0]}": np.abs(measured) * factor, f"measured {names[1]}": loss_factor(measured)}
     return pd.DataFrame(columns)
+
+
+def wide_table(prediction: Prediction, display: Display | None = None) -> pd.DataFrame:
+    """The same with frequency down and amplitude across: a column of stiffness for each amplitude, then of loss factor.
+
+    A point that the grid lacks is an empty cell.
+    """
+    import pandas as pd
+
+    (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
+    frequency, row = np.unique(prediction.frequency, return_inverse=True)
+    amplitude, column = np.unique(prediction.amplitude, return_inverse=True)
+    parts = {
+        words(prediction.direction)[2]: (stiffness, prediction.stiffness.value * factor),
+        "loss factor": ("-", prediction.loss_factor.value),
+    }
+    headers, columns = ["frequency [Hz]"], [frequency]
+    for name, (unit, values) in parts.items():
+        grid = np.full((amplitude.size, frequency.size), np.nan)
+        grid[column, row] = values
+        headers += [f"{name} {level * length_factor:.10g} {length} [{unit}]" for level in amplitude]
+        columns += [*grid]
+    return pd.DataFrame(np.transpose(columns), columns=headers)
 
 
 def shaken_table(found: PredictedResonance) -> pd.DataFrame:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import cycle
 from typing import Any
 
 import numpy as np
+from spoiled_exports import EXPORTS
 from spoiled_rows import IN_CAMPAIGN, IN_MODEL, IN_MORE, IN_RESONANCE, USAGE, WHOLE_CAMPAIGNS, WHOLE_MODELS
 from spoiled_tables import IN_LOOP, IN_SWEEP
 
@@ -146,6 +147,8 @@ TAKING_MODELS = (
     ("fit-static", "campaign.toml", "--dynamic", "model.json"),
     ("fit-dynamic", "campaign.toml", "--static", "model.json"),
 )
+#: The formats that are written without a compiler.
+EXPORT = ("export", "model.json", *(f"--format={name}" for name in ("nastran", "abaqus", "adams", "csv", "xlsx")))
 
 
 @dataclass(frozen=True)
@@ -180,18 +183,24 @@ def campaigns() -> Iterator[Spoiled]:
 
 
 def models() -> Iterator[Spoiled]:
-    """One entry of the model file changed; the commands that take a model in turn."""
+    """One entry of the model file changed; the commands that take a model in turn, and export each."""
     commands = cycle(TAKING_MODELS)
     for name, change, *says in IN_MODEL:
         document = json.loads(json.dumps(MODEL))
         change(document)
-        yield Spoiled(name, next(commands), tuple(says), {"model.json": json.dumps(document)})
+        yield from given(name, next(commands), says, json.dumps(document))
     for name, content, *says in WHOLE_MODELS:
-        yield Spoiled(name, next(commands), tuple(says), {"model.json": content})
+        yield from given(name, next(commands), says, content)
+
+
+def given(name: str, command: tuple[str, ...], says: Iterable[str], model: str | bytes | None) -> Iterator[Spoiled]:
+    """A model file, to a command and to export."""
+    yield Spoiled(name, command, tuple(says), {"model.json": model})
+    yield Spoiled(f"export: {name}", EXPORT, tuple(says), {"model.json": model})
 
 
 def usage() -> Iterator[Spoiled]:
-    for command, *says in USAGE:
+    for command, *says in [*USAGE, *EXPORTS]:
         yield Spoiled(command, tuple(command.split("|")), tuple(says))
 
 

@@ -26,6 +26,7 @@ CAMPAIGN = "configs/cmp_15961.toml"
         ("run", CAMPAIGN),
         ("predict", "model/model.json"),
         ("simulate", "model/model.json"),
+        ("export", "model/model.json", "--format", "abaqus"),
     ],
     ids=lambda arguments: arguments[0],
 )
@@ -123,7 +124,7 @@ def test_everyday_units_need_no_pint(work: Path, tmp_path: Path) -> None:
     assert (tmp_path / "fit" / "model.json").exists()
 
 
-@pytest.mark.parametrize("command", ["run", "fit-static", "fit-dynamic", "fit", "predict", "simulate"])
+@pytest.mark.parametrize("command", ["run", "fit-static", "fit-dynamic", "fit", "predict", "simulate", "export"])
 def test_every_command_has_help_that_names_its_files(bushfit: Run, command: str) -> None:
     done = bushfit(command, "--help")
     assert done.returncode == 0

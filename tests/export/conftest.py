@@ -1,26 +1,73 @@
-"""FMUs that several tests run, each made once."""
+"""The paper's bushing to be exported over the whole grid of the kept computation, which bushfit did not make."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+import pandas as pd
 import pytest
-from fmus import Running, order
+from kept import HASH
 
-from bushfit.export.contract import Exported
-from bushfit.export.fmu import export
+from bushfit.export.contract import Exported, Order
+from bushfit.geometry import Direction
 from bushfit.model.model import Model
+from bushfit.model.result import Result
+from bushfit.prediction import predict
+from bushfit.reading.measurement import Source
+
+if TYPE_CHECKING:
+    from fmus import Running
+
+
+@pytest.fixture(scope="session")
+def known(root: Path) -> pd.DataFrame:
+    """Direction, frequency, amplitude, |K| and loss factor in SI, from an independent computation in time."""
+    table = pd.read_csv(root / "data/reference/stiffness_table1.csv")
+    return table.set_axis(["direction", "frequency", "amplitude", "stiffness", "loss"], axis=1)
+
+
+@pytest.fixture(scope="session")
+def order(known: pd.DataFrame, paper_model: Model) -> Order:
+    """All directions; axially five amplitudes, radially four, in torsion three."""
+    result = Result(paper_model)
+    predictions = [
+        predict(result, direction, rows["frequency"].unique(), rows["amplitude"].unique())
+        for direction in Direction
+        for rows in [known[known["direction"] == direction]]
+    ]
+    return Order(result, Source(Path("model.json"), HASH), tuple(predictions), 0.01)
+
+
+@pytest.fixture(scope="session")
+def named(order: Order) -> Callable[[str], Order]:
+    """The same of a bushing, and from a file, of any name."""
+
+    def called(name: str) -> Order:
+        assert order.result.model.bushing is not None
+        model = replace(order.result.model, bushing=replace(order.result.model.bushing, name=name))
+        return replace(order, result=Result(model), source=Source(Path(name.replace("\0", "") or "x"), HASH))
+
+    return called
 
 
 @pytest.fixture(scope="session")
 def exported(paper_model: Model) -> Exported:
-    """The paper's bushing in three directions, for all systems."""
-    return export(order(paper_model))
+    """The paper's bushing in three directions as an FMU for all systems."""
+    from fmus import order_of
+
+    from bushfit.export.fmu import export
+
+    return export(order_of(paper_model))
 
 
 @pytest.fixture(scope="session")
 def paper(exported: Exported, tmp_path_factory: pytest.TempPathFactory) -> Running:
     """The same, ready to run."""
+    from fmus import Running
+
     folder = tmp_path_factory.mktemp("fmu")
     ((name, content),) = exported.files.items()
     (folder / name).write_bytes(content)

@@ -1,0 +1,89 @@
+"""`bushfit export`: model -> files of solvers, multibody codes and spreadsheets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from bushfit.cli.common import Options, example, open_model, path_option, place_option, shared_options
+from bushfit.cli.grids import grid_options, parse_grids, positive
+from bushfit.cli.show import warn
+
+#: Names of the formats; jobs/export.py, which knows where each is written, is slow to import.
+_FORMATS = ("fmu", "nastran", "abaqus", "adams", "csv", "xlsx")
+
+
+@click.command(
+    "export",
+    epilog=example(
+        "bushfit export data/arm_bushing/truth.json --format nastran --format xlsx",
+        'bushfit export data/arm_bushing/truth.json --format abaqus --units "m kg s N" -o results/si',
+    ),
+)
+@click.argument("model", type=click.Path(path_type=Path))
+@click.option(
+    "--format", "formats", type=click.Choice(_FORMATS), multiple=True, required=True, help="May be given again."
+)
+@path_option("--campaign", help="Take the grid of this campaign's [predict], or of its sweeps.")
+@place_option(
+    "directions",
+    multiple=True,
+    help="axial, radial or torsion, or a specimen's name; may be given again [axial and radial, and all specimens].",
+)
+@grid_options
+@click.option(
+    "--units",
+    help='Length, mass, time and force that fit together [decks "mm t s N"; tables as predict; fmu SI].',
+)
+@click.option("--dialect", type=click.Choice(["optistruct"]), help="Of --format nastran: |K| and loss angle.")
+@click.option("--accuracy", default="1 %", help="Largest error of the modulus that an fmu may have [1 %].")
+@shared_options
+def command(
+    model: Path,
+    formats: tuple[str, ...],
+    campaign: Path | None,
+    directions: tuple[str, ...],
+    units: str | None,
+    dialect: Literal["optistruct"] | None,
+    accuracy: str,
+    options: Options,
+    **grids: str | None,
+) -> None:
+    """MODEL (the model.json of run, fit or diagnose, or dynamic.json) in the files of other programs.
+
+    Writes bushing.bdf (nastran), bushing.fem (with --dialect optistruct), bushing.inp (abaqus), bushing_car.bus and
+    bushing_ride.bus (adams), a .fmu (fmu), bushing.xlsx, or a CSV file for each table. Says what each format cannot
+    carry, and what that costs. Effects of the rig are left out. z is the bushing's axis.
+    """
+    from bushfit.campaign.campaign import load_campaign
+    from bushfit.campaign.naming import folder_name
+    from bushfit.campaign.schema import PredictSettings
+    from bushfit.errors import naming
+    from bushfit.export.systems import UnitSystem
+    from bushfit.jobs.export import Export, source_of
+    from bushfit.jobs.predict import Predict
+
+    result, loaded = open_model(model), load_campaign(campaign) if campaign else None
+    asked = parse_grids(grids)
+    if dialect and "nastran" not in formats:
+        raise click.UsageError("'--dialect' is of '--format nastran'.")
+    with naming(place="--units"):
+        system = UnitSystem.parse(units) if units is not None else None
+    job = Export(
+        tuple(dict.fromkeys(formats)),
+        Predict(PredictSettings(directions=directions or None, **asked)),
+        positive(accuracy, "--accuracy", "1") or 0.0,
+        system,
+        dialect or "nastran",
+    )
+    folder = options.folder(loaded.slug if loaded else folder_name(result.name))
+    options.require_free(folder, [])
+    outcome = job.run(result, source_of(model), loaded)
+    for name, exported in outcome.exported.items():
+        for loss in exported.losses:
+            options.say(f"{name} leaves out: {loss}")
+    warn(options, outcome.predicted.warnings)
+    options.write(folder, outcome.files)
+    options.tell(outcome.document)

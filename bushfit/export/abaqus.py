@@ -1,0 +1,101 @@
+"""Abaqus: a connector whose stiffness and damping follow tables over frequency, and the compound as a material.
+
+Connector: with FREQUENCY DEPENDENCE=ON all 21 constants of the symmetric 6 x 6 matrix stand in three lines a frequency,
+its upper triangle column by column. Forces are D u + C du/dt, so C is the loss stiffness over 2 pi f.
+
+Material: neo-Hooke with C10 = G/2 for the long-term modulus G (of the elastic branch) and D1 = 0 for an incompressible
+rubber. The table has omega Re(g*) = G''/G and omega Im(g*) = 1 - G'/G, two columns of bulk, which are zero, and the
+frequency.
+
+Source: Abaqus Keywords Reference Guide, *CONNECTOR ELASTICITY, *CONNECTOR DAMPING, *HYPERELASTIC and *VISCOELASTIC;
+Abaqus Analysis User's Guide, "Frequency domain viscoelasticity".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from bushfit.effects import Level as EffectLevel
+from bushfit.effects.contract import Array
+from bushfit.export.contract import Exported, Order
+from bushfit.export.deck import commented, heading, stated, to_bytes
+from bushfit.export.levels import Level, by_dof, directions, levels, tables
+from bushfit.export.losses import Form, of_tables
+from bushfit.export.systems import MM_T_S_N, UnitSystem
+from bushfit.geometry import Specimen
+from bushfit.units import number
+
+#: Constants of a symmetric 6 x 6 matrix, and how many of them a data line holds.
+_CONSTANTS, _A_LINE = 21, 8
+#: The parameter that is the long-term modulus [Pa].
+_LONG_TERM = "mu"
+#: Where the material's modulus is asked for: engineering shear strain, which is twice the equivalent strain.
+_COMPOUND = Specimen("compound", "modulus")
+
+_FORM = Form(
+    lambda f, k: (k.real, k.imag / (2.0 * np.pi * f)),
+    lambda f, a, b: a + 2j * np.pi * f * b,
+)
+
+
+def export(order: Order) -> Exported:
+    """A connector behavior for each amplitude, and the compound at the strains of the first direction."""
+    units = order.units or MM_T_S_N
+    losses = tuple(of_tables(order, _FORM))
+    if known := _LONG_TERM in order.result.model.values:
+        losses += ("compound: strain is uniform in a material, so the amplitude of each element is that of the table",)
+    else:
+        losses += ("compound: no elastic branch, so no long-term modulus, and no material",)
+    about = f"{units}; frequency in {units.frequency.name}, rotation in rad"
+    used = "behaviors are for CONN3D2 of type BUSHING; they act in *STEADY STATE DYNAMICS, DIRECT"
+    lines = commented("**", [*heading(order, about, losses), used])
+    for rank, level in enumerate(levels(order), start=1):
+        lines += commented("**", [f"BUSHING_{rank}: {stated(level)}"])
+        lines += [f"*CONNECTOR BEHAVIOR, NAME=BUSHING_{rank}", *_behavior(level, units)]
+    return Exported({"bushing.inp": to_bytes([*lines, *(_materials(order, units) if known else ())])}, losses)
+
+
+def _behavior(level: Level, units: UnitSystem) -> Iterator[str]:
+    """Elasticity and damping of one amplitude."""
+    frequency = level[0].frequency
+    diagonals = np.zeros((2, 6, frequency.size))
+    for dof, table in by_dof(level):
+        factor = units.display(table.direction.motion).stiffness.factor
+        storage, damping = _FORM.parts(frequency, table.stiffness * factor)
+        diagonals[:, dof - 1] = storage, damping * units.time.factor
+    for keyword, diagonal in zip(("ELASTICITY", "DAMPING"), diagonals, strict=True):
+        yield f"*CONNECTOR {keyword}, FREQUENCY DEPENDENCE=ON"
+        for f, values in zip(frequency * units.frequency.factor, diagonal.T, strict=True):
+            yield from _constants(values, f)
+
+
+def _constants(diagonal: Array, frequency: float) -> Iterator[str]:
+    """The lines of one frequency: the upper triangle of a diagonal matrix, (6,), column by column."""
+    triangle = np.diag(diagonal).T[np.tril_indices(6)]
+    texts = [_real(value) for value in (*triangle, frequency)]
+    for start in range(0, _CONSTANTS + 1, _A_LINE):
+        yield ", ".join(texts[start : start + _A_LINE])
+
+
+def _materials(order: Order, units: UnitSystem) -> Iterator[str]:
+    """The compound at the strain of each amplitude of the first direction."""
+    model, first = order.result.model.without(EffectLevel.INSTRUMENT), directions(order)[0]
+    long_term = model.values[_LONG_TERM]
+    for rank, table in enumerate(tables(first), start=1):
+        strain = 2.0 * table.amplitude * model.unit_strain(table.direction)
+        ratio = model.stiffness(_COMPOUND, table.frequency, strain) / long_term
+        where = f"shear strain amplitude {number(100.0 * strain, 6)} %, that of {stated((table,))}"
+        yield from commented("**", [f"COMPOUND_{rank}: {where}"])
+        yield f"*MATERIAL, NAME=COMPOUND_{rank}"
+        yield "*HYPERELASTIC, NEO HOOKE, MODULI=LONG TERM"
+        yield f"{_real(0.5 * long_term * units.stress.factor)}, 0."
+        yield "*VISCOELASTIC, FREQUENCY=TABULAR"
+        for f, loss, gain in zip(table.frequency * units.frequency.factor, ratio.imag, 1.0 - ratio.real, strict=True):
+            yield f"{_real(loss)}, {_real(gain)}, 0., 0., {_real(f)}"
+
+
+def _real(value: float) -> str:
+    """A real of eleven digits; nothing is 0."""
+    return f"{value:.10E}" if value else "0."

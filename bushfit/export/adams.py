@@ -1,0 +1,160 @@
+"""Adams Car: bushing property files (.bus), a force over displacement and a damping in each of six directions.
+
+The curve is the storage stiffness at the lowest frequency times each amplitude, so that it softens as the rubber does.
+The damping is one number: in `bushing_car.bus` a viscous damper, in `bushing_ride.bus` the loss angle that the bushing
+of Adams Car Ride reads there. Both are those of the middle frequency and amplitude of the grid. A file states
+its units, which Adams converts; they are mm, newton, degrees and second.
+
+Source: Adams Car Ride help, "Frequency Bushing" (damping coefficients are interpreted as loss angles); blocks,
+attributes and units as in the public fixture `fixture.bus` of the package suspension_multibody, which reads them;
+Altair TeimOrbit format and AutoBush, which reads the same files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.export.contract import Exported, Order
+from bushfit.export.deck import commented, heading, stated, to_bytes
+from bushfit.export.levels import DOFS, Table, directions, middle, tables
+from bushfit.export.losses import of_all, of_band
+from bushfit.geometry import ROTATION, TRANSLATION, Direction
+from bushfit.prediction import percent_off
+from bushfit.reading.measurement import loss_factor
+from bushfit.units import number
+
+#: Names of what moves and what resists in each degree of freedom: x and fx to az and tz.
+_AXES = (("x", "fx"), ("y", "fy"), ("z", "fz"), ("ax", "tx"), ("ay", "ty"), ("az", "tz"))
+#: Displacement [mm, deg] of the curve of a degree of freedom of which nothing is known, whose force is zero.
+_UNKNOWN = 1.0
+#: From SI to the displacement and force of the files: mm and N, deg and N mm.
+_SCALES = {TRANSLATION: (1e3, 1.0), ROTATION: (float(np.degrees(1.0)), 1e3)}
+#: Units of the files.
+_UNITS = {"LENGTH": "mm", "ANGLE": "degrees", "FORCE": "newton", "MASS": "kg", "TIME": "second"}
+#: What of the damping column each file has.
+_KINDS = {
+    "car": "damping: viscous, N s/mm and N mm s/deg",
+    "ride": "damping: the loss angle in deg, for the frequency bushing of Adams Car Ride alone",
+}
+
+
+class _Element(NamedTuple):
+    """What stands for a direction: its tables by amplitude, and the points of its curve, (n,) [m, N or rad, N m]."""
+
+    tables: Sequence[Table]
+    moved: Array
+    force: Array
+
+    @property
+    def direction(self) -> Direction:
+        """That it stands for."""
+        return self.tables[0].direction
+
+    @property
+    def reference(self) -> Table:
+        """The table of the amplitude at which the damping is right."""
+        return middle(self.tables)
+
+    @property
+    def frequency(self) -> float:
+        """At which the damping is right [Hz]."""
+        return float(self.reference.frequency[self._row])
+
+    @property
+    def curve(self) -> tuple[Array, Array]:
+        """The points in the units of the file."""
+        displacement, force = _SCALES[self.direction.motion]
+        return self.moved * displacement, self.force * force
+
+    def damping(self, kind: str) -> float:
+        """A damper's constant [N s/m or N m s/rad], or a loss angle [rad]."""
+        stiffness = self.reference.stiffness[self._row]
+        return float(stiffness.imag / (2.0 * np.pi * self.frequency) if kind == "car" else np.angle(stiffness))
+
+    def damping_written(self, kind: str) -> float:
+        """The same in the units of the file."""
+        displacement, force = _SCALES[self.direction.motion]
+        return self.damping(kind) * (force / displacement if kind == "car" else float(np.degrees(1.0)))
+
+    def stiffness(self, kind: str, table: Table) -> Array:
+        """Complex stiffness of the element at the points of a table, (n,)."""
+        storage = np.interp(table.amplitude, self.moved, self.force) / table.amplitude
+        if kind == "ride":
+            return np.full(table.frequency.size, storage * (1.0 + 1j * np.tan(self.damping(kind))))
+        return storage + 2j * np.pi * table.frequency * self.damping(kind)
+
+    @property
+    def _row(self) -> int:
+        """The middle of the frequencies, the lower of two."""
+        return (self.reference.frequency.size - 1) // 2
+
+
+def export(order: Order) -> Exported:
+    """One file for Adams Car and one for Adams Car Ride, and what they leave out."""
+    elements = [_element(tables(each)) for each in directions(order)]
+    shared = [line for each in directions(order) for line in of_band(each)] + list(of_all(order))
+    if order.units:
+        shared.append(f"the units asked for, {order.units}: the file states its own, which Adams converts")
+    files, losses = dict[str, bytes](), list[str]()
+    for kind in _KINDS:
+        own = [_frequency_lost(element, kind) for element in elements]
+        files[f"bushing_{kind}.bus"] = to_bytes(_file(order, elements, kind, [*own, *shared]))
+        losses += own
+    return Exported(files, (*losses, *shared))
+
+
+def _element(own: Sequence[Table]) -> _Element:
+    """The curve through the storage force of each amplitude, and the table and row of the damping.
+
+    A single amplitude is continued in a straight line, because splines need five points.
+    """
+    amplitude = np.array([table.amplitude for table in own])
+    force = amplitude * np.array([table.stiffness[0].real for table in own])
+    if amplitude.size == 1:
+        amplitude, force = (values[0] * np.array([1.0, 2.0]) for values in (amplitude, force))
+    moved, resisting = (np.concatenate([-values[::-1], [0.0], values]) for values in (amplitude, force))
+    return _Element(own, moved, resisting)
+
+
+def _frequency_lost(element: _Element, kind: str) -> str:
+    """What one curve and one damping cost over the grid of a direction."""
+    pairs = [(element.stiffness(kind, table), table.stiffness) for table in element.tables]
+    found, exact = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+    loss = number(float(np.max(np.abs(loss_factor(found) - loss_factor(exact)))), 2)
+    return (
+        f"{element.direction}, {kind}: frequency, one damping, of {number(element.frequency, 4)} Hz: over the grid "
+        f"|K| is {percent_off(np.abs(found / exact))} off, the loss factor up to {loss}"
+    )
+
+
+def _file(order: Order, elements: Sequence[_Element], kind: str, losses: Sequence[str]) -> Iterator[str]:
+    """The lines of a property file."""
+    at = f"{number(elements[0].frequency, 4)} Hz, {stated([element.reference for element in elements])}"
+    about = [_KINDS[kind], f"damping at {at}; curves at the lowest frequency"]
+    yield from commented("$", [*heading(order, ", ".join(_UNITS.values()), losses), *about])
+    yield from _block("MDI_HEADER", {"FILE_TYPE": "'bus'", "FILE_VERSION": "4.0", "FILE_FORMAT": "'ASCII'"})
+    yield from _block("UNITS", {name: f"'{unit}'" for name, unit in _UNITS.items()})
+    known = {dof: element for element in elements for dof in DOFS[element.direction]}
+    damping = [known[dof].damping_written(kind) if dof in known else 0.0 for dof in range(1, 7)]
+    rows = zip(_AXES, damping, strict=True)
+    yield from _block("DAMPING", {f"{resists.upper()}_DAMPING": _real(value) for (_, resists), value in rows})
+    for dof, (moves, resists) in enumerate(_AXES, start=1):
+        curve = known[dof].curve if dof in known else (_UNKNOWN * np.arange(-2.0, 3.0), np.zeros(5))
+        yield from _block(f"{resists.upper()}_CURVE", {})
+        yield f"{{{moves:>16} {resists:>17}}}"
+        yield from (f"{_real(moved):>17} {_real(resisting):>17}" for moved, resisting in zip(*curve, strict=True))
+
+
+def _block(name: str, attributes: Mapping[str, str]) -> Iterator[str]:
+    """A block and its attributes."""
+    yield f"[{name}]"
+    yield from (f" {key} = {value}" for key, value in attributes.items())
+
+
+def _real(value: float) -> str:
+    """A real of ten digits."""
+    return f"{value:.9E}"

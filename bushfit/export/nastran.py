@@ -1,0 +1,120 @@
+"""Nastran and OptiStruct: PBUSH and PBUSHT, a property for each amplitude, with tables over frequency.
+
+In a frequency response the element has K (1 + i GE) in each degree of freedom; elsewhere the nominal values of PBUSH
+act, here those of the lowest frequency. OptiStruct takes |K| and the loss angle as well: K = KMAG cos(ANGLE) and GE =
+tan(ANGLE), the angle in deg.
+
+Source: Autodesk Nastran 2025 reference, PBUSHT; Altair OptiStruct 2021 reference, PBUSH (example 3) and PBUSHT.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.export.contract import Exported, Order
+from bushfit.export.deck import commented, heading, stated, to_bytes
+from bushfit.export.levels import Level, Table, by_dof, levels
+from bushfit.export.losses import Form, of_tables
+from bushfit.export.systems import MM_T_S_N, UnitSystem
+
+#: Characters of a field in the small and in the large format.
+_SMALL, _LARGE = 8, 16
+#: Degrees of freedom of an element.
+_DOFS = 6
+#: Distance between the numbers of the tables of two properties: that of K in degree of freedom n ends on n, of the loss
+#: on 10 + n.
+_TABLES = 100
+
+
+class _Dialect(NamedTuple):
+    """The names of the two tables, their form, and the name of the file."""
+
+    names: tuple[str, str]
+    form: Form
+    file: str
+
+
+_DIALECTS = {
+    "nastran": _Dialect(
+        ("K", "GE"), Form(lambda _, k: (k.real, k.imag / k.real), lambda _, a, b: a * (1.0 + 1j * b)), "bushing.bdf"
+    ),
+    "optistruct": _Dialect(
+        ("KMAG", "ANGLE"),
+        Form(lambda _, k: (np.abs(k), np.angle(k, deg=True)), lambda _, a, b: a * np.exp(1j * np.radians(b))),
+        "bushing.fem",
+    ),
+}
+
+
+def export(order: Order) -> Exported:
+    """The bulk data of the bushing, without elements, and what it leaves out."""
+    dialect, units = _DIALECTS[order.dialect], order.units or MM_T_S_N
+    losses = tuple(of_tables(order, dialect.form))
+    about = f"{units}; frequency in {units.frequency.name}, rotation in rad"
+    used = "in frequency response; PBUSH alone, at the lowest frequency, acts elsewhere; PARAM,G is added to the loss"
+    lines = commented("$", [*heading(order, about, losses), f"the tables act {used}"])
+    for rank, level in enumerate(levels(order), start=1):
+        lines += commented("$", [f"property {rank}: {stated(level)}"])
+        lines += _property(rank, level, dialect, units)
+    return Exported({dialect.file: to_bytes(lines)}, losses)
+
+
+def _property(pid: int, level: Level, dialect: _Dialect, units: UnitSystem) -> Iterator[str]:
+    """PBUSH, PBUSHT and the tables of one amplitude."""
+    rows = [(dof, table, _in_units(table, dialect, units)) for dof, table in by_dof(level)]
+    several = level[0].frequency.size > 1
+    nominal, numbers = [dict[int, str](), dict[int, str]()], [dict[int, str](), dict[int, str]()]
+    for dof, _, columns in rows:
+        for part, column in enumerate(columns[1:]):
+            nominal[part][dof] = _real(column[0])
+            numbers[part][dof] = str(_TABLES * pid + 10 * part + dof)
+    yield from _large("PBUSH*", [str(pid), *_by_dof(dialect.names, nominal)])
+    if several:
+        yield from _small("PBUSHT", [str(pid), *_by_dof(dialect.names, numbers)])
+        for dof, _, (frequency, *parts) in rows:
+            for part, column in enumerate(parts):
+                yield from _tabled(numbers[part][dof], frequency, column)
+
+
+def _in_units(table: Table, dialect: _Dialect, units: UnitSystem) -> tuple[Array, Array, Array]:
+    """Frequency and the two parts of a table, in the units of the deck."""
+    factor = units.display(table.direction.motion).stiffness.factor
+    return table.frequency * units.frequency.factor, *dialect.form.parts(table.frequency, table.stiffness * factor)
+
+
+def _by_dof(names: Sequence[str], rows: Sequence[dict[int, str]]) -> list[str]:
+    """The fields of a property after its number: a name and six values for each part, and so on the next line."""
+    fields: list[str] = []
+    for name, row in zip(names, rows, strict=True):
+        fields += [*([""] if fields else []), name, *(row.get(dof, "") for dof in range(1, _DOFS + 1))]
+    return fields
+
+
+def _tabled(number: str, x: Array, y: Array) -> Iterator[str]:
+    """TABLED1: pairs of x and y, and ENDT."""
+    pairs = [_real(value) for pair in zip(x, y, strict=True) for value in pair]
+    yield from _large("TABLED1*", [number, "LINEAR", "LINEAR", "", "", "", "", "", *pairs, "ENDT"])
+
+
+def _real(value: float) -> str:
+    """A real of ten digits, which fills a large field even with its sign."""
+    return f"{value:.9E}"
+
+
+def _small(name: str, fields: Sequence[str]) -> Iterator[str]:
+    """A card of small fields, eight a line after its name."""
+    for start in range(0, len(fields), 8):
+        yield "".join(f"{text:<{_SMALL}}" for text in (name, *fields[start : start + 8])).rstrip()
+        name = ""
+
+
+def _large(name: str, fields: Sequence[str]) -> Iterator[str]:
+    """A card of large fields, four a line after its name; lines come in pairs."""
+    padded = [*fields, *[""] * (-len(fields) % 8)]
+    for start in range(0, len(padded), 4):
+        yield (f"{name:<{_SMALL}}" + "".join(f"{text:>{_LARGE}}" for text in padded[start : start + 4])).rstrip()
+        name = "*"

@@ -1,0 +1,90 @@
+"""export: one fitted model in the files of other programs."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bushfit.errors import ModelError
+from bushfit.export.contract import Dialect, Exported, Order
+from bushfit.jobs.predict import Predict, Predicted
+from bushfit.reading.files import sha256, view_bytes
+from bushfit.reading.measurement import Source
+
+if TYPE_CHECKING:
+    from bushfit.campaign.campaign import Campaign
+    from bushfit.export.systems import UnitSystem
+    from bushfit.model.result import Result
+
+#: Where each format is written: a module below bushfit, and its function of an Order; loaded when asked for.
+FORMATS = {
+    "fmu": "export.fmu:export",
+    "nastran": "export.nastran:export",
+    "abaqus": "export.abaqus:export",
+    "adams": "export.adams:export",
+    "csv": "report.spreadsheets:csv",
+    "xlsx": "report.spreadsheets:xlsx",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """The outcome of an export: what was predicted, and each format's files and losses by its name."""
+
+    predicted: Predicted
+    exported: Mapping[str, Exported]
+
+    @property
+    def files(self) -> dict[str, bytes]:
+        """The files of all formats by name."""
+        return {name: content for each in self.exported.values() for name, content in each.files.items()}
+
+    @property
+    def document(self) -> Mapping[str, Any]:
+        """What `--json` prints."""
+        formats = {
+            name: {"files": list(each.files), "left_out": list(each.losses)} for name, each in self.exported.items()
+        }
+        return {"formats": formats, "warnings": self.predicted.warnings}
+
+
+@dataclass(frozen=True)
+class Export:
+    """A model over the grid of a prediction in some formats; directions share one list of frequencies."""
+
+    formats: Sequence[str]
+    predict: Predict = field(default_factory=Predict)
+    accuracy: float = 0.01
+    units: UnitSystem | None = None
+    dialect: Dialect = "nastran"
+
+    def run(self, result: Result, source: Source, campaign: Campaign | None) -> Written:
+        """Predict, and write every format.
+
+        Raises:
+            ModelError: a model that a format cannot hold, or as `Predict.run`.
+        """
+        predicted = self.predict.run(result, campaign)
+        grids = [np.unique(prediction.frequency) for prediction in predicted.predictions]
+        if not all(np.array_equal(grid, grids[0]) for grid in grids):
+            union = tuple(np.unique(np.concatenate(grids)).tolist())
+            asked = replace(self.predict.asked, frequencies=union)
+            predicted = replace(self.predict, asked=asked).run(result, campaign)
+        order = Order(result, source, tuple(predicted.predictions), self.accuracy, self.units, self.dialect)
+        return Written(predicted, {name: _writer(name)(order) for name in self.formats})
+
+
+def source_of(file: Path) -> Source:
+    """A model file by its name and hash."""
+    return Source(Path(file.name), sha256(view_bytes(file, ModelError)).result())
+
+
+def _writer(name: str) -> Callable[[Order], Exported]:
+    """The function that writes a format."""
+    module, _, function = FORMATS[name].partition(":")
+    return getattr(importlib.import_module(f"bushfit.{module}"), function)

@@ -1,0 +1,93 @@
+"""A model as tables for spreadsheets: its predictions, long and wide, its parameters, and where it comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from bushfit import __version__
+from bushfit.export.contract import Exported, Order
+from bushfit.export.losses import NO_LOOPS
+from bushfit.reading.csvfile import to_csv
+from bushfit.reading.xlsxfile import to_xlsx
+from bushfit.report.artifacts import place_names
+from bushfit.report.tables import prediction_table, wide_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from bushfit.model.result import Result
+
+
+#: Tables that belong to no place; they come last.
+_OF_ALL = ("parameters", "provenance")
+
+
+def csv(order: Order) -> Exported:
+    """A file for each table."""
+    files = {f"{name.replace(' ', '_')}.csv": to_csv(table) for name, table in _tables(order).items()}
+    return Exported(files, (NO_LOOPS,))
+
+
+def xlsx(order: Order) -> Exported:
+    """One workbook, a sheet for each table."""
+    return Exported({"bushing.xlsx": to_xlsx(_tables(order))}, (NO_LOOPS,))
+
+
+def _tables(order: Order) -> dict[str, pd.DataFrame]:
+    """All tables by name: two for each place, the parameters, and the provenance."""
+    found = {"parameters": parameters_table(order.result), "provenance": _provenance(order)}
+    for name, prediction in zip(place_names(order.places), order.predictions, strict=True):
+        display = order.units.display(prediction.direction.motion) if order.units else None
+        while {name, f"{name} wide"} & found.keys():  # a specimen may have any name
+            name += "_"
+        found[name] = prediction_table(prediction, display)
+        found[f"{name} wide"] = wide_table(prediction, display)
+    return dict(sorted(found.items(), key=lambda pair: pair[0] in _OF_ALL))
+
+
+def parameters_table(result: Result) -> pd.DataFrame:
+    """Every parameter in SI, with its standard error and 95 % interval where it has one."""
+    import pandas as pd
+
+    model, rows = result.model, []
+    for name, value in model.values.items():  # noqa: PD011  # no frame
+        parameter, (low, high) = model.parameters[name], result.interval(name) or (None, None)
+        rows.append(
+            {
+                "parameter": name,
+                "value": value,
+                "unit": parameter.unit,
+                "std error": result.covariance.stderr(name),
+                "95 %, low": low,
+                "95 %, high": high,
+                "fitted": "yes" if name in result.fitted else "no",
+                "meaning": parameter.meaning,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _provenance(order: Order) -> pd.DataFrame:
+    """Where the tables come from, and what a user must know: a line each."""
+    import pandas as pd
+
+    return pd.DataFrame(_said(order), columns=["what", "value"])
+
+
+def _said(order: Order) -> Iterator[tuple[str, str]]:
+    result, bushing = order.result, order.result.model.bushing
+    yield "bushing", result.name
+    if bushing:
+        for key in ("inner_radius", "outer_radius", "length"):
+            yield f"{key} [m]", f"{getattr(bushing, key):.15g}"
+    yield "effects", ", ".join(result.model.effects)
+    yield "model", str(order.source.file)
+    yield "model, sha256", order.source.sha256
+    for source in result.inputs:
+        yield "test", str(source.file)
+        yield "test, sha256", source.sha256
+    yield "bushfit", __version__
+    yield "left out", NO_LOOPS
+    for line in dict.fromkeys(line for prediction in order.predictions for line in prediction.warnings):
+        yield "warning", line

@@ -1,0 +1,215 @@
+"""Decks read back by programs and parsers that are not bushfit's, against a computation that is not bushfit's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from kept import HASH, rows_of
+from readers import Curves, abaqus_options, by_abaqus, by_optistruct, by_pynastran, teimorbit
+
+from bushfit.effects.contract import Array
+from bushfit.errors import ModelError
+from bushfit.export import abaqus, adams, nastran
+from bushfit.export.contract import Exported, Order
+from bushfit.export.levels import DOFS, levels
+from bushfit.export.systems import MM_T_S_N, UnitSystem
+from bushfit.geometry import Direction, Specimen
+from bushfit.model.model import Model
+from bushfit.prediction import predict
+
+#: Agreement of the model itself with the kept computation, as tests/model/test_model.py holds it.
+MODEL = 2e-4
+#: What the digits of a deck leave.
+DIGITS = 2e-9
+SYSTEMS = ["mm t s N", "m kg s N", "mm kg ms kN", "in lbf*s^2/in s lbf"]
+
+
+def read(name: str, order: Order, folder: Path) -> tuple[Exported, Curves]:
+    """The export of a format, and what its reader finds in it."""
+    if name == "abaqus":
+        exported = abaqus.export(order)
+        return exported, by_abaqus(exported.files["bushing.inp"].decode("ascii"))
+    exported = nastran.export(replace(order, dialect=name))
+    ((file, content),) = exported.files.items()
+    (folder / file).write_bytes(content)
+    found = by_pynastran(folder / file) if name == "nastran" else by_optistruct(content.decode("ascii"))
+    return exported, found
+
+
+@pytest.mark.parametrize("units", SYSTEMS)
+@pytest.mark.parametrize("name", ["nastran", "optistruct", "abaqus"])
+def test_every_value_of_the_grid_is_read_back(
+    name: str, units: str, order: Order, known: pd.DataFrame, tmp_path: Path
+) -> None:
+    """In whatever units, turned back into SI by factors that are typed here."""
+    newton, metre, second = {
+        "mm t s N": (1.0, 1e3, 1.0),
+        "m kg s N": (1.0, 1.0, 1.0),
+        "mm kg ms kN": (1e-3, 1e3, 1e3),
+        "in lbf*s^2/in s lbf": (1.0 / 4.4482216152605, 1.0 / 0.0254, 1.0),
+    }[units]
+    _, found = read(name, replace(order, units=UnitSystem.parse(units)), tmp_path)
+    ranks = range(1, len(levels(order)) + 1)
+    assert set(found) == {(dof, rank) for dofs in DOFS.values() for dof in dofs for rank in ranks}
+    worst, apart = 0.0, 0.0
+    for direction, dofs in DOFS.items():
+        scale = newton * metre if direction is Direction.TORSION else newton / metre
+        for dof in dofs:
+            for rank in ranks:
+                frequency, stiffness = rows_of(known, direction, rank)
+                f, k = found[dof, rank]
+                np.testing.assert_allclose(f * second, frequency, rtol=DIGITS)
+                worst = max(worst, np.abs(k / scale / stiffness - 1.0).max())
+                exact = order.result.model.stiffness(direction, frequency, amplitude_of(known, direction, rank))
+                apart = max(apart, np.abs(k / scale / exact - 1.0).max())
+    print(f"{name}, {units}: {len(found)} curves, off the kept computation {worst:.1e}, off the model {apart:.1e}")
+    assert worst < MODEL
+    assert apart < DIGITS
+
+
+def amplitude_of(known: pd.DataFrame, direction: Direction, rank: int) -> float:
+    amplitudes = np.sort(known[known["direction"] == direction]["amplitude"].unique())
+    return float(amplitudes[min(rank, amplitudes.size) - 1])
+
+
+def test_the_compound_of_abaqus_is_the_model_at_that_strain(order: Order, paper_model: Model) -> None:
+    """*HYPERELASTIC: C10 = G/2. *VISCOELASTIC: omega Re(g*) = G''/G, omega Im(g*) = 1 - G'/G, bulk, frequency.
+
+    Source: Abaqus Analysis User's Guide, "Frequency domain viscoelasticity": storage modulus
+    G (1 - omega Im g*), loss modulus G omega Re g*.
+    """
+    text = abaqus.export(order).files["bushing.inp"].decode("ascii")
+    options = abaqus_options(text)
+    starts = [place for place, (keyword, _, _) in enumerate(options) if keyword == "MATERIAL"]
+    amplitudes = np.unique(order.predictions[0].amplitude)
+    assert len(starts) == amplitudes.size == 5
+    for start, amplitude in zip(starts, amplitudes, strict=True):
+        (_, hyper, ((c10, d1),)), (_, visco, rows) = options[start + 1 : start + 3]
+        assert hyper == {"NEO HOOKE": "", "MODULI": "LONG TERM"}
+        assert visco == {"FREQUENCY": "TABULAR"}
+        assert d1 == 0.0
+        loss, gain, bulk_loss, bulk_gain, frequency = np.array(rows).T
+        assert not bulk_loss.any()
+        assert not bulk_gain.any()
+        modulus = 2.0 * c10 * (1.0 - gain + 1j * loss) * 1e6  # N/mm^2
+        # of the axial stiffness, Eq. 10: K = 2 pi L G/ln(b/a)
+        axial = paper_model.stiffness("axial", frequency, amplitude)
+        np.testing.assert_allclose(modulus, axial * np.log(1.8) / (2.0 * np.pi * 0.034), rtol=1e-8)
+
+
+def test_adams_holds_curve_and_damping(order: Order, known: pd.DataFrame) -> None:
+    """Storage force at each amplitude, damper or loss angle in the middle of the grid; mm, newton, degrees, second."""
+    exported = adams.export(order)
+    factors = {"x": (1e3, 1.0), "ax": (np.degrees(1.0), 1e3)}
+    for kind in ("car", "ride"):
+        blocks = teimorbit(exported.files[f"bushing_{kind}.bus"].decode("ascii"))
+        assert blocks["UNITS"][0] == {
+            "LENGTH": "'mm'",
+            "ANGLE": "'degrees'",
+            "FORCE": "'newton'",
+            "MASS": "'kg'",
+            "TIME": "'second'",
+        }
+        assert list(blocks) == ["MDI_HEADER", "UNITS", "DAMPING", *(f"{end}_CURVE" for end in ENDS)]
+        for direction, ends in (("axial", ["FZ"]), ("radial", ["FX", "FY"]), ("torsion", ["TZ"])):
+            own = known[known["direction"] == direction]
+            length, force = factors["ax" if direction == "torsion" else "x"]
+            amplitudes = np.sort(own["amplitude"].unique())
+            for end in ends:
+                _, names, curve = blocks[f"{end}_CURVE"]
+                assert names == [end[1].lower() if end[0] == "F" else f"a{end[1].lower()}", end.lower()]
+                moved, resisting = curve.T
+                assert (np.diff(moved) > 0.0).all()
+                np.testing.assert_allclose(curve, -curve[::-1], atol=1e-9)
+                np.testing.assert_allclose(moved[moved > 0.0], amplitudes * length, rtol=DIGITS)
+                slow = [rows_of(known, Direction(direction), rank + 1)[1][0].real for rank in range(amplitudes.size)]
+                np.testing.assert_allclose(resisting[moved > 0.0], amplitudes * slow * force, rtol=MODEL)
+                frequency, stiffness = rows_of(known, Direction(direction), (amplitudes.size + 1) // 2)
+                f, k = frequency[7], stiffness[7]  # of 16 from 5 Hz in steps of 10
+                wanted = k.imag / (2.0 * np.pi * f) * force / length if kind == "car" else np.degrees(np.angle(k))
+                assert float(blocks["DAMPING"][0][f"{end}_DAMPING"]) == pytest.approx(wanted, rel=5 * MODEL)
+        for end in ("TX", "TY"):
+            assert not blocks[f"{end}_CURVE"][2][:, 1].any()
+            assert float(blocks["DAMPING"][0][f"{end}_DAMPING"]) == 0.0
+
+
+ENDS = ("FX", "FY", "FZ", "TX", "TY", "TZ")
+
+
+def test_one_frequency_and_one_amplitude(order: Order, tmp_path: Path) -> None:
+    """A table needs two rows and a spline five points: PBUSH alone, and a straight line."""
+    one = replace(order, predictions=(predict(order.result, Direction.AXIAL, [20.0], [2e-4]),))
+    exact = complex(order.result.model.stiffness("axial", 20.0, 2e-4)[()])
+    text = nastran.export(one).files["bushing.bdf"].decode()
+    assert "PBUSHT" not in text.replace("PBUSHT*", "")
+    assert "TABLED1" not in text
+    assert f"{exact.real / 1e3:.9E}" in text
+    blocks = teimorbit(adams.export(one).files["bushing_car.bus"].decode())
+    moved, force = blocks["FZ_CURVE"][2].T
+    assert moved.size == 5
+    np.testing.assert_allclose(force, moved * exact.real / 1e3, rtol=1e-9, atol=1e-9)
+    assert "one frequency, 20 Hz" in " ".join(nastran.export(one).losses)
+    (found,) = read("abaqus", one, tmp_path)[1].values()
+    assert found[1][0] * 1e3 == pytest.approx(exact, rel=DIGITS)
+
+
+WRITERS: list[Callable[[Order], Exported]] = [nastran.export, abaqus.export, adams.export]
+
+
+@pytest.mark.parametrize("export", WRITERS)
+def test_bushing_model_hash_and_units_are_in_every_deck(export: Callable[[Order], Exported], order: Order) -> None:
+    exported = export(replace(order, units=MM_T_S_N))
+    for content in exported.files.values():
+        text = content.decode("ascii")
+        for words in ("bushing: CMP 15 961", "model: model.json", f"sha256: {HASH}", "units: mm"):
+            assert words in text, words
+        assert "left out" in text
+
+
+@pytest.mark.parametrize("export", WRITERS)
+def test_a_specimen_alone_is_refused_and_beside_a_bushing_left_out(
+    export: Callable[[Order], Exported], order: Order
+) -> None:
+    body = predict(order.result, Specimen("DMA =1+1", "modulus"), [5.0, 10.0], [0.01])
+    with pytest.raises(ModelError, match="no direction of a bushing"):
+        export(replace(order, predictions=(body,)))
+    assert "specimens: DMA =1+1" in export(replace(order, predictions=(*order.predictions, body))).losses
+
+
+@pytest.mark.parametrize("export", WRITERS)
+def test_directions_at_different_frequencies_are_refused(export: Callable[[Order], Exported], order: Order) -> None:
+    other = predict(order.result, Direction.RADIAL, [5.0, 11.0], [1e-4])
+    with pytest.raises(ModelError, match="different frequencies"):
+        export(replace(order, predictions=(order.predictions[0], other)))
+
+
+@pytest.mark.parametrize(("name", "at_most"), [("nastran", 0.006), ("optistruct", 0.006), ("abaqus", 0.06)])
+def test_the_error_between_frequencies_that_is_told_is_the_one_there_is(
+    name: str, at_most: float, order: Order, tmp_path: Path
+) -> None:
+    """Read back, drawn as straight lines between the rows, and compared with the model everywhere."""
+    exported, found = read(name, replace(order, predictions=order.predictions[:1]), tmp_path)
+    told = next(line for line in exported.losses if "between its frequencies" in line)
+    claimed = float(told.split("up to ")[1].split(" %")[0]) / 100.0
+    fine, worst = np.linspace(5.0, 155.0, 601), 0.0
+    for (_, rank), (f, k) in found.items():
+        amplitude = np.unique(order.predictions[0].amplitude)[rank - 1]
+        off = drawn(name, f, k, fine) * 1e3 / order.result.model.stiffness("axial", fine, amplitude) - 1.0
+        worst = max(worst, float(np.abs(off).max()))
+    print(f"{name}: told {claimed:.2%}, found {worst:.2%}")
+    assert worst <= at_most
+    assert worst == pytest.approx(claimed, rel=0.15)
+
+
+def drawn(name: str, f: Array, k: Array, fine: Array) -> Array:
+    """The stiffness that a solver takes between the rows of its tables."""
+    if name == "abaqus":
+        return np.interp(fine, f, k.real) + 2j * np.pi * fine * np.interp(fine, f, k.imag / (2.0 * np.pi * f))
+    if name == "nastran":
+        return np.interp(fine, f, k.real) * (1.0 + 1j * np.interp(fine, f, k.imag / k.real))
+    return np.interp(fine, f, np.abs(k)) * np.exp(1j * np.interp(fine, f, np.angle(k)))

@@ -1,0 +1,122 @@
+"""CSV files and the workbook, read back by pandas and openpyxl over the whole grid."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import openpyxl
+import pandas as pd
+import pytest
+
+from bushfit.export.contract import Order
+from bushfit.export.systems import UnitSystem
+from bushfit.geometry import Direction, Specimen
+from bushfit.prediction import Band, predict
+from bushfit.reading.sweeps import read_sweep
+from bushfit.report import spreadsheets
+from bushfit.report.tables import wide_table
+
+#: Agreement of the model with the kept computation, and what seven digits of a CSV file leave.
+MODEL, SEVEN = 2e-4, 1e-6
+
+
+def sheets(content: bytes) -> dict[str, pd.DataFrame]:
+    """The sheets of a workbook as openpyxl reads them."""
+    book = openpyxl.load_workbook(io.BytesIO(content))
+    found = {}
+    for sheet in book:
+        header, *rows = sheet.iter_rows(values_only=True)
+        found[sheet.title] = pd.DataFrame(rows, columns=header)
+    return found
+
+
+@pytest.mark.parametrize("kind", ["csv", "xlsx"])
+def test_long_and_wide_tables_hold_the_whole_grid(kind: str, order: Order, known: pd.DataFrame) -> None:
+    if kind == "csv":
+        files = spreadsheets.csv(order).files
+        tables = {name.removesuffix(".csv").replace("_", " "): pd.read_csv(io.BytesIO(files[name])) for name in files}
+    else:
+        tables = sheets(spreadsheets.xlsx(order).files["bushing.xlsx"])
+    places = [str(direction) for direction in Direction]
+    assert list(tables) == [*(f"{p}{end}" for p in places for end in ("", " wide")), "parameters", "provenance"]
+    worst = 0.0
+    for place in places:
+        rows = known[known["direction"] == place].sort_values(["amplitude", "frequency"])
+        length, stiffness, scale = ("deg", "N m/rad", 1.0) if place == "torsion" else ("mm", "N/mm", 1e-3)
+        moved = rows["amplitude"].to_numpy() * (np.degrees(1.0) if place == "torsion" else 1e3)
+        long, wide = tables[place], tables[f"{place} wide"]
+        np.testing.assert_allclose(long["frequency [Hz]"], rows["frequency"], rtol=SEVEN)
+        np.testing.assert_allclose(long[f"amplitude [{length}]"], moved, rtol=SEVEN)
+        off = np.abs(long[f"stiffness [{stiffness}]"].to_numpy() / scale / rows["stiffness"].to_numpy() - 1.0)
+        worst = max(worst, off.max())
+        assert wide["frequency [Hz]"].tolist() == sorted(rows["frequency"].unique())
+        assert len(wide.columns) == 1 + 2 * np.unique(moved).size
+        for level in np.unique(moved):
+            for name, unit in (("stiffness", stiffness), ("loss factor", "-")):
+                here = long[np.isclose(long[f"amplitude [{length}]"], level)]
+                np.testing.assert_array_equal(wide[f"{name} {level:.10g} {length} [{unit}]"], here[f"{name} [{unit}]"])
+    print(f"{kind}: off the kept computation {worst:.1e}")
+    assert worst < MODEL
+
+
+def test_a_wide_table_is_read_as_a_sweep(order: Order, tmp_path: Path) -> None:
+    """Our own reader takes it back as it takes those of laboratories."""
+    file = tmp_path / "wide.csv"
+    file.write_bytes(spreadsheets.csv(order).files["axial_wide.csv"])
+    sweep = read_sweep(file, Direction.AXIAL)
+    exact = order.result.model.stiffness("axial", sweep.frequency, sweep.amplitude)
+    assert sweep.frequency.size == 80
+    np.testing.assert_allclose(sweep.stiffness, exact, rtol=2e-6)
+
+
+def test_parameters_and_provenance(order: Order, table_1: dict[str, float]) -> None:
+    tables = sheets(spreadsheets.xlsx(order).files["bushing.xlsx"])
+    parameters = tables["parameters"]
+    assert dict(zip(parameters["parameter"], parameters["value"], strict=True)) == table_1
+    assert set(parameters["fitted"]) == {"no"}
+    provenance = dict(tables["provenance"].to_numpy().tolist())
+    assert provenance["model, sha256"] == order.source.sha256
+    assert provenance["bushing"] == "CMP 15 961"
+    assert provenance["length [m]"] == "0.034"
+
+
+def test_units_asked_for_are_in_header_and_value(order: Order) -> None:
+    table = sheets(spreadsheets.xlsx(replace(order, units=UnitSystem.parse("m kg s N"))).files["bushing.xlsx"])
+    exact = np.abs(order.result.model.stiffness("torsion", 5.0, order.predictions[2].amplitude[0]))
+    assert table["torsion"]["stiffness [N*m/rad]"][0] == pytest.approx(exact, rel=1e-12)
+    assert table["torsion"]["amplitude [rad]"][0] == order.predictions[2].amplitude[0]
+    assert table["axial"]["stiffness [N/m]"][0] == pytest.approx(order.predictions[0].stiffness.value[0])
+
+
+def test_specimens_have_tables_whatever_they_are_called(order: Order) -> None:
+    bodies = [
+        predict(order.result, Specimen(name, "modulus"), [5.0], [0.01]) for name in ("parameters", "axial", "x", "x")
+    ]
+    tables = sheets(
+        spreadsheets.xlsx(replace(order, predictions=(order.predictions[0], *bodies))).files["bushing.xlsx"]
+    )
+    assert len(tables) == 2 * 5 + 2
+    assert sum("modulus [MPa]" in table for table in tables.values()) == 4
+    assert "parameter" in tables["parameters"]
+    assert len(spreadsheets.csv(replace(order, predictions=tuple(bodies))).files) == 2 * 4 + 2
+
+
+def test_points_that_a_grid_lacks_are_empty(order: Order) -> None:
+    prediction = order.predictions[0]
+    kept = np.arange(prediction.frequency.size) != 3
+
+    def band(of: Band) -> Band:
+        return Band(of.value[kept], of.low[kept], of.high[kept])
+
+    parts = {name: band(getattr(prediction, name)) for name in ("stiffness", "loss_factor")}
+    holes = replace(prediction, frequency=prediction.frequency[kept], amplitude=prediction.amplitude[kept], **parts)
+    table = wide_table(holes)
+    assert table.isna().sum().sum() == 2
+    assert np.isnan(table.iloc[3, 1])
+
+
+def test_the_same_model_is_the_same_bytes(order: Order) -> None:
+    assert spreadsheets.xlsx(order).files == spreadsheets.xlsx(order).files
