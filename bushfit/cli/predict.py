@@ -46,6 +46,7 @@ _MOST_OF_FIT = 3
 @click.option("--temperature", help='Of the rubber, such as "40 degC", for a model with the effect of it [23 degC].')
 @click.option("--mass", help='Predict its resonance on each place, too: such as "1.2 kg", with --base-acceleration.')
 @click.option("--base-acceleration", help='Amplitude of the base under the mass, such as "0.1 g" or "1 m/s^2".')
+@click.option("--wide", is_flag=True, help="Also <place>_wide.csv: frequency down, amplitude across, no bands.")
 @click.option(
     "--arms",
     is_flag=False,
@@ -62,6 +63,7 @@ def command(
     temperature: str | None,
     mass: str | None,
     base_acceleration: str | None,
+    wide: bool,
     arms: str | None,
     options: Options,
     **grids: str | None,
@@ -103,7 +105,8 @@ def command(
     shaken = positive(mass, "--mass", "kg"), positive(base_acceleration, "--base-acceleration", "m/s^2")
     with naming(place="--temperature"):
         warm = None if temperature is None else kelvin(temperature)
-    job = Predict(PredictSettings(directions=directions or None, **asked), *shaken, warm, positive(arms, "--arms", "1"))
+    within = positive(arms, "--arms", "1")
+    job = Predict(PredictSettings(directions=directions or None, **asked), *shaken, warm, wide, within)
     folder = options.folder(loaded.slug if loaded else folder_name(result.name))
     measured = Kinds(tables=("measured",) if loaded and loaded.sweeps else ())
     options.require_free(folder, options.formats.names(job.kinds(result, loaded) + measured))

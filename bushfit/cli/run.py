@@ -38,7 +38,7 @@ def command(task: Task) -> None:
     shows its passes and what it costs beside the joint fit. Steps whose tests are missing are passed over, and said.
 
     Writes static.json, dynamic.json, model.json (with what diagnose added; then joint.json is the plain fit),
-    diagnosis.json, candidates.csv, and as CSV and PNG: loops, sweeps, gap, axial, radial, and each specimen.
+    diagnosis.json, candidates.csv, and as table and plot: loops, sweeps, gap, axial, radial, and each specimen.
     """
     from bushfit.jobs.run import Run
 

@@ -20,10 +20,11 @@ from bushfit.prediction import PredictedResonance, Prediction, caveats, predict,
 from bushfit.report.artifacts import (
     arms_contents,
     measured_contents,
+    names_of_more,
     place_names,
     prediction_contents,
     resonance_contents,
-    resonance_names,
+    wide_contents,
 )
 from bushfit.report.contents import Contents, Kinds
 from bushfit.report.tables import prediction_table, shaken_table
@@ -37,17 +38,20 @@ if TYPE_CHECKING:
     from bushfit.model.model import Model
     from bushfit.model.result import Misfit, Result, Usable
 
+#: Tables by place, the columns of each by header, null where a cell is empty; and "warnings".
+PredictionDocument = dict[str, dict[str, list[float | None]] | list[str]]
 #: Directions that are predicted where none is asked for: those of the paper.
 _DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
 #: Keys of [predict] that have the amplitudes of each motion.
 _AMPLITUDES = {TRANSLATION: "amplitudes", ROTATION: "torsion_amplitudes", STRAINING: "strain_amplitudes"}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Predicted:
     """The outcome of a prediction: one table a place, and a resonance, where a mass was asked for.
 
-    `measured` are the sweeps of places that the model can predict; `notes`, what else a user must know.
+    `measured` are the sweeps of places that the model can predict; `notes`, what else a user must know; `wide`, whether
+    the tables are written with amplitudes across, too.
     """
 
     result: Result
@@ -55,7 +59,11 @@ class Predicted:
     measured: Sequence[SweepData]
     notes: tuple[str, ...] = ()
     resonances: Sequence[PredictedResonance] = ()
+    wide: bool = False
     arms: Sequence[Arms] = ()
+
+    def __repr__(self) -> str:
+        return f"Prediction of {self.result.name}: {', '.join(str(found.direction) for found in self.predictions)}"
 
     @property
     def document(self) -> Mapping[str, Any]:
@@ -100,6 +108,7 @@ class Predicted:
     @property
     def contents(self) -> Contents:
         found = prediction_contents(self.result, self.predictions, self.measured, self.notes)
+        found |= wide_contents(self.predictions if self.wide else ())
         places = [prediction.direction for prediction in self.predictions]
         found |= arms_contents(self.result.model, self.arms, places, self.result.name)
         return found | resonance_contents(self.resonances)
@@ -120,14 +129,15 @@ class Predict:
     """Dynamic stiffness over a grid: the one asked for, else the campaign's [predict], else that of its sweeps.
 
     With a mass [kg] and the acceleration of its base [m/s^2], its resonance at each place, too. All at a temperature
-    [K], where the model has an effect of it. With a relative error, Maxwell arms that keep within it over the
-    frequencies predicted.
+    [K], where the model has an effect of it. `wide` tables have amplitudes across. With a relative error, Maxwell arms
+    that keep within it over the frequencies predicted.
     """
 
     asked: PredictSettings = field(default_factory=PredictSettings)
     mass: float | None = None
     base_acceleration: float | None = None
     temperature: float | None = None
+    wide: bool = False
     arms: float | None = None
 
     def places(self, result: Result | None, campaign: Campaign | None) -> list[Place]:
@@ -146,10 +156,11 @@ class Predict:
         return [*(_DIRECTIONS if bodies[0][0] or not specimens else ()), *specimens.values()]
 
     def kinds(self, result: Result | None, campaign: Campaign | None) -> Kinds:
-        """The tables and pictures of each place."""
+        """The tables and pictures of each place, and the further tables asked for."""
         places = self.places(result, campaign)
-        names = [*place_names(places), *(["arms"] if self.arms else [])]
-        return Kinds.shown(names) + Kinds(tables=tuple(resonance_names(places) if self.mass else ()))
+        more = [what for what, wanted in (("wide", self.wide), ("resonance", self.mass)) if wanted]
+        tables = tuple(name for what in more for name in names_of_more(places, what))
+        return Kinds.shown([*place_names(places), *(["arms"] if self.arms else [])]) + Kinds(tables=tables)
 
     def run(self, result: Result, campaign: Campaign | None, notes: tuple[str, ...] = ()) -> Predicted:
         """One prediction a place.
@@ -187,7 +198,7 @@ class Predict:
             if self.mass and self.base_acceleration
         ]
         arms = self._arms(result.model, predictions) if self.arms else ()
-        return Predicted(result, predictions, known, notes, resonances, arms)
+        return Predicted(result, predictions, known, notes, resonances, self.wide, arms)
 
     def _arms(self, model: Model, predictions: Sequence[Prediction]) -> tuple[Arms, ...]:
         """Maxwell arms over the frequencies of all predictions."""

@@ -76,9 +76,16 @@ def prediction_contents(
     )
 
 
+def wide_contents(predictions: Sequence[Prediction]) -> Contents:
+    """The table of each prediction with frequency down and amplitude across."""
+    names = names_of_more([prediction.direction for prediction in predictions], "wide")
+    pairs = zip(names, predictions, strict=True)
+    return Contents(tables={name: partial(tables.wide_table, prediction) for name, prediction in pairs})
+
+
 def resonance_contents(resonances: Sequence[PredictedResonance]) -> Contents:
     """A table of a mass on each place."""
-    names = resonance_names([found.place for found in resonances])
+    names = names_of_more([found.place for found in resonances], "resonance")
     pairs = zip(names, resonances, strict=True)
     return Contents(tables={name: partial(tables.shaken_table, found) for name, found in pairs})
 
@@ -131,6 +138,12 @@ def place_names(places: Sequence[Place]) -> list[str]:
     return names
 
 
-def resonance_names(places: Sequence[Place]) -> list[str]:
-    """The names of the tables of a mass on each place."""
-    return [f"{name}_resonance" for name in place_names(places)]
+def names_of_more(places: Sequence[Place], what: str) -> list[str]:
+    """The names of one more table of each place, such as axial_wide: none that a place itself has."""
+    taken, names = place_names(places), list[str]()
+    for name in taken:
+        more = f"{name}_{what}"
+        while more in taken:
+            more += "_"
+        names.append(more)
+    return names

@@ -1,25 +1,23 @@
-"""The paper's bushing to be exported over the whole grid of the kept computation, which bushfit did not make."""
+"""The paper's bushing to be exported over the whole grid of the kept computation, which bushfit did not make; FMUs."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pandas as pd
 import pytest
+from fmus import Running, order_of
 from kept import HASH
 
 from bushfit.export.contract import Exported, Order
+from bushfit.export.fmu import export
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.prediction import predict
 from bushfit.reading.measurement import Source
-
-if TYPE_CHECKING:
-    from fmus import Running
 
 
 @pytest.fixture(scope="session")
@@ -55,19 +53,13 @@ def named(order: Order) -> Callable[[str], Order]:
 
 @pytest.fixture(scope="session")
 def exported(paper_model: Model) -> Exported:
-    """The paper's bushing in three directions as an FMU for all systems."""
-    from fmus import order_of
-
-    from bushfit.export.fmu import export
-
+    """The paper's bushing in three directions, for all systems."""
     return export(order_of(paper_model))
 
 
 @pytest.fixture(scope="session")
 def paper(exported: Exported, tmp_path_factory: pytest.TempPathFactory) -> Running:
     """The same, ready to run."""
-    from fmus import Running
-
     folder = tmp_path_factory.mktemp("fmu")
     ((name, content),) = exported.files.items()
     (folder / name).write_bytes(content)

@@ -12,7 +12,7 @@ from bushfit.report.plots.inspection import inspection_figure
 from bushfit.report.plots.prediction import fine_grid, prediction_figure
 from bushfit.report.plots.reduction import reduction_figure
 from bushfit.report.plots.resonance import resonance_figure
-from bushfit.report.plots.style import to_png
+from bushfit.report.plots.style import to_image
 
 __all__ = [
     "arms_figure",
@@ -24,5 +24,5 @@ __all__ = [
     "reduction_figure",
     "resonance_figure",
     "sweeps_figure",
-    "to_png",
+    "to_image",
 ]
