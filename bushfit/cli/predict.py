@@ -76,10 +76,9 @@ def command(
     the campaign's sweeps at each place, or the paper's as far as it was measured. A warning names what leaves the
     fitted directions, strains or frequencies.
 
-    --mass shakes the base under a mass: the transmissibility over frequency, in <place>_resonance.csv.
+    --mass shakes the base under a mass: its transmissibility, in <place>_resonance.csv.
 
-    --bushing carries the compound to another shape: effects of the material are kept, those of the old bushing and its
-    rig are left out, and it is said which.
+    --bushing carries the compound to another shape: effects of the material are kept, those of the old bushing are not.
     """
     from bushfit.campaign.campaign import load_bushing, load_campaign
     from bushfit.campaign.naming import folder_name
