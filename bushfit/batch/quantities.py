@@ -10,7 +10,6 @@ from bushfit.batch.points import Point
 from bushfit.effects import is_parameter, parameter_named, parameter_names
 from bushfit.units import for_people
 
-Record = Mapping[str, Any]
 #: Value, low and high of its 95 % interval, standard error, in SI; None where it is not known.
 Figures = tuple[float, float | None, float | None, float | None]
 
@@ -54,7 +53,7 @@ def parameter_quantities(names: Collection[str]) -> list[Quantity]:
     return [Quantity(name, "-" if unit == "1" else unit) for name, unit in units.items()]
 
 
-def figures(record: Record) -> Iterator[tuple[str, Figures]]:
+def figures(record: Mapping[str, Any]) -> Iterator[tuple[str, Figures]]:
     """All quantities of a row's record that are known, by name."""
     for name, (value, low, high, stderr, _) in record.get("parameters", {}).items():
         if value is not None:

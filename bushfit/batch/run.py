@@ -10,11 +10,12 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 
 from bushfit.batch import ledger, pool
+from bushfit.batch.document import BatchSummary, Record
 from bushfit.batch.junit import Report
 from bushfit.batch.limits import Judge, Judgement, Limits
 from bushfit.batch.manifest import Row
@@ -31,8 +32,6 @@ from bushfit.report.contents import Contents, Formats, Kinds, Picture
 from bushfit.report.folder import check_free as check_writable
 from bushfit.report.folder import write_files
 
-#: Layout of the summary as JSON.
-SCHEMA = "bushfit/batch/1"
 #: The table and the picture of the batch.
 KINDS = Kinds.shown(["batch"])
 #: Their files in whatever form, in the batch's folder.
@@ -83,7 +82,7 @@ class Summary:
     scatter: dict[Quantity, tuple[float, float]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
-    def add(self, number: int, row: Row, record: ledger.Record, judged: Judgement | None) -> None:
+    def add(self, number: int, row: Row, record: Record, judged: Judgement | None) -> None:
         """Count one row."""
         self.status[record["status"]] += 1
         self.kept += bool(record.get("kept"))
@@ -101,9 +100,10 @@ class Summary:
             elif judged.edge:
                 self.edge.append((row.name, "; ".join(judged.edge.values())))
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> BatchSummary:
+        """JSON-ready data."""
         return {
-            "schema": SCHEMA,
+            "schema": "bushfit/batch/1",
             "rows": self.status.total(),
             "done": self.status["done"],
             "failed": [{"name": name, "error": error} for name, error in self.errors],

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import product
 
-from bushfit.batch.ledger import ROWS, Record
+from bushfit.batch.document import Record
+from bushfit.batch.ledger import ROWS
 from bushfit.batch.limits import Judgement
 from bushfit.batch.manifest import Row
 from bushfit.batch.quantities import OF_FIT, Quantity, figures
@@ -53,7 +54,8 @@ class Table:
             words = ["; ".join(said.values()) for said in (judged.missed, judged.edge)] if judged else ["", ""]
             cells += [str(judged.verdict) if judged else "", *words]
         if self._verdicts:
-            cells += [record.get("verdict", ""), *(", ".join(record.get(k, ())) for k in ("effects", "alternatives"))]
+            names = record.get("effects", []), record.get("alternatives", [])
+            cells += [record.get("verdict", ""), *map(", ".join, names)]
         for quantity, part in self._numbers:
             value = found.get(quantity.name, (None,) * 4)[_PARTS[part]]
             cells.append(None if value is None else value * quantity.factor)

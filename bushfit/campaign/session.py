@@ -12,6 +12,12 @@ from bushfit.effects.contract import Array, Circumstances
 from bushfit.geometry import Bushing, Place, Specimen, unit_strain
 from bushfit.reading.measurement import Loop, Sweep
 
+#: Amplitudes that differ by less than this share belong to one level [1]: more than a rig misses one by, and less than
+#: programmes step by (chosen).
+_LEVEL_STEP = 0.15
+#: Strain amplitude below which none is told from another [1]; an unknown one, of a resonance test, counts as none.
+_LEAST_STRAIN = 1e-9
+
 
 class Visit(NamedTuple):
     """One test as the session sees it.
@@ -71,6 +77,26 @@ def session(bushing: Bushing | None, visits: Sequence[Visit]) -> list[Circumstan
         ends = np.cumsum([strain.size for strain in strains])
         turn = np.arange(ends[-1]) / max(float(ends[-1]) - 1.0, 1.0)
         strained = np.maximum.accumulate(np.concatenate([[0.0], *strains]))[:-1]
-        for i, turns, before in zip(mine, np.split(turn, ends[:-1]), np.split(strained, ends[:-1]), strict=True):
-            found[i] = Circumstances(visits[i].temperature, turns, before)
+        known = (turn, strained, *_last_larger(np.concatenate(strains), turn))
+        for i, *own in zip(mine, *(np.split(each, ends[:-1]) for each in known), strict=True):
+            found[i] = Circumstances(visits[i].temperature, *own)
     return [found[i] for i in range(len(visits))]
+
+
+def _last_larger(strain: Array, turn: Array) -> tuple[Array, Array]:
+    """The last strain amplitude before each point that was of a larger level, and the turns since then, (n,) each.
+
+    Where none was larger, both are 0 and the point's own turn.
+    """
+    level = np.round(np.log(np.maximum(strain, _LEAST_STRAIN)) / np.log1p(_LEVEL_STEP))
+    ends = np.append(np.flatnonzero(np.diff(level)), strain.size - 1)
+    left, since = np.zeros(ends.size), np.zeros(ends.size)
+    above: list[int] = []  # ends of runs before, each of a larger level than all after it
+    for run, end in enumerate(ends):
+        while above and level[above[-1]] <= level[end]:
+            above.pop()
+        if above:
+            left[run], since[run] = strain[above[-1]], turn[above[-1]]
+        above.append(int(end))
+    runs = np.searchsorted(ends, np.arange(strain.size))
+    return left[runs], turn - since[runs]

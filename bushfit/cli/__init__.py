@@ -28,6 +28,7 @@ _COMMANDS = {
     "init": ("init", "Test files and geometry -> a campaign."),
     "reduce": ("reduce", "Raw stepped-sine histories -> a sweep, with its noise and distortion."),
     "simulate": ("simulate", "Model -> a simulated campaign of raw tests, with noise."),
+    "schema": ("schema", "JSON Schemas of the files: for programs that read them, and for editors."),
 }
 
 #: Linear algebra on one thread: the matrices are small, and a sum split over threads ends in other digits.

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from bushfit.diagnosis.correction import Correction, correct
+from bushfit.diagnosis.document import Description
 from bushfit.diagnosis.evidence import Evidence, fit_from
 from bushfit.diagnosis.fingerprint import Fingerprint, fingerprint
 from bushfit.diagnosis.locate import contrasts, locate
-from bushfit.diagnosis.record import Description
 from bushfit.effects.unnamed import NAME
 from bushfit.errors import FitError
 from bushfit.fitting.data_sets import parted

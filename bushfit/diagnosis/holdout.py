@@ -62,6 +62,7 @@ class HeldOut:
     """Root mean square residual of one part, predicted from the other parts.
 
     Args:
+        part: what was held out, in words.
         before, after: in units of noise, as it is shown.
         whitened: before and after in units of noise and of the prediction's own error, by which is decided.
     """
@@ -74,7 +75,13 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class Skipped:
-    """A part that was not held out, why, and the effects of the model after of which the rest says nothing."""
+    """A part that was not held out.
+
+    Args:
+        part: what it is, in words.
+        reason: why it was not held out.
+        effects: of the model with what was added, of which the rest says nothing.
+    """
 
     part: str
     reason: str

@@ -9,6 +9,7 @@ import numpy as np
 
 from bushfit.diagnosis.again import searched_again
 from bushfit.diagnosis.described import describe
+from bushfit.diagnosis.document import Description, Verdict
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.faults import Fault, faults
 from bushfit.diagnosis.form import other_form
@@ -17,7 +18,7 @@ from bushfit.diagnosis.leads import leads
 from bushfit.diagnosis.locate import contrasts, largest_smooth_misfit, locate
 from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.propose import Proposal
-from bushfit.diagnosis.record import Description, Diagnosis, Judged, Named, Verdict, Where
+from bushfit.diagnosis.record import Diagnosis, Judged, Named, Where
 from bushfit.diagnosis.refit import Candidate
 from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.search import CHANCE_LEVEL, SAME, Search, Step

@@ -44,6 +44,7 @@ _FILES = (
     "self_heating",
     "temperature",
     "mullins_levels",
+    "filler_recovery",
     "elastic_preload",
     "strain_scale",
     "clearance",

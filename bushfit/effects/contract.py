@@ -104,15 +104,19 @@ class Circumstances:
         temperature: of the rubber [K], a number or one per operating point, (n,).
         turn: when in the session a point was measured, from 0 for the first to 1 for the last, as temperature.
         strained: largest strain amplitude that the rubber had seen before [1], as temperature.
+        left: last strain amplitude before that was larger than the point's [1], as temperature; 0 where none was.
+        rested: turns since then, as temperature.
     """
 
     temperature: Array | float | None = None
     turn: Array | float | None = None
     strained: Array | float | None = None
+    left: Array | float | None = None
+    rested: Array | float | None = None
 
     def at(self, points: Any) -> Circumstances:
         """The circumstances of some operating points, by an index; numbers stay."""
-        known = (self.temperature, self.turn, self.strained)
+        known = (self.temperature, self.turn, self.strained, self.left, self.rested)
         return Circumstances(*(each[points] if isinstance(each, np.ndarray) else each for each in known))
 
 
@@ -195,7 +199,7 @@ class Effect:
     twins: tuple[str, ...] = ()
     replaces: str | None = None
     frees: tuple[str, ...] = ()
-    under: tuple[Literal["temperature", "turn", "strained"], ...] = ()
+    under: tuple[Literal["temperature", "turn", "strained", "left", "rested"], ...] = ()
     taken: str = ""
     harmonic_only: bool = False
     in_place_of: Callable[[Values], dict[str, float]] | None = None

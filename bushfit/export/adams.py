@@ -3,10 +3,11 @@
 The curve is the storage stiffness at the lowest frequency times each amplitude, so that it softens as the rubber does.
 The damping is one number: in `bushing_car.bus` a viscous damper, in `bushing_ride.bus` the loss angle that the bushing
 of Adams Car Ride reads there. Both are those of the middle frequency and amplitude of the grid. A file states
-its units, which Adams converts; they are mm, newton, deg and sec.
+its units, which Adams converts; they are mm, newton, degrees and second.
 
-Source: Adams Car Ride help, "Frequency Bushing" (damping coefficients are interpreted as loss angles); Altair TeimOrbit
-format and AutoBush, which reads the same files.
+Source: Adams Car Ride help, "Frequency Bushing" (damping coefficients are interpreted as loss angles); blocks,
+attributes and units as in the public fixture `fixture.bus` of the package suspension_multibody, which reads them;
+Altair TeimOrbit format and AutoBush, which reads the same files.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ _UNKNOWN = 1.0
 #: From SI to the displacement and force of the files: mm and N, deg and N mm.
 _SCALES = {TRANSLATION: (1e3, 1.0), ROTATION: (float(np.degrees(1.0)), 1e3)}
 #: Units of the files.
-_UNITS = {"LENGTH": "mm", "ANGLE": "deg", "FORCE": "newton", "MASS": "kg", "TIME": "sec"}
+_UNITS = {"LENGTH": "mm", "ANGLE": "degrees", "FORCE": "newton", "MASS": "kg", "TIME": "second"}
 #: What of the damping column each file has.
 _KINDS = {
     "car": "damping: viscous, N s/mm and N mm s/deg",

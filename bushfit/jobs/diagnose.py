@@ -21,12 +21,15 @@ if TYPE_CHECKING:
     from bushfit.model.result import Result
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Diagnosed:
     """The outcome of a diagnosis of a campaign of that name."""
 
     name: str
     diagnosis: Diagnosis
+
+    def __repr__(self) -> str:
+        return f"{self.name}: {self.diagnosis.verdict}\n  {self.diagnosis.summary}"
 
     @property
     def result(self) -> Result:

@@ -34,13 +34,15 @@ if TYPE_CHECKING:
     from bushfit.geometry import Place
     from bushfit.model.result import Misfit, Result, Usable
 
+#: Tables by place, the columns of each by header, null where a cell is empty; and "warnings".
+PredictionDocument = dict[str, dict[str, list[float | None]] | list[str]]
 #: Directions that are predicted where none is asked for: those of the paper.
 _DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
 #: Keys of [predict] that have the amplitudes of each motion.
 _AMPLITUDES = {TRANSLATION: "amplitudes", ROTATION: "torsion_amplitudes", STRAINING: "strain_amplitudes"}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Predicted:
     """The outcome of a prediction: one table a place, and a resonance, where a mass was asked for.
 
@@ -54,6 +56,9 @@ class Predicted:
     notes: tuple[str, ...] = ()
     resonances: Sequence[PredictedResonance] = ()
     wide: bool = False
+
+    def __repr__(self) -> str:
+        return f"Prediction of {self.result.name}: {', '.join(str(found.direction) for found in self.predictions)}"
 
     @property
     def document(self) -> Mapping[str, Any]:

@@ -28,6 +28,14 @@ def test_turns_go_from_first_to_last_and_strains_remember_the_largest_before() -
     np.testing.assert_allclose(second.strained, 3 * [1e-3 * unit_strain(BUSHING, Direction.AXIAL)])
 
 
+def test_the_last_larger_strain_counts_from_when_it_was_left() -> None:
+    up_and_down = np.array([1.0, 2.0, 4.0, 4.1, 2.0, 2.1, 1.0, 2.0]) * 1e-4
+    (found,) = session(BUSHING, [Visit(Direction.AXIAL, up_and_down)])
+    strain = up_and_down * unit_strain(BUSHING, Direction.AXIAL)
+    np.testing.assert_allclose(found.left, [0.0, 0.0, 0.0, 0.0, strain[3], strain[3], strain[5], strain[3]])
+    np.testing.assert_allclose(7.0 * found.rested[4:], [1.0, 2.0, 1.0, 4.0])
+
+
 def test_the_order_that_is_stated_counts() -> None:
     small, large = Visit(Direction.AXIAL, np.array([1e-4]), order=2), Visit(Direction.AXIAL, np.array([1e-3]), order=1)
     later, earlier = session(BUSHING, [small, large])

@@ -40,7 +40,7 @@ ACTIVE = {"delay"}
 #: The reversal of dry friction falls on a sample only to the accuracy of the sampling.
 SAMPLES = 2**14
 #: A warm test, late in the session and after a large strain.
-UNDER = Circumstances(temperature=303.0, turn=0.7, strained=0.08)
+UNDER = Circumstances(temperature=303.0, turn=0.7, strained=0.08, left=0.08, rested=0.03)
 #: Effects made of parts that set in one after the other: the slope jumps there, by so much, and no rule of differences
 #: over both sides meets it.
 KINKED = {"sliders": 5e-3}
@@ -345,7 +345,7 @@ def test_a_stack_of_values_equals_one_after_the_other(effect: Effect, rng: np.ra
     ]
     frequency, amplitudes = np.array([0.1, 40.0, 155.0, 155.0]), amplitude * np.array([1.0, 0.5, 1.5, 0.0])
     turns = np.linspace(0.0, 1.0, 4)
-    each_point = Circumstances(295.0 + turns, turns, 0.1 * turns)
+    each_point = Circumstances(295.0 + turns, turns, 0.1 * turns, 0.1 * turns, 0.1 - 0.1 * turns)
     both = model.stiffness(direction, frequency, amplitudes, kind="loop", values=stacked(models), under=each_point)
     assert both.shape == (3, 4)
     for row, each in zip(both, models, strict=True):

@@ -238,7 +238,7 @@ def test_what_corrects_a_formula_scales_that_direction_and_no_other(effect: Effe
         assert (abs(ratio[0] - 1.0) > 1e-6) == (direction == effect.corrects)
 
 
-WARM = Circumstances(temperature=33.0 + CELSIUS, turn=0.5, strained=0.1)
+WARM = Circumstances(33.0 + CELSIUS, turn=0.5, strained=0.1, left=0.1, rested=0.02)
 
 
 def test_warm_rubber_is_softer_and_faster() -> None:
@@ -282,6 +282,18 @@ def test_mullins_softens_below_the_largest_strain_so_far_and_not_there() -> None
     assert ratio.real[0] == pytest.approx(1.0 - 0.2 * math.erf(0.75))
     np.testing.assert_allclose(ratio[1:], 1.0, rtol=1e-12)
     same(softened, PLAIN, 0.0)
+
+
+def test_friction_recovers_after_a_larger_strain() -> None:
+    """Left at twice the strain, three quarters of the share are lost at first, 1/e of that a time constant later."""
+    values = {"filler_recovery.share": 0.4, "filler_recovery.tau": 0.1}
+    broken = PLAIN.with_effect("filler_recovery", values)
+    left = 2.0 * AMPLITUDE * PLAIN.unit_strain(Direction.AXIAL)
+    for rested, lost in ((0.0, 0.3), (0.1, 0.3 / math.e), (100.0, 0.0)):
+        weak = PLAIN.with_values({"sigma_fmax": (1.0 - lost) * PLAIN.values["sigma_fmax"]})
+        stiffness = broken.stiffness("axial", FREQUENCY, AMPLITUDE, under=Circumstances(left=left, rested=rested))
+        np.testing.assert_allclose(stiffness, weak.stiffness("axial", FREQUENCY, AMPLITUDE), rtol=1e-12)
+    same(broken, PLAIN, 0.0)
 
 
 def test_a_loop_clock_that_runs_slow_is_a_faster_loop() -> None:

@@ -103,17 +103,17 @@ def test_the_compound_of_abaqus_is_the_model_at_that_strain(order: Order, paper_
 
 
 def test_adams_holds_curve_and_damping(order: Order, known: pd.DataFrame) -> None:
-    """In mm, newton, deg and sec: storage force at each amplitude, damper or loss angle in the middle of the grid."""
+    """Storage force at each amplitude, damper or loss angle in the middle of the grid; mm, newton, degrees, second."""
     exported = adams.export(order)
     factors = {"x": (1e3, 1.0), "ax": (np.degrees(1.0), 1e3)}
     for kind in ("car", "ride"):
         blocks = teimorbit(exported.files[f"bushing_{kind}.bus"].decode("ascii"))
         assert blocks["UNITS"][0] == {
             "LENGTH": "'mm'",
-            "ANGLE": "'deg'",
+            "ANGLE": "'degrees'",
             "FORCE": "'newton'",
             "MASS": "'kg'",
-            "TIME": "'sec'",
+            "TIME": "'second'",
         }
         assert list(blocks) == ["MDI_HEADER", "UNITS", "DAMPING", *(f"{end}_CURVE" for end in ENDS)]
         for direction, ends in (("axial", ["FZ"]), ("radial", ["FX", "FY"]), ("torsion", ["TZ"])):
