@@ -47,6 +47,13 @@ _MOST_OF_FIT = 3
 @click.option("--mass", help='Predict its resonance on each place, too: such as "1.2 kg", with --base-acceleration.')
 @click.option("--base-acceleration", help='Amplitude of the base under the mass, such as "0.1 g" or "1 m/s^2".')
 @click.option("--wide", is_flag=True, help="Also <place>_wide.csv: frequency down, amplitude across, no bands.")
+@click.option(
+    "--arms",
+    is_flag=False,
+    flag_value="1 %",
+    metavar="[ERROR]",
+    help="Also write arms.csv and arms.png: Maxwell arms in place of the springpot, within this error [1 %].",
+)
 @shared_options
 def command(
     model: Path,
@@ -57,6 +64,7 @@ def command(
     mass: str | None,
     base_acceleration: str | None,
     wide: bool,
+    arms: str | None,
     options: Options,
     **grids: str | None,
 ) -> None:
@@ -97,7 +105,8 @@ def command(
     shaken = positive(mass, "--mass", "kg"), positive(base_acceleration, "--base-acceleration", "m/s^2")
     with naming(place="--temperature"):
         warm = None if temperature is None else kelvin(temperature)
-    job = Predict(PredictSettings(directions=directions or None, **asked), *shaken, warm, wide)
+    within = positive(arms, "--arms", "1")
+    job = Predict(PredictSettings(directions=directions or None, **asked), *shaken, warm, wide, within)
     folder = options.folder(loaded.slug if loaded else folder_name(result.name))
     measured = Kinds(tables=("measured",) if loaded and loaded.sweeps else ())
     options.require_free(folder, options.formats.names(job.kinds(result, loaded) + measured))
@@ -107,6 +116,8 @@ def command(
         frequency, largest = found.peak
         peak = f"resonance at {frequency:.4g} Hz, |T| {largest:.3g}"
         options.say(f"{found.place} under {mass}, base at {base_acceleration}: {peak}")
+    for part in outcome.arms:
+        options.say(part.sentence)
     tell_tests(options, outcome.tests, outcome.usable)
     warn(options, of_fit)
     options.write(folder, options.formats.files(outcome.contents_beside))

@@ -222,6 +222,8 @@ class Branch(Effect):
             differentiates numerically.
         stress_sensitivities: the same of the stress.
         uses: the paper's parameters that it reads besides its own.
+        size: of a linear branch that fades with memory, the parameter that its modulus is proportional to; Maxwell arms
+            can stand for it. None for all others.
     """
 
     modulus: Callable[[Values, Array, Array], Array]
@@ -229,6 +231,7 @@ class Branch(Effect):
     modulus_sensitivities: Callable[[Values, Array, Array], dict[str, Array]] | None = None
     stress_sensitivities: Callable[[Values, History], dict[str, Array]] | None = None
     uses: tuple[str, ...] = ()
+    size: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

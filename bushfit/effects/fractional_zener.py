@@ -66,6 +66,7 @@ EFFECT = Branch(
     source="M. Caputo, F. Mainardi, Riv. Nuovo Cimento 1 (1971) 161; R. L. Bagley, P. J. Torvik, AIAA J. 21 (1983) 741",
     confirmed_by="sweep to twice the highest frequency: the loss factor must fall there",
     uses=("m", "alpha"),
+    size="m",
     modulus=modulus,
     stress=stress,
 )

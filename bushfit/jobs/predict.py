@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 from bushfit.campaign.schema import PredictSettings
 from bushfit.campaign.session import measured_session
+from bushfit.effects import Level
 from bushfit.errors import ModelError
 from bushfit.fitting.agreement import met_within, misfits
 from bushfit.fitting.data_sets import SweepData, sweep_data
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Specimen, place_named
 from bushfit.jobs.grid import default_grid
+from bushfit.model.arms import Arms, model_arms
 from bushfit.prediction import PredictedResonance, Prediction, caveats, predict, predict_resonance
 from bushfit.report.artifacts import (
+    arms_contents,
     measured_contents,
     names_of_more,
     place_names,
@@ -32,6 +35,7 @@ if TYPE_CHECKING:
 
     from bushfit.campaign.campaign import Campaign
     from bushfit.geometry import Place
+    from bushfit.model.model import Model
     from bushfit.model.result import Misfit, Result, Usable
 
 #: Tables by place, the columns of each by header, null where a cell is empty; and "warnings".
@@ -56,6 +60,7 @@ class Predicted:
     notes: tuple[str, ...] = ()
     resonances: Sequence[PredictedResonance] = ()
     wide: bool = False
+    arms: Sequence[Arms] = ()
 
     def __repr__(self) -> str:
         return f"Prediction of {self.result.name}: {', '.join(str(found.direction) for found in self.predictions)}"
@@ -64,7 +69,17 @@ class Predicted:
     def document(self) -> Mapping[str, Any]:
         tables = {str(p.direction): _filled(prediction_table(p)) for p in self.predictions}
         shaken = {f"{found.place}_resonance": shaken_table(found).to_dict(orient="list") for found in self.resonances}
-        return {**tables, **shaken, "warnings": self.warnings}
+        arms = [
+            {
+                "in_place_of": part.stands_for,
+                "shear_modulus_Pa": part.modulus.tolist(),
+                "relaxation_time_s": part.time.tolist(),
+                "band_Hz": part.band,
+                "largest_relative_error": part.error,
+            }
+            for part in self.arms
+        ]
+        return {**tables, **shaken, **({"arms": arms} if arms else {}), "warnings": self.warnings}
 
     @property
     def warnings(self) -> list[str]:
@@ -94,6 +109,8 @@ class Predicted:
     def contents(self) -> Contents:
         found = prediction_contents(self.result, self.predictions, self.measured, self.notes)
         found |= wide_contents(self.predictions if self.wide else ())
+        places = [prediction.direction for prediction in self.predictions]
+        found |= arms_contents(self.result.model, self.arms, places, self.result.name)
         return found | resonance_contents(self.resonances)
 
     @property
@@ -112,7 +129,8 @@ class Predict:
     """Dynamic stiffness over a grid: the one asked for, else the campaign's [predict], else that of its sweeps.
 
     With a mass [kg] and the acceleration of its base [m/s^2], its resonance at each place, too. All at a temperature
-    [K], where the model has an effect of it. `wide` tables have amplitudes across.
+    [K], where the model has an effect of it. `wide` tables have amplitudes across. With a relative error, Maxwell arms
+    that keep within it over the frequencies predicted.
     """
 
     asked: PredictSettings = field(default_factory=PredictSettings)
@@ -120,6 +138,7 @@ class Predict:
     base_acceleration: float | None = None
     temperature: float | None = None
     wide: bool = False
+    arms: float | None = None
 
     def places(self, result: Result | None, campaign: Campaign | None) -> list[Place]:
         """Those asked for, else the paper's directions where there is a bushing, and all specimens.
@@ -141,7 +160,7 @@ class Predict:
         places = self.places(result, campaign)
         more = [what for what, wanted in (("wide", self.wide), ("resonance", self.mass)) if wanted]
         tables = tuple(name for what in more for name in names_of_more(places, what))
-        return Kinds.shown(place_names(places)) + Kinds(tables=tables)
+        return Kinds.shown([*place_names(places), *(["arms"] if self.arms else [])]) + Kinds(tables=tables)
 
     def run(self, result: Result, campaign: Campaign | None, notes: tuple[str, ...] = ()) -> Predicted:
         """One prediction a place.
@@ -178,7 +197,22 @@ class Predict:
             for place in self.places(result, campaign)
             if self.mass and self.base_acceleration
         ]
-        return Predicted(result, predictions, known, notes, resonances, self.wide)
+        arms = self._arms(result.model, predictions) if self.arms else ()
+        return Predicted(result, predictions, known, notes, resonances, self.wide, arms)
+
+    def _arms(self, model: Model, predictions: Sequence[Prediction]) -> tuple[Arms, ...]:
+        """Maxwell arms over the frequencies of all predictions."""
+        assert self.arms
+        frequencies = [prediction.frequency for prediction in predictions]
+        band = float(min(map(min, frequencies))), float(max(map(max, frequencies)))
+        found = model_arms(model.without(Level.INSTRUMENT), band, self.arms)
+        if not found:
+            raise ModelError(
+                "there is nothing that Maxwell arms could stand for",
+                place="--arms",
+                expected="a model whose stiffness depends on frequency, as by a springpot",
+            )
+        return found
 
     def _settings(self, campaign: Campaign | None) -> PredictSettings:
         given = {key: value for key, value in vars(self.asked).items() if value is not None}

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from bushfit.diagnosis.record import Diagnosis
     from bushfit.fitting.data_sets import LoopData, SweepData
     from bushfit.geometry import Place
+    from bushfit.model.arms import Arms
+    from bushfit.model.model import Model
     from bushfit.model.result import Result
     from bushfit.prediction import PredictedResonance, Prediction
 
@@ -86,6 +88,18 @@ def resonance_contents(resonances: Sequence[PredictedResonance]) -> Contents:
     names = names_of_more([found.place for found in resonances], "resonance")
     pairs = zip(names, resonances, strict=True)
     return Contents(tables={name: partial(tables.shaken_table, found) for name, found in pairs})
+
+
+def arms_contents(model: Model, arms: Sequence[Arms], places: Sequence[Place], title: str) -> Contents:
+    """`arms`: Maxwell arms as a table, and a picture of their modulus and its error; nothing where there are none."""
+
+    def picture() -> Figure:
+        from bushfit.report.plots import arms_figure
+
+        return arms_figure(model, arms, title)
+
+    table = partial(tables.arms_table, model, arms, places)
+    return Contents({}, {"arms": table}, {"arms": picture}) if arms else Contents()
 
 
 def measured_contents(result: Result, fitted: Sequence[SweepData], left: Sequence[SweepData]) -> Contents:

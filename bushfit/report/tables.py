@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from bushfit.effects.contract import Array
     from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
     from bushfit.geometry import Display, Place
+    from bushfit.model.arms import Arms
     from bushfit.model.model import Model
     from bushfit.prediction import PredictedResonance, Prediction
     from bushfit.reduction.resonance import Resonance
@@ -106,6 +107,22 @@ def shaken_table(found: PredictedResonance) -> pd.DataFrame:
         other = shaken_table(found.if_rigs).iloc[:, 1:].add_suffix(f", {IF_RIGS}")
         table = pd.concat([table, other], axis=1)
     return table
+
+
+def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> pd.DataFrame:
+    """Maxwell arms, a row an arm, and before them the spring that stands beside: modulus, stiffness at each place,
+    relaxation time."""
+    import pandas as pd
+
+    from bushfit.model.arms import listed
+
+    names, moduli, times = zip(*listed(model, arms), strict=True)
+    modulus = np.array(moduli)
+    columns = {"in place of": names, "relaxation time [s]": times, "shear modulus [MPa]": 1e-6 * modulus}
+    for place in places:
+        *_, (unit, factor) = place.display
+        columns[f"{place} {words(place)[2]} [{unit}]"] = factor * model.stiffness_per_modulus(place) * modulus
+    return pd.DataFrame(columns)
 
 
 def loops_table(model: Model, data_sets: Sequence[LoopData]) -> pd.DataFrame:

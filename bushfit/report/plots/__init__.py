@@ -5,6 +5,7 @@ The one importer of matplotlib. Nothing here touches its global state, so figure
 thread. Levels differ in colour (of scales that survive colour blindness and grey print), line style and marker.
 """
 
+from bushfit.report.plots.arms import arms_figure
 from bushfit.report.plots.fits import loops_figure, sweeps_figure
 from bushfit.report.plots.gap import gap_figure
 from bushfit.report.plots.inspection import inspection_figure
@@ -14,6 +15,7 @@ from bushfit.report.plots.resonance import resonance_figure
 from bushfit.report.plots.style import to_image
 
 __all__ = [
+    "arms_figure",
     "fine_grid",
     "gap_figure",
     "inspection_figure",
