@@ -52,7 +52,7 @@ _MOST_OF_FIT = 3
     is_flag=False,
     flag_value="1 %",
     metavar="[ERROR]",
-    help="Also write arms.csv and arms.png: Maxwell arms in place of the springpot, within this error [1 %].",
+    help="Also arms.csv, arms.png: Maxwell arms for the springpot, within this error [1 %].",
 )
 @shared_options
 def command(
@@ -78,8 +78,8 @@ def command(
 
     --mass shakes the base under a mass: the transmissibility over frequency, in <place>_resonance.csv.
 
-    --bushing carries the compound to another shape: effects of the material are kept, those of the old bushing and its
-    rig are left out, and it is said which.
+    --bushing carries the compound to another shape: effects of the material are kept, those of the old bushing and
+    its rig left out, which is said.
     """
     from bushfit.campaign.campaign import load_bushing, load_campaign
     from bushfit.campaign.naming import folder_name
