@@ -55,7 +55,7 @@ def refits(
     Args:
         evidence, proposed: the fitted model without the effects, and the effects to fit.
         known: candidates that need no fit.
-        starts: per proposal values to start from, where not the proposal's own.
+        starts: by name of a proposal values to start from, where not its own.
         held, bounds: parameters that do not move, and limits inside the parameters' own.
     """
     fits: dict[str, Descent] = {}
@@ -63,7 +63,7 @@ def refits(
         limits = {**_within_stroke(evidence.data_sets, proposal.name), **bounds}
         with suppress(FitError, ModelError):  # no response with this effect: no candidate
             known_to_it = {
-                name: value for name, value in starts[proposal.name].items() if name in proposal.model.values
+                name: value for name, value in starts.get(proposal.name, {}).items() if name in proposal.model.values
             }
             fits[proposal.name] = fit_from(proposal.model.with_values(known_to_it), evidence.data_sets, held, limits)
     claimed = {proposal.name: evidence.chi_square - proposal.score for proposal in proposed}

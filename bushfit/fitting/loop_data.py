@@ -94,8 +94,7 @@ class LoopData(DataSet):
         return self._whitened(self.drive.at_rows(self.drive.from_datum(slopes)) * self._per_noise)
 
     def moved(self, change: Array, model: Model, beside: Array | float = 0.0) -> Array:
-        wave = self.drive.coefficients[1] * np.exp(2j * np.pi * self.drive.phase)
-        return self._whitened(np.real(change * wave) * self._per_noise)
+        return np.concatenate((change.real, change.imag), axis=-1) @ self._unit_changes
 
     def residual_with(self, added: Array, model: Model) -> Array:
         return self.residual(model) + self.moved(added, model)
@@ -196,6 +195,12 @@ class LoopData(DataSet):
     def _counted(self, white: Array) -> Array:
         """Of whitened rows, (..., n), what counts as its residuals."""
         return white @ self._fundamental if self.fundamental_only else white
+
+    @cached_property
+    def _unit_changes(self) -> Array:
+        """What 1 and i of a change of stiffness do to the residuals, (2, n)."""
+        wave = self.drive.coefficients[1] * np.exp(2j * np.pi * self.drive.phase)
+        return self._whitened(np.array([wave.real, -wave.imag]) * self._per_noise)
 
     @cached_property
     def _fundamental(self) -> Array:
