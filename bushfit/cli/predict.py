@@ -29,7 +29,7 @@ _MOST_OF_FIT = 3
 @click.argument("model", type=click.Path(path_type=Path))
 @path_option(
     "--campaign",
-    help="Lay this campaign's sweeps over the plots, set them beside the prediction, and use its [predict] grid.",
+    help="Set this campaign's sweeps beside the prediction, and use its [predict] grid.",
 )
 @path_option(
     "--bushing",
