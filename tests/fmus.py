@@ -32,7 +32,7 @@ LEVELS = {
 }
 
 
-def order(model: Model, places: Sequence[Place] = tuple(LEVELS), accuracy: float = 0.01, **result: Any) -> Order:
+def order_of(model: Model, places: Sequence[Place] = tuple(LEVELS), accuracy: float = 0.01, **result: Any) -> Order:
     """An order of these places over the paper's grid."""
     found = Result(model, **result)
     grids = [LEVELS.get(place, (0.01, 0.05)) if isinstance(place, Direction) else (0.01, 0.05) for place in places]

@@ -29,7 +29,7 @@ _MOST_OF_FIT = 3
 @click.argument("model", type=click.Path(path_type=Path))
 @path_option(
     "--campaign",
-    help="Lay this campaign's sweeps over the plots, set them beside the prediction, and use its [predict] grid.",
+    help="Lay its sweeps over the plots and beside the prediction, and use its [predict] grid.",
 )
 @path_option(
     "--bushing",
@@ -52,7 +52,7 @@ _MOST_OF_FIT = 3
     is_flag=False,
     flag_value="1 %",
     metavar="[ERROR]",
-    help="Also write arms.csv and arms.png: Maxwell arms in place of the springpot, within this error [1 %].",
+    help="Also arms.csv, arms.png: Maxwell arms for the springpot, within this error [1 %].",
 )
 @shared_options
 def command(
@@ -76,10 +76,9 @@ def command(
     the campaign's sweeps at each place, or the paper's as far as it was measured. A warning names what leaves the
     fitted directions, strains or frequencies.
 
-    --mass shakes the base under a mass: the transmissibility over frequency, in <place>_resonance.csv.
+    --mass shakes the base under a mass: its transmissibility, in <place>_resonance.csv.
 
-    --bushing carries the compound to another shape: effects of the material are kept, those of the old bushing and its
-    rig are left out, and it is said which.
+    --bushing carries the compound to another shape: effects of its material are kept, those of bushing and rig are not.
     """
     from bushfit.campaign.campaign import load_bushing, load_campaign
     from bushfit.campaign.naming import folder_name

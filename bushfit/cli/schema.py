@@ -12,7 +12,7 @@ from bushfit.cli.show import new_table
 
 @click.command("schema", epilog=example("bushfit schema", "bushfit schema model"))
 @click.argument("name", required=False)
-@partial(shared_options, where="nothing is written")
+@partial(shared_options, where="nothing is written", forms=())
 def command(name: str | None, options: Options) -> None:
     """Print the JSON Schema (draft 2020-12) of NAME on standard output; without NAME, tell which there are.
 

@@ -51,7 +51,15 @@ class Described:
         if self.fingerprint is None:
             return "nothing is told of its form"
         no_law = "" if self.fingerprint.is_power_law else "it is no power law of frequency and amplitude; nearest: "
-        return no_law + self.fingerprint.words
+        return no_law + self.fingerprint.words + self._peak
+
+    @property
+    def _peak(self) -> str:
+        """Its peak, where it has one."""
+        if self.correction.data.peak is None:
+            return ""
+        middle, width = (number(each, 2) for each in self.correction.data.peak)
+        return f"; with a peak, as of a resonance, at {middle} Hz, {width} Hz wide"
 
     @property
     def size(self) -> str:

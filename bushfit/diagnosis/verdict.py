@@ -141,7 +141,7 @@ def unexplained(
     told = "" if words == _NO_NAME else f"; {words}"
     said = f"{_NO_NAME}: {found.size}; {found.words}{told}{lead}"
     names, out, about = [Named(UNNAMED, found.evidence)], found.correction.held, found.description
-    return finish(search, "described", said, found.after, names, fault=fault, held=out, description=about)
+    return finish(search, "described", said, found.after, names, fault=fault, held=out, description=about, again=again)
 
 
 def _share_beside(evidence: Evidence, fault: Fault) -> float:

@@ -12,6 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError
 from bushfit.export.contract import Order
+from bushfit.export.losses import of_band
 from bushfit.geometry import Place
 from bushfit.model.arms import Arms, fading, model_arms, qualified_size
 from bushfit.model.model import Model
@@ -94,7 +95,7 @@ def in_time(order: Order) -> InTime:
     Raises:
         ModelError: an effect that has no law in time, or none in the C sources; or no arms within the accuracy.
     """
-    model, rig = order.result.model.without(Level.INSTRUMENT), order.result.model
+    model = order.result.model.without(Level.INSTRUMENT)
     left = [effect.name for effect in model.records if _is_left(effect)]
     kept = model.without(*left)
     held = [effect.name for effect in kept.records if isinstance(effect, Modifier)]
@@ -103,12 +104,9 @@ def in_time(order: Order) -> InTime:
     arms = model_arms(kept, band(order), order.accuracy)
     middle = [kept.values_at(p.direction, _middle(p.frequency), _middle(p.amplitude)) for p in order.predictions]
     values, names = _values(kept, order.places, middle, arms)
-    losses = [f"{part.sentence}, and fading below" for part in arms]
-    if out := [effect.name for effect in rig.records if effect.level is Level.INSTRUMENT]:
-        losses.append(f"left out, because they belong to the rig and not to the bushing: {', '.join(out)}")
-    losses += [effect.taken for effect in kept.records if effect.taken]
+    losses = [f"the whole memory of the rubber: {part.sentence}, fading below" for part in arms]
     for prediction, own in zip(order.predictions, middle, strict=True):
-        losses += _lost(kept, held, left, prediction, own)
+        losses += [*_lost(kept, held, left, prediction, own), *of_band(prediction)]
     return InTime(
         order.places,
         values,
@@ -234,7 +232,7 @@ def _lost(
         return []
     (length, factor), *_ = prediction.direction.display
     frequency, amplitude = number(_middle(prediction.frequency), 3), number(factor * _middle(prediction.amplitude), 3)
-    said = [f"{', '.join(held)} held as at {frequency} Hz and {amplitude} {length}"] * bool(held)
-    said += [f"{', '.join(left)} left out"] * bool(left)
+    said = [f"{', '.join(held)}, held as at {frequency} Hz and {amplitude} {length}"] * bool(held)
+    said += [", ".join(left)] * bool(left)
     off = f"stiffness off by up to {number(100.0 * error, 2)} % over the grid"
     return [f"{prediction.direction}: {'; '.join(said)}: {off}"]

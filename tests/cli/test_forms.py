@@ -117,7 +117,7 @@ def test_a_variable_of_the_environment_holds_for_all_commands(place: Path, monke
 @pytest.mark.parametrize("form", READ)
 def test_what_is_simulated_is_fitted(place: Path, form: str) -> None:
     assert call(place, "simulate", "model.json", "-o", f"sim-{form}", "--table-format", form).returncode == 0
-    fitted = call(place, "fit", f"sim-{form}/campaign.toml", "-o", f"fit-{form}", "--no-plots")
+    fitted = call(place, "fit", f"sim-{form}/campaign.toml", "-o", f"fitted-{form}", "--no-plots")
     assert fitted.returncode == 0, fitted.stderr
 
 

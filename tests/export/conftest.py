@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from fmus import Running
-from fmus import order as order_of
+from fmus import Running, order_of
 from kept import HASH
 
 from bushfit.export.contract import Exported, Order

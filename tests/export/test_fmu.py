@@ -9,7 +9,7 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
-from fmus import HERE, LEVELS, Running, off, order, wandering, written
+from fmus import HERE, LEVELS, Running, off, order_of, wandering, written
 
 from bushfit.effects import LIBRARY, Branch, Layer, Level, qualified
 from bushfit.effects.contract import Array
@@ -81,7 +81,7 @@ def every(paper_model: Model, tmp_path_factory: pytest.TempPathFactory) -> tuple
     """A model with every law at its neutral values, and its FMU."""
     folder = tmp_path_factory.mktemp("every")
     model = Model.started(paper_model.bushing, (*paper_model.effects, *SETTABLE), paper_model.values)
-    return model, Running(written(order(model), folder), folder / "open")
+    return model, Running(written(order_of(model), folder), folder / "open")
 
 
 def test_every_law_of_the_sources_is_tested() -> None:
@@ -114,7 +114,7 @@ def test_each_effect_follows_the_rig(every: tuple[Model, Running], name: str) ->
 def test_what_fades_with_memory_follows_the_rig(paper_model: Model, opened: Path) -> None:
     names = tuple(dict.fromkeys(name.partition(".")[0] for name in FADING))
     model = Model.started(paper_model.bushing, (*paper_model.effects, *names), {**paper_model.values, **FADING})
-    running = Running(written(order(model, accuracy=2e-3), opened), opened / "fading")
+    running = Running(written(order_of(model, accuracy=2e-3), opened), opened / "fading")
     motion, step, frequency = motions("random", 1)
     errors = [
         off(*pair)
@@ -129,7 +129,7 @@ def test_what_fades_with_memory_follows_the_rig(paper_model: Model, opened: Path
 
 def test_preload_of_one_direction_has_values_of_its_own(paper_model: Model, opened: Path) -> None:
     model = paper_model.with_effect("elastic_preload.radial", {"elastic_preload.radial": 1.2})
-    running = Running(written(order(model), opened), opened / "preload")
+    running = Running(written(order_of(model), opened), opened / "preload")
     assert {"mu.axial", "mu.radial", "mu.torsion"} <= set(running.reference)
     motion, step, frequency = motions("random", 1)
     assert off(running.run(motion, step), on_the_rig(model, motion, step, frequency)) < LARGEST
