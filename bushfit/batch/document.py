@@ -93,31 +93,65 @@ class Scatter(TypedDict):
     unit: str
 
 
-class BatchSummary(TypedDict):
-    """What came of a batch.
+class Control(TypedDict):
+    """The middle and the scatter of a column of the table, and what is allowed.
+
+    Args:
+        median: in the unit of the column.
+        sigma: robust standard deviation, in the unit of the column.
+        allowed: least and largest, in the unit of the column; null where there is no limit.
+    """
+
+    median: float
+    sigma: float
+    allowed: list[float | None]
+
+
+class Counts(TypedDict):
+    """What came of a batch, row by row.
 
     Args:
         schema: of this document.
         rows: how many there are.
         done: how many of them are done.
         failed: the others, and why.
-        kept: how many were taken over from an earlier run.
         limits: bushings by how they meet the limits.
         missed: names of the bushings that miss a limit.
         conditional: names of those that pass on condition: the value is within, its interval reaches over the limit.
-        scatter: by quantity.
         warnings: what could not be judged, and other things to know.
-        seconds: that the batch took [s].
     """
 
     schema: Literal["bushfit/batch/1"]
     rows: int
     done: int
     failed: list[Failure]
-    kept: int
     limits: dict[str, int]
     missed: list[str]
     conditional: list[str]
-    scatter: dict[str, Scatter]
     warnings: list[str]
+
+
+class BatchFile(Counts):
+    """What came of a batch, beside its table.
+
+    Args:
+        title: of the batch.
+        quantities: by column of the table.
+    """
+
+    title: str
+    quantities: dict[str, Control]
+
+
+class BatchSummary(Counts):
+    """What came of a batch in this run.
+
+    Args:
+        kept: how many rows were taken over from an earlier run.
+        scatter: by quantity.
+        seconds: that the batch took [s].
+    """
+
+    kept: int
+    scatter: dict[str, Scatter]
     seconds: float

@@ -27,6 +27,11 @@ class Quantity:
         return Quantity(self.name, *for_people(self.unit, self.factor, size))
 
     @property
+    def tabled(self) -> Quantity:
+        """The same as tables have it: a parameter in the unit for its usual size, whatever it is in this batch."""
+        return self.for_people(parameter_named(self.name).typical) if is_parameter(self.name) else self
+
+    @property
     def header(self) -> str:
         return f"{self.name} [{self.unit}]"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import time
 from collections import Counter, defaultdict
@@ -15,7 +16,7 @@ from typing import get_args
 import numpy as np
 
 from bushfit.batch import ledger, pool
-from bushfit.batch.document import BatchSummary, Record
+from bushfit.batch.document import BatchFile, BatchSummary, Control, Counts, Record, Scatter
 from bushfit.batch.junit import Report
 from bushfit.batch.limits import Judge, Judgement, Limits
 from bushfit.batch.manifest import Row
@@ -28,21 +29,21 @@ from bushfit.effects.contract import Array
 from bushfit.errors import OutputError
 from bushfit.reading.tablefile import opened
 from bushfit.reduction.scatter import scatter
-from bushfit.report.contents import Contents, Formats, Kinds, Picture
+from bushfit.report.contents import Contents, Formats, Kinds, Picture, pages_of
 from bushfit.report.folder import check_free as check_writable
-from bushfit.report.folder import write_files
+from bushfit.report.folder import to_json, write_files
 
-#: The table and the picture of the batch.
-KINDS = Kinds.shown(["batch"])
-#: Their files in whatever form, in the batch's folder.
-FILES = [f"batch.{ending}" for ending in ("csv", "xlsx", *get_args(Picture))]
+#: All that is written of the whole batch: what is said of it, its table, picture and page.
+KINDS = Kinds(("batch",), ("batch",), ("batch",), ("index",))
+#: The files of these in whatever form, in the batch's folder.
+FILES = ["index.html", *(f"batch.{ending}" for ending in ("json", "csv", "xlsx", *get_args(Picture)))]
 #: Bushings that must have a quantity for it to be drawn: fewer show no scatter.
 _LEAST_DRAWN = 3
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A batch: its title, rows, what all rows share, limits, a JUnit file on request, forms of table and picture."""
+    """A batch: its title, rows, what all rows share, limits, a JUnit file on request, how the whole is written."""
 
     title: str
     rows: Sequence[Row]
@@ -100,24 +101,38 @@ class Summary:
             elif judged.edge:
                 self.edge.append((row.name, "; ".join(judged.edge.values())))
 
-    def to_document(self) -> BatchSummary:
-        """JSON-ready data."""
+    @property
+    def counts(self) -> Counts:
+        """JSON-ready data, whatever of it was done in this run."""
         return {
             "schema": "bushfit/batch/1",
             "rows": self.status.total(),
             "done": self.status["done"],
             "failed": [{"name": name, "error": error} for name, error in self.errors],
-            "kept": self.kept,
             "limits": dict(self.limits),
             "missed": [name for name, _ in self.missed],
             "conditional": [name for name, _ in self.edge],
-            "scatter": {
-                quantity.name: {"median": middle, "sigma": spread, "unit": quantity.unit}
-                for quantity, (middle, spread) in self.scatter.items()
-            },
             "warnings": self.notes,
-            "seconds": self.seconds,
         }
+
+    def to_document(self) -> BatchSummary:
+        """The same with what this run took, and the scatter of each quantity in its unit."""
+        scatter: dict[str, Scatter] = {
+            quantity.name: {"median": middle, "sigma": spread, "unit": quantity.unit}
+            for quantity, (middle, spread) in self.scatter.items()
+        }
+        return {**self.counts, "kept": self.kept, "scatter": scatter, "seconds": self.seconds}
+
+    def to_file(self, title: str, judge: Judge | None) -> BatchFile:
+        """The same as a file: with its title, and of each quantity its column, its limits and its scatter there."""
+        quantities: dict[str, Control] = {}
+        for quantity, (middle, spread) in self.scatter.items():
+            allowed, tabled = judge.allowed.get(quantity.name, ()) if judge else (), quantity.tabled
+            ends = [end * tabled.factor if math.isfinite(end) else None for end in allowed]
+            scale = tabled.factor / quantity.factor
+            sizes: Control = {"median": middle * scale, "sigma": spread * scale, "allowed": ends or [None, None]}
+            quantities[tabled.header] = sizes
+        return {**self.counts, "title": title, "quantities": quantities}
 
 
 def check_free(plan: Plan, *, force: bool) -> None:
@@ -156,7 +171,7 @@ def _blamed_on(junit: Path) -> Iterator[None]:
 
 
 def run(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Summary:
-    """Do every row, then write the table, the picture and the JUnit report.
+    """Do every row, then write the table, the picture, the summary, the page and the JUnit report.
 
     Args:
         plan, workers: the batch, and where its rows are done.
@@ -223,6 +238,11 @@ def _report(plan: Plan, spool: Spool, summary: Summary) -> None:
     scattered = {quantity: scatter(sizes[np.isfinite(sizes)]) for quantity, sizes in values.items()}
     summary.scatter = {q: (middle * q.factor, spread * q.factor) for q, (middle, spread) in scattered.items()}
     summary.notes += [*(judge.notes if judge else ()), *_notes(summary, name)]
+    write_files(plan.orders.output, {"batch.json": to_json(summary.to_file(plan.title, judge))}, force=True)
+    if plan.formats.pages:
+        from bushfit.report.page.index import read_batch
+
+        write_files(plan.orders.output, pages_of(read_batch(plan.orders.output)), force=True)
 
 
 def _notes(summary: Summary, table: str) -> Iterator[str]:

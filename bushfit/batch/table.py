@@ -10,7 +10,6 @@ from bushfit.batch.ledger import ROWS
 from bushfit.batch.limits import Judgement
 from bushfit.batch.manifest import Row
 from bushfit.batch.quantities import OF_FIT, Quantity, figures
-from bushfit.effects import parameter_named
 
 #: Columns of every batch, before its numbers.
 _FIRST = ("name", "campaign", "folder", "status", "error")
@@ -35,9 +34,8 @@ class Table:
     ) -> None:
         self._verdicts, self._limits = verdicts, limits
         header = [*_FIRST, *(_JUDGED if limits else ()), *(_FOUND if verdicts else ())]
-        usual = [quantity.for_people(parameter_named(quantity.name).typical) for quantity in parameters]
         self._numbers = [
-            *product(usual, ("", ", std error", ", low", ", high")),
+            *product((quantity.tabled for quantity in parameters), ("", ", std error", ", low", ", high")),
             *product(OF_FIT.values(), ("",)),
             *product(points, ("", ", low", ", high")),
         ]

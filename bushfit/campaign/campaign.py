@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -44,6 +45,7 @@ class Campaign:
     Args:
         name: of the campaign; default the name of the bushing, or of the first specimen.
         path: the campaign file.
+        sha256: of its bytes; empty where there is no such file.
         bushing: None where specimens alone were tested.
         simulate: None where the file has no such table.
     """
@@ -58,6 +60,7 @@ class Campaign:
     simulate: SimulateSettings | None = None
     specimens: tuple[Specimen, ...] = ()
     rig: RigSettings = field(default_factory=RigSettings)
+    sha256: str = ""
 
     def __repr__(self) -> str:
         kinds = {"loop": len(self.loops), "sweep": len(self.sweeps)}
@@ -112,6 +115,7 @@ def load_campaign(path: str | Path) -> Campaign:
         content.simulate,
         specimens,
         content.rig,
+        hashlib.sha256(path.read_bytes()).hexdigest(),
     )
 
 

@@ -63,6 +63,8 @@ _SECONDS_A_LINE = 10.0
 )
 @click.option("--tables", is_flag=True, help="Write each bushing's loops.csv, sweeps.csv and the like too.")
 @click.option("--plots", is_flag=True, help="Write each bushing's plots too.")
+@click.option("--reports", is_flag=True, help="Write report.html of each bushing that is diagnosed too.")
+@click.option("--no-report", is_flag=True, help="Write no index.html.")
 @shared_options
 def command(
     manifest: tuple[str, ...],
@@ -74,6 +76,8 @@ def command(
     resume: bool,
     tables: bool,
     plots: bool,
+    reports: bool,
+    no_report: bool,
     options: Options,
     **asked: tuple[Any, ...],
 ) -> None:
@@ -92,8 +96,8 @@ def command(
     fails costs that row; its error stands in the table. --force also removes results of bushings that are no longer
     listed. Exit status 1 where a row failed or a limit is missed.
 
-    Writes batch.csv (a row a bushing), batch.png, and bushings/<name>/ with model.json of each, or all that `bushfit
-    run` writes.
+    Writes batch.csv (a row a bushing), batch.png, batch.json, index.html (control charts, a table to sort), and
+    bushings/<name>/ with model.json of each, or all that `bushfit run` writes.
     """
     from bushfit.batch.limits import check_judged, read_limits
     from bushfit.batch.manifest import read_manifest
@@ -108,10 +112,10 @@ def command(
         check_judged(judged_by, limits, read.rows)
     with naming(place="--at"):
         points = (*read.points, *map(parse_point, at), *(judged_by.points if judged_by else ()))
-    formats = replace(options.formats, tables=tables, pictures=plots and options.formats.pictures)
+    formats = replace(options.formats, tables=tables, pictures=plots and options.formats.pictures, pages=reports)
     output = options.folder(read.stem).absolute()
     orders = Orders(output, tuple(dict.fromkeys(points)), formats, resume)
-    plan = Plan(read.stem, read.rows, orders, judged_by, junit, options.formats)
+    plan = Plan(read.stem, read.rows, orders, judged_by, junit, replace(options.formats, pages=not no_report))
     check_free(plan, force=options.force)
     workers: Pool = DaskPool(scheduler) if scheduler else LocalPool(jobs or os.cpu_count() or 1)
     with _progress(options, len(plan.rows)) as advance:

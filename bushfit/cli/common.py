@@ -246,6 +246,18 @@ def campaign_options(function: F, soft_l1: str = "points far off pull less, outl
     return wrapped  # type: ignore[return-value]
 
 
+def report_option(function: F) -> F:
+    """--no-report of a command with a `task` that writes a report."""
+
+    @click.option("--no-report", is_flag=True, help="Write no report.html.")
+    @wraps(function)
+    def wrapped(*args: Any, task: Task, no_report: bool, **kwargs: Any) -> Any:
+        options = replace(task.options, formats=replace(task.options.formats, pages=not no_report))
+        return function(*args, task=replace(task, options=options), **kwargs)
+
+    return wrapped  # type: ignore[return-value]
+
+
 def _only(campaigns: Sequence[Path]) -> Path:
     """The one campaign of a command line; several test files in its place are told what makes one of them."""
     from bushfit.campaign.campaign import refuse_tests

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, Task, campaign_options, example
+from bushfit.cli.common import Options, Task, campaign_options, example, report_option
 from bushfit.cli.diagnose import tell_findings, tell_verdict
 from bushfit.cli.predict import tell_predictions
 from bushfit.cli.show import new_table, parameter_table, report, tell_fit, tell_result, tell_sources, warn
@@ -30,6 +30,7 @@ _OPEN = 100.0
 
 @click.command("run", epilog=example("bushfit run configs/cmp_15961.toml"))
 @campaign_options
+@report_option
 def command(task: Task) -> None:
     """Fit CAMPAIGN in every way, ask what the model lacks, and predict from the result.
 
@@ -38,7 +39,7 @@ def command(task: Task) -> None:
     shows its passes and what it costs beside the joint fit. Steps whose tests are missing are passed over, and said.
 
     Writes static.json, dynamic.json, model.json (with what diagnose added; then joint.json is the plain fit),
-    diagnosis.json, candidates.csv, and as table and plot: loops, sweeps, gap, axial, radial, and each specimen.
+    diagnosis.json, candidates.csv, report.html; as table and plot: loops, sweeps, gap, axial, radial, each specimen.
     """
     from bushfit.jobs.run import Run
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -10,7 +9,7 @@ from rich import box
 from rich.markup import escape
 from rich.table import Table
 
-from bushfit.units import alike, for_people, number
+from bushfit.units import number
 
 if TYPE_CHECKING:
     from bushfit.cli.common import Options
@@ -19,15 +18,8 @@ if TYPE_CHECKING:
 
 #: Correlation between two parameters from which on it is shown without -v: they trade off against each other.
 _CLOSE = 0.9
-#: A value below its least possible value times this is shown as resting there: logarithms tell no more apart.
-_AT_LEAST = 1.01
 #: Tests that the terminal shows at most without -v, those that are met worst.
 _MOST_TESTS = 8
-#: Digits of a value whose standard error is not known.
-_PLAIN_DIGITS = 4
-#: Fewest and most digits of a value, however small or large its standard error.
-_FEWEST_DIGITS = 2
-_MOST_DIGITS = 6
 
 
 def tell_fit(options: Options, name: str, outcome: Fitted) -> None:
@@ -116,33 +108,9 @@ def new_table(title: str, *columns: str, names: int = 1) -> Table:
 
 def parameter_table(title: str, result: Result) -> Table:
     """The paper's Table 1 with uncertainty: value, standard error, 95 % interval (by profile, if any), unit."""
-    kind = "95 % by profile" if result.profile else "95 % interval"
-    table = new_table(title, "parameter", "value", "std error", kind, "unit")
-    for name, parameter in result.model.parameters.items():
-        value, stderr = result.model.values[name], result.covariance.stderr(name)
-        interval = result.profile.get(name) or result.interval(name)
-        if parameter.log and value <= _AT_LEAST * parameter.bounds[0]:  # a slope there tells nothing of its error
-            stderr = interval = None
-        elif interval == parameter.bounds:
-            interval = None
-        digits, (unit, factor) = _digits(value, stderr), for_people(parameter.unit, 1.0, value)
-        known = [end * factor for end in interval or () if end is not None]
-        shown, *texts = alike([value * factor, *known], digits, least=2)
-        ends = ["open" if end is None else texts.pop(0) for end in interval or ()]
-        error = "" if stderr is None else alike([stderr * factor], 2)[0]
-        table.add_row(_labelled(name, result), shown, error, " to ".join(ends), unit)
+    from bushfit.report.parameters import interval_kind, parameter_rows
+
+    table = new_table(title, "parameter", "value", "std error", interval_kind(result), "unit")
+    for row in parameter_rows(result):
+        table.add_row(row.label, row.value, row.error, row.interval, row.unit)
     return table
-
-
-def _labelled(name: str, result: Result) -> str:
-    if name in result.at_bound:
-        return f"{name} (at {result.at_bound[name]})"
-    return name if name in result.fitted else f"{name} (held)"
-
-
-def _digits(value: float, stderr: float | None) -> int:
-    """Digits that carry meaning: two of the standard error."""
-    if not stderr or not value:
-        return _PLAIN_DIGITS
-    carried = math.floor(math.log10(abs(value))) - math.floor(math.log10(stderr)) + 2
-    return int(min(max(carried, _FEWEST_DIGITS), _MOST_DIGITS))

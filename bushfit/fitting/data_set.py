@@ -182,6 +182,10 @@ class DataSet(ABC):
         """As `jacobian`, of `residual_with`: what is added stays as it is, or stays the same share of the model's."""
 
     @abstractmethod
+    def off(self, model: Model) -> Array:
+        """Model less measured of every point, relative to |K| or to half a loop's force range, (parts, n)."""
+
+    @abstractmethod
     def relative(self, model: Model) -> Array:
         """Misfit of the points that carry weight, relative to |K| or to half a loop's force range, for NRMSE."""
 

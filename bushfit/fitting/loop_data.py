@@ -124,8 +124,11 @@ class LoopData(DataSet):
     def change(self, one: Model, other: Model) -> float:
         return float(np.max(np.abs(self.force(one) - self.force(other)))) / self.drive.half_range
 
+    def off(self, model: Model) -> Array:
+        return ((self.force(model) - self.drive.force) / self.drive.half_range)[None]
+
     def relative(self, model: Model) -> Array:
-        return ((self.force(model) - self.drive.force) / self.drive.half_range)[self.drive.weight > 0.0]
+        return self.off(model)[0, self.drive.weight > 0.0]
 
     def distance(self, model: Model) -> Array:
         return np.abs(self.misfit(model))

@@ -211,6 +211,10 @@ class SweepData(DataSet):
         distinct, place = np.unique(points, return_inverse=True)
         return distinct.real, distinct.imag, place
 
+    def off(self, model: Model) -> Array:
+        off = (self.stiffness(model) - self.measured) / np.abs(self.measured)
+        return np.stack((off.real, off.imag))
+
     def relative(self, model: Model) -> Array:
         return np.abs(self.stiffness(model) / self.measured - 1.0)[self.weights > 0.0]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.errors import FitError
-from bushfit.model.file import to_document
+from bushfit.jobs.about import about, asked, document_of
 from bushfit.model.model import Model
 from bushfit.report.artifacts import diagnosis_contents
 from bushfit.report.contents import Contents, Kinds
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Diagnosed:
-    """The outcome of a diagnosis of a campaign of that name."""
+    """The outcome of a diagnosis; `campaign` is what its documents say of the campaign."""
 
-    name: str
+    campaign: Mapping[str, Any]
     diagnosis: Diagnosis
 
     def __repr__(self) -> str:
-        return f"{self.name}: {self.diagnosis.verdict}\n  {self.diagnosis.summary}"
+        return f"{self.campaign['name']}: {self.diagnosis.verdict}\n  {self.diagnosis.summary}"
 
     @property
     def result(self) -> Result:
@@ -41,8 +41,8 @@ class Diagnosed:
 
     @property
     def contents(self) -> Contents:
-        documents = {"diagnosis": self.document, "model": to_document(self.result)}
-        return Contents(documents) | diagnosis_contents(self.diagnosis, self.name)
+        documents = {"diagnosis": self.document, "model": document_of(self.result, self.campaign)}
+        return (Contents(documents) | diagnosis_contents(self.diagnosis, self.campaign["name"])).reported()
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Diagnose:
     model: Model | None = None
 
     def kinds(self, campaign: Campaign) -> Kinds:
-        return Kinds(("diagnosis", "model"), ("gap", "candidates"), ("gap",))
+        return Kinds(("diagnosis", "model"), ("gap", "candidates"), ("gap",), ("report",))
 
     def run(self, data: Data) -> Diagnosed:
         model = self.model or Model.started(data.campaign.bushing, data.effects, {})
@@ -66,4 +66,12 @@ class Diagnose:
                 found="every parameter is held with vary = false",
                 hint="bushfit fit says how well the values given meet the tests; free one to diagnose",
             )
-        return Diagnosed(data.campaign.name, diagnose(data, self.model, self.settings))
+        return Diagnosed(about(data, "diagnose", self._options()), diagnose(data, self.model, self.settings))
+
+    def _options(self) -> tuple[str, ...]:
+        """What was asked for, as it is typed."""
+        mine, usual = self.settings, Settings()
+        options = asked(model=["MODEL.json"] if self.model else [], adopt=mine.adopt, without=mine.without)
+        if mine.max_effects != usual.max_effects:
+            options += ("--max-effects", str(mine.max_effects))
+        return options + (("--tolerance", f"{mine.tolerance:g}") if mine.tolerance != usual.tolerance else ())

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from bushfit.errors import FitError
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, given_static
-from bushfit.model.file import to_document
+from bushfit.jobs.about import about, asked, document_of
 from bushfit.report.artifacts import fit_contents
 from bushfit.report.contents import Contents, Kinds
 
@@ -21,12 +21,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fitted:
-    """The outcome of a fit: `<stem>.json`, tables and plots of some kinds of test, a result a step, the last final."""
+    """The outcome of a fit: `<stem>.json`, tables and plots of some kinds of test, a result a step, the last final.
+
+    `campaign` is what its document says of the campaign.
+    """
 
     stem: str
     kinds: tuple[str, ...]
     data: Data
     reports: tuple[tuple[str, Result], ...]
+    campaign: Mapping[str, Any]
 
     def __repr__(self) -> str:
         return repr(self.result)
@@ -37,7 +41,7 @@ class Fitted:
 
     @cached_property
     def document(self) -> Mapping[str, Any]:
-        return to_document(self.result)
+        return document_of(self.result, self.campaign)
 
     @property
     def contents(self) -> Contents:
@@ -55,7 +59,8 @@ class FitStatic:
 
     def run(self, data: Data) -> Fitted:
         result = fit_static(data, self.dynamic)
-        return Fitted("static", ("loops",), data, (("static fit of the loops", result),))
+        campaign = about(data, "fit-static", ("--dynamic", "DYNAMIC.json") if self.dynamic else ())
+        return Fitted("static", ("loops",), data, (("static fit of the loops", result),), campaign)
 
 
 @dataclass(frozen=True)
@@ -80,7 +85,8 @@ class FitDynamic:
             static = fit_static(data)
             reports.append(("static fit of the loops, because no --static was given", static))
         reports.append(("dynamic fit of the smallest sweep", fit_dynamic(data, static)))
-        return Fitted("dynamic", ("sweeps",), data, tuple(reports))
+        campaign = about(data, "fit-dynamic", ("--static", "STATIC.json") if self.static else ())
+        return Fitted("dynamic", ("sweeps",), data, tuple(reports), campaign)
 
 
 @dataclass(frozen=True)
@@ -101,7 +107,8 @@ class Fit:
     def run(self, data: Data) -> Fitted:
         effects = (*data.effects, *(name for name in self.effects if name not in data.campaign.fit.effects))
         result = fit_joint(data, effects=effects, directions=self.directions or None, profile=self.profile)
-        return Fitted("model", tests_of(data.campaign), data, (("joint fit", result),))
+        options = (*asked(direction=self.directions, effect=self.effects), *(["--profile"] if self.profile else []))
+        return Fitted("model", tests_of(data.campaign), data, (("joint fit", result),), about(data, "fit", options))
 
 
 def tests_of(campaign: Campaign) -> tuple[str, ...]:

@@ -12,11 +12,11 @@ from typing_extensions import TypedDict
 from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.errors import FitError
 from bushfit.fitting.procedures import TwoStep, fit_two_step
+from bushfit.jobs.about import about, document_of
 from bushfit.jobs.diagnose import Diagnose, Diagnosed
 from bushfit.jobs.fits import Fit, FitStatic, Fitted, contents_of_tests, tests_of
 from bushfit.jobs.predict import Predict, Predicted
 from bushfit.model.document import ModelFile
-from bushfit.model.file import to_document
 from bushfit.model.model import FIVE
 from bushfit.report.artifacts import diagnosis_contents
 from bushfit.report.contents import Contents, Kinds
@@ -78,7 +78,8 @@ class Ran:
     def document(self) -> Mapping[str, Any]:
         results = {"static": self.static and self.static.result, "dynamic": self.two_step and self.two_step.result}
         results |= {"joint": self.joint.result if self.added else None, "model": self.result}
-        documents = {name: to_document(result) for name, result in results.items() if result}
+        campaign = about(self.data, "run")
+        documents = {name: document_of(result, campaign) for name, result in results.items() if result}
         return {**documents, "diagnosis": self.diagnosed.document} if self.diagnosed else documents
 
     @property
@@ -86,7 +87,7 @@ class Ran:
         campaign, found = self.data.campaign, self.diagnosed
         of_tests = contents_of_tests(self.data, self.result, tests_of(campaign))
         of_gap = diagnosis_contents(found.diagnosis, campaign.name) if found else Contents()
-        return Contents(self.document) | of_tests | of_gap | self.predicted.contents
+        return (Contents(self.document) | of_tests | of_gap | self.predicted.contents).reported()
 
 
 @dataclass(frozen=True)

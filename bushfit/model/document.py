@@ -147,6 +147,60 @@ class FitTable(Quality):
 
 
 @dataclass(frozen=True)
+class TestTable:
+    """A test of the campaign, its range, and what the campaign says of it.
+
+    Args:
+        test: its name.
+        kind: "loop" or "sweep".
+        place: direction, or specimen by its name.
+        frequency_Hz: least and largest [Hz].
+        amplitude: least and largest, zero-to-peak, in the unit.
+        unit: of the amplitude, SI; "1" of a strain.
+        rows: of a loop, or operating points.
+        repeats: of each operating point.
+        stepped: what a sweep steps through, "frequency" or "amplitude"; null of a loop.
+        file: that it was read from; null where it came from none.
+        sha256: of the file.
+        conditions: that the campaign states, such as its temperature, preload or date.
+    """
+
+    __test__ = False  # no test of pytest's
+
+    test: str
+    kind: str
+    place: str
+    frequency_Hz: tuple[Number, Number]  # noqa: N815
+    amplitude: tuple[Number, Number]
+    unit: str
+    rows: WholeNumber
+    repeats: WholeNumber = 1
+    stepped: str | None = None
+    file: str | None = None
+    sha256: str | None = None
+    conditions: Mapping[str, str | float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class CampaignTable:
+    """The campaign that a model comes from.
+
+    Args:
+        name: of the campaign.
+        file: its name.
+        sha256: of the file.
+        command: with all that settles the numbers, as it would be typed beside the file.
+        tests: all that the campaign has.
+    """
+
+    name: str
+    file: str
+    sha256: str
+    command: str
+    tests: tuple[TestTable, ...] = ()
+
+
+@dataclass(frozen=True)
 class ProvenanceTable:
     """What the model was made from, and with what.
 
@@ -178,6 +232,7 @@ class ModelFile:
         specimens: other bodies of the compound.
         unresolved: effects of the model that may as well be the rig's, as the tests cannot tell.
         unnamed: data of the effect of that name: a smooth correction of the stiffness.
+        campaign: that the model was fitted to; null where it is known of none.
     """
 
     schema: SchemaName
@@ -192,3 +247,4 @@ class ModelFile:
     specimens: tuple[SpecimenTable, ...] = ()
     unresolved: tuple[str, ...] = ()
     unnamed: Unnamed | None = None
+    campaign: CampaignTable | None = None

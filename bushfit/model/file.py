@@ -45,8 +45,25 @@ def load_result(file: Path) -> Result:
         ModelError: a file that is missing or too large, is no JSON, names another schema, or has a key that is missing,
             given twice, or of the wrong kind; it names the file.
     """
+    return from_document(_read_json(file), file)
+
+
+def read_document(file: Path) -> dict[str, Any]:
+    """A JSON document of a result, as it stands in a file.
+
+    Raises:
+        ModelError: as `load_result`, of any schema.
+    """
+    if isinstance(document := _read_json(file), dict):
+        return document
+    raise ModelError(
+        "not a result", file=file, found=_KINDS.get(type(document), "null"), expected="a JSON object { ... }"
+    )
+
+
+def _read_json(file: Path) -> Any:
     data = read_utf8(file, ModelError, largest=_LARGEST_BYTES, hint="bushfit fit writes a model.json")
-    return from_document(_parse(data.decode("utf-8-sig"), file), file)
+    return _parse(data.decode("utf-8-sig"), file)
 
 
 def from_document(document: object, file: Path | None = None) -> Result:

@@ -73,6 +73,11 @@ def defused(text: str) -> str:
     return f"'{line}" if _FORMULA.match(line) else line
 
 
+def undefused(text: str) -> str:
+    """The text that was written so, but for the ends of its lines."""
+    return text[1:] if text.startswith("'") and _FORMULA.match(text[1:]) else text
+
+
 def raw_loop_table(loop: Loop) -> pd.DataFrame:
     """A loop as a rig writes it: time, displacement and force in the units of engineers, or strain and stress."""
     import pandas as pd

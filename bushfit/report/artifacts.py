@@ -126,7 +126,8 @@ def diagnosis_contents(diagnosis: Diagnosis, title: str) -> Contents:
         words += f". Held out, {held.before:.2f} x noise before and {held.after:.2f} after" if held.parts else ""
         return gap_figure(before.model, after.model, before.data_sets, title, words, mended=after.data_sets)
 
-    gap = partial(tables.gap_table, before.model, after.model, before.data_sets, after.data_sets)
+    tests = before.data_sets, after.data_sets
+    gap = partial(tables.gap_table, before.model, after.model, *tests, diagnosis.result.model)
     found = {"gap": gap, "candidates": partial(tables.candidates_table, diagnosis)}
     return Contents({}, found, {"gap": picture})
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,19 @@ if TYPE_CHECKING:
     from bushfit.reduction.result import Reduction
 
 
+#: Headers of what was measured and of the model beside it, in the tables of loops and sweeps.
+_MEASURED = re.compile(
+    r"(strain amplitude|(model )?(displacement|rotation|strain|force|moment|stress|stiffness|modulus|loss factor)) \["
+)
+#: Columns of all tables that hold texts; the others hold numbers.
+TEXTS = frozenset(
+    (
+        *("loop", "sweep", "test", "kind", "direction", "fitted"),
+        *("effect", "level", "parameters", "why"),
+        *("name", "campaign", "folder", "status", "error", "limits", "out of limits", "on the edge", "verdict"),
+        *("named effects", "cannot be told from", "on a bound", "warnings"),
+    )
+)
 #: End of the headers, and name of the line, of what holds where an unresolved effect belongs to the rig.
 IF_RIGS = "if it is the rig's"
 
@@ -181,11 +195,16 @@ def sweeps_table(model: Model, data_sets: Sequence[SweepData]) -> pd.DataFrame:
 
 
 def gap_table(
-    before: Model, after: Model, data_sets: Sequence[DataSet], mended: Sequence[DataSet] | None = None
+    before: Model,
+    after: Model,
+    data_sets: Sequence[DataSet],
+    mended: Sequence[DataSet] | None = None,
+    result: Model | None = None,
 ) -> pd.DataFrame:
-    """Every residual of a diagnosis, before and after, in units of noise: a row per sweep point or loop row.
+    """Every residual of a diagnosis, before and after, in units of noise and in %: a row per sweep point or loop row.
 
     `mended` are the tests that belong to the model after, where they are others: a row says where it was recorded.
+    `result` is the model to use, `after` unless given, whose response stands beside what was measured.
     """
     import pandas as pd
 
@@ -195,7 +214,11 @@ def gap_table(
         for name, model, test in (("before", before, data_set), ("after", after, later)):
             parts = zip(test.components, np.split(test.misfit(model), test.parts), strict=True)
             columns |= {f"{part} {name} [noise]": values for part, values in parts}
-        return pd.DataFrame(columns)
+            off = zip(test.components, test.off(model), strict=True)
+            columns |= {f"{part} {name} [%]": 100.0 * values for part, values in off}
+        table: Any = loops_table if data_set.kind == "loop" else sweeps_table
+        shown = table(result or after, [data_set])
+        return pd.DataFrame(columns | {name: shown[name] for name in shown if _MEASURED.match(name)})
 
     return pd.concat([rows(*pair) for pair in zip(data_sets, mended or data_sets, strict=True)], ignore_index=True)
 

@@ -19,7 +19,7 @@ Run = Callable[..., Done]
 #: An inertia is hidden here.
 CAMPAIGN = "case_001/bushing.toml"
 CLEAN = "case_000/bushing.toml"
-TABLES = {"diagnosis.json", "model.json", "gap.csv", "candidates.csv"}
+TABLES = {"diagnosis.json", "model.json", "gap.csv", "candidates.csv", "report.html"}
 
 
 @pytest.fixture(scope="module")

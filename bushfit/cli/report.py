@@ -1,0 +1,35 @@
+"""`bushfit report`: a folder of results -> one page to show, to print and to mail."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import click
+
+from bushfit.cli.common import Options, example, shared_options
+
+
+@click.command("report", epilog=example("bushfit report data/reports/mystery_mount -o results/page"))
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@partial(shared_options, where="DIR")
+def command(folder: Path, options: Options) -> None:
+    """Make one page of DIR, the results of run, diagnose, a fit, or of a batch: to show, to print, to mail.
+
+    The page is a single file that needs no network: what was tested, the verdict and within what the model is usable,
+    the parameters with intervals, prediction beside measurement, loops, what was missing, the next test, and where the
+    numbers come from. It is made of the JSON and CSV files of DIR, and shows what they hold; run and diagnose write it
+    by themselves.
+
+    Writes report.html, or for a batch index.html.
+    """
+    from bushfit.jobs.report import report
+    from bushfit.report.contents import pages_of
+
+    target = options.output or folder
+    base = "" if options.output is None else f"{folder.resolve().as_uri()}/"
+    contents = report(folder, base)
+    options.require_free(target, [f"{name}.html" for name in contents.pages])
+    pages = pages_of(contents)
+    options.write(target, pages)
+    options.tell({"pages": {str(target / name): len(page) for name, page in pages.items()}})

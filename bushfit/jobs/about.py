@@ -1,0 +1,62 @@
+"""What a result says of its campaign: which file, which tests under which conditions, and the command that made it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bushfit.errors import typed
+from bushfit.fitting.data_sets import DataSet, SweepData
+from bushfit.model.file import to_document
+
+if TYPE_CHECKING:
+    from bushfit.fitting.data import Data
+    from bushfit.model.result import Result
+
+
+def document_of(result: Result, campaign: Mapping[str, Any]) -> dict[str, Any]:
+    """The JSON document of a result, with the campaign that it comes from."""
+    return {**to_document(result), "campaign": campaign}
+
+
+def about(data: Data, command: str, options: Iterable[str] = ()) -> dict[str, Any]:
+    """The campaign as JSON-ready data: its name, file and tests, and the command with all that settles its numbers."""
+    campaign = data.campaign
+    loss = () if campaign.fit.loss == "linear" else ("--loss", campaign.fit.loss)
+    words = ["bushfit", command, *(typed(Path(word)) for word in (campaign.path.name, *options, *loss))]
+    return {
+        "name": campaign.name,
+        "file": campaign.path.name,
+        "sha256": campaign.sha256,
+        "command": " ".join(words),
+        "tests": [_test(data_set) for data_set in (*data.loops, *data.sweeps)],
+    }
+
+
+def asked(**options: Iterable[str]) -> tuple[str, ...]:
+    """Options that may be given again as they are typed, each with all its values."""
+    return tuple(word for name, values in options.items() for value in values for word in (f"--{name}", value))
+
+
+def _test(data_set: DataSet) -> dict[str, Any]:
+    """A test: what it was made on, its range [SI], and its file with the conditions that the campaign states."""
+    source, sweep = data_set.test.source, data_set.sweep if isinstance(data_set, SweepData) else None
+    return {
+        "test": data_set.name,
+        "kind": data_set.kind,
+        "place": str(data_set.direction),
+        "stepped": sweep and sweep.stepped,
+        "frequency_Hz": _ends(data_set.frequency),
+        "amplitude": _ends(data_set.amplitude),
+        "unit": data_set.direction.motion.displacement_unit,
+        "repeats": int(sweep.repeat.max()) if sweep else 1,
+        "rows": data_set.size // data_set.parts,
+        "file": source and str(source.file),
+        "sha256": source and source.sha256,
+        "conditions": dict(source.conditions) if source else {},
+    }
+
+
+def _ends(values: Any) -> list[float]:
+    return [float(values.min()), float(values.max())]

@@ -1,0 +1,209 @@
+"""The pictures of a result: each place's sweeps and loops beside the model, and what is left before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from markupsafe import Markup
+
+from bushfit.effects.contract import Array
+from bushfit.geometry import Place
+from bushfit.model.result import Result
+from bushfit.report.page.chart import DASHES, Cells, Rule, Series, chart, colors, maps
+from bushfit.report.page.gathered import (
+    MOST_LEVELS,
+    Curve,
+    LoopCurve,
+    Sweeps,
+    cells_at,
+    columns_of,
+    loops_at,
+    places_of,
+    sweeps_at,
+    tests_of,
+)
+from bushfit.units import number
+
+if TYPE_CHECKING:
+    from bushfit.model.document import TestTable
+    from bushfit.report.contents import Tables
+
+#: Points of sweeps, and rows of loops, of a whole page: with these it stays below 500 kB.
+_MOST_POINTS, _MOST_ROWS = 3200, 2400
+#: Fewest points of a curve, however many there are.
+_FEWEST = 24
+#: Most places that are drawn: a page of more is no page.
+MOST_PLACES = 8
+#: Amplitudes that were stepped over more than this ratio lie on a logarithmic axis; and frequencies over this one.
+_DECADES, _LOG_FREQUENCIES = 3.0, 40.0
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """What is drawn of a place: its pictures, and what must be said of them."""
+
+    place: str
+    pictures: Sequence[Markup]
+    notes: Sequence[str]
+
+
+def tested_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) -> list[Panel]:
+    """Stiffness and loss factor of each place, measured and predicted."""
+    table, places = tests_of(tables, "sweep"), places_of(result, tables)
+    if table is None:
+        return []
+    found: list[Panel] = []
+    most = max(_FEWEST, _MOST_POINTS // (MOST_LEVELS * min(len(places), MOST_PLACES) or 1))
+    for name, place in places.items():
+        rows = table[table["direction"] == str(place)]
+        if len(rows) and len(found) < MOST_PLACES:
+            kinds = list(sweeps_at(place, rows, tests, tables.get(name), most))
+            pictures = [picture for sweeps in kinds for picture in _sweeps(sweeps)]
+            found.append(Panel(str(place), pictures, _notes(kinds, most)))
+    return found
+
+
+def _notes(kinds: Sequence[Sweeps], most: int) -> list[str]:
+    """What a reader has to know of the pictures of a place."""
+    notes = []
+    if any(sweeps.predicted for sweeps in kinds):
+        notes.append("Lines with 95 % bands: prediction, without effects of the rig.")
+    if any(not sweeps.predicted for sweeps in kinds):
+        notes.append("Lines without bands: the model at the measured points.")
+    notes.append("Points: measured, mean of the repeats.")
+    if any(curve.rigs is not None for sweeps in kinds for curve in sweeps.curves):
+        notes.append("Broken grey lines: the same if what was added is the rig's; the bands span both.")
+    if left := sum(sweeps.left_out for sweeps in kinds):
+        notes.append(f"{left} further levels are left out of the picture; the tables have all.")
+    if any(curve.measured.shape[1] >= most for sweeps in kinds for curve in sweeps.curves):
+        notes.append(f"Of each curve at most {most} points, every n-th, are drawn.")
+    return notes
+
+
+def _sweeps(sweeps: Sweeps) -> Iterator[Markup]:
+    """|K| and loss factor of sweeps over what they step through."""
+    x = np.concatenate([curve.measured[0] for curve in sweeps.curves])
+    log = bool(x.max() > (_DECADES if sweeps.stepped == "amplitude" else _LOG_FREQUENCIES) * x.min() > 0.0)
+    stiffness = columns_of(sweeps.place)[1]
+    for row, label in enumerate((stiffness, "loss factor [-]"), start=1):
+        what = label.partition(" [")[0]
+        looks = zip(sweeps.curves, colors(len(sweeps.curves)), DASHES, strict=False)
+        series = [each for curve, *look in looks for each in _series(curve, row, *look)]
+        title = f"{sweeps.place}: {what}"
+        yield chart(title, (sweeps.x_label, label), series, _described(sweeps, row, what, label), log=log)
+
+
+def _series(curve: Curve, row: int, color: str, dashes: str) -> Iterator[Series]:
+    """One level in a chart of |K| (row 1) or loss factor (row 2), and the same if it is the rig's."""
+    x, values = curve.model[0], curve.model[row]
+    points = curve.measured[0], curve.measured[row]
+    if curve.rigs is not None:
+        yield Series("", "#777777", "3 3", line=(x, curve.rigs[row - 1]))
+    band = None if curve.band is None else (x, curve.band[2 * row - 2], curve.band[2 * row - 1])
+    yield Series(curve.name, color, "" if curve.band is None else dashes, (x, values), band, points)
+
+
+def _described(sweeps: Sweeps, row: int, what: str, label: str) -> str:
+    """A chart of sweeps in words."""
+    unit = label.partition("[")[2].rstrip("]").removesuffix("-")
+    over = sweeps.x_label.partition(" [")[0]
+    parts = [f"{what} over {over}, {sweeps.place}, measured and model"]
+    for curve in sweeps.curves:
+        spans = (f"{_span(values[row])} {unit}".strip() for values in (curve.measured, curve.model))
+        parts.append("{}: measured {}, model {}".format(curve.name, *spans))
+    return "; ".join(parts)
+
+
+def _span(values: Array) -> str:
+    known = values[np.isfinite(values)]
+    return f"{number(float(known.min()), 3)} to {number(float(known.max()), 3)}" if known.size else "nothing"
+
+
+def loop_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) -> list[Panel]:
+    """Force over displacement of each place, measured and modelled."""
+    table = tests_of(tables, "loop")
+    if table is None:
+        return []
+    found: list[Panel] = []
+    drawn = table.groupby("direction")["test"].nunique().clip(upper=MOST_LEVELS).nlargest(MOST_PLACES).sum()
+    most = max(_FEWEST, _MOST_ROWS // max(1, int(drawn)))
+    for place in places_of(result, tables).values():
+        rows = table[table["direction"] == str(place)]
+        if len(rows) and len(found) < MOST_PLACES:
+            loops = loops_at(place, rows, tests, most)
+            every = max(loop.every for loop in loops)
+            notes = [
+                "The last cycle of each loop. Points: measured"
+                + (f", one row in {every}" if every > 1 else "")
+                + ". Lines: model."
+            ]
+            if left := rows["test"].nunique() - len(loops):
+                notes.append(f"{left} further loops are left out of the picture; loops.csv has all.")
+            found.append(Panel(str(place), _loops(place, loops), notes))
+    return found
+
+
+def _loops(place: Place, loops: Sequence[LoopCurve]) -> list[Markup]:
+    """Hysteresis loops of a place, and what of them is left."""
+    moved, resisting, _ = place.motion.words
+    labels = f"{moved} [{place.display.displacement.name}]", f"{resisting} [{place.display.force.name}]"
+    looks = list(zip(loops, colors(len(loops)), strict=True))
+    series = [
+        Series(loop.name, color, line=tuple(loop.rows[[0, 2]]), points=tuple(loop.rows[:2])) for loop, color in looks
+    ]
+    left = [Series(loop.name, color, points=(loop.rows[0], loop.rows[1] - loop.rows[2])) for loop, color in looks]
+    spans = "; ".join(
+        f"{loop.name}: measured {_span(loop.rows[1])} {place.display.force.name}, model {_span(loop.rows[2])}"
+        for loop in loops
+    )
+    off = "; ".join(f"{each.name}: {_span(each.points[1])} {place.display.force.name}" for each in left if each.points)
+    return [
+        chart(
+            f"{place}: hysteresis",
+            labels,
+            series,
+            f"{labels[1]} over {labels[0]}, measured and model; {spans}",
+            dot=2.6,
+        ),
+        chart(
+            f"{place}: measured less model",
+            labels,
+            left,
+            f"{resisting}, measured less model, over {moved}; {off}",
+            dot=2.6,
+            rules=[Rule(0.0, "")],
+        ),
+    ]
+
+
+def gap_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) -> list[Panel]:
+    """What is left of each place before and after, measured less model in %."""
+    gap = tables.get("gap")
+    if gap is None or not any(str(name).endswith("before [%]") for name in gap):
+        return []
+    found: list[Panel] = []
+    for place in list(places_of(result, tables).values())[:MOST_PLACES]:
+        shown = list(cells_at(place, gap, tests))
+        if shown:
+            heads = ("before", "after") if max(len(cells.sides) for cells in shown) > 1 else ("model and tests",)
+            shown = [
+                Cells(each.name, each.rows, each.along, (*each.sides, *each.sides)[: len(heads)]) for each in shown
+            ]
+            title = f"{place}: measured less model, %"
+            found.append(Panel(str(place), [maps(title, heads, shown, _mapped(place, heads, shown))], []))
+    return found
+
+
+def _mapped(place: Place, heads: Sequence[str], shown: Sequence[Cells]) -> str:
+    """Maps in words: the root mean square of what is left."""
+    parts = []
+    for cells in shown:
+        sizes = (
+            f"{head} {number(float(np.sqrt(np.nanmean(np.square(side)))), 2)} %"
+            for head, side in zip(heads, cells.sides, strict=True)
+        )
+        parts.append(f"{cells.name}: {', '.join(sizes)}")
+    return f"Measured less model, {place}, root mean square of the cells; {'; '.join(parts)}"

@@ -1,0 +1,134 @@
+"""Result folders read back: documents and tables by name, as they were before they were files."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bushfit.errors import ModelError
+from bushfit.model.file import read_document
+from bushfit.reading.csvfile import undefused
+from bushfit.reading.files import read_utf8, view_bytes
+from bushfit.report.artifacts import place_names
+from bushfit.report.page.schema import MODELS, PLAIN, checked
+from bushfit.report.tables import TEXTS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from bushfit.report.contents import Contents
+
+#: Documents of a result.
+_DOCUMENTS = (*MODELS, PLAIN, "diagnosis")
+#: Tables of a result beside those of the predictions, which are named after places.
+_TABLES = ("loops", "sweeps", "gap", "candidates")
+#: Size of a table that is read back at most [bytes]: ten times that of a loop as it is written.
+_LARGEST = 500_000_000
+
+
+def read_results(folder: Path) -> Contents:
+    """What stands in a folder of results, with its page to be written.
+
+    Raises:
+        ModelError: no folder, none of results, or a file in it that is not as bushfit writes it.
+    """
+    from bushfit.geometry import Direction
+    from bushfit.report.contents import Contents
+
+    if not folder.is_dir():
+        found = "a file" if folder.exists() else "nothing"
+        raise ModelError("a folder of results is needed", file=folder, found=found, expected="as bushfit run writes it")
+    files = {name: folder / f"{name}.json" for name in _DOCUMENTS if (folder / f"{name}.json").exists()}
+    if not set(files) & set(MODELS):
+        standing = sorted(path.name for path in folder.iterdir())[:8]
+        raise ModelError(
+            "there is no model in this folder",
+            file=folder,
+            found=", ".join(standing) or "nothing",
+            expected=" or ".join(f"{name}.json" for name in MODELS),
+            hint=f"bushfit run CAMPAIGN -o {folder} makes one",
+        )
+    documents = {name: read_document(file) for name, file in files.items()}
+    result = checked(documents, files).result
+    names = (*_TABLES, *place_names([*Direction, *result.specimens]))
+    tables = {name: table for name in names if (table := read_table(folder, name)) is not None}
+    return Contents(documents, {name: _given(table) for name, table in tables.items()}).reported()
+
+
+def canonical(table: pd.DataFrame) -> pd.DataFrame:
+    """A table as its file would give it back: texts, and numbers of seven digits; nan where a cell is empty."""
+    import pandas as pd
+
+    def column(name: str) -> object:
+        values = table[name]
+        if name in TEXTS:
+            return [" ".join(str(value).split("\n")) for value in values]
+        numbers = values.to_numpy(dtype=float, na_value=np.nan)
+        return [float(f"{value:.7g}") for value in numbers.tolist()]
+
+    return pd.DataFrame({str(name): column(name) for name in table.columns})
+
+
+def _given(table: pd.DataFrame) -> Callable[[], pd.DataFrame]:
+    return lambda: table
+
+
+def read_table(folder: Path, name: str) -> pd.DataFrame | None:
+    """A table in whichever form it stands, CSV first; None where it does not.
+
+    Raises:
+        ModelError: a table that is not as bushfit writes it.
+    """
+    import pandas as pd
+
+    for ending, read in (("csv", _csv), ("xlsx", _workbook)):
+        file = folder / f"{name}.{ending}"
+        if not file.exists():
+            continue
+        try:
+            texts = read(file)
+            return pd.DataFrame({header: _column(header, texts[header]) for header in texts.columns})
+        except (ValueError, KeyError, pd.errors.ParserError) as error:
+            raise ModelError(
+                "this table is not as bushfit writes it",
+                file=file,
+                found=str(error),
+                hint="write the results anew, or take the file away: the page then goes without it",
+            ) from error
+    return None
+
+
+def _column(header: str, cells: pd.Series[str]) -> object:
+    """Texts as they were, or numbers, of which an empty cell is none."""
+    if header in TEXTS:
+        return [undefused(cell) for cell in cells]
+    return np.array([float(cell.replace(",", ".")) if cell else np.nan for cell in cells])
+
+
+def _csv(file: Path) -> pd.DataFrame:
+    """Cells of a CSV file as texts, with commas and points, or semicolons and decimal commas."""
+    import pandas as pd
+
+    data = read_utf8(file, ModelError, largest=_LARGEST)
+    mark = re.search("[,;]", data.partition(b"\n")[0].decode("utf-8-sig"))
+    return pd.read_csv(
+        io.BytesIO(data), sep=mark[0] if mark else ",", dtype=str, keep_default_na=False, encoding="utf-8-sig"
+    )
+
+
+def _workbook(file: Path) -> pd.DataFrame:
+    """Cells of the first sheet of a workbook as texts."""
+    import pandas as pd
+    from python_calamine import CalamineError, CalamineWorkbook
+
+    try:
+        workbook = CalamineWorkbook.from_filelike(io.BytesIO(view_bytes(file, ModelError, largest=_LARGEST)[:]))
+        header, *rows = workbook.get_sheet_by_index(0).to_python()
+    except CalamineError as error:
+        raise ValueError(str(error)) from error
+    return pd.DataFrame([[str(cell) for cell in row] for row in rows], columns=[str(cell) for cell in header])

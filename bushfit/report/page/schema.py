@@ -1,0 +1,154 @@
+"""What a page reads of the JSON documents: pydantic checks them, so that what is spoiled is one clear error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bushfit.errors import ModelError
+from bushfit.model.document import CampaignTable
+from bushfit.model.file import from_document
+from bushfit.model.result import Result
+from bushfit.validation import Number, WholeNumber, check_tables
+
+#: Documents that hold a model, the one to use first.
+MODELS = ("model", "dynamic", "static")
+#: The plain fit, beside a model with what was added.
+PLAIN = "joint"
+#: What "schema" of a diagnosis says.
+DIAGNOSIS = "bushfit/diagnosis/2"
+
+Pair = tuple[Number, Number]
+
+
+@dataclass(frozen=True)
+class Size:
+    """effects.parameters: a value [SI] with its interval."""
+
+    value: Number
+    unit: str
+    ci95: Pair | None = None
+
+
+@dataclass(frozen=True)
+class Found:
+    """effects: what was added, or leads a set of look-alikes."""
+
+    name: str
+    level: str
+    sentence: str
+    evidence: str
+    parameters: Mapping[str, Size]
+    twins: tuple[str, ...] = ()
+    alternatives: tuple[str, ...] = ()
+    test: str | None = None
+    correction: str | None = None
+
+
+@dataclass(frozen=True)
+class Region:
+    """where, remainder: a region of disagreement in a sentence."""
+
+    excess: Number
+    reading: str
+
+
+@dataclass(frozen=True)
+class Change:
+    """gap: root mean square residuals in units of noise."""
+
+    before: Number
+    after: Number
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """gap.skipped: what could not be held out."""
+
+    part: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Gap:
+    """gap: on the data fitted, and on what was held out."""
+
+    calibration: Change
+    heldout: Change | None = None
+    skipped: tuple[Skipped, ...] = ()
+    name_again: tuple[WholeNumber, WholeNumber] | None = None
+
+
+@dataclass(frozen=True)
+class Words:
+    """description: what a gap without a name is like."""
+
+    words: str
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """diagnosis.json, as far as the page tells it."""
+
+    verdict: str
+    summary: str
+    effects: tuple[Found, ...]
+    where: tuple[Region, ...]
+    remainder: tuple[Region, ...]
+    gap: Gap
+    next_test: str
+    description: Words | None = None
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Model:
+    campaign: CampaignTable | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """All documents of a result: the model to use, the plain fit beside it, the campaign, and the diagnosis."""
+
+    result: Result
+    plain: Result | None
+    about: CampaignTable | None
+    diagnosis: Diagnosed | None
+    versions: Mapping[str, str]
+
+
+def checked(documents: Mapping[str, Mapping[str, Any]], files: Mapping[str, Path] | None = None) -> Checked:
+    """The documents by their names, checked; errors name the `files` that they were read from.
+
+    Raises:
+        ModelError: no model among them, or one that is spoiled.
+    """
+    at = files or {}
+    name = next((name for name in MODELS if name in documents), None)
+    if name is None:
+        raise ModelError("there is no model among the results", expected=" or ".join(f"{name}.json" for name in MODELS))
+    model, plain, diagnosis = documents[name], documents.get(PLAIN), documents.get("diagnosis")
+    result = from_document(model, at.get(name))
+    if diagnosis is not None and diagnosis.get("schema") != DIAGNOSIS:
+        raise ModelError(
+            "not a diagnosis this version reads",
+            file=at.get("diagnosis"),
+            place="schema",
+            found=repr(diagnosis.get("schema")),
+            expected=DIAGNOSIS,
+            hint="bushfit diagnose writes it anew",
+        )
+    provenance = model.get("provenance", {})
+    return Checked(
+        result,
+        from_document(plain, at.get(PLAIN)) if plain else None,
+        check_tables(model, at.get(name), _Model, kind=ModelError).campaign,
+        check_tables(diagnosis, at.get("diagnosis"), Diagnosed, kind=ModelError) if diagnosis is not None else None,
+        {"bushfit": str(provenance.get("bushfit", "")), **_texts(provenance.get("packages"))},
+    )
+
+
+def _texts(versions: object) -> dict[str, str]:
+    return {str(key): str(value) for key, value in versions.items()} if isinstance(versions, Mapping) else {}

@@ -1,0 +1,235 @@
+"""What a page tells of a result, in the order in which its reader asks: what was tested, the verdict, the numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Bushing, Place, Specimen
+from bushfit.model.result import Misfit, Result, Usable
+from bushfit.report.page.drawings import MOST_PLACES, gap_panels, loop_panels, tested_panels
+from bushfit.report.page.gathered import columns_of, places_of
+from bushfit.report.page.schema import Checked, Found
+from bushfit.report.parameters import interval_kind, parameter_rows
+from bushfit.report.tables import spread
+from bushfit.units import alike, for_people, number
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from bushfit.model.document import TestTable
+    from bushfit.report.contents import Tables
+
+#: How a verdict is coloured: nothing to do, something to know, something to do.
+_TONES = {"consistent": "good", "named": "good", "unexplained": "bad"}
+#: Conditions of tests, as a campaign has them, and what a page calls them.
+_CONDITIONS = {
+    "temperature_degC": "Temperature",
+    "preload": "Preload",
+    "date": "Date of tests",
+    "operator": "Operator",
+    "specimen_number": "Specimen no.",
+}
+#: Correlation between two parameters from which on it is shown: they trade off against each other.
+_CLOSE = 0.9
+#: Frequencies and amplitudes of a place whose predicted values are tabled.
+_FREQUENCIES, _AMPLITUDES = 3, 2
+#: Letters from which on two warnings, of the fit and of the diagnosis, say the same with other figures.
+_SAME_LETTERS = 40
+#: Rows of predicted values of all places together.
+_ROWS = 12
+#: Warnings, regions, and tests that a page lists at most: the documents have all.
+_MOST = 12
+#: Units of amplitudes, by SI, as people read them.
+_DISPLAYS = {motion.displacement_unit: motion.display.displacement for motion in (TRANSLATION, ROTATION, STRAINING)}
+
+
+def story(found: Checked, tables: Tables) -> dict[str, Any]:
+    """All that the template of a report asks for."""
+    result, diagnosis, about = found.result, found.diagnosis, found.about
+    tests = about.tests if about else ()
+    said = (*result.warnings, *(diagnosis.warnings if diagnosis else ()))
+    warnings = list({line[:_SAME_LETTERS]: line for line in reversed(said)}.values())[::-1]
+    return {
+        "name": about.name if about else result.name,
+        "subject": "rubber bushing" if result.model.bushing else "rubber compound",
+        "facts": [*_bodies(result), *_conditions(tests)],
+        "tests": [_tested(test, result.tests) for test in tests[:_MOST]],
+        "conditioned": any(test.conditions for test in tests),
+        "more_tests": max(0, len(tests) - _MOST),
+        "diagnosis": diagnosis,
+        "tone": _TONES.get(diagnosis.verdict, "fair") if diagnosis else "fair",
+        "effects": [_effect(effect) for effect in diagnosis.effects] if diagnosis else [],
+        "usable": [_usable(place) for place in result.usable],
+        "rows": list(parameter_rows(result)),
+        "interval": interval_kind(result),
+        "plain": _plain(found),
+        "quality": _quality(result),
+        "correlations": [
+            f"{one}/{other} {size:+.2f}" for one, other, size in result.covariance.correlations() if abs(size) > _CLOSE
+        ],
+        "equation": result.model.equation().splitlines()[0],
+        "places": tested_panels(result, tables, tests),
+        "tabled": _tabled(result, tables),
+        "loops": loop_panels(result, tables, tests),
+        "gap": gap_panels(result, tables, tests),
+        "gaps": (gaps := _gaps(found)),
+        "added": any(before != after for _, before, after in gaps if after),
+        "warnings": warnings[:_MOST],
+        "more_warnings": max(0, len(warnings) - _MOST),
+        "unresolved": result.unresolved,
+        "outliers": len(result.outliers),
+        "about": about,
+        "files": _files(found),
+        "versions": found.versions,
+    }
+
+
+def _bodies(result: Result) -> Iterator[tuple[str, str]]:
+    """What was tested, and its sizes."""
+    if bushing := result.model.bushing:
+        yield "Bushing", _tube(bushing)
+    for specimen in result.specimens:
+        yield f"Specimen {specimen}", _specimen(specimen)
+
+
+def _tube(bushing: Bushing) -> str:
+    inner, outer, length = (
+        number(1e3 * size, 4) for size in (2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length)
+    )
+    formulas = "; radial formulas corrected by finite elements" if bushing.shape == "calibrated" else ""
+    return f"rubber tube, inner diameter {inner} mm, outer diameter {outer} mm, length {length} mm{formulas}"
+
+
+def _specimen(specimen: Specimen) -> str:
+    if specimen.area is None or specimen.thickness is None:
+        return f"modulus of the compound, {specimen.strain} strain"
+    blocks = "one block" if specimen.elements == 1 else f"{specimen.elements} blocks in parallel"
+    return (
+        f"{blocks} in shear, {number(1e6 * specimen.area, 4)} mm² each, {number(1e3 * specimen.thickness, 4)} mm thick"
+    )
+
+
+def _conditions(tests: Sequence[TestTable]) -> Iterator[tuple[str, str]]:
+    """Conditions of all tests: each value once; of three that every report has, too, that they are not stated."""
+    for key, name in _CONDITIONS.items():
+        values = list(dict.fromkeys(test.conditions[key] for test in tests if key in test.conditions))
+        if key == "temperature_degC" and values:
+            degrees = sorted(float(value) for value in values)
+            yield name, " to ".join(dict.fromkeys(f"{number(end, 3)} °C" for end in (degrees[0], degrees[-1])))
+        elif values:
+            yield name, ", ".join(str(value) for value in values)
+        elif key in ("temperature_degC", "preload", "date"):
+            yield name, "not stated"
+
+
+def _tested(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str]:
+    """A test in a row of a table: its range, and how well the model meets it."""
+    unit, factor = _DISPLAYS[test.unit]
+    met = next((misfit for misfit in misfits if misfit.test == test.test and misfit.held is None), None)
+    stated = [
+        f"{number(float(value), 3)} °C" if key == "temperature_degC" else f"{_CONDITIONS.get(key, key)} {value}"
+        for key, value in test.conditions.items()
+        if key in ("temperature_degC", "preload", "order")
+    ]
+    return {
+        "test": test.test,
+        "kind": {"loop": "hysteresis loop", "sweep": "sweep"}.get(test.kind, test.kind),
+        "place": test.place,
+        "frequency": _ends(test.frequency_Hz, 1.0, "Hz"),
+        "amplitude": _ends(test.amplitude, factor, unit),
+        "rows": f"{test.rows}",
+        "conditions": ", ".join(stated),
+        "nrmse": f"{number(100 * met.nrmse, 2)} %" if met else "",
+        "chi": number(met.reduced_chi_square, 2) if met else "",
+        "fitted": "" if met is None or met.fitted else "not fitted",
+    }
+
+
+def _ends(ends: tuple[float, float], factor: float, unit: str) -> str:
+    return " to ".join(dict.fromkeys(number(end * factor, 3) for end in ends)) + f" {unit}"
+
+
+def _usable(place: Usable) -> dict[str, Any]:
+    return {
+        "place": place.place,
+        "stiffness": f"{number(100 * place.stiffness, 2)} %",
+        "loss": number(place.loss_factor, 2),
+        "points": f"{place.points}",
+        "held_out": place.held_out,
+    }
+
+
+def _effect(effect: Found) -> dict[str, Any]:
+    """An effect that was named, with its sizes as people read them."""
+    sizes = []
+    for name, size in effect.parameters.items():
+        unit, factor = for_people(size.unit, 1.0, size.value)
+        value, *ends = alike([factor * x for x in (size.value, *(size.ci95 or ()))], 4, least=2)
+        sizes.append({"name": name, "value": f"{value} {unit}".removesuffix(" -"), "interval": " to ".join(ends)})
+    return {"found": effect, "sizes": sizes}
+
+
+def _plain(found: Checked) -> dict[str, str]:
+    """Values of the plain fit by parameter, where another model is to be used."""
+    rows = parameter_rows(found.plain) if found.plain else ()
+    return {row.name: row.value for row in rows}
+
+
+def _quality(result: Result) -> dict[str, str]:
+    quality = result.quality
+    if quality is None:
+        return {}
+    return {
+        "nrmse": f"{number(100 * quality.nrmse, 2)} %",
+        "chi": number(quality.reduced_chi_square, 3),
+        "points": f"{quality.points}",
+        "noise": f"{number(100 * quality.noise, 2)} %",
+    }
+
+
+def _files(found: Checked) -> list[tuple[str, str]]:
+    """Every file behind the result with its hash: the campaign, its tests, fitted or not, and what else was fitted."""
+    about = found.about
+    named = [(about.file, about.sha256), *((test.file, test.sha256) for test in about.tests)] if about else []
+    inputs = ((str(source.file), source.sha256) for source in found.result.inputs)
+    return list(dict.fromkeys((file, sha256) for file, sha256 in (*named, *inputs) if file and sha256))
+
+
+def _gaps(found: Checked) -> list[tuple[str, str, str]]:
+    """Root mean square of what is left, in units of noise: held out first."""
+    if found.diagnosis is None:
+        return []
+    gap = found.diagnosis.gap
+    held = ("not testable", "") if gap.heldout is None else (f"{gap.heldout.before:.2f}", f"{gap.heldout.after:.2f}")
+    fitted = f"{gap.calibration.before:.2f}", f"{gap.calibration.after:.2f}"
+    return [("held out, predicted from the other tests", *held), ("data fitted", *fitted)]
+
+
+def _tabled(result: Result, tables: Tables) -> list[tuple[str, ...]]:
+    """Predicted values at some corners of the grid of each place, their bands, and what was measured there."""
+    places = [(tables[name], place) for name, place in places_of(result, tables).items() if name in tables]
+    frequencies = min(max(_ROWS // max(_AMPLITUDES * len(places), 1), 1), _FREQUENCIES)
+    return [row for table, place in places[:MOST_PLACES] for row in _corners(table, place, frequencies)]
+
+
+def _corners(table: pd.DataFrame, place: Place, frequencies: int) -> Iterator[tuple[str, ...]]:
+    """Rows of cells: place, frequency, amplitude; then of |K| and loss factor the value, its band, and as measured."""
+    amplitude, stiffness, _ = columns_of(place)
+    names = (stiffness, "loss factor [-]")
+    if not {amplitude, *names, *(f"{name}, {end}" for name in names for end in ("low", "high"))} <= set(table):
+        return
+    (length, _), _, (unit, _) = place.display
+    levels = np.unique(table[amplitude])
+    for level in levels[spread(levels.size, _AMPLITUDES)]:
+        mine = table[table[amplitude] == level].sort_values("frequency [Hz]").to_dict("records")
+        for at in spread(len(mine), frequencies):
+            row = mine[at]
+            cells = [str(place), f"{number(row['frequency [Hz]'], 4)} Hz", f"{number(float(level), 3)} {length}"]
+            for name, of in zip(names, (f" {unit}", ""), strict=True):
+                value, *ends = alike([row[name], row[f"{name}, low"], row[f"{name}, high"]], 4, least=2)
+                measured = row.get(f"measured {name}", np.nan)
+                cells += [value + of, " to ".join(ends), "" if np.isnan(measured) else alike([measured], 4)[0]]
+            yield tuple(cells)

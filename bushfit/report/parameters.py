@@ -1,0 +1,73 @@
+"""Parameters as people read them: digits that carry meaning, units in which they read them, intervals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+from bushfit.units import alike, for_people
+
+if TYPE_CHECKING:
+    from bushfit.model.result import Result
+
+#: A value below its least possible value times this is shown as resting there: logarithms tell no more apart.
+_AT_LEAST = 1.01
+#: Digits of a value whose standard error is not known.
+_PLAIN_DIGITS = 4
+#: Fewest and most digits of a value, however small or large its standard error.
+_FEWEST_DIGITS = 2
+_MOST_DIGITS = 6
+
+
+class Row(NamedTuple):
+    """One parameter in words; `error` and `interval` are empty where they are not known, `state` says what is odd."""
+
+    name: str
+    state: str
+    value: str
+    error: str
+    interval: str
+    unit: str
+    meaning: str
+
+    @property
+    def label(self) -> str:
+        """The name, and what is odd in brackets."""
+        return f"{self.name} ({self.state})" if self.state else self.name
+
+
+def interval_kind(result: Result) -> str:
+    """What the intervals of a result are."""
+    return "95 % by profile" if result.profile else "95 % interval"
+
+
+def parameter_rows(result: Result) -> Iterator[Row]:
+    """The paper's Table 1 with uncertainty: value, standard error, 95 % interval (by profile, if any), unit."""
+    for name, parameter in result.model.parameters.items():
+        value, stderr = result.model.values[name], result.covariance.stderr(name)
+        interval = result.profile.get(name) or result.interval(name)
+        if parameter.log and value <= _AT_LEAST * parameter.bounds[0]:  # a slope there tells nothing of its error
+            stderr = interval = None
+        elif interval == parameter.bounds:
+            interval = None
+        digits, (unit, factor) = _digits(value, stderr), for_people(parameter.unit, 1.0, value)
+        known = [end * factor for end in interval or () if end is not None]
+        shown, *texts = alike([value * factor, *known], digits, least=2)
+        ends = ["open" if end is None else texts.pop(0) for end in interval or ()]
+        error = "" if stderr is None else alike([stderr * factor], 2)[0]
+        yield Row(name, _state(name, result), shown, error, " to ".join(ends), unit, parameter.meaning)
+
+
+def _state(name: str, result: Result) -> str:
+    if name in result.at_bound:
+        return f"at {result.at_bound[name]}"
+    return "" if name in result.fitted else "held"
+
+
+def _digits(value: float, stderr: float | None) -> int:
+    """Digits that carry meaning: two of the standard error."""
+    if not stderr or not value:
+        return _PLAIN_DIGITS
+    carried = math.floor(math.log10(abs(value))) - math.floor(math.log10(stderr)) + 2
+    return int(min(max(carried, _FEWEST_DIGITS), _MOST_DIGITS))

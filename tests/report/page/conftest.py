@@ -1,0 +1,58 @@
+"""The results of two campaigns, of a batch, and their pages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from commandline import call
+
+#: Campaigns whose pages are looked at, by the names of their folders.
+CAMPAIGNS = {"cmp_15961": "configs/cmp_15961.toml", "mystery_mount": "configs/mystery_mount.toml"}
+
+
+@pytest.fixture(scope="session")
+def results(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The folder of `bushfit run` of a campaign by its name, without pictures; each is made once."""
+    home = tmp_path_factory.mktemp("results")
+
+    def made(name: str) -> Path:
+        folder = home / name
+        if not folder.exists():
+            done = call(root, "run", CAMPAIGNS[name], "-o", folder, "--no-plots", "-q")
+            assert done.returncode == 0, done.stderr
+        return folder
+
+    return made
+
+
+@pytest.fixture(scope="session")
+def measured(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Measured rubber: the compound fitted to its coupons and predicted for the mount, as the README does it."""
+    folder = tmp_path_factory.mktemp("measured") / "mount"
+    fit = ("fit", "configs/epdm_70.toml", "--direction", "DMA", "--direction", "DMA 2", "-o", folder)
+    predict = ("predict", folder / "model.json", "--campaign", "configs/epdm_70.toml", "-o", folder)
+    for command in (fit, predict, ("report", folder)):
+        done = call(root, *command, "--no-plots", "-q")
+        assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture(scope="session")
+def batch(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A batch of four bushings, one of which misses a limit, another of which has no tests, diagnosed and reported."""
+    home = tmp_path_factory.mktemp("batch")
+    rows = [
+        f'[[bushings]]\ncampaign = "{root / "data/practice" / f"case_00{n}" / "bushing.toml"}"\nname = "c{n}"\n'
+        for n in range(3)
+    ]
+    (home / "empty.toml").write_text(
+        '[bushing]\nname = "e"\ninner_radius = "1 mm"\nouter_radius = "2 mm"\nlength = "3 mm"\n'
+    )
+    rows.append('[[bushings]]\ncampaign = "empty.toml"\nname = "=1+1 <b>"\n')
+    (home / "m.toml").write_text('commands = ["diagnose"]\nat = ["axial 25 Hz 0.1 mm"]\n' + "".join(rows))
+    (home / "limits.toml").write_text('[parameters.mu]\nmin = "1.2 MPa"\n')
+    done = call(home, "batch", "m.toml", "--limits", "limits.toml", "-o", "out", "--reports", "--jobs", "1", "-q")
+    assert done.returncode == 1, done.stderr
+    return home / "out"

@@ -1,0 +1,394 @@
+"""The report of a result: the same from memory and from its files, whole, escaped, small, and true to the tables."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from commandline import call
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from reading_html import loads, parsed
+
+from bushfit.campaign.campaign import load_campaign
+from bushfit.fitting.data import Data
+from bushfit.jobs.diagnose import Diagnose
+from bushfit.report.contents import Formats, pages_of
+from bushfit.report.page import report_page
+from bushfit.report.page.readback import canonical, read_results
+
+Results = Callable[[str], Path]
+#: A page at most [bytes].
+LARGEST = 500_000
+SECTIONS = ["tested", "verdict", "parameters", "predicted", "loops", "gap", "open", "provenance"]
+#: Names that would do harm where they are not escaped.
+NASTY = [
+    '"><script>alert(1)</script>',
+    "a'b\"c",
+    "</style><b>",
+    "{{ 7*7 }}",
+    "=1+1",
+    "&lt;",
+    "<!--",
+    "']]>",
+    "\u202eabc",
+]
+
+
+def page_of(folder: Path) -> str:
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["cmp_15961", "mystery_mount"])
+def test_run_writes_a_whole_page_that_loads_nothing(results: Results, name: str) -> None:
+    page = page_of(results(name))
+    found = parsed(page)
+    assert loads(page) == []
+    sections = [value for tag, key, value in found.attributes if (tag, key) == ("section", "id")]
+    assert sections == SECTIONS
+    print(f"{name}: {len(page.encode())} bytes, {found.counts['svg']} pictures")
+    assert len(page.encode()) < LARGEST
+    described = [value for tag, key, value in found.attributes if (tag, key) == ("svg", "aria-label")]
+    assert len(described) == found.counts["svg"] >= 6
+    assert min(map(len, described)) > 40
+    assert not [key for _, key, _ in found.attributes if key == "style"], "a content policy would drop it"
+
+
+@pytest.mark.parametrize("name", ["cmp_15961", "mystery_mount"])
+def test_the_folder_gives_the_page_that_run_wrote(results: Results, name: str) -> None:
+    folder = results(name)
+    assert pages_of(read_results(folder))["report.html"] == (folder / "report.html").read_bytes()
+
+
+def test_diagnose_writes_it_too_and_its_folder_gives_the_same(root: Path, tmp_path: Path) -> None:
+    """Without tables of their own, loops and sweeps are shown from that of the gap."""
+    data = Data.of(load_campaign(root / "data/practice/case_001/bushing.toml"))
+    files = Formats(pictures=False).files(Diagnose().run(data).contents)
+    for file, content in files.items():
+        (tmp_path / file).write_bytes(content)
+    page = files["report.html"]
+    assert pages_of(read_results(tmp_path))["report.html"] == page
+    found = parsed(page.decode())
+    for words in (
+        "axial: stiffness",
+        "axial: loss factor",
+        "radial: stiffness",
+        "axial: hysteresis",
+        "bushfit diagnose bushing.toml",
+    ):
+        assert words in found.text
+    assert "Lines without bands: the model at the measured points." in found.text
+
+
+@pytest.mark.parametrize("form", ["xlsx", "decimal comma"])
+def test_other_forms_of_tables_are_read_back(results: Results, tmp_path: Path, form: str) -> None:
+    folder = tmp_path / "x"
+    shutil.copytree(results("mystery_mount"), folder)
+    for file in folder.glob("*.csv"):
+        table = pd.read_csv(file)
+        if form == "xlsx":
+            table.to_excel(file.with_suffix(".xlsx"), index=False)
+            file.unlink()
+        else:
+            file.write_bytes(table.to_csv(index=False, sep=";", decimal=",").encode("utf-8-sig"))
+    assert pages_of(read_results(folder))["report.html"].decode() == page_of(folder)
+
+
+def test_what_it_says_is_what_the_documents_say(results: Results) -> None:
+    folder = results("mystery_mount")
+    text = parsed(page_of(folder)).text
+    diagnosis = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
+    model = json.loads((folder / "model.json").read_text(encoding="utf-8"))
+    for words in (
+        *("Mystery mount", "inner diameter 24 mm, outer diameter 48 mm, length 50 mm", "Verdict: named"),
+        *(diagnosis["summary"], diagnosis["next_test"], "rig_compliance"),
+        "sleeve_compliance.compliance = 0.01408 mm/kN",
+        *("0.77933", "0.77857 to 0.78009", "1.2 %", "bushfit run mystery_mount.toml", "Not held out"),
+        *(where["reading"] for where in diagnosis["where"]),
+        *(source["sha256"] for source in model["provenance"]["inputs"]),
+        *(model["campaign"]["sha256"], "numpy", "2.00", "1.00"),
+    ):  # fmt: skip
+        assert words in text
+    assert len(model["campaign"]["sha256"]) == 64
+
+
+def test_conditions_of_the_tests_are_told(root: Path, tmp_path: Path) -> None:
+    """Temperature, preload, date and the rest go from the campaign through the document onto the page."""
+    text = (root / "configs/cmp_15961.toml").read_text(encoding="utf-8").replace("../data", str(root / "data"))
+    stated = 'temperature = "22 degC"\npreload = "150 N axial"\ndate = "12 May 2025"\n'
+    stated += 'operator = "night shift"\nspecimen_number = "A-7"\n'
+    (tmp_path / "c.toml").write_text(text.replace("[[sweeps]]\n", f"[[sweeps]]\n{stated}"), encoding="utf-8")
+    done = call(
+        tmp_path,
+        "fit",
+        "c.toml",
+        "-o",
+        "x",
+        "--no-plots",
+        "-q",
+        "--effect",
+        "inertia",
+        "--direction",
+        "axial",
+        "--direction",
+        "radial",
+    )
+    assert done.returncode == 0, done.stderr
+    assert call(tmp_path, "report", "x", "-q").returncode == 0
+    found = parsed(page_of(tmp_path / "x")).text
+    for words in ("22 °C", "150 N axial", "12 May 2025", "night shift", "A-7", "Fitted, not diagnosed"):
+        assert words in found
+    assert "bushfit fit c.toml --direction axial --direction radial --effect inertia" in found
+
+
+def drawn(page: str, title: str) -> dict[str, dict[str, np.ndarray]]:
+    """The points of a chart by its title, series and kind, back from pixels by the axes that it states, (2, n)."""
+    (svg,) = re.findall(rf"<svg(?:(?!</svg>).)*?>{re.escape(title)}</text>.*?</svg>", page, re.DOTALL)
+    x, y = (re.search(rf'data-{axis}="([^"]*)"', svg)[1].split() for axis in "xy")  # type: ignore[index]
+
+    def back(axis: list[str], pixels: np.ndarray) -> np.ndarray:
+        low, high, first, last = map(float, axis[:4])
+        share = (pixels - first) / (last - first)
+        return low * (high / low) ** share if axis[4] == "log" else low + (high - low) * share
+
+    found: dict[str, dict[str, np.ndarray]] = {}
+    for name, inside in re.findall(r'<g data-series="([^"]*)">(.*?)</g>', svg):
+        for d, of in re.findall(r'd="([^"]*)"[^>]*data-of="(\w+)"', inside):
+            pairs = np.array([pair.split() for pair in re.findall(r"-?[\d.]+ -?[\d.]+", d)], dtype=float).T
+            found.setdefault(name, {})[of] = np.stack((back(x, pairs[0]), back(y, pairs[1])))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("title", "column"), [("radial: stiffness", "stiffness [N/mm]"), ("radial: loss factor", "loss factor [-]")]
+)
+def test_points_and_lines_are_those_of_the_tables(results: Results, title: str, column: str) -> None:
+    """Means of the repeats and the prediction, within a tenth of a pixel."""
+    folder = results("cmp_15961")
+    shown = drawn(page_of(folder), title)
+    sweeps, predicted = pd.read_csv(folder / "sweeps.csv"), pd.read_csv(folder / "radial.csv")
+    assert list(shown) == ["0.1 mm", "0.2 mm", "0.5 mm"]
+    for level in (0.1, 0.2, 0.5):
+        mine = sweeps[(sweeps["direction"] == "radial") & (sweeps["amplitude [mm]"] == level)]
+        means = mine.groupby("frequency [Hz]")[column].mean()
+        points, line = shown[f"{level} mm"]["measured"], shown[f"{level} mm"]["model"]
+        reach = np.ptp(sweeps.loc[sweeps["direction"] == "radial", column]) / 100
+        np.testing.assert_allclose(points[0], means.index, atol=0.06)
+        np.testing.assert_allclose(points[1], means.to_numpy(), atol=reach / 10)
+        there = predicted[predicted["amplitude [mm]"] == level]
+        np.testing.assert_allclose(line[1], there[column], atol=reach / 10)
+
+
+def test_maps_are_measured_less_model(results: Results) -> None:
+    """The mean of what is left of a direction, of the plain model and with the effect, as in words."""
+    folder = results("mystery_mount")
+    gap = pd.read_csv(folder / "gap.csv")
+    radial = gap[(gap["direction"] == "radial") & (gap["kind"] == "sweep")]
+    cells = radial.groupby(["amplitude [mm]", "frequency [Hz]"])["storage before [%]"].mean()
+    size = np.sqrt(np.mean(cells**2))
+    told = re.search(
+        r"Measured less model, radial, [^;]*; storage: before ([\d.]+) %, after ([\d.]+) %", page_of(folder)
+    )
+    assert told is not None
+    assert float(told[1]) == pytest.approx(size, rel=0.02)
+    assert float(told[2]) < 0.3 * float(told[1])
+    off = radial["model stiffness [N/mm]"] / radial["stiffness [N/mm]"] - 1.0
+    assert 100 * off.mean() == pytest.approx(radial["storage after [%]"].mean(), abs=0.1)
+    assert cells.mean() > 2.0, "the plain model is stiffer than what was measured: model less measured is above zero"
+
+
+def grown(table: pd.DataFrame, column: str, times: int) -> pd.DataFrame:
+    """A table with so many times its tests."""
+    return pd.concat([table.assign(**{column: table[column] + f" {n}"}) for n in range(times)], ignore_index=True)
+
+
+def test_a_large_campaign_stays_small_and_says_what_is_left_out(results: Results) -> None:
+    contents = read_results(results("mystery_mount"))
+    tables = {name: make() for name, make in contents.tables.items()}
+    large = tables | {"loops": grown(tables["loops"], "loop", 30), "gap": grown(tables["gap"], "test", 30)}
+    levels = [
+        tables["sweeps"].assign(**{"amplitude [mm]": tables["sweeps"]["amplitude [mm]"] * 1.1**n}) for n in range(60)
+    ]
+    between = [level.assign(**{"frequency [Hz]": level["frequency [Hz]"] + n / 10}) for n, level in enumerate(levels)]
+    large["sweeps"] = pd.concat([*levels, *between], ignore_index=True)
+    page = report_page(contents.documents, large)
+    print(f"{sum(map(len, large.values()))} rows in {len(page.encode())} bytes")
+    assert len(page.encode()) < LARGEST
+    text = parsed(page).text
+    for words in ("further levels are left out", "further loops are left out", "one row in "):
+        assert words in text
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_names_do_no_harm(root: Path, data: st.DataObject) -> None:
+    """Whatever stands in a text, the page has the same elements and attributes, and says it to the letter."""
+    contents = read_results(root / "data/reports/mystery_mount")
+    plain = parsed(report_page(contents.documents, {name: make() for name, make in contents.tables.items()}))
+    letters = st.text(st.characters(exclude_categories=["C", "Z"]), min_size=1, max_size=40)
+    name = data.draw(st.one_of(st.sampled_from(NASTY), letters))
+
+    def spoiled(value: Any, key: str = "") -> Any:
+        if isinstance(value, dict):
+            return {name: spoiled(each, name) for name, each in value.items()}
+        if isinstance(value, list):
+            return [spoiled(each, key) for each in value]
+        return name if isinstance(value, str) and key in FOREIGN else value
+
+    tables = {
+        key: make().replace({"test": dict.fromkeys(["sweep_axial"], name)}) for key, make in contents.tables.items()
+    }
+    found = parsed(report_page(spoiled(contents.documents), tables))
+    same = ("script", "style", "svg", "section", "table", "h2", "b", "a", "meta", "body", "button")
+    assert {tag: found.counts[tag] for tag in same} == {tag: plain.counts[tag] for tag in same}
+    assert {key for _, key, _ in found.attributes} == {key for _, key, _ in plain.attributes}
+    assert " ".join(name.split()) in found.text
+    assert loads(report_page(spoiled(contents.documents), tables)) == [] or "//" in name
+
+
+#: Keys of the documents whose texts come from a user's files.
+FOREIGN = {
+    "name",
+    "summary",
+    "next_test",
+    "command",
+    "reading",
+    "sentence",
+    "evidence",
+    "preload",
+    "date",
+    "warnings",
+    "test",
+} - {"test"}
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda folder: shutil.rmtree(folder), ("a folder of results is needed", "nothing")),
+        (
+            lambda folder: [file.unlink() for file in folder.glob("*.json")],
+            ("there is no model in this folder", "axial.csv", "bushfit run CAMPAIGN"),
+        ),
+        (lambda folder: (folder / "model.json").write_text("{"), ("model.json, line 1", "not valid JSON")),
+        (lambda folder: (folder / "model.json").write_text("[]"), ("model.json: not a result", "a list")),
+        (lambda folder: change(folder / "model.json", schema="bushfit/model/9"), ("model.json, schema",)),
+        (lambda folder: change(folder / "model.json", campaign={"name": 3}), ("model.json, campaign.",)),
+        (
+            lambda folder: change(folder / "diagnosis.json", schema="bushfit/diagnosis/1"),
+            ("diagnosis.json, schema", "bushfit/diagnosis/2"),
+        ),
+        (lambda folder: change(folder / "diagnosis.json", gap=7), ("diagnosis.json, gap", "a table")),
+        (
+            lambda folder: (folder / "sweeps.csv").write_text("sweep,direction\na,axial\n"),
+            ("a column of a table is missing", "frequency [Hz]"),
+        ),
+        (
+            lambda folder: (folder / "axial.csv").write_text("frequency [Hz],amplitude [mm]\nx,1\n"),
+            ("axial.csv: this table is not as bushfit writes it", "'x'"),
+        ),
+        (lambda folder: (folder / "axial.csv").write_bytes(b""), ("axial.csv: the file is empty",)),
+        (lambda folder: (folder / "axial.csv").write_bytes(b"\xff\xfe\x00"), ("axial.csv", "not UTF-8")),
+        (lambda folder: (folder / "report.html").write_text("mine"), ("results stand there already", "--force")),
+    ],
+)
+def test_spoiled_folders_are_one_clear_error(
+    root: Path, tmp_path: Path, spoil: Callable[[Path], object], says: tuple[str, ...]
+) -> None:
+    folder = tmp_path / "x"
+    shutil.copytree(root / "data/reports/mystery_mount", folder)
+    spoil(folder)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    done = call(tmp_path, "report", "x")
+    assert done.returncode == 2
+    assert done.stderr.count("bushfit: error: ") == 1, done.stderr
+    for words in says:
+        assert words in done.stderr
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+def change(file: Path, **keys: object) -> None:
+    file.write_text(json.dumps(json.loads(file.read_text(encoding="utf-8")) | keys), encoding="utf-8")
+
+
+def test_the_command(root: Path, tmp_path: Path) -> None:
+    folder = root / "data/reports/mystery_mount"
+    done = call(tmp_path, "report", folder, "-o", "page", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == {"pages": {"page/report.html": (tmp_path / "page/report.html").stat().st_size}}
+    assert "wrote report.html to page" in done.stderr
+    assert call(tmp_path, "report", folder, "-o", "page").returncode == 2
+    first = (tmp_path / "page/report.html").read_bytes()
+    assert call(tmp_path, "report", folder, "-o", "page", "--force").returncode == 0
+    assert (tmp_path / "page/report.html").read_bytes() == first
+
+
+def test_without_a_report(root: Path, tmp_path: Path) -> None:
+    campaign = root / "data/practice/case_000/bushing.toml"
+    assert call(tmp_path, "diagnose", campaign, "-o", "x", "--no-plots", "--no-report", "-q").returncode == 0
+    assert not (tmp_path / "x/report.html").exists()
+    assert call(tmp_path, "report", "x", "-q").returncode == 0
+    assert (tmp_path / "x/report.html").exists()
+
+
+def test_canonical_tables_are_those_of_the_files() -> None:
+    table = pd.DataFrame({"test": ["=1", "a\nb"], "repeat": [1, 2], "force [N]": [np.nan, 1.23456789]})
+    found = canonical(table)
+    assert found["test"].tolist() == ["=1", "a b"]
+    assert found["force [N]"].tolist()[1] == 1.234568
+    assert np.isnan(found["force [N]"][0])
+
+
+STYLED = re.compile(r"<(style|script)>(.*?)</\1>", re.DOTALL)
+
+
+def bare(page: str) -> str:
+    """A page without its pictures, every number the same: other processors round otherwise."""
+    return re.sub(
+        r"[-+]?\d+(?:\.\d+)?(?:e-?\d+)?", "#", re.sub(r"<svg.*?</svg>|[0-9a-f]{64}", "", page, flags=re.DOTALL)
+    )
+
+
+def assert_current(kept: Path, made: Path) -> None:
+    one, other = kept.read_text(encoding="utf-8"), made.read_text(encoding="utf-8")
+    remedy = f"stale: copy {made.name} of the command that data/README.md names to {kept}"
+    assert STYLED.findall(one) == STYLED.findall(other), remedy
+    assert bare(one) == bare(other), remedy
+    assert one.count("<svg") == other.count("<svg")
+    assert len(one) == pytest.approx(len(other), rel=0.02)
+
+
+@pytest.mark.parametrize("name", ["cmp_15961", "mystery_mount"])
+def test_the_reports_of_the_readme_are_current(root: Path, results: Results, name: str) -> None:
+    assert_current(root / f"data/reports/{name}.html", results(name) / "report.html")
+
+
+def test_the_report_of_measured_rubber_is_current_and_says_that_the_mount_was_not_fitted(
+    root: Path, measured: Path
+) -> None:
+    assert_current(root / "data/measured/epdm_70/report.html", measured / "report.html")
+    text = parsed(page_of(measured)).text
+    assert loads(page_of(measured)) == []
+    for words in (
+        "(not fitted)",
+        "2 blocks in parallel in shear, 772 mm² each, 6 mm thick",
+        "mount 25 %",
+        "Fitted, not diagnosed",
+    ):
+        assert words in text
+
+
+def test_the_results_to_try_it_on_are_current(root: Path, results: Results) -> None:
+    made = results("mystery_mount")
+    kept = sorted((root / "data/reports/mystery_mount").iterdir())
+    assert len(kept) == 5
+    for file in kept:
+        one, other = (bare(folder.read_text(encoding="utf-8")) for folder in (file, made / file.name))
+        assert one == other, f"stale: copy {file.name} of bushfit run configs/mystery_mount.toml to {file}"

@@ -1,0 +1,127 @@
+"""Pages in a browser: nothing is asked for, nothing complained of, all can read them, and two sheets hold a report.
+
+Where no Chromium is found, these tests are skipped, and say so.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import chromium
+import pytest
+from chromium import Tab
+
+pytestmark = pytest.mark.skipif(
+    chromium.found() is None, reason=f"none of {', '.join(chromium.NAMES)} is installed here"
+)
+Pages = Callable[[str], Path]
+NAMES = ("cmp_15961", "mystery_mount", "measured", "batch")
+
+
+@pytest.fixture(scope="module")
+def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
+    with chromium.tab(tmp_path_factory.mktemp("profile")) as opened:
+        yield opened
+
+
+@pytest.fixture
+def pages(results: Pages, request: pytest.FixtureRequest) -> Pages:
+    def page(name: str) -> Path:
+        if name == "measured":
+            return Path(request.getfixturevalue("measured")) / "report.html"
+        return (
+            Path(request.getfixturevalue("batch")) / "index.html" if name == "batch" else results(name) / "report.html"
+        )
+
+    return page
+
+
+@pytest.mark.parametrize("width", [1280, 400])
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_is_asked_for_and_all_can_read_it(tab: Tab, pages: Pages, name: str, width: int) -> None:
+    """axe-core judges contrast, alternative texts, roles, tables and the rest."""
+    page = pages(name)
+    tab.open(page, width)
+    assert tab.requests == [page.resolve().as_uri()]
+    assert tab.complaints == []
+    assert tab.run("document.documentElement.scrollWidth <= innerWidth"), "the page itself does not scroll sideways"
+    axe = pytest.importorskip("axe_core_python", reason="axe-core-python is not installed here")
+    tab.run((Path(axe.__file__).parent / "axe.min.js").read_text(encoding="utf-8") + "; 0")
+    told = "{bad: r.violations.map(v => v.id + ' ' + v.nodes[0].html), passes: r.passes.length}"
+    found = tab.run(f"axe.run(document).then(r => ({told}))")
+    print(f"{name} at {width}: {found['passes']} rules of axe-core hold")
+    assert found["bad"] == []
+    assert found["passes"] > 15
+
+
+@pytest.mark.parametrize("name", NAMES[:3])
+def test_a_report_is_two_sheets_of_paper(tab: Tab, pages: Pages, name: str) -> None:
+    tab.open(pages(name), 1280)
+    assert tab.sheets() == 2
+
+
+def test_values_are_told_under_the_pointer(tab: Tab, pages: Pages) -> None:
+    """At a measured point its own values, by the axes that the picture states."""
+    tab.open(pages("cmp_15961"), 1280)
+    told = tab.run(
+        """(() => {
+          const svg = document.querySelector('#predicted svg');
+          const path = svg.querySelector('g[data-series="0.2 mm"] [data-of="measured"]');
+          const [x, y] = path.getAttribute('d').match(/-?[\\d.]+/g).map(Number);
+          const at = new DOMPoint(x, y).matrixTransform(svg.getScreenCTM());
+          svg.dispatchEvent(new PointerEvent('pointermove', {clientX: at.x, clientY: at.y, bubbles: true}));
+          return document.querySelector('.hint').textContent;
+        })()"""
+    )
+    found = re.fullmatch(r"0\.2 mm, measured: ([\d.]+), ([\d.]+)", told)
+    assert found, told
+    assert float(found[1]) == pytest.approx(5.0, abs=0.1)
+    assert float(found[2]) == pytest.approx(559, abs=5)
+
+
+def test_levels_and_directions_are_switched_and_all_are_printed(tab: Tab, pages: Pages) -> None:
+    tab.open(pages("mystery_mount"), 1280)
+    shown = "[...document.querySelectorAll('#predicted [data-place=\"radial\"]')].every(e => e.checkVisibility())"
+    series = "document.querySelector('#predicted g[data-series=\"0.5 mm\"]').getAttribute('display')"
+    assert tab.run(shown)
+    tab.run("[...document.querySelectorAll('#predicted button')].find(b => b.textContent === 'radial').click()")
+    tab.run("[...document.querySelectorAll('#predicted button')].find(b => b.textContent === '0.5 mm').click()")
+    assert not tab.run(shown)
+    assert tab.run(series) == "none"
+    assert tab.sheets() == 2, "what is switched off on the screen is on paper all the same"
+
+
+def test_a_batch_is_sorted_by_its_headings(tab: Tab, pages: Pages) -> None:
+    tab.open(pages("batch"), 1280)
+    column = "[...document.querySelectorAll('tbody tr')].map(r => r.cells[0].textContent)"
+    tab.run("document.querySelector('thead button').click()")
+    assert tab.run(column) == ["=1+1 <b>", "c0", "c1", "c2"]
+    tab.run("document.querySelector('thead button').click()")
+    assert tab.run(column) == ["c2", "c1", "c0", "=1+1 <b>"]
+    tab.run("[...document.querySelectorAll('thead button')].find(b => b.textContent.startsWith('mu')).click()")
+    mu = tab.run(
+        "[...document.querySelectorAll('tbody tr')].map(r => parseFloat(r.querySelector('td[align]').textContent))"
+    )
+    assert mu[:3] == sorted(mu[:3])
+
+
+def test_without_style_and_script_nothing_is_lost(tab: Tab, pages: Pages, tmp_path: Path) -> None:
+    """As Jenkins shows it, whose content policy forbids both: https://www.jenkins.io/doc/book/security/configuring-content-security-policy"""
+    policy = "sandbox; default-src 'none'; img-src 'self'; style-src 'self';"
+    strict = re.sub(
+        r'(http-equiv="Content-Security-Policy" content=")[^"]*',
+        rf"\1{policy}",
+        pages("mystery_mount").read_text(encoding="utf-8"),
+    )
+    (tmp_path / "strict.html").write_text(strict, encoding="utf-8")
+    tab.open(tmp_path / "strict.html", 1280, scripts=False)
+    assert any("style" in each for each in tab.complaints), "the policy is in force"
+    tab.ask("Emulation.setScriptExecutionDisabled", value=False)
+    assert tab.run("getComputedStyle(document.body).maxWidth") == "none"
+    assert tab.run("[...document.querySelectorAll('svg')].every(e => e.getBoundingClientRect().width > 400)")
+    assert tab.run("[...document.querySelectorAll('[hidden]')].length") == 0
+    assert tab.run("document.documentElement.scrollWidth <= innerWidth")
+    stroke = "getComputedStyle(document.querySelector('[data-series=\"0.1 mm\"] path[data-of=model]')).stroke"
+    assert tab.run(stroke) == "rgb(45, 17, 96)", "pictures keep their colours"

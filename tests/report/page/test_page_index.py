@@ -1,0 +1,90 @@
+"""The page of a batch: a row a bushing, links, control charts, limits; and what is spoiled in its folder."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from commandline import call
+from reading_html import loads, parsed
+
+from bushfit.report.contents import pages_of
+from bushfit.report.page.index import index_page, read_batch
+
+
+def test_a_batch_writes_its_page_and_the_folder_gives_the_same(batch: Path) -> None:
+    written = (batch / "index.html").read_bytes()
+    assert pages_of(read_batch(batch))["index.html"] == written
+    page = written.decode()
+    assert loads(page) == []
+    found = parsed(page)
+    for words in ("m: 4 bushings", "3 done, 1 failed", "=1+1 <b>", "mu [MPa]", "inertia", "Control charts"):
+        assert words in found.text
+    links = [value for tag, key, value in found.attributes if (tag, key) == ("a", "href")]
+    assert sorted(links) == [f"bushings/c{n}/report.html" for n in range(3)]
+    assert all((batch / link).is_file() for link in links)
+    summary = json.loads((batch / "batch.json").read_text(encoding="utf-8"))
+    mu = summary["quantities"]["mu [Pa]"]
+    assert mu["allowed"] == [1.2e6, None]
+    table = pd.read_csv(batch / "batch.csv")
+    assert mu["median"] == pytest.approx(table["mu [Pa]"].median())
+    out = table["mu [Pa]"] < 1.2e6
+    assert f"{int(out.sum())} out of limits" in page
+    rows = re.findall(r'<tr><th scope="row" align="left">(?:<a [^>]*>)?([^<]*)', page)
+    assert rows[0] == "=1+1 &lt;b&gt;", "what failed comes first"
+    assert len(rows) == 4
+
+
+def test_report_makes_it_again_and_elsewhere_with_whole_links(batch: Path, tmp_path: Path) -> None:
+    done = call(tmp_path, "report", batch, "-o", "x")
+    assert done.returncode == 0, done.stderr
+    links = re.findall(r'href="([^"]*)"', (tmp_path / "x/index.html").read_text(encoding="utf-8"))
+    assert sorted(links) == [f"{batch.resolve().as_uri()}/bushings/c{n}/report.html" for n in range(3)]
+
+
+def test_many_bushings_stay_small(batch: Path) -> None:
+    contents = read_batch(batch)
+    table = contents.tables["batch"]()
+    random = np.random.default_rng(1)
+    many = table.iloc[[0] * 20_000].assign(**{"mu [Pa]": random.normal(1.3e6, 5e4, 20_000)}).reset_index(drop=True)
+    page = index_page(contents.documents, {"batch": many})
+    print(f"20000 bushings in {len(page.encode())} bytes")
+    assert len(page.encode()) < 500_000
+    assert "of 20000; batch.csv has all" in page
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "says"),
+    [
+        ("batch.json", "{", "not valid JSON"),
+        ("batch.json", '{"schema": "x"}', "not a batch this version reads"),
+        ("batch.json", None, "there is no such file"),
+        ("batch.csv", None, "the table of the batch is missing"),
+        ("batch.csv", "name,status\n", "the table of the batch is missing"),
+    ],
+)
+def test_spoiled_batches_are_one_clear_error(
+    batch: Path, tmp_path: Path, file: str, content: str | None, says: str
+) -> None:
+    folder = tmp_path / "x"
+    folder.mkdir()
+    for name in ("batch.json", "batch.csv"):
+        shutil.copy(batch / name, folder)
+    (folder / file).unlink() if content is None else (folder / file).write_text(content)
+    done = call(tmp_path, "report", "x")
+    assert (done.returncode, done.stderr.count("bushfit: error: ")) == (2, 1), done.stderr
+    assert says in done.stderr
+    assert not (folder / "index.html").exists()
+
+
+def test_a_batch_without_a_page(root: Path, tmp_path: Path) -> None:
+    pattern = root / "data/practice/case_00[0]/bushing.toml"
+    done = call(tmp_path, "batch", pattern, "-o", "x", "--no-report", "--jobs", "1", "-q")
+    assert done.returncode == 0, done.stderr
+    assert not (tmp_path / "x/index.html").exists()
+    assert (tmp_path / "x/batch.json").exists()
