@@ -44,7 +44,7 @@ def searched_again(search: Search, steps: Sequence[Step], held: HoldOut) -> list
             continue
         try:
             rest = fit(search.base.model, part.rest(search.base.data_sets), search.held, search.bounds)
-            anew = Search.begin(rest, settings, search.start, search.held, search.bounds, search)
+            anew = Search.begin(rest, settings, search.start, search.held, search.bounds)
             again = anew.reconsider(*anew.grow())[1]
         except (FitError, ModelError):
             continue

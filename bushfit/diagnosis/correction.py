@@ -42,8 +42,10 @@ _SIZES = np.geomspace(0.1, 30.0, 26)
 _FEWEST = 6
 #: Steps of ln of the middle of the peaks that are tried first; chosen, half of the least width but one.
 _STEP = 0.1
-#: Their widths over the middle; chosen: nothing wider is called a peak.
-_WIDTHS = (0.1, 0.2, 0.4, 0.8)
+#: Their widths over the middle; chosen: nothing wider is called a peak, and what one frequency shows is narrower still.
+_WIDTHS = (0.01, 0.03, 0.1, 0.2, 0.4, 0.8)
+#: Width over the distance of the frequencies on either side, below which one frequency alone shows it: a fault may too.
+_NARROW = 0.3
 #: Steps of ln of the middle in the finer trials about the best.
 _FINER = (0.05, 0.02, 0.01)
 #: Peaks of each of these trials, in such steps of ln of the middle and of the width, which the data tell less well.
@@ -100,7 +102,7 @@ def correct(evidence: Evidence) -> Correction | None:
 
 def _peak(terms: Terms, weight: Array) -> tuple[float, float] | None:
     """Middle and width [Hz] of the peak of any phase, linear in ln motion, that takes most off chi-square; None where
-    sweeps have too few frequencies for one.
+    sweeps have too few frequencies for one, or it is too narrow for them.
 
     Args:
         weight: of each residual, 1 or 0, (n,).
@@ -120,7 +122,9 @@ def _peak(terms: Terms, weight: Array) -> tuple[float, float] | None:
         gains = ScoreTest(evidence, terms.columns(values, evidence.model) * weight, groups, _PEAK_LEFT).gains()
         best = logs[int(np.argmax(gains))]
         logs = best + finer * np.array(_ABOUT)
-    return float(np.exp(best[0])), float(np.exp(best.sum()))
+    middle, width = float(np.exp(best[0])), float(np.exp(best.sum()))
+    above = np.clip(np.searchsorted(steps, best[0]), 1, steps.size - 1)
+    return None if width < _NARROW * np.ptp(np.exp(steps[above - 1 : above + 1])) else (middle, width)
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +230,7 @@ class _Process:
             rows = part.rows(evidence.data_sets)
             design = self.design.without(rows)
             anew = _likeliest(design, (*self.lengths, self.tilt))
-            root, size = (anew.root, anew.size) if anew else (self.root[:, :0], 1.0)
+            root, size = (anew.root, anew.size) if anew else (np.zeros((len(design.columns), 0)), 1.0)
             pair = [
                 predicted(evidence.residual, *_beside(own, root[:, :amounts].T @ design.columns, size), rows)
                 for amounts in (0, root.shape[1])
