@@ -102,7 +102,7 @@ def correct(evidence: Evidence) -> Correction | None:
 
 def _peak(terms: Terms, weight: Array) -> tuple[float, float] | None:
     """Middle and width [Hz] of the peak of any phase, linear in ln motion, that takes most off chi-square; None where
-    sweeps have too few frequencies for one, or it is too narrow for them.
+    sweeps have too few frequencies for one, or it is too narrow for them, wider than a peak, or not between them.
 
     Args:
         weight: of each residual, 1 or 0, (n,).
@@ -123,8 +123,11 @@ def _peak(terms: Terms, weight: Array) -> tuple[float, float] | None:
         best = logs[int(np.argmax(gains))]
         logs = best + finer * np.array(_ABOUT)
     middle, width = float(np.exp(best[0])), float(np.exp(best.sum()))
-    above = np.clip(np.searchsorted(steps, best[0]), 1, steps.size - 1)
-    return None if width < _NARROW * np.ptp(np.exp(steps[above - 1 : above + 1])) else (middle, width)
+    above = int(np.searchsorted(steps, best[0]))
+    if not 0 < above < steps.size:
+        return None
+    step = float(np.ptp(np.exp(steps[above - 1 : above + 1])))
+    return (middle, width) if _NARROW * step <= width <= middle else None
 
 
 @dataclass(frozen=True, eq=False)
