@@ -1,3 +1,52 @@
 """bushfit: fit and question the frequency- and amplitude-dependent stiffness of rubber bushings."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bushfit.api import (
+        diagnose,
+        fit,
+        fit_dynamic,
+        fit_static,
+        load_campaign,
+        load_model,
+        parameters,
+        picture,
+        predict,
+        run,
+        save,
+        simulate,
+        table,
+    )
+
 __version__ = "0.1.0"
+__all__ = [
+    "diagnose",
+    "fit",
+    "fit_dynamic",
+    "fit_static",
+    "load_campaign",
+    "load_model",
+    "parameters",
+    "picture",
+    "predict",
+    "run",
+    "save",
+    "simulate",
+    "table",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """The functions of `bushfit.api`, imported when the first is asked for, because that takes a second."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    return getattr(import_module("bushfit.api"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -7,7 +7,7 @@ may be either's, an effect with a twin that these tests cannot tell from it, giv
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import combinations
 from typing import Any
@@ -49,11 +49,17 @@ _BANDS = ("stiffness", "loss_factor", "storage_stiffness", "loss_stiffness")
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """A predicted quantity with its 95 % band, each (n,)."""
+    """A predicted quantity with its 95 % band, each (n,).
+
+    Args:
+        root: what independent errors of one standard deviation each do to the quantity, (r, n): their root sum of
+            squares is its standard error; none where it has no uncertainty.
+    """
 
     value: Array
     low: Array
     high: Array
+    root: Array = field(default_factory=lambda: np.empty((0, 1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +155,8 @@ def _predicted(
 
     def band(value: Array, slope: Array) -> Band:
         half = np.hypot(beyond * covariance.half_width(slope[:count]), Z95 * np.linalg.norm(slope[count:], axis=0))
-        return Band(value, value - half, value + half)
+        root = np.concatenate((beyond * (covariance.root.T @ slope[:count]), slope[count:]))
+        return Band(value, value - half, value + half, root)
 
     relative = slopes / stiffness
     loss_factor = stiffness.imag / stiffness.real
@@ -178,7 +185,7 @@ def _open_to(
 def _spanned(bands: Sequence[Band]) -> Band:
     """The first band, from the least to the largest of all."""
     low, high = (np.array([getattr(band, end) for band in bands]) for end in ("low", "high"))
-    return Band(bands[0].value, low.min(axis=0), high.max(axis=0))
+    return replace(bands[0], low=low.min(axis=0), high=high.max(axis=0))
 
 
 def _measured(direction: Place, frequency: Array, amplitude: Array, sweeps: Sequence[SweepData]) -> Array:

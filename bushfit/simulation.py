@@ -31,6 +31,7 @@ from bushfit.model.result import Result
 from bushfit.reading.measurement import Loop, Source, Sweep
 from bushfit.reading.resonance import ResonanceTest
 from bushfit.reading.runs import runs_of
+from bushfit.reading.tablefile import Form, ending, to_bytes
 from bushfit.reduction.programme import programme
 from bushfit.reduction.resonance import reduce_resonance, response
 
@@ -349,35 +350,38 @@ def _resonance(
     )
 
 
-def to_files(simulated: Simulated) -> dict[str, bytes]:
-    """The campaign as files: CSVs, `campaign.toml` that names them, and `truth.json`, the model behind them.
+def to_files(simulated: Simulated, form: Form = "csv") -> dict[str, bytes]:
+    """The campaign as files: tables, `campaign.toml` that names them, and `truth.json`, the model behind them.
 
     A resonance test is what `bushfit reduce` takes; `campaign.toml` says how.
     """
     from bushfit.model.file import to_document
-    from bushfit.reading.csvfile import raw_loop_table, raw_resonance_table, raw_sweep_table, to_csv
+    from bushfit.reading.csvfile import raw_loop_table, raw_resonance_table, raw_sweep_table
 
+    tables = {
+        **{loop.name: raw_loop_table(loop) for loop in simulated.loops},
+        **{sweep.name: raw_sweep_table(sweep) for sweep in simulated.sweeps},
+        **{test.name: raw_resonance_table(test) for _, test in simulated.resonances},
+    }
     return {
-        **{f"{loop.name}.csv": to_csv(raw_loop_table(loop)) for loop in simulated.loops},
-        **{f"{sweep.name}.csv": to_csv(raw_sweep_table(sweep)) for sweep in simulated.sweeps},
-        **{f"{test.name}.csv": to_csv(raw_resonance_table(test)) for _, test in simulated.resonances},
-        "campaign.toml": _campaign_toml(simulated).encode(),
+        **{f"{name}.{ending(form)}": to_bytes(name, table, form) for name, table in tables.items()},
+        "campaign.toml": _campaign_toml(simulated, form).encode(),
         "truth.json": (json.dumps(to_document(simulated.result), indent=1) + "\n").encode(),
     }
 
 
-def _campaign_toml(simulated: Simulated) -> str:
-    seed = simulated.plan.seed
+def _campaign_toml(simulated: Simulated, form: Form) -> str:
+    seed, end = simulated.plan.seed, ending(form)
     lines = [f"# Simulated by bushfit simulate with seed {seed}: no rubber was tested. The model is in truth.json."]
     lines += body_lines(simulated.truth.bushing, simulated.specimens)
     for kind, tests in (("loops", simulated.loops), ("sweeps", simulated.sweeps)):
         for each in tests:
-            lines += table_lines(kind, f"{each.name}.csv", each.direction, each.temperature)
+            lines += table_lines(kind, f"{each.name}.{end}", each.direction, each.temperature)
     for mass, test in simulated.resonances:
-        file, folder = (typed(Path(name)) for name in (f"{test.name}.csv", test.name))
+        file, folder = (typed(Path(name)) for name in (f"{test.name}.{end}", test.name))
         tested = "specimen" if isinstance(test.direction, Specimen) else "direction"
         place = typed(Path(str(test.direction)))
         lines += ["", "# A sweep comes of this resonance test with:"]
         lines += [f'# bushfit reduce {file} --mass "{mass:.6g} kg" --{tested} {place} -o {folder}']
-        lines += [f"# {line}" for line in table_lines("sweeps", f"{test.name}/sweep.csv", test.direction) if line]
+        lines += [f"# {line}" for line in table_lines("sweeps", f"{test.name}/sweep.{end}", test.direction) if line]
     return "\n".join(lines) + "\n"

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, cast, get_args, get_type_hints
 
-from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, ValidationInfo
+from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, ValidationInfo, WithJsonSchema
 from pydantic_core import ErrorDetails
 
 from bushfit.errors import BushfitError, CampaignError, did_you_mean
@@ -66,8 +66,13 @@ def unknown_key(key: str, known: Collection[str]) -> CampaignError:
     return CampaignError("unknown key", found=f'"{key}"', expected=expected, hint=hint)
 
 
-def converted(convert: Callable[[Any, ValidationInfo], Any]) -> BeforeValidator:
-    """A pydantic validator that calls convert(raw value, info); what it raises keeps its words."""
+def converted(
+    convert: Callable[[Any, ValidationInfo], Any], written: Mapping[str, Any] | None = None
+) -> BeforeValidator:
+    """A pydantic validator that calls convert(raw value, info); what it raises keeps its words.
+
+    `written` is the JSON Schema of what stands in the file; without it, it is that of the converted value.
+    """
 
     def run(raw: Any, info: ValidationInfo) -> Any:
         try:
@@ -75,7 +80,9 @@ def converted(convert: Callable[[Any, ValidationInfo], Any]) -> BeforeValidator:
         except BushfitError as error:
             raise ValueError(error) from error
 
-    return BeforeValidator(run)
+    if written is None:
+        return BeforeValidator(run)
+    return BeforeValidator(run, json_schema_input_type=Annotated[Any, WithJsonSchema(dict(written))])
 
 
 def standing_in_table(keys: Callable[[], Iterable[str]]) -> Mapping[str, Any]:
@@ -116,6 +123,11 @@ def check_tables(
     raise complaint  # outside of `except`: pydantic's error holds ours, and a ring of errors cannot be pickled
 
 
+def plain(value: Any, schema: Any) -> Any:
+    """A value of the type `schema`, which pydantic can check, as JSON-ready data."""
+    return _adapter(schema).dump_python(value, mode="json")
+
+
 def _complaint(detail: ErrorDetails, schema: type, kind: type[BushfitError]) -> BushfitError:
     """One of pydantic's errors in the project's words, with its place in the file."""
     location = detail["loc"]
@@ -143,7 +155,7 @@ def _place(table: type, location: tuple[int | str, ...]) -> str:
     for key in location:
         if isinstance(key, int):
             words[-1] += f" #{key + 1}"
-        elif key not in _in_table(table):
+        elif key not in in_table(table):
             words.append(key)
         table = _table_at(table, (key,))
     return ".".join(words)
@@ -151,15 +163,16 @@ def _place(table: type, location: tuple[int | str, ...]) -> str:
 
 def known_keys(table: type) -> Sequence[str]:
     """The keys that a table of the file may have."""
-    gathered = _in_table(table)
+    gathered = in_table(table)
     return [
         key for entry in fields(table) for key in (gathered[entry.name]() if entry.name in gathered else [entry.name])
     ]
 
 
-def _in_table(table: type) -> Mapping[str, Callable[[], Iterable[str]]]:
+def in_table(table: type) -> Mapping[str, Callable[[], Iterable[str]]]:
     """The fields whose keys stand in the table itself, each with the function that gives these keys."""
-    return {entry.name: entry.metadata[_IN_TABLE] for entry in fields(table) if _IN_TABLE in entry.metadata}
+    known = fields(table) if is_dataclass(table) else ()
+    return {entry.name: entry.metadata[_IN_TABLE] for entry in known if _IN_TABLE in entry.metadata}
 
 
 def _table_at(table: type, location: tuple[int | str, ...]) -> type:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
 
-from bushfit.batch.ledger import Record
+from bushfit.batch.document import Record
 from bushfit.batch.limits import Judgement
 from bushfit.batch.manifest import Row
 

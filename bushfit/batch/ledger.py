@@ -19,9 +19,10 @@ import uuid
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 from bushfit import __version__
+from bushfit.batch.document import Record
 from bushfit.batch.manifest import Row
 from bushfit.batch.points import Point
 from bushfit.errors import OutputError
@@ -29,7 +30,7 @@ from bushfit.report import disk
 from bushfit.report.contents import Formats
 
 #: Layout of a record; records of another are done again.
-SCHEMA = "bushfit/row/2"
+SCHEMA: Literal["bushfit/row/2"] = "bushfit/row/2"
 #: File of a row's record, in the row's folder.
 RECORD = "row.json"
 #: Folder of the rows' folders, in that of the batch.
@@ -37,12 +38,16 @@ ROWS = "bushings"
 #: Folder in which results are made ready, in that of the batch; gone when the batch ends.
 ASIDE = ".aside"
 
-Record = dict[str, Any]
-
 
 def key(row: Row, points: tuple[Point, ...], formats: Formats) -> str:
     """Hash of a row's settings, of what is asked of it, and of the version that answers."""
-    asked = {"settings": asdict(row.settings), "points": [str(point) for point in points], "formats": asdict(formats)}
+    asked = {
+        "settings": asdict(row.settings),
+        "points": [str(point) for point in points],
+        "tables": formats.tables,
+        "table_form": formats.table_form if formats.tables or row.settings.predicted else None,
+        "pictures": formats.picture_forms if formats.pictures else (),
+    }
     return hashlib.sha256(json.dumps([__version__, SCHEMA, asked], sort_keys=True).encode()).hexdigest()
 
 

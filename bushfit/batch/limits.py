@@ -17,17 +17,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import ConfigDict, Field, ValidationInfo
 
+from bushfit.batch.document import Record
 from bushfit.batch.manifest import Row
 from bushfit.batch.points import At, Point
-from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, STIFFNESS, Figures, Quantity, Record, at_point, figures
-from bushfit.campaign.parameters import parameter_value
-from bushfit.campaign.quantities import Share
+from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, STIFFNESS, Figures, Quantity, at_point, figures
+from bushfit.campaign.parameters import Size, parameter_value
+from bushfit.campaign.quantities import Share, text
 from bushfit.campaign.toml import read_toml
+from bushfit.diagnosis import document
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
 from bushfit.reduction.scatter import scatter
@@ -52,11 +54,19 @@ class Verdict(IntEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Bounds:
-    """Limits of one quantity: min and max; nominal and tolerance; sigma robust standard deviations of the batch."""
+    """Limits of one quantity.
 
-    min: float | None = None
-    max: float | None = None
-    nominal: float | None = None
+    Args:
+        min, max: least and largest allowed value.
+        nominal: the middle of the allowed values.
+        tolerance: how far a value may lie from nominal, as a share of it.
+        sigma: how many robust standard deviations of the batch a value may lie from its median.
+        at_least: bushings that the batch must have for sigma to be judged.
+    """
+
+    min: Size | None = None
+    max: Size | None = None
+    nominal: Size | None = None
     tolerance: Share | None = None
     sigma: Annotated[float, Field(gt=0)] | None = None
     at_least: Annotated[int, Field(ge=3)] = 10
@@ -112,13 +122,17 @@ def _ratio(raw: object, _: ValidationInfo) -> object:
     return raw if isinstance(raw, int | float) and not isinstance(raw, bool) else quantity(raw, "1")
 
 
-Ratio = Annotated[float, converted(_ratio)]
-Stiffness = Annotated[float, converted(_stiffness)]
+Ratio = Annotated[float, converted(_ratio, text("a share, or a number") | {"type": ["string", "number"]})]
+Stiffness = Annotated[float, converted(_stiffness, text("a number with a unit of N/m, N*m/rad or Pa, by the point"))]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Located:
-    """A table with a point; the last base, so that the point is read first and settles the units."""
+    """A table with a point; the last base, so that the point is read first and settles the units.
+
+    Args:
+        at: the operating point.
+    """
 
     at: At
 
@@ -147,6 +161,7 @@ class Limits:
 
     Args:
         parameters: by name, in the file's units of a campaign's [fit].
+        stiffness, loss_factor: at operating points.
         nrmse, reduced_chi_square: largest allowed.
         verdicts: of `diagnose` that are allowed; empty for all.
         guard: whether a conditional pass counts as a miss.
@@ -159,7 +174,7 @@ class Limits:
     loss_factor: tuple[LossFactorBounds, ...] = ()
     nrmse: Ratio | None = None
     reduced_chi_square: Ratio | None = None
-    verdicts: tuple[Literal["consistent", "named", "ambiguous", "partly", "unexplained"], ...] = ()
+    verdicts: tuple[document.Verdict, ...] = ()
     guard: Annotated[bool, Field(strict=True)] = False
 
     def __post_init__(self) -> None:

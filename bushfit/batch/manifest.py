@@ -90,6 +90,11 @@ class Settings:
         return replace(other, **{key: value for key, value in vars(self).items() if value is not None})
 
     @property
+    def predicted(self) -> bool:
+        """Whether the row is predicted, of which the tables are always written."""
+        return not {"run", "predict"}.isdisjoint(self.commands or ())
+
+    @property
     def diagnosed(self) -> bool:
         """Whether a row with these ends in a verdict."""
         return not {"run", "diagnose"}.isdisjoint(self.commands or ())
@@ -97,7 +102,12 @@ class Settings:
 
 @dataclass(frozen=True, kw_only=True)
 class Entry(Settings):
-    """[[bushings]], or a line of a CSV manifest: a campaign file or a pattern of such, relative to the manifest."""
+    """[[bushings]], or a line of a CSV manifest.
+
+    Args:
+        campaign: a campaign file or a pattern of such, relative to the manifest.
+        name: of the bushing; that of the file unless stated.
+    """
 
     campaign: Text
     name: Text | None = None
@@ -105,7 +115,12 @@ class Entry(Settings):
 
 @dataclass(frozen=True, kw_only=True)
 class ManifestFile(Settings):
-    """A whole TOML manifest: settings for every row that has none of its own, points, rows."""
+    """A whole TOML manifest, with settings for every row that has none of its own.
+
+    Args:
+        bushings: the rows.
+        at: operating points at which stiffness and loss factor are wanted.
+    """
 
     __pydantic_config__ = ConfigDict(extra="forbid")
 

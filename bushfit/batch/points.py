@@ -62,5 +62,6 @@ def _motion(amplitude: str) -> Motion:
     return STRAINING if agrees(amplitude.lstrip("+-.0123456789eE "), STRAINING.displacement_unit) else TRANSLATION
 
 
+_WRITTEN = {"type": "string", "description": 'a place, a frequency and an amplitude: "axial 25 Hz 0.1 mm"'}
 #: A point as a key of a TOML file.
-At = Annotated[Point, converted(lambda raw, _: parse_point(raw) if isinstance(raw, str) else raw)]
+At = Annotated[Point, converted(lambda raw, _: parse_point(raw) if isinstance(raw, str) else raw, _WRITTEN)]

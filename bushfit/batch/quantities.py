@@ -10,7 +10,6 @@ from bushfit.batch.points import Point
 from bushfit.effects import is_parameter, parameter_named, parameter_names
 from bushfit.units import for_people
 
-Record = Mapping[str, Any]
 #: Value, low and high of its 95 % interval, standard error, in SI; None where it is not known.
 Figures = tuple[float, float | None, float | None, float | None]
 
@@ -26,6 +25,11 @@ class Quantity:
     def for_people(self, size: float) -> Quantity:
         """The same in the unit in which people read numbers of that size [SI]."""
         return Quantity(self.name, *for_people(self.unit, self.factor, size))
+
+    @property
+    def tabled(self) -> Quantity:
+        """The same as tables have it: a parameter in the unit for its usual size, whatever it is in this batch."""
+        return self.for_people(parameter_named(self.name).typical) if is_parameter(self.name) else self
 
     @property
     def header(self) -> str:
@@ -54,7 +58,7 @@ def parameter_quantities(names: Collection[str]) -> list[Quantity]:
     return [Quantity(name, "-" if unit == "1" else unit) for name, unit in units.items()]
 
 
-def figures(record: Record) -> Iterator[tuple[str, Figures]]:
+def figures(record: Mapping[str, Any]) -> Iterator[tuple[str, Figures]]:
     """All quantities of a row's record that are known, by name."""
     for name, (value, low, high, stderr, _) in record.get("parameters", {}).items():
         if value is not None:

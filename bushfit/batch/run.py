@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import shutil
 import time
 from collections import Counter, defaultdict
@@ -12,11 +11,12 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import get_args
 
 import numpy as np
 
 from bushfit.batch import ledger, pool
+from bushfit.batch.document import BatchFile, BatchSummary, Control, Counts, Record, Scatter
 from bushfit.batch.junit import Report
 from bushfit.batch.limits import Judge, Judgement, Limits
 from bushfit.batch.manifest import Row
@@ -27,38 +27,30 @@ from bushfit.batch.table import Table
 from bushfit.batch.work import Orders, given_up, work
 from bushfit.effects.contract import Array
 from bushfit.errors import OutputError
+from bushfit.reading.tablefile import opened
 from bushfit.reduction.scatter import scatter
-from bushfit.report.contents import pages_of
+from bushfit.report.contents import Contents, Formats, Kinds, Picture, pages_of
 from bushfit.report.folder import check_free as check_writable
 from bushfit.report.folder import to_json, write_files
 
-#: Layout of the summary as JSON.
-SCHEMA = "bushfit/batch/1"
-#: File of the table, in the batch's folder.
-TABLE = "batch.csv"
-#: File of the picture, in the batch's folder.
-PICTURE = "batch.png"
-#: File of what is said of the whole batch, in the batch's folder.
-SUMMARY = "batch.json"
-#: Page of the batch, in the batch's folder.
-INDEX = "index.html"
-#: All that is written of the whole batch.
-WRITTEN = (TABLE, PICTURE, SUMMARY, INDEX)
+#: All that is written of the whole batch: what is said of it, its table, picture and page.
+KINDS = Kinds(("batch",), ("batch",), ("batch",), ("index",))
+#: The files of these in whatever form, in the batch's folder.
+FILES = ["index.html", *(f"batch.{ending}" for ending in ("json", "csv", "xlsx", *get_args(Picture)))]
 #: Bushings that must have a quantity for it to be drawn: fewer show no scatter.
 _LEAST_DRAWN = 3
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A batch: its title, rows, what all rows share, limits, a JUnit file on request, whether to draw, and a page."""
+    """A batch: its title, rows, what all rows share, limits, a JUnit file on request, how the whole is written."""
 
     title: str
     rows: Sequence[Row]
     orders: Orders
     limits: Limits | None
     junit: Path | None
-    picture: bool
-    page: bool = True
+    formats: Formats
 
 
 @dataclass
@@ -91,7 +83,7 @@ class Summary:
     scatter: dict[Quantity, tuple[float, float]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
-    def add(self, number: int, row: Row, record: ledger.Record, judged: Judgement | None) -> None:
+    def add(self, number: int, row: Row, record: Record, judged: Judgement | None) -> None:
         """Count one row."""
         self.status[record["status"]] += 1
         self.kept += bool(record.get("kept"))
@@ -109,33 +101,38 @@ class Summary:
             elif judged.edge:
                 self.edge.append((row.name, "; ".join(judged.edge.values())))
 
-    def to_document(self) -> dict[str, Any]:
+    @property
+    def counts(self) -> Counts:
+        """JSON-ready data, whatever of it was done in this run."""
         return {
-            "schema": SCHEMA,
+            "schema": "bushfit/batch/1",
             "rows": self.status.total(),
             "done": self.status["done"],
             "failed": [{"name": name, "error": error} for name, error in self.errors],
-            "kept": self.kept,
             "limits": dict(self.limits),
             "missed": [name for name, _ in self.missed],
             "conditional": [name for name, _ in self.edge],
-            "scatter": {
-                quantity.name: {"median": middle, "sigma": spread, "unit": quantity.unit}
-                for quantity, (middle, spread) in self.scatter.items()
-            },
             "warnings": self.notes,
-            "seconds": self.seconds,
         }
 
-    def to_file(self, title: str, judge: Judge | None) -> dict[str, Any]:
+    def to_document(self) -> BatchSummary:
+        """The same with what this run took, and the scatter of each quantity in its unit."""
+        scatter: dict[str, Scatter] = {
+            quantity.name: {"median": middle, "sigma": spread, "unit": quantity.unit}
+            for quantity, (middle, spread) in self.scatter.items()
+        }
+        return {**self.counts, "kept": self.kept, "scatter": scatter, "seconds": self.seconds}
+
+    def to_file(self, title: str, judge: Judge | None) -> BatchFile:
         """The same as a file: with its title, and of each quantity its column, its limits and its scatter there."""
-        quantities = {}
+        quantities: dict[str, Control] = {}
         for quantity, (middle, spread) in self.scatter.items():
-            allowed = judge.allowed.get(quantity.name, ()) if judge else ()
-            ends = [end * quantity.factor if math.isfinite(end) else None for end in allowed]
-            quantities[quantity.header] = {"median": middle, "sigma": spread, "allowed": ends or [None, None]}
-        told = {key: value for key, value in self.to_document().items() if key not in ("seconds", "kept", "scatter")}
-        return {**told, "title": title, "quantities": quantities}
+            allowed, tabled = judge.allowed.get(quantity.name, ()) if judge else (), quantity.tabled
+            ends = [end * tabled.factor if math.isfinite(end) else None for end in allowed]
+            scale = tabled.factor / quantity.factor
+            sizes: Control = {"median": middle * scale, "sigma": spread * scale, "allowed": ends or [None, None]}
+            quantities[tabled.header] = sizes
+        return {**self.counts, "title": title, "quantities": quantities}
 
 
 def check_free(plan: Plan, *, force: bool) -> None:
@@ -145,8 +142,8 @@ def check_free(plan: Plan, *, force: bool) -> None:
         OutputError: the folder cannot be written or holds a batch, or the report cannot be written.
     """
     output, over = plan.orders.output, force or plan.orders.resume
-    check_writable(output, list(WRITTEN), force=True)
-    found = [name for name in (*WRITTEN, ledger.ROWS) if (output / name).exists()]
+    check_writable(output, FILES, force=True)
+    found = [name for name in (*FILES, ledger.ROWS) if (output / name).exists()]
     if found and not over:
         raise OutputError(
             "results stand there already",
@@ -157,7 +154,7 @@ def check_free(plan: Plan, *, force: bool) -> None:
     if plan.junit:
         with _blamed_on(plan.junit):
             place, own = plan.junit.resolve(), output.resolve()
-            if place in {own / name for name in WRITTEN} or own / ledger.ROWS in (place, *place.parents):
+            if place in [own / name for name in FILES] or own / ledger.ROWS in (place, *place.parents):
                 raise OutputError("the report cannot stand among the results of the rows, nor in place of the table")
             check_writable(plan.junit.parent, [plan.junit.name], force=over)
 
@@ -174,7 +171,7 @@ def _blamed_on(junit: Path) -> Iterator[None]:
 
 
 def run(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Summary:
-    """Do every row, then write batch.csv, batch.png, batch.json, index.html and the JUnit report.
+    """Do every row, then write the table, the picture, the summary, the page and the JUnit report.
 
     Args:
         plan, workers: the batch, and where its rows are done.
@@ -187,7 +184,7 @@ def run(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Summary:
     begin, output = time.perf_counter(), plan.orders.output
     try:
         with ledger.held(output), closing(Spool(output / ledger.ASIDE / "records", len(plan.rows))) as spool:
-            for name in WRITTEN:  # from here on they tell of results that are replaced
+            for name in FILES:  # from here on they tell of results that are replaced
                 (output / name).unlink(missing_ok=True)
             strays = ledger.strays(output, plan.rows)
             fate = "are still in bushings/ (--force removes them)"
@@ -220,20 +217,19 @@ def _report(plan: Plan, spool: Spool, summary: Summary) -> None:
     quantities = {quantity.name: quantity for quantity in (*parameters, *OF_FIT.values(), *points)}
     judge = Judge(plan.limits, columns, quantities) if plan.limits else None
     report = Report(plan.title) if plan.junit else None
-    aside = plan.orders.output / ledger.ASIDE / TABLE
-    with aside.open("w", encoding="utf-8", newline="") as stream:
-        diagnosed = any(row.settings.diagnosed for row in plan.rows)
-        table = Table(stream, parameters, points, verdicts=diagnosed, limits=judge is not None)
+    name = plan.formats.table("batch")
+    aside = plan.orders.output / ledger.ASIDE / name
+    diagnosed = any(row.settings.diagnosed for row in plan.rows)
+    table = Table(parameters, points, verdicts=diagnosed, limits=judge is not None)
+    with opened(aside, plan.formats.table_form, table.headers) as write:
         for number, (row, record) in enumerate(zip(plan.rows, spool, strict=True)):
             judged = judge(record) if judge and record["status"] == "done" else None
-            table.add(row, record, judged)
+            write(table.row(row, record, judged))
             summary.add(number, row, record, judged)
             if report:
                 report.add(row, record, judged)
-        stream.flush()
-        os.fsync(stream.fileno())
-    aside.replace(plan.orders.output / TABLE)
-    if plan.picture:
+    aside.replace(plan.orders.output / name)
+    if plan.formats.pictures:
         _draw(plan, columns, intervals, quantities, judge, summary.missing)
     if report and plan.junit:
         with _blamed_on(plan.junit):
@@ -241,16 +237,16 @@ def _report(plan: Plan, spool: Spool, summary: Summary) -> None:
     values = {quantity: columns[name] for name, quantity in quantities.items() if name in columns}
     scattered = {quantity: scatter(sizes[np.isfinite(sizes)]) for quantity, sizes in values.items()}
     summary.scatter = {q: (middle * q.factor, spread * q.factor) for q, (middle, spread) in scattered.items()}
-    summary.notes += [*(judge.notes if judge else ()), *_notes(summary)]
-    write_files(plan.orders.output, {SUMMARY: to_json(summary.to_file(plan.title, judge))}, force=True)
-    if plan.page:
+    summary.notes += [*(judge.notes if judge else ()), *_notes(summary, name)]
+    write_files(plan.orders.output, {"batch.json": to_json(summary.to_file(plan.title, judge))}, force=True)
+    if plan.formats.pages:
         from bushfit.report.page.index import read_batch
 
         write_files(plan.orders.output, pages_of(read_batch(plan.orders.output)), force=True)
 
 
-def _notes(summary: Summary) -> Iterator[str]:
-    """What a user must know of bushings whose numbers are not to be trusted blindly."""
+def _notes(summary: Summary, table: str) -> Iterator[str]:
+    """What a user must know of bushings whose numbers are not to be trusted blindly; a file has the table."""
     names = ", ".join(f"{name} of {times}" for name, times in summary.bounds.most_common())
     unsettled = (
         f"a parameter at rest on a bound of its fit, which the tests do not settle: {names}; see the column on a"
@@ -258,7 +254,7 @@ def _notes(summary: Summary) -> Iterator[str]:
     said = {f"{unsettled} bound": summary.bounded, "warnings of their own: see the column warnings": summary.warned}
     for words, count in said.items():
         if count:
-            yield f"{count} bushing{'s' * (count > 1)} with {words} of batch.csv"
+            yield f"{count} bushing{'s' * (count > 1)} with {words} of {table}"
 
 
 def _draw(
@@ -269,7 +265,6 @@ def _draw(
     judge: Judge | None,
     missing: Mapping[str, Collection[int]],
 ) -> None:
-    from bushfit.report.plots import to_png
     from bushfit.report.plots.batch import Panel, batch_figure
 
     panels = []
@@ -284,4 +279,5 @@ def _draw(
             panels.append(Panel(shown.header, values, limits, out, ends))
     if panels:
         names = [row.name for row in plan.rows]
-        write_files(plan.orders.output, {PICTURE: to_png(batch_figure(panels, plan.title, names))}, force=True)
+        drawn = Contents(pictures={"batch": lambda: batch_figure(panels, plan.title, names)})
+        write_files(plan.orders.output, plan.formats.files(drawn), force=True)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bushfit.batch.ledger import Record
+from bushfit.batch.document import Record
 from bushfit.batch.quantities import figures
 from bushfit.effects.contract import Array
 

@@ -1,16 +1,15 @@
-"""batch.csv: a row a bushing, in the manifest's order, a unit in every header."""
+"""The table of a batch: a row a bushing, in the manifest's order, a unit that people use in every header."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
-from typing import TextIO
 
-from bushfit.batch.ledger import ROWS, Record
+from bushfit.batch.document import Record
+from bushfit.batch.ledger import ROWS
 from bushfit.batch.limits import Judgement
 from bushfit.batch.manifest import Row
 from bushfit.batch.quantities import OF_FIT, Quantity, figures
-from bushfit.reading.csvfile import Rows
 
 #: Columns of every batch, before its numbers.
 _FIRST = ("name", "campaign", "folder", "status", "error")
@@ -25,28 +24,25 @@ _LAST = ("on a bound", "warnings")
 
 
 class Table:
-    """Writes rows as they come."""
+    """The headers and the rows.
+
+    A parameter has the unit for its usual size, whatever it is in this batch: the headers of two batches agree.
+    """
 
     def __init__(
-        self,
-        stream: TextIO,
-        parameters: Sequence[Quantity],
-        points: Sequence[Quantity],
-        *,
-        verdicts: bool,
-        limits: bool,
+        self, parameters: Sequence[Quantity], points: Sequence[Quantity], *, verdicts: bool, limits: bool
     ) -> None:
         self._verdicts, self._limits = verdicts, limits
         header = [*_FIRST, *(_JUDGED if limits else ()), *(_FOUND if verdicts else ())]
         self._numbers = [
-            *product(parameters, ("", ", std error", ", low", ", high")),
+            *product((quantity.tabled for quantity in parameters), ("", ", std error", ", low", ", high")),
             *product(OF_FIT.values(), ("",)),
             *product(points, ("", ", low", ", high")),
         ]
         header += [quantity.header + part for quantity, part in self._numbers]
-        self._rows = Rows(stream, [*header, *_LAST])
+        self.headers = [*header, *_LAST]
 
-    def add(self, row: Row, record: Record, judged: Judgement | None) -> None:
+    def row(self, row: Row, record: Record, judged: Judgement | None) -> list[str | float | None]:
         """One line."""
         found = dict(figures(record))
         folder = f"{ROWS}/{row.folder}" if record["status"] == "done" else ""
@@ -56,9 +52,10 @@ class Table:
             words = ["; ".join(said.values()) for said in (judged.missed, judged.edge)] if judged else ["", ""]
             cells += [str(judged.verdict) if judged else "", *words]
         if self._verdicts:
-            cells += [record.get("verdict", ""), *(", ".join(record.get(k, ())) for k in ("effects", "alternatives"))]
+            names = record.get("effects", []), record.get("alternatives", [])
+            cells += [record.get("verdict", ""), *map(", ".join, names)]
         for quantity, part in self._numbers:
             value = found.get(quantity.name, (None,) * 4)[_PARTS[part]]
             cells.append(None if value is None else value * quantity.factor)
         bounds = ", ".join(f"{name} ({end})" for name, end in record.get("at_bound", {}).items())
-        self._rows.add([*cells, bounds, "; ".join(record.get("warnings", ()))])
+        return [*cells, bounds, "; ".join(record.get("warnings", ()))]

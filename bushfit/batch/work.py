@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from bushfit import __version__
 from bushfit.batch import ledger
-from bushfit.batch.ledger import Record
+from bushfit.batch.document import Found, Record
 from bushfit.batch.points import Point
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.effects import effect_named
@@ -20,7 +20,7 @@ from bushfit.effects.contract import Parameter
 from bushfit.errors import BatchError, BushfitError
 from bushfit.fitting.data import Data
 from bushfit.model.file import load_result
-from bushfit.model.result import Result
+from bushfit.model.result import End, Result
 from bushfit.prediction import Band, predict
 from bushfit.report.contents import Formats
 
@@ -78,13 +78,13 @@ def _one_thread() -> Any:
 
 def _row(row: Row, orders: Orders) -> Record:
     wanted = ledger.key(row, orders.points, orders.formats)
-    if orders.resume and (record := ledger.standing(orders.output, row, wanted)):
-        return {**record, "kept": True}
+    if orders.resume and (stands := ledger.standing(orders.output, row, wanted)):
+        return {**stands, "kept": True}
     begin = time.perf_counter()
     files: dict[str, bytes] = {}
     try:
-        found = _worked(row, orders, files)
-        record = {"schema": ledger.SCHEMA, "key": wanted, "status": "done", **found}
+        record: Record = {"schema": ledger.SCHEMA, "key": wanted, "status": "done", "seconds": 0.0}
+        record.update(cast("Record", _worked(row, orders, files)))  # a part of it
     except Exception as error:  # whatever befalls a row, it costs that row and is said
         files.clear()
         record = _failed(_in_words(error))
@@ -109,7 +109,7 @@ def _in_words(error: Exception) -> str:
     return f"{kind}: {type(error).__name__}: {error}"
 
 
-def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Record:
+def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Found:
     """Run a row's commands, gather their files, and say what was found."""
     settings, path = row.settings, Path(row.campaign)
     inputs = {path.name: ledger.digest(path.read_bytes())} if path.is_file() else {}
@@ -122,8 +122,9 @@ def _worked(row: Row, orders: Orders, files: dict[str, bytes]) -> Record:
         result, diagnosed = _run(campaign, orders.formats, files)
     else:
         result, diagnosed = _one_by_one(campaign, settings, orders.formats, files)
-    found = {"campaign_name": campaign.name, "inputs": inputs, **(_verdict(diagnosed.diagnosis) if diagnosed else {})}
-    return {**found, **_numbers(result, orders.points, found.get("warnings", []))}
+    found: Found = _verdict(diagnosed.diagnosis) if diagnosed else {}
+    numbers = _numbers(result, orders.points, found.get("warnings", []))
+    return {"campaign_name": campaign.name, "inputs": inputs, **found, **numbers}
 
 
 def _run(campaign: Campaign, formats: Formats, files: dict[str, bytes]) -> tuple[Result, Diagnosed | None]:
@@ -162,7 +163,7 @@ def _one_by_one(
     return result, diagnosed
 
 
-def _verdict(diagnosis: Diagnosis) -> Record:
+def _verdict(diagnosis: Diagnosis) -> Found:
     """What a diagnosis adds to the record of a row."""
     return {
         "verdict": diagnosis.verdict,
@@ -186,9 +187,10 @@ def _diagnose(settings: Settings) -> Diagnose:
     return Diagnose(how, start.model if start else None)
 
 
-def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> Record:
+def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> Found:
     """Parameters, quality, and stiffness and loss factor at the points, each with what is known of its error."""
-    parameters, at_bound = {}, {}
+    parameters: dict[str, list[float | str | None]] = {}
+    at_bound: dict[str, End] = {}
     for name, parameter in result.model.parameters.items():
         interval = result.interval(name)
         value, stderr = result.model.values[name], result.covariance.stderr(name)

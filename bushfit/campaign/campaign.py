@@ -10,16 +10,15 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from bushfit.campaign.files import LoopFile, SweepFile
 from bushfit.campaign.naming import folder_name
 from bushfit.campaign.places import place_tested
 from bushfit.campaign.schema import (
     CampaignFile,
     FitSettings,
-    LoopFile,
     PredictSettings,
     RigSettings,
     SimulateSettings,
-    SweepFile,
 )
 from bushfit.campaign.toml import read_toml
 from bushfit.effects import place_of
@@ -39,7 +38,7 @@ TEST_FILES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".xls", ".xlsx", ".xlsm", 
 _CONDITIONS = ("order", "preload", "date", "operator", "specimen_number")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Campaign:
     """A bushing, specimens of its compound, their tests, and the settings of what to do with them, all in SI.
 
@@ -62,6 +61,11 @@ class Campaign:
     specimens: tuple[Specimen, ...] = ()
     rig: RigSettings = field(default_factory=RigSettings)
     sha256: str = ""
+
+    def __repr__(self) -> str:
+        kinds = {"loop": len(self.loops), "sweep": len(self.sweeps)}
+        counts = (f"{count} {kind}{'s' * (count != 1)}" for kind, count in kinds.items())
+        return f"Campaign {self.name}: {', '.join(counts)}"
 
     @property
     def slug(self) -> str:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import WithJsonSchema
 
 from bushfit.effects import is_parameter, parameter_named, parameter_names
 from bushfit.errors import CampaignError, naming
@@ -16,6 +17,10 @@ from bushfit.validation import unknown_key
 _LARGEST_NUMBER = 1e100
 #: The second to the power of alpha, at the end of the unit of m.
 _S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
+#: A value of a parameter: a number here, a text or a number in the file.
+Size = Annotated[
+    float, WithJsonSchema({"type": ["string", "number"], "description": "with its unit; a ratio may be a number"})
+]
 
 
 def parameter_value(place: str, name: str, raw: Any) -> float:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, Field
 
 from bushfit.errors import CampaignError
-from bushfit.geometry import TRANSLATION, Place
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Place
 from bushfit.units import quantity, temperature
 from bushfit.validation import converted
 
@@ -28,7 +28,12 @@ FIRST_ERROR = Field(fail_fast=True)
 
 def si(*units: str) -> BeforeValidator:
     """A validator that takes a text with any of these units, and gives SI."""
-    return converted(lambda raw, _: quantity(raw, *units))
+    return converted(lambda raw, _: quantity(raw, *units), text(f"a number with a unit of {' or '.join(units)}"))
+
+
+def text(words: str) -> dict[str, Any]:
+    """The JSON Schema of a text that is described in words."""
+    return {"type": "string", "description": words}
 
 
 def motion(per: str = "") -> BeforeValidator:
@@ -37,12 +42,14 @@ def motion(per: str = "") -> BeforeValidator:
     def unit(direction: object) -> str:
         return (direction.motion if isinstance(direction, Place) else TRANSLATION).displacement_unit + per
 
-    return converted(lambda raw, info: quantity(raw, unit(info.data.get("direction"))))
+    units = " or ".join(f"{each.displacement_unit}{per}" for each in (TRANSLATION, ROTATION, STRAINING))
+    written = text(f"a number with a unit of {units}, by what is tested")
+    return converted(lambda raw, info: quantity(raw, unit(info.data.get("direction"))), written)
 
 
-def table(convert: Callable[[dict[str, Any]], Any]) -> BeforeValidator:
-    """A validator that converts a table; what is none it leaves to pydantic."""
-    return converted(lambda raw, _: convert(raw) if isinstance(raw, dict) else raw)
+def table(convert: Callable[[dict[str, Any]], Any], written: Mapping[str, Any] | None = None) -> BeforeValidator:
+    """A validator that converts a table, whose JSON Schema is `written`; what is none it leaves to pydantic."""
+    return converted(lambda raw, _: convert(raw) if isinstance(raw, dict) else raw, written)
 
 
 def _frequencies(raw: dict[str, Any]) -> list[str]:
@@ -57,12 +64,26 @@ def _frequencies(raw: dict[str, Any]) -> list[str]:
     return [f"{value!r} Hz" for value in (start + step * np.arange(count)).tolist()]
 
 
-Temperature = Annotated[float, converted(lambda raw, _: temperature(raw))]
+_HERTZ = text("a number with a unit of Hz")
+#: How frequencies are written: a list, or a range with both ends.
+_FREQUENCIES = {
+    "anyOf": [
+        {"type": "array", "items": _HERTZ, "minItems": 1},
+        {
+            "type": "object",
+            "properties": dict.fromkeys(("start", "stop", "step"), _HERTZ),
+            "required": ["start", "stop", "step"],
+            "additionalProperties": False,
+        },
+    ]
+}
+
+Temperature = Annotated[float, converted(lambda raw, _: temperature(raw), text('a temperature, such as "23 degC"'))]
 Length = Annotated[float, si("m"), Field(gt=0)]
 Angle = Annotated[float, si("rad"), Field(gt=0)]
 Strain = Annotated[float, si("1"), Field(gt=0)]
 Frequency = Annotated[float, si("Hz"), Field(gt=0)]
-Frequencies = Annotated[tuple[Frequency, ...], FIRST_ERROR, table(_frequencies), Field(min_length=1)]
+Frequencies = Annotated[tuple[Frequency, ...], FIRST_ERROR, table(_frequencies, _FREQUENCIES), Field(min_length=1)]
 Displacement = Annotated[float, motion(), Field(gt=0)]
 SHAKEN = Field(ge=1.0 / LARGEST_SHAKEN, le=LARGEST_SHAKEN)
 Share = Annotated[float, si("1"), Field(ge=0, lt=1)]

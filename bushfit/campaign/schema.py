@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, ConfigDict, Field, InstanceOf
+from pydantic import ConfigDict, Field, InstanceOf, WithJsonSchema
 
-from bushfit.campaign.parameters import effect_values, parameter_settings, parameter_values
+from bushfit.campaign.files import LoopFile, SweepFile
+from bushfit.campaign.parameters import Size, effect_values, parameter_settings, parameter_values
 from bushfit.campaign.places import KEYS, with_places
 from bushfit.campaign.quantities import (
     FIRST_ERROR,
@@ -24,7 +25,6 @@ from bushfit.campaign.quantities import (
     Share,
     Strain,
     Temperature,
-    motion,
     si,
     table,
 )
@@ -32,11 +32,8 @@ from bushfit.effects import is_parameter, parameter_names
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
 from bushfit.geometry import TRANSLATION, Direction, Place, Shape, Specimen, SpecimenKind, StatedStrain
-from bushfit.reading.headers import AmplitudeConvention
-from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Stepped, Waveform
 from bushfit.reading.resonance import FEWEST_ROWS
-from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.validation import Flag, Name, Text, converted, known_keys, standing_in_table, unknown_key
 
 #: What a sweep's residuals compare: real and imaginary part, or |K| and loss factor.
@@ -56,18 +53,6 @@ def _fit_table(raw: dict[str, Any]) -> dict[str, Any]:
     return {**settings, "parameters": {key: value for key, value in raw.items() if key not in settings}}
 
 
-def _roles(known: Collection[str]) -> BeforeValidator:
-    """A validator that refuses other keys than these roles of columns."""
-
-    def check_keys(raw: dict[str, Any]) -> dict[str, Any]:
-        for role in raw:
-            if role not in known:
-                raise unknown_key(role, known)
-        return raw
-
-    return table(check_keys)
-
-
 #: Puts the direction or specimen itself into each test of [simulate].
 _SIMULATED_PLACES = converted(
     lambda raw, info: with_places(raw, [Specimen(**vars(table)) for table in info.data.get("specimens", ())])
@@ -76,7 +61,14 @@ _SIMULATED_PLACES = converted(
 
 @dataclass(frozen=True)
 class BushingTable:
-    """[bushing]: geometry [m], and the radial formulas to go by."""
+    """[bushing]: a tube of rubber between two sleeves.
+
+    Args:
+        name: tables and plots are headed with it.
+        inner_radius, outer_radius: of the rubber, not diameters [m].
+        length: mean length of the rubber [m].
+        shape: the radial formulas: the paper's as they are, or corrected by finite elements.
+    """
 
     name: Name
     inner_radius: Length
@@ -87,7 +79,16 @@ class BushingTable:
 
 @dataclass(frozen=True)
 class SpecimenTable:
-    """[[specimens]]: another body of the same compound, and what its tests give. See geometry.Specimen."""
+    """[[specimens]]: another body of the same compound, and what its tests give. See geometry.Specimen.
+
+    Args:
+        name: its tests and tables go by it.
+        kind: "modulus" where tests give strain and modulus, "shear" where they give displacement and force of blocks.
+        strain: that files of a modulus test state: shear, the tensor's (half of it), or that of a bar in tension.
+        area: of one block in shear [m^2].
+        thickness: of one block in shear [m].
+        elements: blocks in parallel.
+    """
 
     name: Name
     kind: SpecimenKind
@@ -103,81 +104,18 @@ class SpecimenTable:
 
 
 @dataclass(frozen=True)
-class TestFile(FileFormat):
-    """What [[loops]] and [[sweeps]] say alike: a file, what was tested in it, and under which conditions.
-
-    Args:
-        direction: of the bushing; a specimen has none, which may be written "shear".
-        specimen: by its name in [[specimens]]; the bushing unless stated.
-        noise: relative standard deviation of a point, where it is known.
-        weight: of the test in the fit, a share of the weight that its noise gives it.
-        temperature: [K]; it selects the rows of a file that has several.
-        order: number of the test in the session; its place among all [[loops]], then all [[sweeps]], unless stated.
-        preload, date, operator, specimen_number: carried on to results as they are written.
-    """
-
-    __test__ = False
-
-    file: Text
-    direction: Annotated[Direction | None, converted(lambda raw, _: None if raw == "shear" else raw)] = None
-    specimen: Name | None = None
-    noise: Share | None = None
-    weight: Annotated[float, Field(gt=0, le=1)] = 1.0
-    temperature: Temperature | None = None
-    order: Count | None = None
-    preload: Text | None = None
-    date: Text | None = None
-    operator: Text | None = None
-    specimen_number: Text | None = None
-
-
-@dataclass(frozen=True)
-class LoopFile(TestFile):
-    """[[loops]]: a file and what it does not say itself. See reading.read_loop."""
-
-    columns: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS)] = field(default_factory=dict)
-    units: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS)] = field(default_factory=dict)
-    force_sign: Literal[1, -1] = 1
-    rate: Annotated[float, motion("/s"), Field(gt=0)] | None = None
-    frequency: Frequency | None = None
-    waveform: Waveform | None = None
-
-    def __post_init__(self) -> None:
-        if (self.frequency is None) != (self.waveform is None) or (self.rate and self.frequency):
-            raise ValueError(
-                CampaignError(
-                    "these keys do not settle the time of a loop",
-                    found=", ".join(key for key in ("rate", "frequency", "waveform") if getattr(self, key)),
-                    expected='rate, or frequency and waveform ("sine" or "triangle") together',
-                )
-            )
-
-
-@dataclass(frozen=True)
-class SweepFile(TestFile):
-    """[[sweeps]]: a file and what it does not say itself. See reading.read_sweep.
-
-    Args:
-        at_amplitude: of a file without a column for it, with its unit: "0.1 mm", "0.15 %".
-        at_frequency: likewise [Hz].
-        stepped: what was stepped while the other was held, where the order of the rows does not tell it.
-    """
-
-    columns: Annotated[Mapping[str, Text], _roles(SWEEP_COLUMNS)] = field(default_factory=dict)
-    units: Annotated[Mapping[str, Text], _roles(SWEEP_COLUMNS)] = field(default_factory=dict)
-    amplitude: AmplitudeConvention | None = None
-    at_amplitude: Text | None = None
-    at_frequency: Frequency | None = None
-    stepped: Stepped | None = None
-
-
-@dataclass(frozen=True)
 class ParameterSetting:
-    """[fit.<parameter>]: start value and bounds [SI], None where the fit chooses; vary = False holds the value."""
+    """[fit.<parameter>]: start value and bounds [SI], None where the fit chooses.
 
-    value: float | None = None
-    min: float | None = None
-    max: float | None = None
+    Args:
+        value: to start from, or to hold.
+        min, max: least and largest value.
+        vary: false holds the value.
+    """
+
+    value: Size | None = None
+    min: Size | None = None
+    max: Size | None = None
     vary: Flag = True
 
 
@@ -212,6 +150,8 @@ class FitSettings:
 
     Args:
         dynamic_amplitudes: [m or rad] that fit-dynamic uses; none for the smallest.
+        residuals: compare real and imaginary part, or |K| and loss factor.
+        loss: "linear" for least squares; with "soft_l1" points far off pull less, wild ones not at all.
         effects: added to the paper's model, such as "stiffness_factor.mount".
     """
 
@@ -243,19 +183,32 @@ class PredictSettings:
 
 @dataclass(frozen=True)
 class SimulatedTest:
-    """What [[simulate.loops]], [[simulate.sweeps]] and [[simulate.resonances]] say alike: what is tested, and at which
-    temperature [K], where that is to be known."""
+    """What [[simulate.loops]], [[simulate.sweeps]] and [[simulate.resonances]] say alike.
 
-    direction: Annotated[Place, InstanceOf[Place]] = field(metadata=standing_in_table(lambda: KEYS))
+    Args:
+        direction: of the bushing that is tested; a specimen has none, which may be written "shear".
+        specimen: that is tested in place of the bushing, by its name in [[specimens]].
+        temperature: of the test [K], where that is to be known.
+    """
+
+    direction: Annotated[Place, InstanceOf[Place], WithJsonSchema({"type": "string"})] = field(
+        metadata=standing_in_table(lambda: KEYS)
+    )
     temperature: Temperature | None = field(default=None, kw_only=True)
 
 
 @dataclass(frozen=True)
 class SimulatedLoop(SimulatedTest):
-    """[[simulate.loops]]: zero-to-peak amplitude [m or rad, or strain], frequency [Hz], cycles and waveform.
+    """[[simulate.loops]]: one loop, or a programme of all amplitudes in turn at each frequency, in one go from rest.
 
-    In place of one amplitude or one frequency a programme has amplitudes or frequencies: all amplitudes in turn at each
-    frequency, `cycles` of each, recorded in one go from rest, with `pause` [s] at zero between them.
+    Args:
+        amplitude: zero-to-peak [m or rad, or strain].
+        frequency: [Hz].
+        cycles: of each loop.
+        waveform: of the displacement.
+        amplitudes: of a programme, in place of the one amplitude.
+        frequencies: of a programme, in place of the one frequency [Hz].
+        pause: at zero between two loops of a programme [s].
     """
 
     amplitude: Displacement = 0.0
@@ -283,9 +236,11 @@ class SimulatedLoop(SimulatedTest):
 
 @dataclass(frozen=True)
 class SimulatedSweep(SimulatedTest):
-    """[[simulate.sweeps]]: all combinations of amplitudes, zero-to-peak [m or rad, or strain], and frequencies [Hz].
+    """[[simulate.sweeps]]: all combinations of amplitudes and frequencies.
 
     Args:
+        amplitudes: zero-to-peak [m or rad, or strain].
+        frequencies: [Hz].
         stepped: what changes from point to point of a run; the other is held.
         reached: standard deviation of the amplitude that a point really reached, relative to the one that was asked.
     """
@@ -314,9 +269,12 @@ class SimulatedSweep(SimulatedTest):
 
 @dataclass(frozen=True)
 class SimulatedResonance(SimulatedTest):
-    """[[simulate.resonances]]: a mass [kg] on the bushing, or on blocks in shear, whose base is shaken with a sine.
+    """[[simulate.resonances]]: a mass on the bushing, or on blocks in shear, whose base is shaken with a sine.
 
-    `base_acceleration` is zero-to-peak [m/s^2], the same at all frequencies [Hz].
+    Args:
+        mass: [kg].
+        base_acceleration: zero-to-peak, the same at all frequencies [m/s^2].
+        frequencies: [Hz].
     """
 
     mass: Annotated[float, si("kg"), SHAKEN]
@@ -351,8 +309,8 @@ class SimulateSettings:
         loops, sweeps, resonances: the tests; empty for the rig's own choice.
     """
 
-    parameters: Annotated[Mapping[str, float], table(parameter_values)] = field(default_factory=dict)
-    effects: Annotated[Mapping[str, Mapping[str, float]], table(effect_values)] = field(default_factory=dict)
+    parameters: Annotated[Mapping[str, Size], table(parameter_values)] = field(default_factory=dict)
+    effects: Annotated[Mapping[str, Mapping[str, Size]], table(effect_values)] = field(default_factory=dict)
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
     repeats: Count = 1
     noise: Share = 0.0
@@ -368,7 +326,19 @@ class SimulateSettings:
 
 @dataclass(frozen=True)
 class CampaignFile:
-    """A whole campaign file."""
+    """A whole campaign file: a bushing, or specimens of a compound, and their tests. Quantities are texts with a unit.
+
+    Args:
+        bushing: geometry.
+        name: of the campaign and its results folder; that of the bushing unless stated.
+        specimens: other bodies of the same compound.
+        loops: hysteresis loops.
+        sweeps: stepped sines.
+        simulate: what the virtual rig tests, and how well it measures; for bushfit simulate alone.
+        rig: class of the test machine.
+        fit: how the model is fitted.
+        predict: what to predict, and where.
+    """
 
     __pydantic_config__ = ConfigDict(extra="forbid")
 

@@ -20,6 +20,7 @@ _COMMANDS = {
     "fit-dynamic": ("fit.dynamic", "Smallest-amplitude sweep -> m, alpha (rate dependence)."),
     "fit": ("fit.fit", "Loops and sweeps -> all five parameters together: the fit to use."),
     "predict": ("predict", "Model -> axial and radial stiffness tables and plots."),
+    "compare": ("compare", "Results side by side, or model families: what differs, and is it more than chance?"),
     "export": ("export", "Model -> files of solvers, multibody codes and spreadsheets."),
     "diagnose": ("diagnose", "Where do model and tests disagree? What is missing? Add it, show the gap shrink."),
     "report": ("report", "A folder of results -> one page to show, to print and to mail."),
@@ -29,6 +30,7 @@ _COMMANDS = {
     "init": ("init", "Test files and geometry -> a campaign."),
     "reduce": ("reduce", "Raw stepped-sine histories -> a sweep, with its noise and distortion."),
     "simulate": ("simulate", "Model -> a simulated campaign of raw tests, with noise."),
+    "schema": ("schema", "JSON Schemas of the files: for programs that read them, and for editors."),
 }
 
 #: Linear algebra on one thread: the matrices are small, and a sum split over threads ends in other digits.

@@ -7,6 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from bushfit.cli.common import Options, example, path_option, place_option, shared_options
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import naming
-from bushfit.report.contents import Formats
 from bushfit.units import alike, for_people
 
 if TYPE_CHECKING:
@@ -112,10 +112,10 @@ def command(
         check_judged(judged_by, limits, read.rows)
     with naming(place="--at"):
         points = (*read.points, *map(parse_point, at), *(judged_by.points if judged_by else ()))
-    formats = Formats(tables=tables, pictures=plots and options.plots, pages=reports)
+    formats = replace(options.formats, tables=tables, pictures=plots and options.formats.pictures, pages=reports)
     output = options.folder(read.stem).absolute()
     orders = Orders(output, tuple(dict.fromkeys(points)), formats, resume)
-    plan = Plan(read.stem, read.rows, orders, judged_by, junit, options.plots, not no_report)
+    plan = Plan(read.stem, read.rows, orders, judged_by, junit, replace(options.formats, pages=not no_report))
     check_free(plan, force=options.force)
     workers: Pool = DaskPool(scheduler) if scheduler else LocalPool(jobs or os.cpu_count() or 1)
     with _progress(options, len(plan.rows)) as advance:
@@ -170,7 +170,7 @@ def _progress(options: Options, total: int) -> Iterator[Callable[[str], None]]:
 
 def _tell(options: Options, summary: Summary, folder: Path, plan: Plan) -> None:
     """Counts, the batch's own scatter, what failed, what misses limits and what passes on condition."""
-    from bushfit.batch.run import WRITTEN
+    from bushfit.batch.run import KINDS
 
     console, status = options.console, summary.status
     if summary.scatter:
@@ -193,6 +193,6 @@ def _tell(options: Options, summary: Summary, folder: Path, plan: Plan) -> None:
         for name in names[:_MOST_SHOWN]:
             options.say(f"{word}: {name}")
         if len(names) > _MOST_SHOWN:
-            options.say(f"... and {len(names) - _MOST_SHOWN} more {word}: see batch.csv")
-    written = [*(name for name in WRITTEN if (folder / name).exists()), "bushings/"]
+            options.say(f"... and {len(names) - _MOST_SHOWN} more {word}: see {options.formats.table('batch')}")
+    written = [*(name for name in options.formats.names(KINDS) if (folder / name).exists()), "bushings/"]
     options.say(f"wrote {', '.join(written)} to {folder}")

@@ -7,13 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args
 
 import click
 from rich.console import Console
 
 from bushfit.errors import ModelError, typed
-from bushfit.report.contents import Formats
+from bushfit.reading.tablefile import Form
+from bushfit.report.contents import Formats, Picture
 from bushfit.report.folder import check_free, to_json, write_files
 
 if TYPE_CHECKING:
@@ -88,14 +89,8 @@ class Options:
     verbose: bool
     quiet: bool
     as_json: bool
-    plots: bool
+    formats: Formats
     force: bool
-    report: bool = True
-
-    @property
-    def formats(self) -> Formats:
-        """How results are written."""
-        return Formats(pictures=self.plots, pages=self.report)
 
     def folder(self, name: str) -> Path:
         """Where results go: --output, or results/<name>."""
@@ -131,20 +126,55 @@ def example(*commands: str) -> str:
     return "\b\n" + "\n".join([f"Example{'s' * (len(commands) > 1)}:", *(f"  {command}" for command in commands)])
 
 
-def shared_options(function: F, where: str = "results/<campaign or file>") -> F:
-    """-o, -v, -q, --json, --no-plots, --force, gathered into one `options` argument; `where` results go without -o."""
+#: Options of the forms of files; each may also be set by a variable of the environment, once for all commands.
+_FORMS = {
+    "tables": click.option(
+        "--table-format",
+        type=click.Choice(get_args(Form)),
+        metavar="FORM",
+        default=Formats.table_form,
+        envvar="BUSHFIT_TABLE_FORMAT",
+        show_envvar=True,
+        help="csv, decimal-comma (for a German Excel), xlsx [csv].",
+    ),
+    "pictures": click.option(
+        "--plot-format",
+        type=click.Choice(get_args(Picture)),
+        metavar="FORM",
+        multiple=True,
+        default=Formats.picture_forms,
+        envvar="BUSHFIT_PLOT_FORMAT",
+        show_envvar=True,
+        help="png, svg, pdf; may be given again [png].",
+    ),
+}
+
+
+def shared_options(
+    function: F, where: str = "results/<campaign or file>", forms: Sequence[str] = ("tables", "pictures")
+) -> F:
+    """-o, -v, -q, --json, --no-plots, --force, and those of `forms`, gathered into one `options` argument.
+
+    Without -o results go to `where`; `forms` says whether a command writes tables and pictures.
+    """
+    for form in reversed(forms):
+        function = _FORMS[form](function)
 
     @click.option("-o", "--output", type=_Folder(path_type=Path), help=f"Folder for the results [{where}].")
-    @click.option("-v", "--verbose", is_flag=True, help="Say more: steps on the way, all correlations, files.")
+    @click.option("-v", "--verbose", is_flag=True, help="Say more: steps on the way, correlations, files.")
     @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
     @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on standard output.")
-    @click.option("--no-plots", is_flag=True, help="Write no PNG files.")
+    @click.option("--no-plots", is_flag=True, help="Write no plots.")
     @click.option("--force", is_flag=True, help="Replace results that stand.")
     @wraps(function)
     def wrapped(*args: Any, **kwargs: Any) -> Any:
         given = {name: kwargs.pop(name) for name in ("output", "verbose", "quiet", "as_json", "force")}
-        options = Options(plots=not kwargs.pop("no_plots"), **given)
-        return function(*args, options=options, **kwargs)
+        formats = Formats(
+            pictures=not kwargs.pop("no_plots"),
+            table_form=kwargs.pop("table_format", Formats.table_form),
+            picture_forms=tuple(dict.fromkeys(kwargs.pop("plot_format", Formats.picture_forms))),
+        )
+        return function(*args, options=Options(formats=formats, **given), **kwargs)
 
     return wrapped  # type: ignore[return-value]
 
@@ -222,7 +252,8 @@ def report_option(function: F) -> F:
     @click.option("--no-report", is_flag=True, help="Write no report.html.")
     @wraps(function)
     def wrapped(*args: Any, task: Task, no_report: bool, **kwargs: Any) -> Any:
-        return function(*args, task=replace(task, options=replace(task.options, report=not no_report)), **kwargs)
+        options = replace(task.options, formats=replace(task.options.formats, pages=not no_report))
+        return function(*args, task=replace(task, options=options), **kwargs)
 
     return wrapped  # type: ignore[return-value]
 

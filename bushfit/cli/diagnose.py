@@ -122,10 +122,9 @@ def _tell_gap(options: Options, document: Mapping[str, Any]) -> None:
     console.print(table)
     if gap["name_again"]:
         again, searched = gap["name_again"]
-        what = "it" if document["effects"] else "what was taken back"
-        console.print(
-            f"  searched anew without each of {searched} parts of the tests, {what} comes out again in {again}"
-        )
+        what = "it" if document["effects"] and document["verdict"] != "described" else "what was taken back"
+        parts = f"each of {searched} parts" if searched > 1 else "one part"
+        console.print(f"  searched anew without {parts} of the tests, {what} comes out again in {again}")
     if usable:
         how = "of what was predicted from other runs" if usable["held_out"] else "of what was fitted"
         words = f"{number(100 * usable['stiffness'], 2)} % of stiffness and {number(usable['loss_factor'], 2)}"

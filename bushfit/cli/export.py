@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -39,7 +40,7 @@ _FORMATS = ("fmu", "nastran", "abaqus", "adams", "csv", "xlsx")
 )
 @click.option("--dialect", type=click.Choice(["optistruct"]), help="Of --format nastran: |K| and loss angle.")
 @click.option("--accuracy", default="1 %", help="Largest error of the modulus that an fmu may have [1 %].")
-@shared_options
+@partial(shared_options, forms=["tables"])
 def command(
     model: Path,
     formats: tuple[str, ...],
@@ -77,6 +78,7 @@ def command(
         positive(accuracy, "--accuracy", "1") or 0.0,
         system,
         dialect or "nastran",
+        options.formats.table_form == "decimal-comma",
     )
     folder = options.folder(loaded.slug if loaded else folder_name(result.name))
     options.require_free(folder, [])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,7 +38,7 @@ _SIDES = ("inner", "outer")
 @click.option("--length", help='Mean length of the rubber, such as "34 mm".')
 @click.option("--name", help="Of the bushing [the folder of the first file].")
 @file_options()
-@shared_options
+@partial(shared_options, forms=())
 def command(
     files: tuple[Path, ...], name: str | None, stated: Mapping[str, Any], options: Options, **sizes: str | None
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from bushfit.cli.common import Options, example, shared_options
 from bushfit.cli.raw import file_options, options_named
 from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError
+from bushfit.report.contents import Contents, Kinds
 
 if TYPE_CHECKING:
     from bushfit.inspection.record import Inspected
@@ -30,7 +32,7 @@ _FILES_A_PICTURE = 5
 )
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @file_options()
-@shared_options
+@partial(shared_options, where="results/<first file>", forms=["pictures"])
 def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options) -> None:
     """Look at test files before a campaign names them: loops, sweeps, raw stepped-sine histories, in any mixture.
 
@@ -41,12 +43,10 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     settle, a motion off zero, a force that counts the other way; in sweeps copied rows, missing frequencies, a
     repeat that is off or drifts, loss factors below zero. Rows count from 1 below the header.
 
-    The text for the campaign goes to standard output; it names the files by their full path, to be pasted into a
-    campaign in any folder. A file that cannot be used does not keep the others from being told; then nothing is
-    written, and the exit status is 2.
+    The text for the campaign goes to standard output; it names files by their full path, so that any campaign takes it.
+    A file that cannot be used does not keep the others from being told; then nothing is written, exit status 2.
 
-    Writes inspect.png (inspect_2.png and so on of more than five files), with -o there, else under results/ in a folder
-    of the first file's name.
+    Writes inspect.png, and inspect_2.png and so on of more than five files.
     """
     from bushfit.campaign.naming import folder_name
     from bushfit.inspection.draft import named_apart, pasted_text
@@ -56,9 +56,8 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
     sources, left_out = gather(files, stated)
     tell_left_out(options, left_out)
     last = math.ceil(len(sources) / _FILES_A_PICTURE)
-    pages = ["inspect.png", *(f"inspect_{page}.png" for page in range(2, last + 1))]
-    if options.plots:
-        options.require_free(folder, pages)
+    pages = ["inspect", *(f"inspect_{page}" for page in range(2, last + 1))]
+    options.require_free(folder, options.formats.names(Kinds(pictures=tuple(pages))))
     seen: list[Inspected] = []
     failed: list[BushfitError] = []
     for source in sources:
@@ -77,12 +76,12 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
         for other in failed[:-1]:
             click.echo(f"cannot be used: {other}", err=True)
         raise failed[-1]
-    if options.plots:
-        from bushfit.report.plots import inspection_figure, to_png
+    if options.formats.pictures:
+        from bushfit.report.plots import inspection_figure
 
         groups = (seen[start : start + _FILES_A_PICTURE] for start in range(0, len(seen), _FILES_A_PICTURE))
-        figures = (inspection_figure(group) for group in groups)
-        options.write(folder, {page: to_png(figure) for page, figure in zip(pages, figures, strict=True)})
+        figures = {page: partial(inspection_figure, group) for page, group in zip(pages, groups, strict=True)}
+        options.write(folder, options.formats.files(Contents(pictures=figures)))
     options.tell({"files": [one.to_document() for one in seen], "left_out": list(left_out), "campaign": text})
 
 

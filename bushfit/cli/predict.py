@@ -29,7 +29,7 @@ _MOST_OF_FIT = 3
 @click.argument("model", type=click.Path(path_type=Path))
 @path_option(
     "--campaign",
-    help="Lay this campaign's sweeps over the plots, set them beside the prediction, and use its [predict] grid.",
+    help="Lay its sweeps over the plots and beside the prediction, and use its [predict] grid.",
 )
 @path_option(
     "--bushing",
@@ -46,6 +46,14 @@ _MOST_OF_FIT = 3
 @click.option("--temperature", help='Of the rubber, such as "40 degC", for a model with the effect of it [23 degC].')
 @click.option("--mass", help='Predict its resonance on each place, too: such as "1.2 kg", with --base-acceleration.')
 @click.option("--base-acceleration", help='Amplitude of the base under the mass, such as "0.1 g" or "1 m/s^2".')
+@click.option("--wide", is_flag=True, help="Also <place>_wide.csv: frequency down, amplitude across, no bands.")
+@click.option(
+    "--arms",
+    is_flag=False,
+    flag_value="1 %",
+    metavar="[ERROR]",
+    help="Also arms.csv, arms.png: Maxwell arms for the springpot, within this error [1 %].",
+)
 @shared_options
 def command(
     model: Path,
@@ -55,6 +63,8 @@ def command(
     temperature: str | None,
     mass: str | None,
     base_acceleration: str | None,
+    wide: bool,
+    arms: str | None,
     options: Options,
     **grids: str | None,
 ) -> None:
@@ -66,10 +76,9 @@ def command(
     the campaign's sweeps at each place, or the paper's as far as it was measured. A warning names what leaves the
     fitted directions, strains or frequencies.
 
-    --mass shakes the base under a mass: the transmissibility over frequency, in <place>_resonance.csv.
+    --mass shakes the base under a mass: its transmissibility, in <place>_resonance.csv.
 
-    --bushing carries the compound to another shape: effects of the material are kept, those of the old bushing and its
-    rig are left out, and it is said which.
+    --bushing carries the compound to another shape: effects of its material are kept, those of bushing and rig are not.
     """
     from bushfit.campaign.campaign import load_bushing, load_campaign
     from bushfit.campaign.naming import folder_name
@@ -95,7 +104,8 @@ def command(
     shaken = positive(mass, "--mass", "kg"), positive(base_acceleration, "--base-acceleration", "m/s^2")
     with naming(place="--temperature"):
         warm = None if temperature is None else kelvin(temperature)
-    job = Predict(PredictSettings(directions=directions or None, **asked), *shaken, warm)
+    within = positive(arms, "--arms", "1")
+    job = Predict(PredictSettings(directions=directions or None, **asked), *shaken, warm, wide, within)
     folder = options.folder(loaded.slug if loaded else folder_name(result.name))
     measured = Kinds(tables=("measured",) if loaded and loaded.sweeps else ())
     options.require_free(folder, options.formats.names(job.kinds(result, loaded) + measured))
@@ -105,6 +115,8 @@ def command(
         frequency, largest = found.peak
         peak = f"resonance at {frequency:.4g} Hz, |T| {largest:.3g}"
         options.say(f"{found.place} under {mass}, base at {base_acceleration}: {peak}")
+    for part in outcome.arms:
+        options.say(part.sentence)
     tell_tests(options, outcome.tests, outcome.usable)
     warn(options, of_fit)
     options.write(folder, options.formats.files(outcome.contents_beside))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -16,6 +17,7 @@ from bushfit.cli.grids import parse_grid, positive
 from bushfit.cli.raw import direction_error, file_options, options_named
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import BushfitError, MeasurementError
+from bushfit.report.contents import Contents, Kinds
 from bushfit.units import alike, number
 
 if TYPE_CHECKING:
@@ -47,7 +49,7 @@ _LINES_AN_OCTAVE = 3
 @click.option("--mass-added", help='What moves with it, such as "15 g".')
 @click.option("--specimen", help="What was tested, where it is no bushing.")
 @click.option("--base-acceleration", help='Such as "0.1 g", where no column says it.')
-@shared_options
+@partial(shared_options, where="results/<first file>")
 def command(
     files: tuple[Path, ...],
     stated: Mapping[str, Any],
@@ -70,22 +72,18 @@ def command(
     Writes sweep.csv, for [[sweeps]] of a campaign or `bushfit init`, and reduce.png.
     """
     from bushfit.campaign.naming import folder_name
-    from bushfit.reading.csvfile import to_csv
 
-    folder = options.folder(folder_name(files[0].stem))
-    options.require_free(folder, ["sweep.csv", *(["reduce.png"] if options.plots else [])])
+    folder, formats = options.folder(folder_name(files[0].stem)), options.formats
+    options.require_free(folder, formats.names(Kinds(tables=("sweep",), pictures=("reduce",))))
     table = _resonance_table(files[0], stated, moving)
     found = (
         _histories(files, stated, levels, cycles) if table is None else _resonance(files, table, stated, moving, levels)
     )
     found.tell(options)
-    output = {"sweep.csv": to_csv(found.points)}
-    if options.plots:
-        from bushfit.report.plots import to_png
-
-        output["reduce.png"] = to_png(found.figure())
-    options.write(folder, output)
-    snippet = f'[[sweeps]]\nfile = "sweep.csv"\n{found.body} = {json.dumps(found.name, ensure_ascii=False)}\n'
+    contents = Contents(tables={"sweep": lambda: found.points}, pictures={"reduce": found.figure})
+    options.write(folder, formats.files(contents))
+    file = formats.table("sweep")
+    snippet = f'[[sweeps]]\nfile = "{file}"\n{found.body} = {json.dumps(found.name, ensure_ascii=False)}\n'
     options.say(f"for a campaign in {folder} (elsewhere, with the way there):\n\n{snippet}")
     document = {found.body: found.name, "points": found.points.to_dict(orient="list"), **found.document}
     options.tell({**document, "warnings": list(found.warnings), "campaign": snippet})

@@ -39,7 +39,7 @@ def command(task: Task) -> None:
     shows its passes and what it costs beside the joint fit. Steps whose tests are missing are passed over, and said.
 
     Writes static.json, dynamic.json, model.json (with what diagnose added; then joint.json is the plain fit),
-    diagnosis.json, candidates.csv, report.html, and as CSV and PNG: loops, sweeps, gap, axial, radial, each specimen.
+    diagnosis.json, candidates.csv, report.html; as table and plot: loops, sweeps, gap, axial, radial, each specimen.
     """
     from bushfit.jobs.run import Run
 

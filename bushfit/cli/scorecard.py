@@ -17,6 +17,7 @@ from bushfit.cli.show import new_table
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from bushfit.scorecard.document import Asked
     from bushfit.scorecard.outcome import Outcome, Task
 
 #: What `--family` takes, beside `all`: those of `bushfit.scorecard.families`, which is slow to import.
@@ -40,7 +41,7 @@ _FAMILIES = ("effects", "mistakes", "amplitude_sweeps", "awkward", "faults", "ou
     help="What is hidden, or awkward, in the campaigns.",
 )
 @click.option("--keep", is_flag=True, help="Keep the campaigns and the sealed truths, in -o/campaigns.")
-@partial(shared_options, where="nothing is written")
+@partial(shared_options, where="nothing is written", forms=())
 def command(campaigns: int, seed: int, jobs: int, family: str, keep: bool, options: Options) -> None:
     """Judge `diagnose` on hidden campaigns of random bushings, and print how often it is right.
 
@@ -55,18 +56,18 @@ def command(campaigns: int, seed: int, jobs: int, family: str, keep: bool, optio
     same command goes on where it was stopped, and ends with scorecard.json. Seeds from 77000 on are kept for cards that
     are shown; try and tune with others.
     """
-    from dataclasses import asdict
-
     from bushfit.report.folder import to_json, write_files
     from bushfit.scorecard.card import card, confusion
+    from bushfit.scorecard.document import Scorecard
     from bushfit.scorecard.families import CARD_SEEDS, FAMILIES, tasks
     from bushfit.scorecard.ledger import LEDGER, ledger
+    from bushfit.validation import plain
 
     folder = options.output
     if keep and folder is None:
         raise click.UsageError("--keep needs a folder: -o/--output")
     chosen = {each: tasks(campaigns, seed, each) for each in FAMILIES if family in (each, "all")}
-    asked = {
+    asked: Asked = {
         "schema": "bushfit/scorecard/1",
         "version": __version__,
         "families": list(chosen),
@@ -89,12 +90,13 @@ def command(campaigns: int, seed: int, jobs: int, family: str, keep: bool, optio
             table.add_row(row.measure, row.figure, str(row.over), row.target, met)
         options.console.print(table)
         _tell(options, confusion(outcomes[name]), outcomes[name])
-    document = {
+    whole: Scorecard = {
         **asked,
-        "card": {name: [asdict(row) for row in rows] for name, rows in cards.items()},
-        "confusion": {name: confusion(found) for name, found in outcomes.items()},
-        "outcomes": [asdict(outcome) for found in outcomes.values() for outcome in found],
+        "card": cards,
+        "confusion": {name: {**confusion(found)} for name, found in outcomes.items()},
+        "outcomes": [outcome for found in outcomes.values() for outcome in found],
     }
+    document = plain(whole, Scorecard)
     if folder:
         write_files(folder, {"scorecard.json": to_json(document)}, force=True)
         options.say(f"wrote scorecard.json to {folder}")

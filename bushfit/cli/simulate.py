@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     metavar="NAME.PARAMETER=VALUE",
     help='Hide an effect, such as "inertia.mass=0.1 kg".',
 )
-@shared_options
+@partial(shared_options, forms=["tables"])
 def command(source: Path, effects: tuple[str, ...], options: Options, **settings: Any) -> None:
     """Put a model on the virtual rig and write a campaign of simulated raw tests.
 
@@ -49,7 +50,7 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
     that of the [simulate] table, or none; each option replaces one entry of the table. Good for planning: would
     `bushfit diagnose` see in these tests what --effect hides there?
 
-    Writes campaign.toml, the CSV files it names, and truth.json, the model behind them.
+    Writes campaign.toml, the tables it names, and truth.json, the model behind them.
     """
     from bushfit.campaign.naming import folder_name
     from bushfit.model.file import model_document
@@ -61,7 +62,7 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
         truth = _with_effect(truth, text)
     with naming(source):
         simulated = simulate(truth, plan)
-    files = to_files(simulated)
+    files = to_files(simulated, options.formats.table_form)
     folder = options.folder(f"simulated {folder_name(simulated.result.name)}")
     options.say(truth.equation())
     options.write(folder, files)

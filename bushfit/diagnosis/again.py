@@ -33,7 +33,8 @@ class Again:
 def searched_again(search: Search, steps: Sequence[Step], held: HoldOut) -> list[Again]:
     """The search made anew without each part that was held out, with the same noise, and what comes of it.
 
-    It adds as many effects as were named and looks for no more: what a part less brings beside them is not asked.
+    It adds as many effects as were named and looks for no more: what a part less brings beside them is not asked. Of
+    several effects another name without one part is enough to take them back, and ends it.
     """
     named, told = {step.name for step in steps}, {part.part for part in held.parts}
     known = {name for step in steps for name in (step.name, *(rival.name for rival in step.richer))}
@@ -51,4 +52,6 @@ def searched_again(search: Search, steps: Sequence[Step], held: HoldOut) -> list
         every = all(any(name in members for members in sets) for name in named)
         others = () if every else tuple(step.name for step, own in zip(again, sets, strict=True) if not own & known)
         found.append(Again(part.name, every, others))
+        if others and len(steps) > 1:
+            break
     return found

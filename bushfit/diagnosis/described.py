@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from bushfit.diagnosis.correction import Correction, correct
+from bushfit.diagnosis.document import Description
 from bushfit.diagnosis.evidence import Evidence, fit_from
 from bushfit.diagnosis.fingerprint import Fingerprint, fingerprint
 from bushfit.diagnosis.locate import contrasts, locate
-from bushfit.diagnosis.record import Description
 from bushfit.effects.unnamed import NAME
 from bushfit.errors import FitError
 from bushfit.fitting.data_sets import parted
@@ -51,7 +51,15 @@ class Described:
         if self.fingerprint is None:
             return "nothing is told of its form"
         no_law = "" if self.fingerprint.is_power_law else "it is no power law of frequency and amplitude; nearest: "
-        return no_law + self.fingerprint.words
+        return no_law + self.fingerprint.words + self._peak
+
+    @property
+    def _peak(self) -> str:
+        """Its peak, where it has one."""
+        if self.correction.data.peak is None:
+            return ""
+        middle, width = (number(each, 2) for each in self.correction.data.peak)
+        return f"; with a peak, as of a resonance, at {middle} Hz, {width} Hz wide"
 
     @property
     def size(self) -> str:

@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.fitting.agreement import met_within, misfits, usable
+from bushfit.fitting.assess import Stage, covariance, measured_range, quality
 from bushfit.fitting.data_set import DataSet, Freedoms
+from bushfit.fitting.data_sets import sources
 from bushfit.fitting.descent import Descent
+from bushfit.fitting.plausible import apart_in_temperature
+from bushfit.fitting.procedures import cautions
 from bushfit.fitting.solve import Bounds, Solution
 from bushfit.model.model import Model
+from bushfit.model.result import Result
 
 #: Evaluations of the model in one fit at most; a model that fits badly is then taken as it is.
 EVALUATIONS = 40
+#: What is said of the parameters beside a correction.
+_BENT_BY_THE_GAP = (
+    "the parameters are those of the plain model, bent by the gap that was described: their intervals are invalid"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,3 +118,33 @@ def fit(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds:
 def fit_from(model: Model, data_sets: Sequence[DataSet], held: Sequence[str], bounds: Bounds) -> Descent:
     """The same fit before its first step."""
     return Descent.start(model, data_sets, [name for name in model.parameters if name not in held], bounds)
+
+
+def result_of(evidence: Evidence, bounds: Bounds, told: Collection[str]) -> Result:
+    """The model with its uncertainty; a parameter at rest on a bound counts as held there.
+
+    Of effects with a twin of the rig the level is unresolved, but of those that are `told`. Beside a correction the
+    parameters are those of the plain model, and so are their errors, by its misfit.
+    """
+    model, names = evidence.model, evidence.solution.coordinates.names
+    moving = tuple(name for name in names if name not in evidence.solution.at_bound)
+    cov = covariance(model.without(UNNAMED), [Stage(moving, evidence.data_sets)])
+    return Result(
+        model,
+        moving,
+        cov,
+        quality(model, evidence.data_sets, len(moving)),
+        measured_range(model, evidence.data_sets),
+        (
+            *([_BENT_BY_THE_GAP] if UNNAMED in model.effects else []),
+            *apart_in_temperature(model, evidence.data_sets),
+            *cautions(model, evidence.solution, evidence.data_sets, bounds, cov),
+        ),
+        sources(evidence.data_sets),
+        at_bound=evidence.solution.at_bound,
+        tests=misfits(model, evidence.data_sets),
+        usable=met_within(model, evidence.data_sets, ())  # a correction has seen every run
+        if UNNAMED in model.effects
+        else usable(evidence.solution, evidence.data_sets),
+        unresolved=tuple(effect.name for effect in model.records if effect.twins and effect.name not in told),
+    )

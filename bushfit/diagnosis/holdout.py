@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -62,6 +63,7 @@ class HeldOut:
     """Root mean square residual of one part, predicted from the other parts.
 
     Args:
+        part: what was held out, in words.
         before, after: in units of noise, as it is shown.
         whitened: before and after in units of noise and of the prediction's own error, by which is decided.
     """
@@ -74,7 +76,13 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class Skipped:
-    """A part that was not held out, why, and the effects of the model after of which the rest says nothing."""
+    """A part that was not held out.
+
+    Args:
+        part: what it is, in words.
+        reason: why it was not held out.
+        effects: of the model with what was added, of which the rest says nothing.
+    """
 
     part: str
     reason: str
@@ -125,23 +133,43 @@ def hold_out(before: Evidence, after: Evidence, bounds: Bounds) -> HoldOut:
     Args:
         bounds: of parameters, where a model has to be fitted to the rest.
     """
+    told, skipped = predicted_parts(before, after, bounds)
+    return HoldOut.of({name: of.residuals for name, of in told.items()}, skipped)
+
+
+def predicted_parts(before: Evidence, after: Evidence, bounds: Bounds) -> tuple[dict[str, Predicted], list[Skipped]]:
+    """What two models predict of each part from the rest, by its name, and the parts that one of them cannot; the
+    arguments are as of `hold_out`."""
     models = [_Fitted.of(evidence) for evidence in dict.fromkeys((before, after))]
-    told, skipped = dict[str, Array](), list[Skipped]()
+    told, skipped = dict[str, Predicted](), list[Skipped]()
     for part in parts(after.data_sets):
         predictions = [model.predicted(part, bounds) for model in models]
-        for prediction in predictions:
-            if isinstance(prediction, Skipped):
-                skipped.append(prediction)
-                break
-        else:
-            told[part.name] = np.array([predictions[0], predictions[-1]])
-    return HoldOut.of(told, skipped)
+        made = [prediction for prediction in predictions if not isinstance(prediction, Skipped)]
+        if len(made) < len(models):
+            skipped.append(next(each for each in predictions if isinstance(each, Skipped)))
+            continue
+        residuals, pulls = zip(made[0], made[-1], strict=True)
+        told[part.name] = Predicted(np.array(residuals), np.array(pulls))
+    return told, skipped
 
 
 def _figures(pair: Array) -> tuple[float, float, tuple[float, float]]:
     """Root mean squares before and after, plain, and both whitened, of residuals (2, 2, n)."""
     (one, one_whitened), (other, other_whitened) = np.sqrt(np.mean(np.square(pair), axis=-1)).tolist()
     return one, other, (one_whitened, other_whitened)
+
+
+class Predicted(NamedTuple):
+    """What two models predict of a part that is held out.
+
+    Args:
+        residuals: of each model, plain and whitened by its prediction's error, (2, 2, n).
+        pulls: by how much half the sum of squares of the plain ones moves with the noise of each row of all tests,
+            (2, all rows).
+    """
+
+    residuals: Array
+    pulls: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +191,8 @@ class _Fitted:
         return cls(evidence, free, LeaveOut.of(solution.jacobian[free], solution.residual))
 
     def predicted(self, part: Part, bounds: Bounds) -> tuple[Array, Array] | Skipped:
-        """Residuals of a part with the model fitted to the others, plain and whitened by the prediction's error."""
+        """Residuals of a part with the model fitted to the others, plain and whitened by the prediction's error, (2,
+        n), and how half their sum of squares moves with the noise of each row of all, (all rows,)."""
         evidence, names = self.evidence, self.evidence.solution.coordinates.names
         rows, clusters = part.rows(evidence.data_sets), _clusters(evidence.data_sets)
         if left_open := [names[self.free[i]] for i in np.flatnonzero(self.whole.open(rows))]:
@@ -171,11 +200,17 @@ class _Fitted:
             return Skipped(part.name, reason, tuple(dict.fromkeys(map(effect_of, left_open))))
         step = self.whole.step(rows)
         if step is not None and not is_far(step):
-            return self.whole.predicted(rows, clusters)
+            return _with_pull(self.whole, rows, clusters, stepped=True)
         refitted = _refitted(evidence, part, bounds)
         if refitted is None or refitted.whole.open(rows).any():
             return Skipped(part.name, "no fit to the rest comes to an end")
-        return refitted.whole.predicted(rows, clusters, stepped=False)
+        return _with_pull(refitted.whole, rows, clusters, stepped=False)
+
+
+def _with_pull(whole: LeaveOut, rows: Array, clusters: Array, *, stepped: bool) -> tuple[Array, Array]:
+    """The residuals of some rows as predicted, plain and whitened, and how noise moves their squares."""
+    residuals = np.array(whole.predicted(rows, clusters, stepped=stepped))
+    return residuals, whole.pulled(rows, residuals[0])
 
 
 def _refitted(evidence: Evidence, part: Part, bounds: Bounds) -> _Fitted | None:

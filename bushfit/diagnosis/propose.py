@@ -102,7 +102,7 @@ def _probed(evidence: Evidence, effect: Effect) -> tuple[list[dict[str, float]],
     """Shapes of an effect on a grid that the tests suggest, and its whitened sensitivity at next to no amount."""
     model = evidence.model.with_effect(effect.name)
     axes = {
-        qualified(effect, parameter): _probes(evidence.data_sets, model, parameter)
+        qualified(effect, parameter): probes(evidence.data_sets, model, parameter)
         for parameter in effect.parameters
         if parameter.neutral is None
     }
@@ -118,7 +118,7 @@ def _probed(evidence: Evidence, effect: Effect) -> tuple[list[dict[str, float]],
     return shapes, (np.concatenate(answers, axis=-1) - evidence.residual) / _STEP
 
 
-def _probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> Array:
+def probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> Array:
     """Values of a shape parameter that these tests could show, by what it is measured against."""
     frequencies = np.concatenate([data_set.frequency for data_set in data_sets])
     match parameter.scale:

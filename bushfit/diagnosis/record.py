@@ -1,11 +1,21 @@
-"""What a diagnosis found, frozen, and as JSON in the schema bushfit/diagnosis/2."""
+"""What a diagnosis found, frozen, and as the document that diagnosis.json holds."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import cast
 
+from bushfit.diagnosis.document import (
+    Description,
+    DiagnosisFile,
+    EffectEntry,
+    GapEntry,
+    SizeEntry,
+    UsableEntry,
+    Verdict,
+    WhereEntry,
+)
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.holdout import HoldOut
 from bushfit.effects import effect_of, parameter_named
@@ -13,9 +23,7 @@ from bushfit.effects.mistakes import candidate_named, labelled
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.geometry import Place
 from bushfit.model.result import Result
-
-SCHEMA = "bushfit/diagnosis/2"
-Verdict = Literal["consistent", "named", "ambiguous", "described", "partly", "unexplained"]
+from bushfit.validation import plain
 
 
 @dataclass(frozen=True)
@@ -96,22 +104,6 @@ class Judged:
     why: str
 
 
-@dataclass(frozen=True)
-class Description:
-    """What a gap without a name is like: one term A e^(i phi) f^p X^q beside the model; value, low and high of each.
-
-    Args:
-        phase_deg: phi [deg].
-        frequency_power, amplitude_power: p and q [1].
-        words: the same for people.
-    """
-
-    phase_deg: tuple[float, float, float]
-    frequency_power: tuple[float, float, float]
-    amplitude_power: tuple[float, float, float]
-    words: str
-
-
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """The whole finding.
@@ -156,34 +148,35 @@ class Diagnosis:
         """Root mean square residual on the data fitted, in units of noise, before and after."""
         return _rms(self.before), _rms(self.after)
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> DiagnosisFile:
         """JSON-ready data."""
-        return {
-            "schema": SCHEMA,
+        document: DiagnosisFile = {
+            "schema": "bushfit/diagnosis/2",
             "verdict": self.verdict,
             "summary": self.summary,
             "effects": [self._effect(named) for named in self.effects],
             "where": [_where(where) for where in self.where],
             "remainder": [_where(where) for where in self.remainder],
-            "description": asdict(self.description) if self.description else None,
+            "description": self.description,
             "gap": self._gap(),
             "usable": self._usable(),
             "next_test": self.next_test,
             "warnings": list(dict.fromkeys((*self.notes, *self.result.warnings))),
         }
+        return plain(document, DiagnosisFile)
 
-    def _gap(self) -> dict[str, Any]:
+    def _gap(self) -> GapEntry:
         before, after = self.calibration
         held = self.holdout
         return {
             "calibration": {"before": before, "after": after},
             "heldout": {"before": held.before, "after": held.after} if held.parts else None,
-            "parts": [asdict(part) for part in held.parts],
-            "skipped": [asdict(part) for part in held.skipped],
+            "parts": held.parts,
+            "skipped": held.skipped,
             "name_again": held.name_again,
         }
 
-    def _usable(self) -> dict[str, Any] | None:
+    def _usable(self) -> UsableEntry | None:
         """Within what the model to use meets the tests, at the worst of all places and place by place."""
         places = self.result.usable
         if not places:
@@ -192,10 +185,10 @@ class Diagnosis:
             "stiffness": max(place.stiffness for place in places),
             "loss_factor": max(place.loss_factor for place in places),
             "held_out": all(place.held_out for place in places),
-            "places": [asdict(place) for place in places],
+            "places": places,
         }
 
-    def _effect(self, named: Named) -> dict[str, Any]:
+    def _effect(self, named: Named) -> EffectEntry:
         effect, model = candidate_named(named.name), self.result.model
         judged = {judged.name: judged.parameters for judged in self.candidates}
         values = model.values if named.name in model.effects else judged.get(named.name, {})
@@ -215,7 +208,7 @@ class Diagnosis:
             "richer": list(named.richer),
         }
 
-    def _parameter(self, name: str, value: float) -> dict[str, Any]:
+    def _parameter(self, name: str, value: float) -> SizeEntry:
         held = name in self.result.model.values
         interval = self.result.interval(name) if held else None
         return {
@@ -237,9 +230,9 @@ def _rms(evidence: Evidence) -> float:
     return float((evidence.chi_square / max(sum(data_set.counted for data_set in evidence.data_sets), 1)) ** 0.5)
 
 
-def _where(where: Where) -> dict[str, Any]:
+def _where(where: Where) -> WhereEntry:
     unit, factor = where.direction.display.displacement
-    return {
+    entry = {
         "direction": str(where.direction),
         "kind": where.kind,
         "frequency_Hz": list(where.frequency),
@@ -248,3 +241,4 @@ def _where(where: Where) -> dict[str, Any]:
         "excess": where.excess,
         "reading": where.reading,
     }
+    return cast(WhereEntry, entry)  # one of its keys is named after the unit

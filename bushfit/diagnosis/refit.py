@@ -46,7 +46,7 @@ def refits(
     evidence: Evidence,
     proposed: Sequence[Proposal],
     known: Sequence[Candidate],
-    start: Mapping[str, float],
+    starts: Mapping[str, Mapping[str, float]],
     held: Sequence[str],
     bounds: Bounds,
 ) -> list[Candidate]:
@@ -55,14 +55,16 @@ def refits(
     Args:
         evidence, proposed: the fitted model without the effects, and the effects to fit.
         known: candidates that need no fit.
-        start: values of the model's own parameters to start from, where not its fitted ones.
+        starts: by name of a proposal values to start from, where not its own.
         held, bounds: parameters that do not move, and limits inside the parameters' own.
     """
     fits: dict[str, Descent] = {}
     for proposal in proposed:
         limits = {**_within_stroke(evidence.data_sets, proposal.name), **bounds}
         with suppress(FitError, ModelError):  # no response with this effect: no candidate
-            known_to_it = {name: value for name, value in start.items() if name in proposal.model.values}
+            known_to_it = {
+                name: value for name, value in starts.get(proposal.name, {}).items() if name in proposal.model.values
+            }
             fits[proposal.name] = fit_from(proposal.model.with_values(known_to_it), evidence.data_sets, held, limits)
     claimed = {proposal.name: evidence.chi_square - proposal.score for proposal in proposed}
     least = min((candidate.evidence.chi_square for candidate in known), default=np.inf)

@@ -106,6 +106,7 @@ class Search:
         start: values of the paper's parameters read off the data.
         held, bounds: parameters the campaign holds, and limits it sets.
         rounds: per set of added effects the refitted model and what every effect says of it.
+        earlier: a search on much the same tests, from whose refits this one's start; None without.
     """
 
     settings: Settings
@@ -113,13 +114,20 @@ class Search:
     held: tuple[str, ...]
     bounds: Bounds
     rounds: dict[frozenset[str], Round] = field(default_factory=dict)
+    earlier: Search | None = None
 
     @classmethod
     def begin(
-        cls, base: Evidence, settings: Settings, start: Mapping[str, float], held: Sequence[str], bounds: Bounds
+        cls,
+        base: Evidence,
+        settings: Settings,
+        start: Mapping[str, float],
+        held: Sequence[str],
+        bounds: Bounds,
+        earlier: Search | None = None,
     ) -> Search:
         """A search that has scored every effect of the library once, and refitted the best."""
-        search = cls(settings, start, tuple(held), bounds)
+        search = cls(settings, start, tuple(held), bounds, earlier=earlier)
         search._round(base, ())
         return search
 
@@ -146,10 +154,18 @@ class Search:
             least = max(chance, _LEAST_SCORE * max((claim.score for claim in proposed), default=0.0))
             fitted = {candidate.name for candidate in known}
             best = [claim for claim in proposed[:_MOST_REFITTED] if claim.score > least and claim.name not in fitted]
-            start = self.start if not added and evidence.reduced > _BENT else {}
-            tried = refits(evidence, best, known, start, self.held, self.bounds)
+            read = self.start if not added and evidence.reduced > _BENT else {}
+            starts = {claim.name: self._found_earlier(key, claim.name) or read for claim in best}
+            tried = refits(evidence, best, known, starts, self.held, self.bounds)
             self.rounds[key] = Round(evidence, proposed, tuple(tried))
         return self.rounds[key]
+
+    def _found_earlier(self, added: frozenset[str], name: str) -> Mapping[str, float]:
+        """Values at which the earlier search left a candidate beside the same effects; none where it met a bound, as
+        the shape of what has no amount means nothing."""
+        before = self.earlier.rounds.get(added) if self.earlier else None
+        found = next((each.evidence.solution for each in (before.tried if before else ()) if each.name == name), None)
+        return found.model.values if found and not found.at_bound else {}
 
     def grow(self) -> tuple[Evidence, list[str]]:
         """Add the best effect, look again, and stop when what is left is chance or too small to matter."""

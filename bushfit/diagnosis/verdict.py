@@ -9,7 +9,8 @@ import numpy as np
 
 from bushfit.diagnosis.again import searched_again
 from bushfit.diagnosis.described import describe
-from bushfit.diagnosis.evidence import Evidence, fit
+from bushfit.diagnosis.document import Description, Verdict
+from bushfit.diagnosis.evidence import Evidence, fit, result_of
 from bushfit.diagnosis.faults import Fault, faults
 from bushfit.diagnosis.form import other_form
 from bushfit.diagnosis.holdout import HoldOut, hold_out
@@ -17,18 +18,12 @@ from bushfit.diagnosis.leads import leads
 from bushfit.diagnosis.locate import contrasts, largest_smooth_misfit, locate
 from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.propose import Proposal
-from bushfit.diagnosis.record import Description, Diagnosis, Judged, Named, Verdict, Where
+from bushfit.diagnosis.record import Diagnosis, Judged, Named, Where
 from bushfit.diagnosis.refit import Candidate
 from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.search import CHANCE_LEVEL, SAME, Search, Step
 from bushfit.effects import effect_named, effect_of, qualified
 from bushfit.effects.unnamed import NAME as UNNAMED
-from bushfit.fitting.agreement import met_within, misfits, usable
-from bushfit.fitting.assess import Stage, covariance, measured_range, quality
-from bushfit.fitting.data_sets import sources
-from bushfit.fitting.plausible import apart_in_temperature
-from bushfit.fitting.procedures import cautions
-from bushfit.model.result import Result
 from bushfit.units import number
 
 #: Held-out gap, in units of noise, up to which little is left (`partly`): chosen, wrong names leave more.
@@ -47,10 +42,6 @@ _ELSEWHERE = 2
 _NOTHING = "nothing is missing beyond noise and tolerance"
 #: What is said of a gap without a name.
 _NO_NAME = "a real gap stays that no known effect closes"
-#: What is said of the parameters beside a correction.
-_BENT_BY_THE_GAP = (
-    "the parameters are those of the plain model, bent by the gap that was described: their intervals are invalid"
-)
 #: Names in one set at most, for it to be a finding: more than three tell an engineer nothing.
 _LARGEST_SET = 3
 
@@ -150,7 +141,7 @@ def unexplained(
     told = "" if words == _NO_NAME else f"; {words}"
     said = f"{_NO_NAME}: {found.size}; {found.words}{told}{lead}"
     names, out, about = [Named(UNNAMED, found.evidence)], found.correction.held, found.description
-    return finish(search, "described", said, found.after, names, fault=fault, held=out, description=about)
+    return finish(search, "described", said, found.after, names, fault=fault, held=out, description=about, again=again)
 
 
 def _share_beside(evidence: Evidence, fault: Fault) -> float:
@@ -305,6 +296,7 @@ def finish(
         again: in how many parts, and of how many, what was added came out again, whether it was believed or not.
     """
     base = search.base
+    told = {*base.model.effects} - {*search.settings.unresolved}
     if not next_test and effects:
         next_test = effect_named(effects[0].name).confirmed_by
     where = (*([_fault_where(fault)] if fault else []), *locate(base))
@@ -319,7 +311,7 @@ def finish(
         tuple(_candidates(search, {named.name for named in effects})),
         base,
         after,
-        _result(after, search),
+        result_of(after, search.bounds, told),
         _notes(search),
         description,
     )
@@ -357,37 +349,6 @@ def _judged(search: Search, proposal: Proposal, candidate: Candidate | None, kep
     own = {name: value for name, value in evidence.model.values.items() if name not in base.model.values}
     held = hold_out(evidence, evidence, search.bounds).after
     return Judged(proposal.name, proposal.score, candidate.gain, base.bic - evidence.bic, held, own, why)
-
-
-def _result(evidence: Evidence, search: Search) -> Result:
-    """The model with its uncertainty; a parameter at rest on a bound counts as held there.
-
-    Of what was added, and not told by the user, the level is unresolved where the rig has a twin of it. Beside a
-    correction the parameters are those of the plain model, and so are their errors, by its misfit.
-    """
-    told = {*search.base.model.effects} - {*search.settings.unresolved}
-    model, names = evidence.model, evidence.solution.coordinates.names
-    moving = tuple(name for name in names if name not in evidence.solution.at_bound)
-    cov = covariance(model.without(UNNAMED), [Stage(moving, evidence.data_sets)])
-    return Result(
-        model,
-        moving,
-        cov,
-        quality(model, evidence.data_sets, len(moving)),
-        measured_range(model, evidence.data_sets),
-        (
-            *([_BENT_BY_THE_GAP] if UNNAMED in model.effects else []),
-            *apart_in_temperature(model, evidence.data_sets),
-            *cautions(model, evidence.solution, evidence.data_sets, search.bounds, cov),
-        ),
-        sources(evidence.data_sets),
-        at_bound=evidence.solution.at_bound,
-        tests=misfits(model, evidence.data_sets),
-        usable=met_within(model, evidence.data_sets, ())  # a correction has seen every run
-        if UNNAMED in model.effects
-        else usable(evidence.solution, evidence.data_sets),
-        unresolved=tuple(effect.name for effect in model.records if effect.twins and effect.name not in told),
-    )
 
 
 def _notes(search: Search) -> tuple[str, ...]:

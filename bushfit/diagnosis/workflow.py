@@ -59,7 +59,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
         if searched.best is None or not (errors := _level_errors(searched.best, data)).matters:
             break
         data, counted = data.with_level_errors(errors.error, errors.freedom), True
-        searched = _search(data, _begin(data, model, settings), model, settings)
+        searched = _search(data, _begin(data, model, settings), model, settings, searched.search)
     found = searched.told or judge(searched.search, searched.final, searched.steps)
     shared = [_level_words(data, found)] if counted else _class_words(data)
     of_loops = outliers_at(found.result.model, data.loops)
@@ -86,9 +86,11 @@ class _Searched(NamedTuple):
     told: Diagnosis | None = None
 
 
-def _search(data: Data, begun: _Begun, model: Model | None, settings: Settings) -> _Searched:
+def _search(
+    data: Data, begun: _Begun, model: Model | None, settings: Settings, earlier: Search | None = None
+) -> _Searched:
     """Look for effects and mistakes in tests whose noise is known."""
-    search = Search.begin(begun.evidence, settings, begun.start, begun.held, data.bounds)
+    search = Search.begin(begun.evidence, settings, begun.start, begun.held, data.bounds, earlier)
     if is_consistent(search):
         return _Searched(search, search.base, told=consistent(search))
     told_wrong = mistaken(search, data, lambda mended, goal: _begin(mended, model, settings, goal).evidence)

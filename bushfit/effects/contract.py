@@ -177,6 +177,8 @@ class Effect:
         twins: names of effects, of the rig above all, with the same equation for all tests. Of such twins the one that
             belongs to the bushing, which is this one, is proposed; its size is then known, its level is not.
         replaces: the branch of the paper that it stands in place of; None where it is added to the others.
+        variant_of: the branch of the paper whose law it changes without standing in its place, where both together are
+            a model of their own in the literature; None of what comes on top of the model.
         frees: mistakes of the record that are single values of it; where one explains the tests as well, it stands.
         under: what of a test's circumstances it depends on, by the names of `Circumstances`.
         taken: what a prediction takes of these where they are not known, for its user; none of the rig's effects.
@@ -198,6 +200,7 @@ class Effect:
     corrects: str | None = None
     twins: tuple[str, ...] = ()
     replaces: str | None = None
+    variant_of: str | None = None
     frees: tuple[str, ...] = ()
     under: tuple[Literal["temperature", "turn", "strained", "left", "rested"], ...] = ()
     taken: str = ""
@@ -222,6 +225,8 @@ class Branch(Effect):
             differentiates numerically.
         stress_sensitivities: the same of the stress.
         uses: the paper's parameters that it reads besides its own.
+        size: of a linear branch that fades with memory, the parameter that its modulus is proportional to; Maxwell arms
+            can stand for it. None for all others.
     """
 
     modulus: Callable[[Values, Array, Array], Array]
@@ -229,6 +234,7 @@ class Branch(Effect):
     modulus_sensitivities: Callable[[Values, Array, Array], dict[str, Array]] | None = None
     stress_sensitivities: Callable[[Values, History], dict[str, Array]] | None = None
     uses: tuple[str, ...] = ()
+    size: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,9 +8,24 @@ from __future__ import annotations
 import numpy as np
 
 from bushfit.effects.clearance import FIRST, SAMPLES
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Values
+from bushfit.effects.contract import (
+    UNKNOWN,
+    Array,
+    ForceBelow,
+    Layer,
+    Level,
+    Parameter,
+    Setting,
+    StiffnessBelow,
+    Values,
+)
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
 from bushfit.effects.history import History
+
+#: Amplitude of the force's first harmonic, over the level, below which no waveform of rubber reaches it; chosen.
+_NEAR = 0.5
+#: Least amplitude [m or rad] to divide by.
+_TINY = np.finfo(float).tiny
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
@@ -25,10 +40,16 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
         return inside
     level, wave = np.asarray(p["level"])[..., None], np.exp(2j * np.pi * np.arange(SAMPLES) / SAMPLES)
     motion = np.broadcast_to(amplitude, inside.shape)[..., None]
-    sine = dead_zone((inside[..., None] * motion * wave).real, level)
-    beyond = dead_zone(below.cycle(omega, motion * wave.real), level)
-    rest = (beyond - sine) @ FIRST / np.where(amplitude > 0.0, amplitude, 1.0)
-    return inside - p["share"] * (inside * first_harmonic(np.abs(inside) * amplitude, p["level"]) + rest)
+    first = np.abs(inside) * amplitude
+    above = (first > _NEAR * p["level"]) | (setting.under is not UNKNOWN)  # where each point has its own circumstances
+    near = above.any(axis=tuple(range(above.ndim - 1)))
+    if not near.any():
+        return inside
+    sine = dead_zone((inside[..., None] * motion * wave)[..., near, :].real, level)
+    beyond = dead_zone(below.cycle(omega[..., near], motion[..., near, :] * wave.real), level)
+    rest = np.zeros(np.broadcast_shapes(first.shape, np.shape(p["level"])), dtype=complex)
+    rest[..., near] = (beyond - sine) @ FIRST
+    return inside - p["share"] * (inside * first_harmonic(first, p["level"]) + rest / np.maximum(amplitude, _TINY))
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:

@@ -65,7 +65,9 @@ EFFECT = Branch(
     parameters=(Parameter("c", "1", (0.0, 10.0), 0.0, 0.1, meaning="springpot over the spring in series, at 25 Hz"),),
     source="M. Caputo, F. Mainardi, Riv. Nuovo Cimento 1 (1971) 161; R. L. Bagley, P. J. Torvik, AIAA J. 21 (1983) 741",
     confirmed_by="sweep to twice the highest frequency: the loss factor must fall there",
+    variant_of="springpot",
     uses=("m", "alpha"),
+    size="m",
     modulus=modulus,
     stress=stress,
 )

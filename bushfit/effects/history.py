@@ -134,6 +134,11 @@ class History:
         return self._by_factor[factor]
 
     @cached_property
+    def solved(self) -> dict[str, Any]:
+        """Where equations over this motion were solved last, by name: good starts of the next solution, and no more."""
+        return {}
+
+    @cached_property
     def _by_factor(self) -> dict[float, History]:
         """The scaled histories by their factor."""
         return {}

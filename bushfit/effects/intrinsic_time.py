@@ -26,5 +26,6 @@ EFFECT = Modifier(
     source="process-dependent viscosity on intrinsic time, steady state: A. Lion, C. Kardelky, Int. J. Plasticity 20 "
     "(2004) 1313; M. Rendek, A. Lion, Int. J. Solids Struct. 47 (2010) 2918",
     confirmed_by="sweep from 0.05 to 5 Hz at the smallest and the largest amplitude: their rise must be in one ratio",
+    variant_of="springpot",
     adjust=adjust,
 )

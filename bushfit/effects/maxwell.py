@@ -47,6 +47,7 @@ EFFECT = Branch(
     ),
     source="Maxwell arm; J. D. Ferry, Viscoelastic Properties of Polymers, 3rd ed., 1980, ch. 3",
     confirmed_by="sweep a decade below and above the relaxation: the step must level off on both sides",
+    size="mu1",
     modulus=modulus,
     stress=stress,
 )

@@ -11,13 +11,19 @@ from bushfit.errors import ModelError
 
 #: The iterations stop when what is missing of the motion is less than this, relative to the imposed motion: rounding.
 TOLERANCE = 1e-14
+#: The same of a history, before a last step that counts as linear and leaves a hundredth of it.
+_LAST = 1e-12
 #: Most rounds of an iteration: chosen, many more than a rig takes that is stiffer than the bushing.
 ROUNDS = 60
 #: What may be missing of the motion when all rounds are used up, relative to the imposed motion: less than any test
 #: resolves.
 _UNSETTLED = 1e-3
+#: Rounds after which a solution is no good start of the next, and K is measured anew; chosen: twice the usual.
+_MANY_ROUNDS = 16
 #: Largest motion of the bushing that an iteration may try, relative to the imposed motion.
 _LARGEST_MOTION = 2.0
+#: The name of its solutions.
+_NAME = "compliance"
 #: Sample at which the pulse stands that measures a stiffness: a few after the start, for the force before it.
 _PULSE_AT = 4
 
@@ -56,36 +62,42 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     Notes:
         Solved for the whole history at once. Each round computes what is missing of the motion, x - x_b - c F(x_b), and
         adds it to x_b times 1/(1 + c K), harmonic by harmonic. K is measured once with a pulse: a poor K costs rounds,
-        not accuracy. Where a round does not bring x_b nearer, the next steps are halved. Dry friction below turns its
-        sense with the imposed motion: that it sticks for a moment is neglected.
+        not accuracy. So K and x_b of the last model that was asked about this motion are where the next one starts.
+        Where a round does not bring x_b nearer, the next steps are halved. Dry friction below turns its sense with the
+        imposed motion: that it sticks for a moment is neglected.
     """
     compliance = p["compliance"]
     if not np.any(compliance):
         return below(history)
-    imposed, history = history.value, history.driven()
+    imposed, solved, history = history.value, history.solved, history.driven()
     count = imposed.shape[-1]
     length = count if history.periodic else next_fast_len(2 * count, real=True)
-    yielding = 1.0 / (1.0 + compliance * _pulse_stiffness(below, history, length))
+    if _NAME not in solved:
+        solved[_NAME] = _pulse_stiffness(below, history, length), imposed
+    rigid, reached = solved.pop(_NAME)
+    yielding = 1.0 / (1.0 + compliance * rigid)
     size = np.max(np.abs(imposed), axis=-1, keepdims=True)
-    reached, felt = imposed, below(history)
+    felt = below(history.with_value(reached))
     last, pace = np.inf * size, np.ones_like(size)
-    for _ in range(ROUNDS):
+    for number in range(ROUNDS):
         missing = imposed - reached - compliance * felt
         off = np.max(np.abs(missing), axis=-1, keepdims=True)
-        if np.all(off <= TOLERANCE * size):
-            break
+        turned = yielding * np.fft.rfft(missing, n=length)
+        if np.all(off <= _LAST * size):
+            if imposed.ndim == 1 and number < _MANY_ROUNDS:
+                solved[_NAME] = tuple(each.reshape(-1, each.shape[-1])[-1] for each in (rigid, reached))
+            return felt + np.fft.irfft(rigid * turned, n=length)[..., :count]
         pace, last = np.where(off < last, pace, 0.5 * pace), off
-        change = np.fft.irfft(yielding * np.fft.rfft(missing, n=length), n=length)[..., :count]
+        change = np.fft.irfft(turned, n=length)[..., :count]
         reached = np.clip(reached + pace * change, -_LARGEST_MOTION * size, _LARGEST_MOTION * size)
         felt = below(history.with_value(reached))
-    else:
-        if not history.periodic and np.any(off > _UNSETTLED * size):
-            raise ModelError(
-                "the rig gives way too much to be followed through time",
-                place="rig_compliance.compliance",
-                found=f"{float(np.max(compliance)):.3g} m/N",
-                expected="a rig several times stiffer than the bushing",
-            )
+    if not history.periodic and np.any(off > _UNSETTLED * size):
+        raise ModelError(
+            "the rig gives way too much to be followed through time",
+            place="rig_compliance.compliance",
+            found=f"{float(np.max(compliance)):.3g} m/N",
+            expected="a rig several times stiffer than the bushing",
+        )
     return felt
 
 

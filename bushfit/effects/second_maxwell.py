@@ -15,6 +15,7 @@ EFFECT = Branch(
     "ch. 3",
     confirmed_by="sweep two decades below and above: between the two relaxations the stiffness must level off",
     after="maxwell",
+    size="mu1",
     modulus=maxwell.modulus,
     stress=maxwell.stress,
 )

@@ -19,6 +19,7 @@ EFFECT = Branch(
     "2007, Eqs. 1-3",
     confirmed_by="sweep to ten times the highest frequency: the rise must go on, where that of a maxwell arm levels "
     "off; a viscous branch is its limit of order 1, without a rise of stiffness",
+    size="m",
     modulus=springpot.modulus,
     stress=springpot.stress,
     modulus_sensitivities=springpot.modulus_sensitivities,

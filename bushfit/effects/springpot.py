@@ -75,6 +75,7 @@ EFFECT = Branch(
         Parameter("alpha", "1", (0.02, 1.0), None, 0.25, meaning="order of the fractional derivative"),
     ),
     source="Garcia Tarrago et al. 2007, Eqs. 1-3",
+    size="m",
     modulus=modulus,
     stress=stress,
     modulus_sensitivities=modulus_sensitivities,

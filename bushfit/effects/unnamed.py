@@ -2,8 +2,9 @@
 
 It is a share of the stiffness. Its data are values at some nodes; between these it is what a Gaussian process with a
 Matern 5/2 kernel makes of them (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, Eqs. 2.25, 2.26
-and 4.17). Beyond their range it fades to 0 within the size of what it corrects. Standard deviations at the nodes go
-over from node to node just as smoothly: errors of neighbours are nearly one, their covariance would add little.
+and 4.17). A peak, as of a resonance, may stand beside that. Beyond their range it fades to 0 within the size of what it
+corrects. Standard deviations at the nodes go over from node to node just as smoothly: errors of neighbours are nearly
+one, their covariance would add little.
 """
 
 from __future__ import annotations
@@ -46,6 +47,26 @@ def correlation(nodes: Array) -> Array:
     return kernel(nodes, nodes) + _JITTER * np.eye(len(nodes))
 
 
+def in_lengths(points: Array, lengths: Sequence[float], tilt: float) -> Array:
+    """ln f + tilt ln e and ln e in units of the kernel's lengths, by ln f and ln e, (..., 2)."""
+    return (points + tilt * points[..., 1:] * (1.0, 0.0)) / lengths
+
+
+def peak_at(peak: tuple[float, float] | None, nodes: Array, points: Array) -> Array:
+    """What a peak adds at points, (..., n, 2), by its strength at the least and at the largest ln e of nodes, (m, 2):
+    complex (..., n, 2), and (..., n, 0) without a peak.
+
+    It is the mode i w f/(f0^2 - f^2 + i w f), f0 its middle and w its width [Hz], linear in ln e between these two.
+    """
+    if peak is None:
+        return np.zeros((*points.shape[:-1], 0))
+    low, high = nodes[:, 1].min(), nodes[:, 1].max()
+    share = np.clip((points[..., 1] - low) / max(high - low, np.finfo(float).tiny), 0.0, 1.0)
+    frequency = np.exp(points[..., 0])
+    width = 1j * peak[1] * frequency
+    return (width / (peak[0] ** 2 - frequency**2 + width))[..., None] * np.stack((1.0 - share, share), axis=-1)
+
+
 @dataclass(frozen=True)
 class Patch:
     """A correction in some directions, as values at nodes.
@@ -54,8 +75,10 @@ class Patch:
         directions: that share it, by name.
         frequency_Hz: of the nodes, (m,).
         strain: of the nodes, equivalent, zero-to-peak, (m,).
-        in_phase, in_quadrature: shares of the stiffness at the nodes, (m,) each.
-        in_phase_error, in_quadrature_error: standard deviations of these, (m,) each.
+        in_phase, in_quadrature: shares of the stiffness at the nodes, without the peak, (m,) each.
+        in_phase_error, in_quadrature_error: standard deviations of the whole there, (m,) each.
+        peak_in_phase, peak_in_quadrature: strength of the peak at the least and at the largest strain of the nodes, as
+            shares of the stiffness, (2,) each; none without a peak.
     """
 
     directions: tuple[Name, ...]
@@ -65,6 +88,8 @@ class Patch:
     in_quadrature: Row
     in_phase_error: Row
     in_quadrature_error: Row
+    peak_in_phase: Row = ()
+    peak_in_quadrature: Row = ()
 
     def __post_init__(self) -> None:
         lists = (self.frequency_Hz, self.strain, self.in_phase, self.in_quadrature)
@@ -82,6 +107,12 @@ class Patch:
         """Logarithms of frequency and strain of the nodes, (m, 2)."""
         return np.log(np.stack((self.frequency_Hz, self.strain), axis=-1))
 
+    def of_peak(self, peak: tuple[float, float] | None, points: Array) -> Array:
+        """What the peak adds at the logarithms of frequency and strain of points, complex, (..., n)."""
+        return peak_at(peak, self.nodes, points) @ (
+            np.array(self.peak_in_phase) + 1j * np.array(self.peak_in_quadrature)
+        )
+
 
 @dataclass(frozen=True)
 class Unnamed:
@@ -89,22 +120,33 @@ class Unnamed:
 
     Args:
         size: standard deviation between nodes that lie far apart.
-        lengths: over which it changes, in ln frequency and ln strain.
+        lengths: over which it changes, in ln frequency + tilt ln strain and in ln strain.
         patches: by direction; what is in none has no correction, within the size of the gap.
+        tilt: by how much what it shows moves along ln frequency with ln strain: 1 where it goes by the rate of strain,
+            -1 where frequencies rise with strain.
+        peak: its middle and width [Hz], where it has one.
     """
 
     size: Number
     lengths: tuple[Number, Number]
     patches: tuple[Patch, ...]
+    tilt: Number = 0.0
+    peak: tuple[Number, Number] | None = None
 
     def __post_init__(self) -> None:
-        if min(self.size, *self.lengths) <= 0.0:
-            raise ValueError(ModelError("a correction of no size or length", expected="size and lengths above 0"))
+        if min(self.size, *self.lengths, *(self.peak or ())) <= 0.0:
+            raise ValueError(ModelError("a correction of no size or length", expected="size, lengths and peak above 0"))
+        strengths = {len(each) for patch in self.patches for each in (patch.peak_in_phase, patch.peak_in_quadrature)}
+        if strengths - {2 if self.peak else 0}:
+            expected = "two strengths, at the least and the largest strain, with a peak, and none without"
+            raise ValueError(ModelError("the strength of a peak", expected=expected))
 
     @property
     def largest(self) -> float:
         """The size of the gap: the largest correction at a node, as a share of the stiffness."""
-        return max(float(np.hypot(each.in_phase, each.in_quadrature).max()) for each in self.patches)
+        smooth = [np.array(each.in_phase) + 1j * np.array(each.in_quadrature) for each in self.patches]
+        pairs = zip(self.patches, smooth, strict=True)
+        return max(float(np.abs(values + each.of_peak(self.peak, each.nodes)).max()) for each, values in pairs)
 
     @property
     def beyond(self) -> float:
@@ -125,10 +167,11 @@ class Unnamed:
             return nothing.astype(complex), np.full((2, *nothing.shape), self.beyond), nothing
         inside = np.clip(points, patch.nodes.min(axis=0), patch.nodes.max(axis=0))
         stays = kernel((points - inside) / _FADES, np.zeros((1, 2)))[..., 0]
-        nodes = patch.nodes / self.lengths
-        near = kernel(inside / self.lengths, nodes)
+        nodes = in_lengths(patch.nodes, self.lengths, self.tilt)
+        near = kernel(in_lengths(inside, self.lengths, self.tilt), nodes)
         weight = near @ np.linalg.inv(correlation(nodes))
         value = weight @ (np.array(patch.in_phase) + 1j * np.array(patch.in_quadrature))
+        value = value + patch.of_peak(self.peak, points)
         open_to = np.square(self.size) * np.maximum(1.0 - np.sum(weight * near, axis=-1), 0.0)
         at_nodes = np.array([patch.in_phase_error, patch.in_quadrature_error])
         between = [np.clip(weight @ error, error.min(), error.max()) for error in at_nodes]
@@ -166,16 +209,16 @@ def nodes_among(points: Array, most: int) -> Array:
 
 
 def patches_of(
-    directions: Sequence[Sequence[str]], nodes: Sequence[Array], mean: Array, error: Array
+    directions: Sequence[Sequence[str]], nodes: Sequence[Array], strengths: int, mean: Array, error: Array
 ) -> tuple[Patch, ...]:
-    """Patches from the values at all nodes, all in phase, then all in quadrature, and their errors, (2 m,) each."""
-    count, begin, made = mean.size // 2, 0, []
-    for names, own in zip(directions, nodes, strict=True):
-        parts = [slice(first + begin, first + begin + len(own)) for first in (0, count)]
-        values = [tuple(of[part].tolist()) for of in (mean, error) for part in parts]
-        axes = [tuple(axis.tolist()) for axis in np.exp(own.T)]
-        made.append(Patch(tuple(names), *axes, *values))
-        begin += len(own)
+    """Patches from the values at the nodes of each and so many strengths of a peak, all in phase and all in quadrature,
+    (2, m), and the errors at the nodes, (2, nodes)."""
+    made, value_ends = [], np.cumsum([len(own) + strengths for own in nodes])
+    error_ends = np.cumsum([len(own) for own in nodes])
+    for names, own, end, last in zip(directions, nodes, value_ends, error_ends, strict=True):
+        values, peak = mean[:, end - len(own) - strengths : end - strengths], mean[:, end - strengths : end]
+        parts = (*np.exp(own.T), *values, *error[:, last - len(own) : last], *peak)
+        made.append(Patch(tuple(names), *(tuple(part.tolist()) for part in parts)))
     return tuple(made)
 
 

@@ -26,6 +26,7 @@ EFFECT = Branch(
     parameters=(Parameter("eta", "Pa*s", (0.0, 1e6), 0.0, 100.0, meaning="viscosity"),),
     source="Kelvin-Voigt model; J. D. Ferry, Viscoelastic Properties of Polymers, 3rd ed., 1980, ch. 1",
     confirmed_by="sweep from 0.05 to 5 Hz: a plain dashpot has nothing left to add there",
+    size="eta",
     modulus=modulus,
     stress=stress,
 )

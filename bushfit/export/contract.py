@@ -27,6 +27,7 @@ class Order:
         accuracy: largest relative error of the modulus that arms in place of a springpot may have.
         units: of the files; None leaves them to the format: mm, t, s and N in decks, those of people in tables.
         dialect: of the format `nastran`.
+        decimal_comma: whether the format `csv` has semicolons and decimal commas.
     """
 
     result: Result
@@ -35,6 +36,7 @@ class Order:
     accuracy: float
     units: UnitSystem | None = None
     dialect: Dialect = "nastran"
+    decimal_comma: bool = False
 
     @property
     def places(self) -> tuple[Place, ...]:

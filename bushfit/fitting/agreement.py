@@ -111,6 +111,14 @@ class LeaveOut:
         along, scale, _ = np.linalg.svd(error, full_matrices=False)
         return plain, plain - along @ ((1.0 - 1.0 / np.hypot(1.0, scale)) * (along.T @ plain))
 
+    def pulled(self, rows: Array, predicted: Array) -> Array:
+        """By how much half the sum of squares of these rows, as predicted from the rest, moves with the noise of each
+        row of all, (all rows,): with their own, and with that of the rest, through the parameters."""
+        through = self.basis @ np.linalg.solve(self._rest(rows), self.basis[rows].T @ predicted)
+        pull = -through
+        pull[rows] = predicted
+        return pull
+
     def _rest(self, rows: Array) -> Array:
         """Information of the other rows along the basis, (m, m)."""
         return np.eye(self.along.size) - self.basis[rows].T @ self.basis[rows]

@@ -30,7 +30,7 @@ class LoopData(DataSet):
 
     Args:
         fundamental_only: whether all but the first harmonic of its residuals is left out, so that it counts as one
-            operating point: of an addition without a law in time nothing else is known.
+            operating point, with two residuals: of an addition without a law in time nothing else is known.
     """
 
     drive: Drive
@@ -41,7 +41,7 @@ class LoopData(DataSet):
 
     @property
     def size(self) -> int:
-        return int(self.drive.force.size)
+        return 2 if self.fundamental_only else int(self.drive.force.size)
 
     @cached_property
     def counted(self) -> int:
@@ -94,8 +94,7 @@ class LoopData(DataSet):
         return self._whitened(self.drive.at_rows(self.drive.from_datum(slopes)) * self._per_noise)
 
     def moved(self, change: Array, model: Model, beside: Array | float = 0.0) -> Array:
-        wave = self.drive.coefficients[1] * np.exp(2j * np.pi * self.drive.phase)
-        return self._whitened(np.real(change * wave) * self._per_noise)
+        return np.concatenate((change.real, change.imag), axis=-1) @ self._unit_changes
 
     def residual_with(self, added: Array, model: Model) -> Array:
         return self.residual(model) + self.moved(added, model)
@@ -156,7 +155,8 @@ class LoopData(DataSet):
                 yield Outlier(self.name, file, row + before + 1, column, off)
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
-        by_noise = self.drive.row_noise.unsure(influence)
+        whole = influence @ self._fundamental.T if self.fundamental_only else influence
+        by_noise = [self._counted(part) for part in self.drive.row_noise.unsure(whole)]
         if not by_noise and self.test.noise is None:
             by_noise = [np.sqrt(2.0 / self._rows) * influence]
         return {(self.name, which): part for which, part in enumerate(by_noise)}
@@ -171,7 +171,7 @@ class LoopData(DataSet):
 
     def suspects(self) -> Iterator[Suspect]:
         """The loop as a whole, wrong in gain or offset."""
-        wrong = np.stack((self.drive.force, np.full(self.size, self.drive.half_range)))
+        wrong = np.stack((self.drive.force, np.full(self.drive.force.size, self.drive.half_range)))
         ends = (self.drive.frequency,) * 2, (self.drive.amplitude,) * 2
         columns = list(self._whitened(wrong * self._per_noise))
         yield Suspect(f"the loop {self.name}", "loop", columns, self.direction, *ends)
@@ -193,8 +193,17 @@ class LoopData(DataSet):
 
     def _whitened(self, rows: Array) -> Array:
         """Rows in units of noise, (..., n), as independent numbers, 0 where one is told from a row left out."""
-        white = self.drive.row_noise.whiten(rows) * self._told
-        return white @ self._fundamental @ self._fundamental.T if self.fundamental_only else white
+        return self._counted(self.drive.row_noise.whiten(rows) * self._told)
+
+    def _counted(self, white: Array) -> Array:
+        """Of whitened rows, (..., n), what counts as its residuals."""
+        return white @ self._fundamental if self.fundamental_only else white
+
+    @cached_property
+    def _unit_changes(self) -> Array:
+        """What 1 and i of a change of stiffness do to the residuals, (2, n)."""
+        wave = self.drive.coefficients[1] * np.exp(2j * np.pi * self.drive.phase)
+        return self._whitened(np.array([wave.real, -wave.imag]) * self._per_noise)
 
     @cached_property
     def _fundamental(self) -> Array:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bushfit.campaign.campaign import reader_keywords
-from bushfit.campaign.schema import LoopFile, SweepFile
+from bushfit.campaign.files import LoopFile, SweepFile
 from bushfit.errors import BushfitError, MeasurementError, naming
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.inspection.loops import look_at_history, look_at_loop, look_at_programme

@@ -21,12 +21,15 @@ if TYPE_CHECKING:
     from bushfit.model.result import Result
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Diagnosed:
     """The outcome of a diagnosis; `campaign` is what its documents say of the campaign."""
 
     campaign: Mapping[str, Any]
     diagnosis: Diagnosis
+
+    def __repr__(self) -> str:
+        return f"{self.campaign['name']}: {self.diagnosis.verdict}\n  {self.diagnosis.summary}"
 
     @property
     def result(self) -> Result:

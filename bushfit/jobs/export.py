@@ -62,6 +62,7 @@ class Export:
     accuracy: float = 0.01
     units: UnitSystem | None = None
     dialect: Dialect = "nastran"
+    decimal_comma: bool = False
 
     def run(self, result: Result, source: Source, campaign: Campaign | None) -> Written:
         """Predict, and write every format.
@@ -75,7 +76,8 @@ class Export:
             union = tuple(np.unique(np.concatenate(grids)).tolist())
             asked = replace(self.predict.asked, frequencies=union)
             predicted = replace(self.predict, asked=asked).run(result, campaign)
-        order = Order(result, source, tuple(predicted.predictions), self.accuracy, self.units, self.dialect)
+        settings = (self.accuracy, self.units, self.dialect, self.decimal_comma)
+        order = Order(result, source, tuple(predicted.predictions), *settings)
         return Written(predicted, {name: _writer(name)(order) for name in self.formats})
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from bushfit.model.result import Result
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fitted:
     """The outcome of a fit: `<stem>.json`, tables and plots of some kinds of test, a result a step, the last final.
 
@@ -31,6 +31,9 @@ class Fitted:
     data: Data
     reports: tuple[tuple[str, Result], ...]
     campaign: Mapping[str, Any]
+
+    def __repr__(self) -> str:
+        return repr(self.result)
 
     @property
     def result(self) -> Result:

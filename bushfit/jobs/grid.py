@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -30,6 +30,8 @@ _AMPLITUDES_OF = {
 _FREQUENCIES = 9
 #: Amplitudes of a grid where the paper's were not measured.
 _AMPLITUDES = 3
+#: Frequency that stands for slow where results are compared [Hz]: below the sweeps, above the loops.
+_SLOW = 1.0
 #: Values of a grid at most of what was stepped through as it came: tables stay readable, and lines smooth.
 _MOST_STEPS = 10
 
@@ -61,6 +63,41 @@ def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ())
     if reached.size < 2:
         reached = _even(least, most, _AMPLITUDES)
     return inside, reached
+
+
+def common_grid(
+    results: Sequence[Result], places: Sequence[Place], sweeps: Sequence[Sweep] = ()
+) -> tuple[Array, Array]:
+    """Frequencies [Hz] and amplitudes [m, rad or 1] at which several results compare at one place, rising.
+
+    It is the default grid of the first, as far as all were fitted there, and 1 Hz where that is within; an even grid
+    over what all were fitted at where fewer than two of its values are. Where their ranges have nothing in common, or
+    are not known, it is that of the first.
+
+    Args:
+        places: the place as each result has it.
+    """
+    known = [(result.measured, place, result) for result, place in zip(results, places, strict=True) if result.measured]
+    frequency, amplitude = default_grid(results[0], places[0], sweeps)
+    if not known:
+        return frequency, amplitude
+    frequencies = [measured.frequency for measured, _, _ in known]
+    strains = [(np.array(measured.strain) / result.model.unit_strain(place)) for measured, place, result in known]
+    with_slow = np.union1d(frequency, _SLOW) if _inside(np.array([_SLOW]), frequencies).size else frequency
+    return _within(with_slow, frequencies, _FREQUENCIES), _within(amplitude, strains, _AMPLITUDES)
+
+
+def _within(values: Array, ranges: Sequence[Any], count: int) -> Array:
+    """The values within all ranges, or so many evenly over what these have in common; all where that is nothing."""
+    inside, low, high = _inside(values, ranges), max(low for low, _ in ranges), min(high for _, high in ranges)
+    if low > high * (1 + MARGIN):
+        return values
+    return inside if inside.size > 1 else _even(low, high, count)
+
+
+def _inside(values: Array, ranges: Sequence[Any]) -> Array:
+    """The values within all ranges."""
+    return values[np.all([(values >= a * (1 - MARGIN)) & (values <= b * (1 + MARGIN)) for a, b in ranges], axis=0)]
 
 
 def _levelled(sweeps: Sequence[Sweep]) -> list[Sweep]:

@@ -9,18 +9,22 @@ from typing import TYPE_CHECKING, Any
 
 from bushfit.campaign.schema import PredictSettings
 from bushfit.campaign.session import measured_session
+from bushfit.effects import Level
 from bushfit.errors import ModelError
 from bushfit.fitting.agreement import met_within, misfits
 from bushfit.fitting.data_sets import SweepData, sweep_data
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Specimen, place_named
 from bushfit.jobs.grid import default_grid
+from bushfit.model.arms import Arms, model_arms
 from bushfit.prediction import PredictedResonance, Prediction, caveats, predict, predict_resonance
 from bushfit.report.artifacts import (
+    arms_contents,
     measured_contents,
+    names_of_more,
     place_names,
     prediction_contents,
     resonance_contents,
-    resonance_names,
+    wide_contents,
 )
 from bushfit.report.contents import Contents, Kinds
 from bushfit.report.tables import prediction_table, shaken_table
@@ -31,19 +35,23 @@ if TYPE_CHECKING:
 
     from bushfit.campaign.campaign import Campaign
     from bushfit.geometry import Place
+    from bushfit.model.model import Model
     from bushfit.model.result import Misfit, Result, Usable
 
+#: Tables by place, the columns of each by header, null where a cell is empty; and "warnings".
+PredictionDocument = dict[str, dict[str, list[float | None]] | list[str]]
 #: Directions that are predicted where none is asked for: those of the paper.
 _DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
 #: Keys of [predict] that have the amplitudes of each motion.
-_AMPLITUDES = {TRANSLATION: "amplitudes", ROTATION: "torsion_amplitudes", STRAINING: "strain_amplitudes"}
+AMPLITUDES = {TRANSLATION: "amplitudes", ROTATION: "torsion_amplitudes", STRAINING: "strain_amplitudes"}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Predicted:
     """The outcome of a prediction: one table a place, and a resonance, where a mass was asked for.
 
-    `measured` are the sweeps of places that the model can predict; `notes`, what else a user must know.
+    `measured` are the sweeps of places that the model can predict; `notes`, what else a user must know; `wide`, whether
+    the tables are written with amplitudes across, too.
     """
 
     result: Result
@@ -51,12 +59,27 @@ class Predicted:
     measured: Sequence[SweepData]
     notes: tuple[str, ...] = ()
     resonances: Sequence[PredictedResonance] = ()
+    wide: bool = False
+    arms: Sequence[Arms] = ()
+
+    def __repr__(self) -> str:
+        return f"Prediction of {self.result.name}: {', '.join(str(found.direction) for found in self.predictions)}"
 
     @property
     def document(self) -> Mapping[str, Any]:
-        tables = {str(p.direction): _filled(prediction_table(p)) for p in self.predictions}
+        tables = {str(p.direction): filled(prediction_table(p)) for p in self.predictions}
         shaken = {f"{found.place}_resonance": shaken_table(found).to_dict(orient="list") for found in self.resonances}
-        return {**tables, **shaken, "warnings": self.warnings}
+        arms = [
+            {
+                "in_place_of": part.stands_for,
+                "shear_modulus_Pa": part.modulus.tolist(),
+                "relaxation_time_s": part.time.tolist(),
+                "band_Hz": part.band,
+                "largest_relative_error": part.error,
+            }
+            for part in self.arms
+        ]
+        return {**tables, **shaken, **({"arms": arms} if arms else {}), "warnings": self.warnings}
 
     @property
     def warnings(self) -> list[str]:
@@ -85,6 +108,9 @@ class Predicted:
     @property
     def contents(self) -> Contents:
         found = prediction_contents(self.result, self.predictions, self.measured, self.notes)
+        found |= wide_contents(self.predictions if self.wide else ())
+        places = [prediction.direction for prediction in self.predictions]
+        found |= arms_contents(self.result.model, self.arms, places, self.result.name)
         return found | resonance_contents(self.resonances)
 
     @property
@@ -93,7 +119,7 @@ class Predicted:
         return self.contents | measured_contents(self.result, *self._parted)
 
 
-def _filled(table: pd.DataFrame) -> dict[str, list[float | None]]:
+def filled(table: pd.DataFrame) -> dict[str, list[float | None]]:
     """The columns of a table, None where a cell is empty."""
     return {str(name): [None if x != x else x for x in column.tolist()] for name, column in table.items()}
 
@@ -103,13 +129,16 @@ class Predict:
     """Dynamic stiffness over a grid: the one asked for, else the campaign's [predict], else that of its sweeps.
 
     With a mass [kg] and the acceleration of its base [m/s^2], its resonance at each place, too. All at a temperature
-    [K], where the model has an effect of it.
+    [K], where the model has an effect of it. `wide` tables have amplitudes across. With a relative error, Maxwell arms
+    that keep within it over the frequencies predicted.
     """
 
     asked: PredictSettings = field(default_factory=PredictSettings)
     mass: float | None = None
     base_acceleration: float | None = None
     temperature: float | None = None
+    wide: bool = False
+    arms: float | None = None
 
     def places(self, result: Result | None, campaign: Campaign | None) -> list[Place]:
         """Those asked for, else the paper's directions where there is a bushing, and all specimens.
@@ -127,9 +156,11 @@ class Predict:
         return [*(_DIRECTIONS if bodies[0][0] or not specimens else ()), *specimens.values()]
 
     def kinds(self, result: Result | None, campaign: Campaign | None) -> Kinds:
-        """The tables and pictures of each place."""
+        """The tables and pictures of each place, and the further tables asked for."""
         places = self.places(result, campaign)
-        return Kinds.shown(place_names(places)) + Kinds(tables=tuple(resonance_names(places) if self.mass else ()))
+        more = [what for what, wanted in (("wide", self.wide), ("resonance", self.mass)) if wanted]
+        tables = tuple(name for what in more for name in names_of_more(places, what))
+        return Kinds.shown([*place_names(places), *(["arms"] if self.arms else [])]) + Kinds(tables=tables)
 
     def run(self, result: Result, campaign: Campaign | None, notes: tuple[str, ...] = ()) -> Predicted:
         """One prediction a place.
@@ -155,7 +186,7 @@ class Predict:
         predictions = []
         for place in self.places(result, campaign):
             frequencies, amplitudes = default_grid(result, place, sweeps)
-            asked = getattr(settings, _AMPLITUDES[place.motion]) or amplitudes
+            asked = getattr(settings, AMPLITUDES[place.motion]) or amplitudes
             grid = settings.frequencies or frequencies, asked
             beside = known if campaign else None
             predictions.append(predict(result, place, *grid, sweeps=beside, temperature=self.temperature))
@@ -166,7 +197,22 @@ class Predict:
             for place in self.places(result, campaign)
             if self.mass and self.base_acceleration
         ]
-        return Predicted(result, predictions, known, notes, resonances)
+        arms = self._arms(result.model, predictions) if self.arms else ()
+        return Predicted(result, predictions, known, notes, resonances, self.wide, arms)
+
+    def _arms(self, model: Model, predictions: Sequence[Prediction]) -> tuple[Arms, ...]:
+        """Maxwell arms over the frequencies of all predictions."""
+        assert self.arms
+        frequencies = [prediction.frequency for prediction in predictions]
+        band = float(min(map(min, frequencies))), float(max(map(max, frequencies)))
+        found = model_arms(model.without(Level.INSTRUMENT), band, self.arms)
+        if not found:
+            raise ModelError(
+                "there is nothing that Maxwell arms could stand for",
+                place="--arms",
+                expected="a model whose stiffness depends on frequency, as by a springpot",
+            )
+        return found
 
     def _settings(self, campaign: Campaign | None) -> PredictSettings:
         given = {key: value for key, value in vars(self.asked).items() if value is not None}

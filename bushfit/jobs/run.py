@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Required
 
+from typing_extensions import TypedDict
+
+from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.errors import FitError
 from bushfit.fitting.procedures import TwoStep, fit_two_step
 from bushfit.jobs.about import about, document_of
 from bushfit.jobs.diagnose import Diagnose, Diagnosed
 from bushfit.jobs.fits import Fit, FitStatic, Fitted, contents_of_tests, tests_of
 from bushfit.jobs.predict import Predict, Predicted
+from bushfit.model.document import ModelFile
 from bushfit.model.model import FIVE
 from bushfit.report.artifacts import diagnosis_contents
 from bushfit.report.contents import Contents, Kinds
@@ -23,7 +27,25 @@ if TYPE_CHECKING:
     from bushfit.model.result import Result
 
 
-@dataclass(frozen=True, eq=False)
+class RunDocument(TypedDict, total=False):
+    """What the whole chain found.
+
+    Args:
+        static: the fit of the loops; where there are loops.
+        dynamic: the paper's two steps; where there are loops and sweeps.
+        joint: the joint fit; where the model to use is another.
+        model: the model to use: the joint fit, or the model with what diagnose added.
+        diagnosis: where model and tests disagree; where a parameter is free.
+    """
+
+    static: ModelFile
+    dynamic: ModelFile
+    joint: ModelFile
+    model: Required[ModelFile]
+    diagnosis: DiagnosisFile
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Ran:
     """The outcome of the whole chain.
 
@@ -38,6 +60,9 @@ class Ran:
     joint: Fitted
     diagnosed: Diagnosed | None
     predicted: Predicted
+
+    def __repr__(self) -> str:
+        return "\n".join(repr(found) for found in (self.diagnosed, self.result) if found)
 
     @property
     def result(self) -> Result:

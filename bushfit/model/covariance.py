@@ -55,21 +55,25 @@ class Covariance:
         return sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
 
     def half_width(self, slopes: Array) -> Array:
-        """Half width of the 95 % intervals of n quantities, (n,).
+        """Half width of the 95 % intervals of n quantities, (n,), by Student's t.
 
         Args:
             slopes: of each quantity by each parameter, (k, n).
+        """
+        return stdtrit(self.freedom(slopes), 0.975) * np.linalg.norm(self.root.T @ slopes, axis=0)
 
-        Notes: Student's t with the effective degrees of freedom of Satterthwaite (1946): 2 v^2 over the variance of v,
-        where v is the quantity's variance, and the variance of v is the sum of squares of what each spread adds to v.
+    def freedom(self, slopes: Array) -> Array:
+        """Effective degrees of freedom of the variances of n quantities with these slopes, (k, n) -> (n,).
+
+        Notes: as Satterthwaite (1946) has them: 2 v^2 over the variance of v, where v is the quantity's variance, and
+        the variance of v is the sum of squares of what each spread adds to v.
         """
         variance = np.sum(np.square(self.root.T @ slopes), axis=0)
         moved = [np.sum(slopes * (part @ slopes), axis=0) for part in self.spread]
         unsure = np.sqrt(np.sum(np.square(moved), axis=0)) if moved else np.zeros_like(variance)
         least = np.sqrt(2.0 / _MOST_FREEDOM)
         share = np.divide(unsure, variance, out=np.zeros_like(variance), where=variance > 0.0)
-        freedom = np.maximum(2.0 / np.square(np.maximum(share, least)), _LEAST_FREEDOM)
-        return stdtrit(freedom, 0.975) * np.sqrt(variance)
+        return np.maximum(2.0 / np.square(np.maximum(share, least)), _LEAST_FREEDOM)
 
     def correlations(self) -> list[tuple[str, str, float]]:
         """Two names and their correlation for every pair of parameters, the most correlated first."""

@@ -1,14 +1,14 @@
 """Model files: a result as JSON in the schema bushfit/model/1, or /2 with specimens, and back.
 
-The dataclasses below are the keys that are read, and pydantic checks them all at once; other keys are left alone.
+Its keys are those of `model.document`.
 """
 
 from __future__ import annotations
 
 import importlib.metadata
 import json
-from collections.abc import Mapping, Set
-from dataclasses import asdict, astuple, dataclass, field
+from collections.abc import Set
+from dataclasses import asdict, astuple
 from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
@@ -18,18 +18,15 @@ import numpy as np
 from bushfit import __version__
 from bushfit.effects.stiffness_factor import EFFECT as FACTOR
 from bushfit.effects.unnamed import NAME as UNNAMED
-from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError, naming
-from bushfit.geometry import Bushing, Shape, Specimen, SpecimenKind, StatedStrain
+from bushfit.geometry import Bushing, Specimen
 from bushfit.model.covariance import Covariance
+from bushfit.model.document import SCHEMAS, CovarianceTable, ModelFile
 from bushfit.model.model import Model
-from bushfit.model.result import End, Misfit, Outlier, Quality, Range, Result, Usable
+from bushfit.model.result import Quality, Range, Result
 from bushfit.reading.files import read_utf8
-from bushfit.reading.measurement import Source
-from bushfit.validation import Flag, Name, Number, WholeNumber, check_tables
+from bushfit.validation import check_tables
 
-#: What the key "schema" of a model file has to say: of one with a bushing alone, and of one with specimens too.
-SCHEMAS = ("bushfit/model/1", "bushfit/model/2")
 #: The effect that older files have in place of a factor of its own for the radial direction, and its parameter.
 _RADIAL_FACTOR = ("radial_factor", "radial_factor.excess")
 #: Size of a model file at most [bytes]: a hundred times what a model with every effect of the library takes.
@@ -39,110 +36,6 @@ _PACKAGES = ("numpy", "scipy", "lmfit")
 
 #: What JSON calls values that are no object.
 _KINDS = {list: "a list", str: "a text", bool: "true or false", int: "a number", float: "a number"}
-
-Matrix = tuple[tuple[Number, ...], ...]
-
-
-@dataclass(frozen=True)
-class BushingTable:
-    """bushing: name, geometry, and the radial formulas it goes by, which older files do not say."""
-
-    name: Name
-    inner_radius_m: Number
-    outer_radius_m: Number
-    length_m: Number
-    shape: Shape = "paper"
-
-
-@dataclass(frozen=True)
-class SpecimenTable:
-    """specimens: other bodies of the compound; see geometry.Specimen."""
-
-    name: Name
-    kind: SpecimenKind
-    strain: StatedStrain = "engineering"
-    area_m2: Number | None = None
-    thickness_m: Number | None = None
-    elements: WholeNumber = 1
-
-
-@dataclass(frozen=True)
-class ParameterTable:
-    """parameters.<name>: the value [SI], and what the fit says of it."""
-
-    value: Number
-    vary: Flag = False
-    profile95: tuple[Number | None, Number | None] | None = None
-    at_bound: End | None = None
-
-
-@dataclass(frozen=True)
-class CovarianceTable:
-    """covariance: a matrix with a row and a column for each name, and others of its size; else it is refused."""
-
-    names: tuple[str, ...]
-    matrix: Matrix
-    spread: tuple[Matrix, ...] = ()
-
-    def __post_init__(self) -> None:
-        size = len(self.names)
-        for matrix in (self.matrix, *self.spread):
-            widths = {len(row) for row in matrix}
-            if len(matrix) != size or widths - {size}:
-                found = f"{len(matrix)} rows of {' or '.join(sorted(map(str, widths))) or 'no'} numbers"
-                raise ValueError(ModelError("no covariance of its names", found=found, expected=f"{size} x {size}"))
-        if any(self.matrix[i][i] < 0.0 for i in range(size)):
-            raise ValueError(ModelError("a variance below zero", place="matrix", expected="squares on the diagonal"))
-
-
-@dataclass(frozen=True)
-class FitTable(Quality):
-    """fit: how well the model meets its tests, and their operating conditions, which older files do not say."""
-
-    frequency_Hz: tuple[Number, Number] | None = None  # noqa: N815
-    strain: tuple[Number, Number] | None = None
-    directions: tuple[Name, ...] = ()
-    tests: tuple[Misfit, ...] = ()
-    usable: tuple[Usable, ...] = ()
-
-    def __post_init__(self) -> None:
-        if self.strain and not self.frequency_Hz:
-            raise ValueError(ModelError("a key is missing", place="frequency_Hz", expected="frequency_Hz = ..."))
-
-    @property
-    def quality(self) -> Quality:
-        return Quality(self.nrmse, self.reduced_chi_square, self.points, self.noise)
-
-    @property
-    def measured(self) -> Range | None:
-        """The operating conditions; None where an older file does not say them."""
-        if self.frequency_Hz is None or self.strain is None:
-            return None
-        return Range(self.frequency_Hz, self.strain, self.directions)
-
-
-@dataclass(frozen=True)
-class ProvenanceTable:
-    """provenance: the files behind the model."""
-
-    inputs: tuple[Source, ...] = ()
-
-
-@dataclass(frozen=True)
-class ModelFile:
-    """A whole model file."""
-
-    bushing: BushingTable | None
-    effects: tuple[str, ...]
-    parameters: Mapping[str, ParameterTable]
-    covariance: CovarianceTable | None = None
-    fit: FitTable | None = None
-    warnings: tuple[str, ...] = ()
-    outliers: tuple[Outlier, ...] = ()
-    provenance: ProvenanceTable = field(default_factory=ProvenanceTable)
-    specimens: tuple[SpecimenTable, ...] = ()
-    unresolved: tuple[str, ...] = ()
-    unnamed: Unnamed | None = None
 
 
 def load_result(file: Path) -> Result:

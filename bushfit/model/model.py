@@ -262,7 +262,7 @@ class Model:
         The other arguments are as of `stiffness`.
         """
         setting = self.setting(direction, kind, under)
-        respond = self._stack_force(setting, self.values if values is None else values, self._layers(setting))
+        respond = self._stack_force(setting, self.values if values is None else values, self.layers(setting))
         return respond(displacement)
 
     def setting(self, place: Place | str, kind: Kind = "sweep", under: Circumstances = UNKNOWN) -> Setting:
@@ -270,12 +270,18 @@ class Model:
         direction = Direction(place) if isinstance(place, str) else place
         return Setting(self.bushing, direction, kind, under, self.unnamed)
 
-    def _layers(self, setting: Setting) -> tuple[Layer, ...]:
+    def layers(self, setting: Setting) -> tuple[Layer, ...]:
         """The layers that act on a test: a coupon whose modulus is measured has no rig and no sleeves around it."""
         layers, turning = self._structure.layers, setting.direction.is_rotation
         if setting.direction.motion is STRAINING:
             return tuple(layer for layer in layers if layer.corrects)
         return tuple(layer for layer in layers if layer.turns or not turning)
+
+    def values_at(self, place: Place, frequency: float, amplitude: float) -> dict[str, float]:
+        """All values as the modifiers leave them at an operating condition [Hz, m or rad]."""
+        omega, reached = 2.0 * np.pi * np.atleast_1d(frequency), np.atleast_1d(amplitude)
+        found = self._adjusted(self.setting(place), self.values, omega, reached, reached * self.unit_strain(place))
+        return {name: float(np.asarray(value).item()) for name, value in found.items()}
 
     def _stack_stiffness(self, setting: Setting, values: Values) -> Callable[[Array, Array], Array]:
         """The stiffness outside all layers, as a function of omega [rad/s] and amplitude [m or rad]."""
@@ -285,7 +291,7 @@ class Model:
             base = self._adjusted(setting, values, omega, amplitude, strain)
             return self._branch_stiffness(setting, values, omega, strain, base)
 
-        layers = self._layers(setting)
+        layers = self.layers(setting)
         if not layers:
             return rubber
         per_sample = {

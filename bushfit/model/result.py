@@ -13,6 +13,7 @@ from bushfit.geometry import Bushing, Place, Specimen, place_named
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Source
+from bushfit.units import alike, for_people, number
 from bushfit.validation import Flag, Number, WholeNumber
 
 #: Largest half width, in units of the value, of which the exponential is taken: exp(300) is far beyond every bound of
@@ -60,7 +61,9 @@ class Misfit:
     """How well a model meets one test, or one run of it.
 
     Args:
+        test: by its name.
         place: direction, or specimen by its name.
+        fitted: whether the model was fitted to it.
         held: what the run holds; None of the whole test.
         value: at which it is held.
         unit: of the value, SI: "m", "rad" or "1" of an amplitude, "Hz".
@@ -106,6 +109,7 @@ class Outlier:
     """A point that lies farther off than noise explains, beside neighbours that do not.
 
     Args:
+        test: by its name.
         file: it came from, as the campaign names it; None for a test that came from no file.
         row: of its data, from 1; header, comments and blank lines do not count.
         column: displacement, force or stiffness.
@@ -124,7 +128,7 @@ class Outlier:
         return f"{self.file or self.test}, {self.column}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """A fitted model, or one given by hand, as the JSON files hold it.
 
@@ -152,6 +156,19 @@ class Result:
     tests: tuple[Misfit, ...] = ()
     usable: tuple[Usable, ...] = ()
     unresolved: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """The parameters with their standard errors, a line each, and how well the model meets its tests."""
+        lines = [f"Result of {self.name}"]
+        for name, parameter in self.model.parameters.items():
+            value, stderr = self.model.values[name], self.covariance.stderr(name)
+            unit, factor = for_people(parameter.unit, 1.0, value)
+            error, size = alike([stderr * factor, value * factor], 2) if stderr else ("", number(value * factor, 4))
+            lines.append(f"  {name} = {' +- '.join(filter(None, (size, error)))} {unit}".removesuffix(" -"))
+        if self.quality:
+            misfit, chi_square = number(100 * self.quality.nrmse, 2), number(self.quality.reduced_chi_square, 3)
+            lines.append(f"  NRMSE {misfit} %, reduced chi-square {chi_square}")
+        return "\n".join(lines)
 
     @property
     def name(self) -> str:

@@ -1,7 +1,8 @@
 """CSV files as bushfit writes them, those of tests among them, which the reader takes back.
 
-Every one has a comma between cells, a decimal point, seven digits, UTF-8, and no text that a spreadsheet would run as a
-formula.
+Every one has seven digits, UTF-8, and no text that a spreadsheet would run as a formula. It has commas and decimal
+points; or semicolons and decimal commas, as Excel expects where numbers are written so, after the byte order mark by
+which Excel knows UTF-8.
 """
 
 from __future__ import annotations
@@ -33,27 +34,33 @@ _LINE_ENDS = re.compile("[\\r\\n]+")
 class Rows:
     """Writes rows of texts and numbers to a stream as they come."""
 
-    def __init__(self, stream: TextIO, headers: Iterable[str]) -> None:
-        self._writer = csv.writer(stream, lineterminator="\n")
+    def __init__(self, stream: TextIO, headers: Iterable[str], *, decimal_comma: bool = False) -> None:
+        self._point = "," if decimal_comma else "."
+        self._writer = csv.writer(stream, delimiter=";" if decimal_comma else ",", lineterminator="\n")
         self._writer.writerow([defused(header) for header in headers])
 
     def add(self, cells: Iterable[str | float | None]) -> None:
         """Write one row; None and nan become empty cells."""
-        self._writer.writerow([_cell(value) for value in cells])
+        self._writer.writerow([_cell(value, self._point) for value in cells])
 
 
-def to_csv(table: pd.DataFrame) -> bytes:
+def encoding(decimal_comma: bool) -> str:
+    """The encoding of a file: UTF-8, before decimal commas with a byte order mark."""
+    return "utf-8-sig" if decimal_comma else "utf-8"
+
+
+def to_csv(table: pd.DataFrame, *, decimal_comma: bool = False) -> bytes:
     """The bytes of a table's file."""
     text = io.StringIO()
-    rows = Rows(text, map(str, table.columns))
+    rows = Rows(text, map(str, table.columns), decimal_comma=decimal_comma)
     for cells in zip(*(column.tolist() for _, column in table.items()), strict=True):
         rows.add(cells)
-    return text.getvalue().encode("utf-8", "replace")
+    return text.getvalue().encode(encoding(decimal_comma), "replace")
 
 
-def _cell(value: object) -> str:
+def _cell(value: object, point: str) -> str:
     if isinstance(value, float):
-        return "" if value != value else f"{value:.7g}"
+        return "" if value != value else f"{value:.7g}".replace(".", point)
     if isinstance(value, str):
         return defused(value)
     return "" if value is None else str(value)

@@ -56,7 +56,13 @@ class Line(NamedTuple):
 class FileFormat:
     """What a user states of a file's format; None where the file itself settles it.
 
-    The encoding goes by Python's name, such as "cp1252"; `header_line` counts from 1, and in a workbook rows.
+    Args:
+        encoding: by Python's name, such as "cp1252".
+        delimiter: what parts the cells.
+        decimal: mark in the numbers.
+        thousands: mark in the numbers.
+        header_line: line of the column names, from 1; of a workbook its row.
+        sheet: of a workbook.
     """
 
     encoding: str | None = None

@@ -27,7 +27,13 @@ _TURN_PROMINENCE = 0.1
 
 @dataclass(frozen=True)
 class Source:
-    """The provenance of a measurement: its file as the campaign names it, and conditions of the test no fit uses."""
+    """The provenance of a measurement.
+
+    Args:
+        file: as the campaign names it.
+        sha256: of its content.
+        conditions: of the test that no fit uses, as the campaign states them, such as preload and date.
+    """
 
     file: Path
     sha256: str

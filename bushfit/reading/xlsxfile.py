@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+from bushfit.errors import OutputError
 
 if TYPE_CHECKING:
     import pandas as pd
+    from xlsxwriter import Workbook
+    from xlsxwriter.format import Format
 
 #: Characters that the name of a sheet must not have.
 _UNSAFE_IN_SHEETS = re.compile(r"[\[\]:*?/\\\x00-\x1f]")
@@ -23,36 +29,88 @@ _LONGEST_TEXT = 32_767
 _MADE = datetime(1980, 1, 1, tzinfo=UTC)
 #: Widest column [characters].
 _WIDEST = 60
+#: What XlsxWriter gives back for a cell that lies beyond the last row or column of a sheet.
+_BEYOND = -1
+
+
+class Sheet:
+    """Writes rows of texts and numbers to a sheet as they come, below headers in bold that stay in sight.
+
+    Every text is written as a text: nothing is run as a formula or taken for a link or a number. Cells without a value,
+    and nan, stay empty.
+    """
+
+    def __init__(self, book: Workbook, name: str, headers: Iterable[str]) -> None:
+        self._sheet = book.add_worksheet(name)
+        self._sheet.freeze_panes(1, 0)
+        self._widths: dict[int, int] = {}
+        self._count = 0
+        self._add(headers, book.add_format({"bold": True}))
+
+    def add(self, cells: Iterable[str | float | None]) -> None:
+        """Write one row.
+
+        Raises:
+            OutputError: more rows or columns than a sheet has.
+        """
+        self._add(cells)
+
+    def _add(self, cells: Iterable[str | float | None], look: Format | None = None) -> None:
+        for place, cell in enumerate(cells):
+            if isinstance(cell, str):
+                self._widen(place, len(cell))
+                beyond = self._sheet.write_string(self._count, place, _text(cell), look) == _BEYOND
+            elif cell is not None and cell - cell == 0:  # neither nan nor infinite, which no cell holds
+                beyond = self._sheet.write_number(self._count, place, cell) == _BEYOND
+            else:
+                continue
+            if beyond:
+                raise OutputError(
+                    "a table is too large for a sheet",
+                    place=self._sheet.name,
+                    expected="at most 1,048,576 rows and 16,384 columns",
+                    hint="--table-format csv has no such limit",
+                )
+        self._count += 1
+
+    def _widen(self, place: int, letters: int) -> None:
+        """Make a column as wide as its widest text, as far as that goes."""
+        width = min(_WIDEST, letters + 1)
+        if width > self._widths.get(place, 0):
+            self._widths[place] = width
+            self._sheet.set_column(place, place, width)
 
 
 def to_xlsx(tables: Mapping[str, pd.DataFrame]) -> bytes:
-    """The bytes of a workbook with a sheet for each table, by its name, headers in bold.
+    """The bytes of a workbook with a sheet for each table, by its name, which is changed where Excel does not take it.
 
-    Every text is written as a text: nothing is run as a formula or taken for a link or a number. Cells without a value,
-    and nan, stay empty. Names of sheets are changed where Excel does not take them.
+    Raises:
+        OutputError: a table that is too large for a sheet.
     """
+    stream, names = io.BytesIO(), set[str]()
+    with _book(stream, in_memory=True) as book:
+        for title, table in tables.items():
+            sheet = Sheet(book, _sheet_name(title, names), map(str, table.columns))
+            for cells in zip(*(column.tolist() for _, column in table.items()), strict=True):
+                sheet.add(cells)
+    return stream.getvalue()
+
+
+@contextmanager
+def streamed(file: Path, headers: Iterable[str]) -> Iterator[Sheet]:
+    """The one sheet of a new workbook, named after its file, whose rows are held in a file beside it until its end."""
+    with file.open("wb") as stream, _book(stream, constant_memory=True, tmpdir=str(file.parent)) as book:
+        yield Sheet(book, _sheet_name(file.stem, set()), headers)
+
+
+@contextmanager
+def _book(stream: IO[bytes], **options: object) -> Iterator[Workbook]:
+    """A workbook that is whole in the end; also after an error, so that no file of its rows stays."""
     from xlsxwriter import Workbook
 
-    stream = io.BytesIO()
-    book = Workbook(stream, {"in_memory": True})
-    book.set_properties({"created": _MADE})
-    bold = book.add_format({"bold": True})
-    names: set[str] = set()
-    for title, table in tables.items():
-        sheet = book.add_worksheet(_sheet_name(title, names))
-        sheet.freeze_panes(1, 0)
-        for place, (header, column) in enumerate(table.items()):
-            cells = column.tolist()
-            sheet.write_string(0, place, _text(str(header)), bold)
-            for row, cell in enumerate(cells, start=1):
-                if isinstance(cell, str):
-                    sheet.write_string(row, place, _text(cell))
-                elif cell is not None and cell - cell == 0:  # neither nan nor infinite, which no cell holds
-                    sheet.write_number(row, place, cell)
-            widths = (len(cell) for cell in (str(header), *cells) if isinstance(cell, str))
-            sheet.set_column(place, place, min(_WIDEST, max(widths) + 1))
-    book.close()
-    return stream.getvalue()
+    with Workbook(stream, options) as book:
+        book.set_properties({"created": _MADE})
+        yield book
 
 
 def _text(text: str) -> str:

@@ -18,9 +18,13 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from bushfit.comparison import Comparison
+    from bushfit.diagnosis.families import FittedFamily
     from bushfit.diagnosis.record import Diagnosis
     from bushfit.fitting.data_sets import LoopData, SweepData
     from bushfit.geometry import Place
+    from bushfit.model.arms import Arms
+    from bushfit.model.model import Model
     from bushfit.model.result import Result
     from bushfit.prediction import PredictedResonance, Prediction
 
@@ -74,11 +78,30 @@ def prediction_contents(
     )
 
 
+def wide_contents(predictions: Sequence[Prediction]) -> Contents:
+    """The table of each prediction with frequency down and amplitude across."""
+    names = names_of_more([prediction.direction for prediction in predictions], "wide")
+    pairs = zip(names, predictions, strict=True)
+    return Contents(tables={name: partial(tables.wide_table, prediction) for name, prediction in pairs})
+
+
 def resonance_contents(resonances: Sequence[PredictedResonance]) -> Contents:
     """A table of a mass on each place."""
-    names = resonance_names([found.place for found in resonances])
+    names = names_of_more([found.place for found in resonances], "resonance")
     pairs = zip(names, resonances, strict=True)
     return Contents(tables={name: partial(tables.shaken_table, found) for name, found in pairs})
+
+
+def arms_contents(model: Model, arms: Sequence[Arms], places: Sequence[Place], title: str) -> Contents:
+    """`arms`: Maxwell arms as a table, and a picture of their modulus and its error; nothing where there are none."""
+
+    def picture() -> Figure:
+        from bushfit.report.plots import arms_figure
+
+        return arms_figure(model, arms, title)
+
+    table = partial(tables.arms_table, model, arms, places)
+    return Contents({}, {"arms": table}, {"arms": picture}) if arms else Contents()
 
 
 def measured_contents(result: Result, fitted: Sequence[SweepData], left: Sequence[SweepData]) -> Contents:
@@ -109,6 +132,23 @@ def diagnosis_contents(diagnosis: Diagnosis, title: str) -> Contents:
     return Contents({}, found, {"gap": picture})
 
 
+def comparison_contents(
+    labels: Sequence[str], names: Sequence[str], comparisons: Sequence[Comparison], families: Sequence[FittedFamily]
+) -> Contents:
+    """`parameters`, `differences` and, of families, `families`, tables; and one picture, `compare`."""
+
+    def picture() -> Figure:
+        from bushfit.report.plots import comparison_figure
+
+        return comparison_figure(labels, names, comparisons)
+
+    pairs = zip(labels[1:], comparisons, strict=True)
+    contrasts = [(label, found, each) for label, found in pairs for each in found.contrasts]
+    found = {"parameters": partial(tables.parameters_table, labels, comparisons)}
+    found |= {"families": partial(tables.families_table, labels, families)} if families else {}
+    return Contents({}, found | {"differences": partial(tables.differences_table, contrasts)}, {"compare": picture})
+
+
 def place_names(places: Sequence[Place]) -> list[str]:
     """The names, without an ending, of the tables and pictures of places: safe on every system, each once."""
     names: list[str] = []
@@ -118,6 +158,12 @@ def place_names(places: Sequence[Place]) -> list[str]:
     return names
 
 
-def resonance_names(places: Sequence[Place]) -> list[str]:
-    """The names of the tables of a mass on each place."""
-    return [f"{name}_resonance" for name in place_names(places)]
+def names_of_more(places: Sequence[Place], what: str) -> list[str]:
+    """The names of one more table of each place, such as axial_wide: none that a place itself has."""
+    taken, names = place_names(places), list[str]()
+    for name in taken:
+        more = f"{name}_{what}"
+        while more in taken:
+            more += "_"
+        names.append(more)
+    return names

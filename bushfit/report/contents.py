@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cache
-from typing import TYPE_CHECKING, Any
+from functools import cache, lru_cache
+from typing import TYPE_CHECKING, Any, Literal
 
+from bushfit.reading.tablefile import Form, ending, to_bytes
 from bushfit.report.folder import to_json
 
 if TYPE_CHECKING:
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     Tables = Mapping[str, pd.DataFrame]
     #: What makes the text of a page of documents and tables.
     Page = Callable[[Documents, Tables], str]
+
+#: Formats of a picture.
+Picture = Literal["png", "svg", "pdf"]
 
 
 @dataclass(frozen=True)
@@ -67,31 +71,45 @@ class Contents:
 
 @dataclass(frozen=True)
 class Formats:
-    """How results are written: whether with tables, with pictures, and with pages."""
+    """How results are written: whether with tables, pictures and pages, and the first two in which forms."""
 
     tables: bool = True
     pictures: bool = True
     pages: bool = True
+    table_form: Form = "csv"
+    picture_forms: tuple[Picture, ...] = ("png",)
+
+    def table(self, name: str) -> str:
+        """The file of a table of this name."""
+        return f"{name}.{ending(self.table_form)}"
 
     def names(self, kinds: Kinds) -> list[str]:
-        """The files of what has these names: documents first, then each table beside its picture."""
+        """The files of what has these names: documents first, then each table beside its pictures, then pages."""
         pages = [f"{name}.html" for name in kinds.pages if self.pages]
         return [*(f"{name}.json" for name in kinds.documents), *(".".join(each) for each in self._shown(kinds)), *pages]
 
     def files(self, contents: Contents) -> dict[str, bytes]:
-        """The bytes of each file of a result, by its name."""
+        """The bytes of each file of a result, by its name.
+
+        Raises:
+            OutputError: a table that is too large for its form.
+        """
         files = {f"{name}.json": to_json(document) for name, document in contents.documents.items()}
         tables = {name: cache(make) for name, make in contents.tables.items()}
-        for name, ending in self._shown(contents.kinds):
-            made = _table(tables[name]) if ending == "csv" else _picture(contents.pictures[name])
-            files[f"{name}.{ending}"] = made
+        drawn = lru_cache(1)(lambda name: contents.pictures[name]())  # once for all forms, which follow each other
+        for name, form in self._shown(contents.kinds):
+            if form in self.picture_forms:
+                files[f"{name}.{form}"] = _picture(drawn(name), form)
+            else:
+                files[f"{name}.{form}"] = to_bytes(name, tables[name](), self.table_form)
         return files | (pages_of(replace(contents, tables=tables)) if self.pages else {})
 
     def _shown(self, kinds: Kinds) -> list[tuple[str, str]]:
         """The name and the ending of each table and picture that is written."""
-        wanted = {"csv": kinds.tables if self.tables else (), "png": kinds.pictures if self.pictures else ()}
+        wanted = {ending(self.table_form): kinds.tables} if self.tables else {}
+        wanted |= dict.fromkeys(self.picture_forms if self.pictures else (), kinds.pictures)
         names = dict.fromkeys((*kinds.tables, *kinds.pictures))
-        return [(name, ending) for name in names for ending, those in wanted.items() if name in those]
+        return [(name, form) for name in names for form, those in wanted.items() if name in those]
 
 
 def pages_of(contents: Contents) -> dict[str, bytes]:
@@ -107,13 +125,7 @@ def _report(documents: Documents, tables: Tables) -> str:
     return report_page(documents, tables)
 
 
-def _table(make: Callable[[], pd.DataFrame]) -> bytes:
-    from bushfit.reading.csvfile import to_csv
+def _picture(figure: Figure, form: str) -> bytes:
+    from bushfit.report.plots import to_image
 
-    return to_csv(make())
-
-
-def _picture(make: Callable[[], Figure]) -> bytes:
-    from bushfit.report.plots import to_png
-
-    return to_png(make())
+    return to_image(figure, form)

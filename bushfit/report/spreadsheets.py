@@ -25,7 +25,8 @@ _OF_ALL = ("parameters", "provenance")
 
 def csv(order: Order) -> Exported:
     """A file for each table."""
-    files = {f"{name.replace(' ', '_')}.csv": to_csv(table) for name, table in _tables(order).items()}
+    named = {f"{name.replace(' ', '_')}.csv": table for name, table in _tables(order).items()}
+    files = {name: to_csv(table, decimal_comma=order.decimal_comma) for name, table in named.items()}
     return Exported(files, (NO_LOOPS,))
 
 

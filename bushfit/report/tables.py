@@ -14,10 +14,13 @@ from bushfit.reading.measurement import loss_factor
 if TYPE_CHECKING:
     import pandas as pd
 
+    from bushfit.comparison import Comparison, Contrast
+    from bushfit.diagnosis.families import FittedFamily
     from bushfit.diagnosis.record import Diagnosis
     from bushfit.effects.contract import Array
     from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
     from bushfit.geometry import Display, Place
+    from bushfit.model.arms import Arms
     from bushfit.model.model import Model
     from bushfit.prediction import PredictedResonance, Prediction
     from bushfit.reduction.resonance import Resonance
@@ -122,6 +125,22 @@ def shaken_table(found: PredictedResonance) -> pd.DataFrame:
     return table
 
 
+def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> pd.DataFrame:
+    """Maxwell arms, a row an arm, and before them the spring that stands beside: modulus, stiffness at each place,
+    relaxation time."""
+    import pandas as pd
+
+    from bushfit.model.arms import listed
+
+    names, moduli, times = zip(*listed(model, arms), strict=True)
+    modulus = np.array(moduli)
+    columns = {"in place of": names, "relaxation time [s]": times, "shear modulus [MPa]": 1e-6 * modulus}
+    for place in places:
+        *_, (unit, factor) = place.display
+        columns[f"{place} {words(place)[2]} [{unit}]"] = factor * model.stiffness_per_modulus(place) * modulus
+    return pd.DataFrame(columns)
+
+
 def loops_table(model: Model, data_sets: Sequence[LoopData]) -> pd.DataFrame:
     """Measured and modelled force of every loop, row by row (or by bin of phase where a loop is long)."""
     import pandas as pd
@@ -222,6 +241,98 @@ def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
             "why": judged.why,
         }
         for judged in diagnosis.candidates
+    ]
+    return pd.DataFrame(rows)
+
+
+def parameters_table(labels: Sequence[str], comparisons: Sequence[Comparison]) -> pd.DataFrame:
+    """Every parameter that results have in common, in SI: a row a parameter and result beside the first."""
+    import pandas as pd
+
+    first, *others = labels
+    rows = [
+        {
+            "parameter": row.name,
+            "unit": row.unit,
+            "reference": first,
+            "other": label,
+            "reference value": row.reference,
+            "other value": row.other,
+            "difference": row.difference,
+            "difference, low": row.interval and row.interval[0],
+            "difference, high": row.interval and row.interval[1],
+            "difference is": "relative" if row.relative else "absolute",
+            "p": row.p,
+            "p by Holm": row.holm,
+            "not tested": row.note,
+        }
+        for label, found in zip(others, comparisons, strict=True)
+        for row in found.parameters
+    ]
+    return pd.DataFrame(rows)
+
+
+def differences_table(contrasts: Sequence[tuple[str, Comparison, Contrast]]) -> pd.DataFrame:
+    """Stiffness and loss factor of results, by label, beside the first over operating points, with 95 % bands.
+
+    Stiffness in the units of its place; `sure` is what differs where the bands of all points hold at once.
+    """
+    import pandas as pd
+
+    def rows(label: str, found: Comparison, each: Contrast) -> pd.DataFrame:
+        (length, length_factor), _, (unit, factor) = each.place.display
+        moved, _, resisted = words(each.place)
+        values: dict[str, Any] = {
+            "other": label,
+            "place": str(each.place),
+            "frequency [Hz]": each.reference.frequency,
+            f"{moved} [{length}]": each.reference.amplitude * length_factor,
+        }
+        name = f"{resisted} [{unit}]"
+        for who, side in (("reference", each.reference), ("other", each.other)):
+            for what, band, scale in ((name, side.stiffness, factor), ("loss factor [-]", side.loss_factor, 1.0)):
+                for end, of in _ends(band).items():
+                    values[f"{who} {what}{end}"] = of * scale
+        differences = (
+            (f"relative difference of {resisted} [-]", each.stiffness, np.expm1),
+            ("difference of loss factor [-]", each.loss_factor, np.asarray),
+        )
+        for what, band, shown in differences:
+            wide = found.widened(band)
+            sure = bool(len(band.root)) & ((wide.low > 0.0) | (wide.high < 0.0))
+            values |= {f"{what}{end}": shown(of) for end, of in _ends(band).items()}
+            values[f"{what}, sure"] = np.where(sure, "yes", "no")
+        return pd.DataFrame(values)
+
+    return pd.concat([rows(*each) for each in contrasts], ignore_index=True)
+
+
+def _ends(band: Any) -> dict[str, Array]:
+    """A band by the end of its columns' names."""
+    return {"": band.value, ", low": band.low, ", high": band.high}
+
+
+def families_table(labels: Sequence[str], families: Sequence[FittedFamily]) -> pd.DataFrame:
+    """How model families meet the same tests, and what was held out of them."""
+    import pandas as pd
+
+    rows = [
+        {
+            "label": label,
+            "family": family.name,
+            "parameters": family.evidence.parameters,
+            "reduced chi-square": family.evidence.reduced,
+            "BIC less the first's": family.evidence.bic - families[0].evidence.bic,
+            "held out [noise]": family.held.after,
+            "the first there [noise]": family.held.before,
+            "parts held out": len(family.held.parts),
+            "fall of the mean square": family.gain and family.gain[0],
+            "fall of the mean square, low": family.gain and family.gain[1],
+            "fall of the mean square, high": family.gain and family.gain[2],
+            "p by Holm": family.p,
+            "words": family.words if family is not families[0] else "",
+        }
+        for label, family in zip(labels, families, strict=True)
     ]
     return pd.DataFrame(rows)
 

@@ -30,10 +30,15 @@ _UPPER_ENDS = {0.01: 0.03, 0.02: 0.03, 0.05: 0.08}
 
 @dataclass(frozen=True)
 class Row:
-    """One measure of the card: its figure as text, a rate with its 95 % interval; what it counts, and the target.
+    """One measure of the card.
 
-    `met` is None where there is no target, no case, or where the rate lies within the target and its interval is still
-    too wide to say so.
+    Args:
+        measure: what is measured.
+        figure: as text: a rate with its 95 % interval.
+        over: how many cases are counted.
+        target: as text; empty where there is none.
+        met: whether the target is met; None where there is no target, no case, or where the rate lies within the target
+            and its interval is still too wide to say so.
     """
 
     measure: str

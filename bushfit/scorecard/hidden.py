@@ -92,7 +92,11 @@ class Sealed:
     """The truth of a hidden campaign: what is hidden, how large, and how visible.
 
     Args:
-        outside, without: what the library does not have, or ""; effects that it is made to lack.
+        hidden: effects, or the mistake and its tests.
+        outside: what the library does not have, or "".
+        without: effects that the library is made to lack.
+        values: of the parameters that are asked for [SI].
+        seed: of everything random.
         visible: largest misfit of the plain model without noise, relative; of a recipe the size it was asked for.
         shared: whether blocks share gain and phase errors.
     """

@@ -19,6 +19,8 @@ class Task:
     """One hidden campaign to make and to diagnose.
 
     Args:
+        kind: of campaign.
+        seed: of everything random in it.
         hidden: effects; of a kind "mistake" the mistake.
         outside: what the library does not have; the name of a recipe, where the campaign is made by one.
         without: effects that the library is made to lack.
@@ -36,6 +38,9 @@ class Outcome:
     """What the workflow said of one campaign, and the truth.
 
     Args:
+        task: what was hidden.
+        sealed: the truth; None where the campaign could not be made.
+        verdict: of the diagnosis; "refused" where the reader does not take the file, "failed" where it went wrong.
         named: effects it named or that lead a set.
         sets: all members of each set, leader first.
         richer: effects that contain what was named as a limit, and their twins.

@@ -129,7 +129,7 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
             for effect in diagnosis.effects
         ),
         before=heldout["before"],
-        again=document["gap"].get("name_again"),
+        again=diagnosis.holdout.name_again,
     )
 
 

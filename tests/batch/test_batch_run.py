@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import openpyxl
 import pytest
 from junitparser import JUnitXml
 from trees import stamps, tree
@@ -94,17 +95,21 @@ def test_the_table_is_in_order_with_units_and_the_numbers_of_the_models(typed: C
     for row in table:
         model = json.loads((shop / "all" / row["folder"] / "model.json").read_text())
         mu = model["parameters"]["mu"]
-        assert float(row["mu [Pa]"]) == pytest.approx(mu["value"], rel=1e-6)
-        assert float(row["mu [Pa], std error"]) == pytest.approx(mu["stderr"], rel=1e-6)
-        assert float(row["mu [Pa], low"]) == pytest.approx(mu["ci95"][0], rel=1e-6)
+        assert float(row["mu [MPa]"]) == pytest.approx(1e-6 * mu["value"], rel=1e-6)
+        assert float(row["mu [MPa], std error"]) == pytest.approx(1e-6 * mu["stderr"], rel=1e-6)
+        assert float(row["mu [MPa], low"]) == pytest.approx(1e-6 * mu["ci95"][0], rel=1e-6)
+        assert 1e3 * float(row["sigma_fmax [kPa]"]) == pytest.approx(
+            model["parameters"]["sigma_fmax"]["value"], rel=1e-6
+        )
         assert float(row["NRMSE [-]"]) == pytest.approx(model["fit"]["nrmse"], rel=1e-6)
         low, value, high = (float(row[f"stiffness axial 25 Hz 0.1 mm [N/mm]{end}"]) for end in (", low", "", ", high"))
         assert low < value < high
         assert float(row["loss factor torsion 10 Hz 1 deg [-]"]) > 0
     summary = json.loads(done.stdout)
     assert (summary["rows"], summary["done"], summary["failed"]) == (5, 5, [])
-    values = sorted(float(row["mu [Pa]"]) for row in table)
-    assert summary["scatter"]["mu"]["median"] == pytest.approx(values[2], rel=1e-6)
+    values = sorted(float(row["mu [MPa]"]) for row in table)
+    assert summary["scatter"]["mu"]["unit"] == "Pa"
+    assert summary["scatter"]["mu"]["median"] == pytest.approx(1e6 * values[2], rel=1e-6)
     assert (shop / "all/batch.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -121,7 +126,7 @@ def test_a_bad_row_costs_that_row(typed: Callable[..., Any], shop: Path) -> None
     assert (good["status"], bad["status"], absent["status"]) == ("done", "failed", "failed")
     assert "sweep_axial.csv" in bad["error"]
     assert "there is no such file" in absent["error"]
-    assert bad["mu [Pa]"] == ""
+    assert bad["mu [MPa]"] == ""
     (suite,) = JUnitXml.fromfile(str(shop / "all/report.xml"))
     cases = list(suite)
     assert (suite.tests, suite.errors, suite.failures) == (3, 2, 0)
@@ -130,12 +135,12 @@ def test_a_bad_row_costs_that_row(typed: Callable[..., Any], shop: Path) -> None
 
 def test_limits_decide_the_exit_status_and_are_named(typed: Callable[..., Any], shop: Path) -> None:
     typed("batch", PATTERN, "-o", "all", "-q")
-    middle = sorted(float(row["mu [Pa]"]) for row in rows(shop / "all"))[2]
-    (shop / "limits.toml").write_text(f'[parameters.mu]\nmax = "{1.1 * middle} Pa"\n')
+    middle = sorted(float(row["mu [MPa]"]) for row in rows(shop / "all"))[2]
+    (shop / "limits.toml").write_text(f'[parameters.mu]\nmax = "{1.1 * middle} MPa"\n')
     done = typed("batch", PATTERN, "-o", "all", "--resume", "--limits", "limits.toml", "--junit", "r.xml")
     assert done.returncode == 1, done.stderr
     table = rows(shop / "all")
-    over = [float(row["mu [Pa]"]) > 1.1 * middle for row in table]
+    over = [float(row["mu [MPa]"]) > 1.1 * middle for row in table]
     assert 0 < sum(over) < 5
     assert ["fail" in row["limits"] for row in table] == over
     assert all(row["out of limits"].startswith("mu = ") == bad for row, bad in zip(table, over, strict=True))
@@ -207,6 +212,28 @@ def test_results_that_stand_are_refused_resumed_or_replaced(typed: Callable[...,
     assert (forced.returncode, json.loads(forced.stdout)["kept"]) == (0, 0)
     assert not set(stamps(shop / "all/bushings").items()) & set(before.items())
     assert tree(shop / "all") == files
+
+
+def test_another_form_replaces_the_table_and_does_again_only_what_has_tables_of_it(
+    typed: Callable[..., Any], shop: Path
+) -> None:
+    few = "bushings/b[01]/bushing.toml"
+    assert typed("batch", few, "-o", "all", "-q").returncode == 0
+    refused = typed("batch", few, "-o", "all", "--table-format", "xlsx")
+    assert refused.returncode == 2
+    assert "batch.csv" in refused.stderr
+    again = typed("batch", few, "-o", "all", "--resume", "--json", "--table-format", "xlsx", "--plot-format", "svg")
+    assert json.loads(again.stdout)["kept"] == 2, "no bushing has a table or a picture"
+    assert "wrote batch.xlsx, bushings/ to" in again.stderr
+    assert sorted(file.name for file in (shop / "all").iterdir()) == ["batch.xlsx", "bushings"], "batch.csv is gone"
+    (sheet,) = openpyxl.load_workbook(shop / "all/batch.xlsx")
+    header, *lines = sheet.iter_rows(values_only=True)
+    model = json.loads((shop / "all/bushings/b1/model.json").read_text())
+    assert dict(zip(header, lines[1], strict=True))["mu [MPa]"] == 1e-6 * model["parameters"]["mu"]["value"]
+    tables = ("batch", few, "-o", "all", "--resume", "--json", "--tables")
+    assert json.loads(typed(*tables).stdout)["kept"] == 0
+    assert json.loads(typed(*tables, "--table-format", "decimal-comma").stdout)["kept"] == 0
+    assert json.loads(typed(*tables, "--table-format", "decimal-comma").stdout)["kept"] == 2
 
 
 def test_results_of_rows_that_are_gone_do_not_stay_unsaid(typed: Callable[..., Any], shop: Path) -> None:

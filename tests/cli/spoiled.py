@@ -142,6 +142,7 @@ FILES = {
 READING = ("fit-static", "fit-dynamic", "fit", "diagnose", "run")
 TAKING_MODELS = (
     ("predict", "model.json"),
+    ("compare", "model.json", "campaign.toml"),
     ("simulate", "model.json"),
     ("diagnose", "campaign.toml", "--model", "model.json"),
     ("fit-static", "campaign.toml", "--dynamic", "model.json"),

@@ -25,6 +25,7 @@ CAMPAIGN = "configs/cmp_15961.toml"
         ("fit", CAMPAIGN),
         ("run", CAMPAIGN),
         ("predict", "model/model.json"),
+        ("compare", "model", "model/model.json"),
         ("simulate", "model/model.json"),
         ("export", "model/model.json", "--format", "abaqus"),
     ],
@@ -124,7 +125,9 @@ def test_everyday_units_need_no_pint(work: Path, tmp_path: Path) -> None:
     assert (tmp_path / "fit" / "model.json").exists()
 
 
-@pytest.mark.parametrize("command", ["run", "fit-static", "fit-dynamic", "fit", "predict", "simulate", "export"])
+@pytest.mark.parametrize(
+    "command", ["run", "fit-static", "fit-dynamic", "fit", "predict", "compare", "simulate", "export"]
+)
 def test_every_command_has_help_that_names_its_files(bushfit: Run, command: str) -> None:
     done = bushfit(command, "--help")
     assert done.returncode == 0

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
+import pytest
 from commandline import Done
 
 Run = Callable[..., Done]
@@ -71,3 +72,26 @@ def test_predict_at_a_temperature_needs_a_model_that_knows_one(bushfit: Run, tmp
         done = bushfit(*at, "--temperature", temperature)
         assert done.returncode == 2
         assert said in done.stderr
+
+
+def test_predict_writes_maxwell_arms_where_asked(bushfit: Run, root: Path, tmp_path: Path) -> None:
+    model, folder = str(root / "data/arm_bushing/truth.json"), tmp_path / "x"
+    done = bushfit("predict", model, "--arms", "0.5 %", "-o", str(folder), "--json")
+    assert done.returncode == 0, done.stderr
+    (part,) = json.loads(done.stdout)["arms"]
+    assert part["in_place_of"] == "springpot"
+    assert part["largest_relative_error"] <= 0.005
+    assert f"{len(part['relaxation_time_s'])} Maxwell arms in place of the springpot: off by at most" in done.stderr
+    table = pd.read_csv(folder / "arms.csv")
+    assert table["in place of"].tolist() == ["elastic"] + ["springpot"] * len(part["relaxation_time_s"])
+    assert table["relaxation time [s]"].tolist()[1:] == pytest.approx(part["relaxation_time_s"], rel=1e-6)
+    ratio = table["radial stiffness [N/mm]"] / table["shear modulus [MPa]"]
+    assert ratio.max() / ratio.min() - 1.0 < 1e-5
+    assert (folder / "arms.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_predict_takes_one_per_cent_for_arms_where_no_error_is_given(bushfit: Run, root: Path, tmp_path: Path) -> None:
+    model = str(root / "data/arm_bushing/truth.json")
+    done = bushfit("predict", model, "-o", str(tmp_path / "x"), "--json", "--no-plots", "--arms")
+    assert done.returncode == 0, done.stderr
+    assert 0.001 < json.loads(done.stdout)["arms"][0]["largest_relative_error"] <= 0.01

@@ -72,7 +72,7 @@ def test_another_name_without_a_part_takes_the_name_back(measured: Measured, mon
         undescribed.setattr(verdict, "describe", lambda *_: None)
         diagnosis = asked(measured(INERTIA, SHARED))
     assert diagnosis.verdict == "unexplained"
-    assert diagnosis.to_document()["gap"]["name_again"] == (1, 3)
+    assert diagnosis.to_document()["gap"]["name_again"] == [1, 3]
     del again[1]
     assert said(asked(measured(INERTIA, SHARED))) == "named inertia"
 

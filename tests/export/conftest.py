@@ -1,4 +1,4 @@
-"""The paper's bushing to be exported over the whole grid of the kept computation, which bushfit did not make."""
+"""The paper's bushing to be exported over the whole grid of the kept computation, which bushfit did not make; FMUs."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from fmus import Running, order_of
 from kept import HASH
 
-from bushfit.export.contract import Order
+from bushfit.export.contract import Exported, Order
+from bushfit.export.fmu import export
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -47,3 +49,24 @@ def named(order: Order) -> Callable[[str], Order]:
         return replace(order, result=Result(model), source=Source(Path(name.replace("\0", "") or "x"), HASH))
 
     return called
+
+
+@pytest.fixture(scope="session")
+def exported(paper_model: Model) -> Exported:
+    """The paper's bushing in three directions, for all systems."""
+    return export(order_of(paper_model))
+
+
+@pytest.fixture(scope="session")
+def paper(exported: Exported, tmp_path_factory: pytest.TempPathFactory) -> Running:
+    """The same, ready to run."""
+    folder = tmp_path_factory.mktemp("fmu")
+    ((name, content),) = exported.files.items()
+    (folder / name).write_bytes(content)
+    return Running(folder / name, folder / "open")
+
+
+@pytest.fixture(scope="session")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder for other FMUs."""
+    return tmp_path_factory.mktemp("others")

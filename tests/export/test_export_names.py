@@ -103,7 +103,7 @@ def test_csv_files_begin_no_formula(name: str, named: Callable[[str], Order]) ->
 
 
 @nasty
-def test_sheets_have_names_that_excel_takes(name: str, order: Order) -> None:
+def test_sheets_have_names_that_excel_takes(name: str) -> None:
     """At most 31 characters, none of []:*?/\\, no apostrophe at an end, not History, and each once, capitals aside."""
     import pandas as pd
 

@@ -29,8 +29,8 @@ from bushfit.report.page.gathered import (
 from bushfit.units import number
 
 if TYPE_CHECKING:
+    from bushfit.model.document import TestTable
     from bushfit.report.contents import Tables
-    from bushfit.report.page.schema import Test
 
 #: Points of sweeps, and rows of loops, of a whole page: with these it stays below 500 kB.
 _MOST_POINTS, _MOST_ROWS = 3200, 2400
@@ -51,7 +51,7 @@ class Panel:
     notes: Sequence[str]
 
 
-def tested_panels(result: Result, tables: Tables, tests: Sequence[Test]) -> list[Panel]:
+def tested_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) -> list[Panel]:
     """Stiffness and loss factor of each place, measured and predicted."""
     table, places = tests_of(tables, "sweep"), places_of(result, tables)
     if table is None:
@@ -123,7 +123,7 @@ def _span(values: Array) -> str:
     return f"{number(float(known.min()), 3)} to {number(float(known.max()), 3)}" if known.size else "nothing"
 
 
-def loop_panels(result: Result, tables: Tables, tests: Sequence[Test]) -> list[Panel]:
+def loop_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) -> list[Panel]:
     """Force over displacement of each place, measured and modelled."""
     table = tests_of(tables, "loop")
     if table is None:
@@ -182,7 +182,7 @@ def _loops(place: Place, loops: Sequence[LoopCurve]) -> list[Markup]:
     ]
 
 
-def gap_panels(result: Result, tables: Tables, tests: Sequence[Test]) -> list[Panel]:
+def gap_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) -> list[Panel]:
     """What is left of each place before and after, measured less model in %."""
     gap = gap_of(tables)
     if gap is None or not any(str(name).endswith("before [%]") for name in gap):

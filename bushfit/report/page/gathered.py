@@ -20,8 +20,8 @@ from bushfit.units import number
 if TYPE_CHECKING:
     import pandas as pd
 
+    from bushfit.model.document import TestTable
     from bushfit.report.contents import Tables
-    from bushfit.report.page.schema import Test
 
 #: How near a predicted level lies to the measured one that it stands for, relative.
 _SAME_LEVEL = 0.02
@@ -140,7 +140,7 @@ def complete(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
 
 
 def sweeps_at(
-    place: Place, rows: pd.DataFrame, tests: Sequence[Test], predicted: pd.DataFrame | None, most: int
+    place: Place, rows: pd.DataFrame, tests: Sequence[TestTable], predicted: pd.DataFrame | None, most: int
 ) -> Iterator[Sweeps]:
     """The sweeps of a place by what they step through, of each curve at most so many points."""
     stiffness = columns_of(place)[1]
@@ -163,7 +163,7 @@ def sweeps_at(
 
 
 def _by_kind(
-    place: Place, rows: pd.DataFrame, tests: Sequence[Test]
+    place: Place, rows: pd.DataFrame, tests: Sequence[TestTable]
 ) -> Iterator[tuple[str | None, str, str, pd.DataFrame]]:
     """Sweeps that step through the same: what it is, the headers of what lies along x and of what is held (the test,
     where nothing is), and the rows."""
@@ -200,7 +200,7 @@ def _predicted(
     return numbers(near, along, *names), numbers(near, *band), numbers(near, *rigs) if rigs[0] in near else None
 
 
-def loops_at(place: Place, rows: pd.DataFrame, tests: Sequence[Test], most: int) -> list[LoopCurve]:
+def loops_at(place: Place, rows: pd.DataFrame, tests: Sequence[TestTable], most: int) -> list[LoopCurve]:
     """The loops of a place, at most eight, each with at most so many rows of its last cycle."""
     resisting, frequency = columns_of(place)[2], {test.test: test.frequency_Hz[0] for test in tests}
     headers = _moved(place), resisting, f"model {resisting}"
@@ -227,7 +227,7 @@ def _thin(count: int, most: int) -> slice:
     return slice(None, None, max(1, -(-count // most)))
 
 
-def cells_at(place: Place, gap: pd.DataFrame, tests: Sequence[Test]) -> Iterator[Cells]:
+def cells_at(place: Place, gap: pd.DataFrame, tests: Sequence[TestTable]) -> Iterator[Cells]:
     """Maps of a place: measured less model in %, of sweeps storage and loss, of loops the force."""
     mine = gap[gap["direction"] == str(place)]
     for stepped, along, held, rows in _by_kind(place, mine[mine["kind"] == "sweep"], tests):

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
+from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.errors import ModelError
+from bushfit.model.document import CampaignTable
 from bushfit.model.file import from_document
 from bushfit.model.result import Result
-from bushfit.reading.measurement import Stepped
-from bushfit.validation import Number, WholeNumber, check_tables
+from bushfit.validation import check_tables
 
 #: Documents that hold a model, the one to use first.
 MODELS = ("model", "dynamic", "static")
@@ -20,121 +21,10 @@ PLAIN = "joint"
 #: What "schema" of a diagnosis says.
 DIAGNOSIS = "bushfit/diagnosis/2"
 
-Pair = tuple[Number, Number]
-
-
-@dataclass(frozen=True)
-class Test:
-    """campaign.tests: a test, its range [SI] and what the campaign says of it."""
-
-    test: str
-    kind: str
-    place: str
-    frequency_Hz: Pair  # noqa: N815
-    amplitude: Pair
-    unit: Literal["m", "rad", "1"]
-    rows: WholeNumber
-    repeats: WholeNumber = 1
-    stepped: Stepped | None = None
-    file: str | None = None
-    sha256: str | None = None
-    conditions: Mapping[str, str | Number] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class About:
-    """campaign: what the result is of; files of older versions do not say it."""
-
-    name: str
-    file: str
-    sha256: str
-    command: str
-    tests: tuple[Test, ...] = ()
-
-
-@dataclass(frozen=True)
-class Size:
-    """effects.parameters: a value [SI] with its interval."""
-
-    value: Number
-    unit: str
-    ci95: Pair | None = None
-
-
-@dataclass(frozen=True)
-class Found:
-    """effects: what was added, or leads a set of look-alikes."""
-
-    name: str
-    level: str
-    sentence: str
-    evidence: str
-    parameters: Mapping[str, Size]
-    twins: tuple[str, ...] = ()
-    alternatives: tuple[str, ...] = ()
-    test: str | None = None
-    correction: str | None = None
-
-
-@dataclass(frozen=True)
-class Region:
-    """where, remainder: a region of disagreement in a sentence."""
-
-    excess: Number
-    reading: str
-
-
-@dataclass(frozen=True)
-class Change:
-    """gap: root mean square residuals in units of noise."""
-
-    before: Number
-    after: Number
-
-
-@dataclass(frozen=True)
-class Skipped:
-    """gap.skipped: what could not be held out."""
-
-    part: str
-    reason: str
-
-
-@dataclass(frozen=True)
-class Gap:
-    """gap: on the data fitted, and on what was held out."""
-
-    calibration: Change
-    heldout: Change | None = None
-    skipped: tuple[Skipped, ...] = ()
-    name_again: tuple[WholeNumber, WholeNumber] | None = None
-
-
-@dataclass(frozen=True)
-class Words:
-    """description: what a gap without a name is like."""
-
-    words: str
-
-
-@dataclass(frozen=True)
-class Diagnosed:
-    """diagnosis.json, as far as the page tells it."""
-
-    verdict: str
-    summary: str
-    effects: tuple[Found, ...]
-    where: tuple[Region, ...]
-    remainder: tuple[Region, ...]
-    gap: Gap
-    next_test: str
-    description: Words | None = None
-    warnings: tuple[str, ...] = ()
-
 
 @dataclass(frozen=True)
 class _Model:
-    campaign: About | None = None
+    campaign: CampaignTable | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,8 +33,8 @@ class Checked:
 
     result: Result
     plain: Result | None
-    about: About | None
-    diagnosis: Diagnosed | None
+    about: CampaignTable | None
+    diagnosis: DiagnosisFile | None
     versions: Mapping[str, str]
 
 
@@ -174,7 +64,7 @@ def checked(documents: Mapping[str, Mapping[str, Any]], files: Mapping[str, Path
         result,
         from_document(plain, at.get(PLAIN)) if plain else None,
         check_tables(model, at.get(name), _Model, kind=ModelError).campaign,
-        check_tables(diagnosis, at.get("diagnosis"), Diagnosed, kind=ModelError) if diagnosis is not None else None,
+        check_tables(diagnosis, at.get("diagnosis"), DiagnosisFile, kind=ModelError) if diagnosis is not None else None,
         {"bushfit": str(provenance.get("bushfit", "")), **_texts(provenance.get("packages"))},
     )
 

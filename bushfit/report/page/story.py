@@ -11,7 +11,7 @@ from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Bushing, Place, S
 from bushfit.model.result import Misfit, Result, Usable
 from bushfit.report.page.drawings import MOST_PLACES, gap_panels, loop_panels, tested_panels
 from bushfit.report.page.gathered import columns_of, complete, places_of
-from bushfit.report.page.schema import Checked, Found, Test
+from bushfit.report.page.schema import Checked
 from bushfit.report.parameters import interval_kind, parameter_rows
 from bushfit.report.tables import spread
 from bushfit.units import alike, for_people, number
@@ -19,6 +19,8 @@ from bushfit.units import alike, for_people, number
 if TYPE_CHECKING:
     import pandas as pd
 
+    from bushfit.diagnosis.document import BeforeAfter, EffectEntry
+    from bushfit.model.document import TestTable
     from bushfit.report.contents import Tables
 
 #: How a verdict is coloured: nothing to do, something to know, something to do.
@@ -49,7 +51,7 @@ def story(found: Checked, tables: Tables) -> dict[str, Any]:
     """All that the template of a report asks for."""
     result, diagnosis, about = found.result, found.diagnosis, found.about
     tests = about.tests if about else ()
-    said = (*result.warnings, *(diagnosis.warnings if diagnosis else ()))
+    said = (*result.warnings, *(diagnosis["warnings"] if diagnosis else ()))
     warnings = list({line[:_SAME_LETTERS]: line for line in reversed(said)}.values())[::-1]
     return {
         "name": about.name if about else result.name,
@@ -59,8 +61,8 @@ def story(found: Checked, tables: Tables) -> dict[str, Any]:
         "conditioned": any(test.conditions for test in tests),
         "more_tests": max(0, len(tests) - _MOST),
         "diagnosis": diagnosis,
-        "tone": _TONES.get(diagnosis.verdict, "fair") if diagnosis else "fair",
-        "effects": [_effect(effect) for effect in diagnosis.effects] if diagnosis else [],
+        "tone": _TONES.get(diagnosis["verdict"], "fair") if diagnosis else "fair",
+        "effects": [_effect(effect) for effect in diagnosis["effects"]] if diagnosis else [],
         "usable": [_usable(place) for place in result.usable],
         "rows": list(parameter_rows(result)),
         "interval": interval_kind(result),
@@ -111,7 +113,7 @@ def _specimen(specimen: Specimen) -> str:
     )
 
 
-def _conditions(tests: Sequence[Test]) -> Iterator[tuple[str, str]]:
+def _conditions(tests: Sequence[TestTable]) -> Iterator[tuple[str, str]]:
     """Conditions of all tests: each value once; of three that every report has, too, that they are not stated."""
     for key, name in _CONDITIONS.items():
         values = list(dict.fromkeys(test.conditions[key] for test in tests if key in test.conditions))
@@ -124,7 +126,7 @@ def _conditions(tests: Sequence[Test]) -> Iterator[tuple[str, str]]:
             yield name, "not stated"
 
 
-def _tested(test: Test, misfits: Sequence[Misfit]) -> dict[str, str]:
+def _tested(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str]:
     """A test in a row of a table: its range, and how well the model meets it."""
     unit, factor = _DISPLAYS[test.unit]
     met = next((misfit for misfit in misfits if misfit.test == test.test and misfit.held is None), None)
@@ -161,12 +163,12 @@ def _usable(place: Usable) -> dict[str, Any]:
     }
 
 
-def _effect(effect: Found) -> dict[str, Any]:
+def _effect(effect: EffectEntry) -> dict[str, Any]:
     """An effect that was named, with its sizes as people read them."""
     sizes = []
-    for name, size in effect.parameters.items():
-        unit, factor = for_people(size.unit, 1.0, size.value)
-        value, *ends = alike([factor * x for x in (size.value, *(size.ci95 or ()))], 4, least=2)
+    for name, size in effect["parameters"].items():
+        unit, factor = for_people(size["unit"], 1.0, size["value"])
+        value, *ends = alike([factor * x for x in (size["value"], *(size["ci95"] or ()))], 4, least=2)
         sizes.append({"name": name, "value": f"{value} {unit}".removesuffix(" -"), "interval": " to ".join(ends)})
     return {"found": effect, "sizes": sizes}
 
@@ -201,10 +203,19 @@ def _gaps(found: Checked) -> list[tuple[str, str, str]]:
     """Root mean square of what is left, in units of noise: held out first."""
     if found.diagnosis is None:
         return []
-    gap = found.diagnosis.gap
-    held = ("not testable", "") if gap.heldout is None else (f"{gap.heldout.before:.2f}", f"{gap.heldout.after:.2f}")
-    fitted = f"{gap.calibration.before:.2f}", f"{gap.calibration.after:.2f}"
-    return [("held out, predicted from the other tests", *held), ("data fitted", *fitted)]
+    gap = found.diagnosis["gap"]
+    return [
+        ("held out, predicted from the other tests", *_change(gap["heldout"])),
+        ("data fitted", *_change(gap["calibration"])),
+    ]
+
+
+def _change(gap: BeforeAfter | None) -> tuple[str, str]:
+    """A gap before and after."""
+    if gap is None:
+        return "not testable", ""
+    before, after = (f"{each:.2f}" if each is not None else "not known" for each in (gap["before"], gap["after"]))
+    return before, after
 
 
 def _tabled(result: Result, tables: Tables) -> list[tuple[str, ...]]:

@@ -5,15 +5,19 @@ The one importer of matplotlib. Nothing here touches its global state, so figure
 thread. Levels differ in colour (of scales that survive colour blindness and grey print), line style and marker.
 """
 
+from bushfit.report.plots.arms import arms_figure
+from bushfit.report.plots.comparison import comparison_figure
 from bushfit.report.plots.fits import loops_figure, sweeps_figure
 from bushfit.report.plots.gap import gap_figure
 from bushfit.report.plots.inspection import inspection_figure
 from bushfit.report.plots.prediction import fine_grid, prediction_figure
 from bushfit.report.plots.reduction import reduction_figure
 from bushfit.report.plots.resonance import resonance_figure
-from bushfit.report.plots.style import to_png
+from bushfit.report.plots.style import to_image
 
 __all__ = [
+    "arms_figure",
+    "comparison_figure",
     "fine_grid",
     "gap_figure",
     "inspection_figure",
@@ -22,5 +26,5 @@ __all__ = [
     "reduction_figure",
     "resonance_figure",
     "sweeps_figure",
-    "to_png",
+    "to_image",
 ]

@@ -1,4 +1,4 @@
-"""What all figures share: size, type, colours, legends, and the way to a PNG."""
+"""What all figures share: size, type, colours, legends, and the way to a file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from matplotlib import colormaps
+from matplotlib import colormaps, rc_context
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
@@ -51,6 +51,8 @@ WORDS: dict[str, Any] = {"fontsize": SMALL, "color": INK}
 OUTLIER = "#c1121f"
 #: Resolution of a picture [dots per inch]: sharp in a report, and small enough to be mailed.
 _DPI = 150
+#: By format: what it would say of when and by which version it was written.
+_UNSAID = {"png": ["Software"], "svg": ["Creator", "Date"], "pdf": ["Creator", "Producer", "CreationDate"]}
 #: Most lines that a legend names: more do not fit beside a panel, and more colours are not told apart.
 MOST_NAMED = 8
 #: Most letters of a file's name in a legend: three legend columns of such names fill the width of a figure.
@@ -230,10 +232,14 @@ def explain(figure: Figure, *sentences: str) -> None:
     figure.supxlabel(text, x=0.01, ha="left", fontsize=SMALL, color=GREY, parse_math=False)
 
 
-def to_png(figure: Figure) -> bytes:
-    """The figure as PNG, the same bytes for the same figure: no date, no version."""
+def to_image(figure: Figure, form: str = "png") -> bytes:
+    """The figure as PNG, SVG or PDF, the same bytes for the same figure: no date, no version.
+
+    Texts of an SVG are outlines, which look the same wherever they are shown; those of a PDF can be found and copied.
+    """
     buffer = io.BytesIO()
-    with warnings.catch_warnings():
+    settings = rc_context({"svg.hashsalt": "bushfit", "svg.fonttype": "path", "pdf.fonttype": 42})
+    with warnings.catch_warnings(), settings:
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        figure.savefig(buffer, format="png", dpi=_DPI, facecolor="white", metadata={"Software": None})
+        figure.savefig(buffer, format=form, dpi=_DPI, facecolor="white", metadata=dict.fromkeys(_UNSAID[form]))
     return buffer.getvalue()

@@ -17,7 +17,7 @@ from matplotlib.transforms import Bbox
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
-from bushfit.report.plots import gap_figure, to_png
+from bushfit.report.plots import gap_figure, to_image
 
 Swept = Callable[..., SweepData]
 Looped = Callable[..., LoopData]
@@ -206,7 +206,7 @@ def test_a_hole_stays_white(paper_model: Model, swept: Swept) -> None:
 
 
 def test_same_figure_same_bytes(paper_model: Model, heavier: Callable[[float], Model], campaign: list[DataSet]) -> None:
-    pictures = {to_png(gap_figure(paper_model, heavier(0.1), campaign, "$ 衬套", "50 % _of_ $")) for _ in range(2)}
+    pictures = {to_image(gap_figure(paper_model, heavier(0.1), campaign, "$ 衬套", "50 % _of_ $")) for _ in range(2)}
     assert len(pictures) == 1
 
 

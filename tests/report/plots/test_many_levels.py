@@ -28,7 +28,7 @@ from bushfit.report.plots import (
     prediction_figure,
     reduction_figure,
     sweeps_figure,
-    to_png,
+    to_image,
 )
 from bushfit.report.plots.batch import Panel, batch_figure
 from bushfit.report.plots.misfit import map_rows
@@ -42,7 +42,7 @@ LONG_NAME = "a file whose name tells all that is known of the test " * 3
 
 def checked(figure: Figure) -> Figure:
     """The figure, after a look at whether anything leaves it or is too small; warnings are errors while it is drawn."""
-    assert to_png(figure)
+    assert to_image(figure)
     width, height = figure.get_size_inches()
     assert height < HIGHEST
     canvas = figure.bbox

@@ -7,7 +7,7 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from bushfit.report.plots import to_png
+from bushfit.report.plots import to_image
 from bushfit.report.plots.batch import Panel, batch_figure
 
 
@@ -25,7 +25,7 @@ def test_medians_limits_and_names(count: int) -> None:
     names = [f"$name {n}" for n in range(count)]
     panels = [one, Panel("alpha [-]", np.full(count, 0.24))]
     figure = batch_figure(panels, "x", names)
-    assert to_png(figure) == to_png(batch_figure(panels, "x", names))
+    assert to_image(figure) == to_image(batch_figure(panels, "x", names))
     axes, other = figure.axes[:2]
     heights = {float(line.get_ydata()[0]) for line in axes.lines if len(set(np.atleast_1d(line.get_ydata()))) == 1}
     assert {float(np.nanmedian(one.values)), 1.2} <= heights
@@ -42,13 +42,13 @@ def test_medians_limits_and_names(count: int) -> None:
 
 def test_a_panel_of_which_all_are_out() -> None:
     values = np.array([3.0, 4.0, 5.0])
-    to_png(batch_figure([Panel("mu [Pa]", values, (1.0, 2.0), [0, 1, 2])], "x", ["a", "b", "c"]))
+    to_image(batch_figure([Panel("mu [Pa]", values, (1.0, 2.0), [0, 1, 2])], "x", ["a", "b", "c"]))
 
 
 def test_triangles_have_a_name_and_the_value_that_the_panel_does_not_show() -> None:
     values = np.array([1.0, 1.01, 0.99, 1.02, 0.98, 4012.0, 1.0, 30.0, 0.97, 20.0])
     figure = batch_figure([Panel("mu [MPa]", values)], "x", [f"b{n}" for n in range(10)])
-    to_png(figure)
+    to_image(figure)
     axes = figure.axes[0]
     assert {text.get_text() for text in axes.texts} == {"b5: 4010", "b7: 30", "b9: 20"}
     boxes = [text.get_window_extent() for text in axes.texts]
@@ -58,7 +58,7 @@ def test_triangles_have_a_name_and_the_value_that_the_panel_does_not_show() -> N
 def test_an_odd_panel_leaves_no_gap_between_the_rows() -> None:
     names = [f"a bushing of a long name {n}" for n in range(10)]
     figure = batch_figure([panel(10)] * 5, "x", names)
-    to_png(figure)
+    to_image(figure)
     places = [axes.get_position() for axes in figure.axes[:5:2]]
     gaps = [above.y0 - below.y1 for above, below in pairwise(places)]
     print("gaps between the rows, shares of the height:", gaps)
@@ -74,7 +74,7 @@ def test_a_panel_shows_no_less_than_what_is_known() -> None:
     ends = np.stack((values - half, values + half))
     names = [f"b{n}" for n in range(6)]
     figure = batch_figure([Panel("a [-]", values, intervals=ends), Panel("b [-]", values)], "x", names)
-    to_png(figure)
+    to_image(figure)
     known, unknown = figure.axes[:2]
     assert np.ptp(known.get_ylim()) > 2.0 * half
     bars = [line for found in known.collections for line in found.get_segments()]

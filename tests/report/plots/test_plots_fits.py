@@ -8,7 +8,7 @@ from figures import FREQUENCIES, Looped, Swept, labels, legend, lines, points
 
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
-from bushfit.report.plots import loops_figure, sweeps_figure, to_png
+from bushfit.report.plots import loops_figure, sweeps_figure, to_image
 
 
 def test_sweeps_have_a_row_a_direction_and_residuals(paper_model: Model, swept: Swept) -> None:
@@ -23,7 +23,7 @@ def test_sweeps_have_a_row_a_direction_and_residuals(paper_model: Model, swept: 
     ]
     assert [len(lines(axes)) for axes in figure.axes] == [3, 3, 0, 0, 5, 5, 0, 0]
     assert sum(len(line.get_xdata()) for line in points(figure.axes[2])) == 3 * 3 * FREQUENCIES.size
-    to_png(figure)
+    to_image(figure)
     assert figure.axes[4].get_xscale() == figure.axes[6].get_xscale() == "log"
     assert figure.axes[4].get_xlim() == figure.axes[6].get_xlim()
 
@@ -43,7 +43,7 @@ def test_loops_show_model_and_residuals(paper_model: Model, looped: Looped) -> N
     assert peak == pytest.approx(458.0, rel=0.02)
     twins = loops_figure(paper_model, [data_sets[0], data_sets[0]], "twins")
     assert legend(twins.axes[1])[0] == "1 mm, 0.1 Hz\n\\$ loop \\$.csv"
-    to_png(twins)
+    to_image(twins)
 
 
 @pytest.mark.parametrize("run_in", [0, 5])

@@ -10,7 +10,7 @@ from rawfigures import colliding, labels, outside
 
 from bushfit.inspection.opening import inspect
 from bushfit.inspection.record import Inspected
-from bushfit.report.plots import inspection_figure, to_png
+from bushfit.report.plots import inspection_figure, to_image
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def test_inspection(seen: list[Inspected]) -> None:
     )
     titles = [axes.get_title(loc="left") for axes in figure.axes if axes.get_title(loc="left")]
     assert sorted(titles) == sorted(f"{one.file.name}: {one.kind}, {one.direction}" for one in seen)
-    assert len({to_png(inspection_figure(seen)) for _ in range(2)}) == 1
+    assert len({to_image(inspection_figure(seen)) for _ in range(2)}) == 1
 
 
 def test_one_file_alone_is_whole(seen: list[Inspected]) -> None:

@@ -16,7 +16,7 @@ from bushfit.model.result import Range, Result
 from bushfit.prediction import predict
 from bushfit.reading.measurement import Sweep
 from bushfit.report.artifacts import prediction_contents
-from bushfit.report.plots import loops_figure, prediction_figure, to_png
+from bushfit.report.plots import loops_figure, prediction_figure, to_image
 
 
 def test_prediction_over_frequency_and_amplitude(paper_model: Model, swept: Swept) -> None:
@@ -121,7 +121,7 @@ def test_one_amplitude_or_one_frequency_leaves_one_row(paper_model: Model) -> No
         prediction, curves = predicted(paper_model, Direction.RADIAL, frequencies, amplitudes)
         figure = prediction_figure(prediction, [], "one", curves=curves)
         assert [axes.get_xlabel() for axes in figure.axes] == [along, along]
-        to_png(figure)
+        to_image(figure)
 
 
 def test_at_most_six_amplitudes_and_four_frequencies(paper_model: Model) -> None:

@@ -11,7 +11,7 @@ from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.steps import reduce
-from bushfit.report.plots import reduction_figure, to_png
+from bushfit.report.plots import reduction_figure, to_image
 
 
 @pytest.mark.parametrize("direction", list(Direction))
@@ -36,7 +36,7 @@ def test_reduction(paper_model: Model, direction: Direction) -> None:
     loss = figure.axes[2]
     drawn = np.concatenate([line.get_ydata() for line in loss.get_lines() if line.get_linestyle() == "None"])
     np.testing.assert_allclose(np.sort(drawn), np.sort([step.loss_factor for step in reduction.steps]))
-    assert len({to_png(reduction_figure(reduction, [history], "$ raw $.csv")) for _ in range(2)}) == 1
+    assert len({to_image(reduction_figure(reduction, [history], "$ raw $.csv")) for _ in range(2)}) == 1
 
 
 def test_reduction_of_many_histories_draws_the_first(paper_model: Model) -> None:

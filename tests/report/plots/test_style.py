@@ -11,7 +11,7 @@ from matplotlib.transforms import Bbox
 
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
-from bushfit.report.plots import loops_figure, prediction_figure, sweeps_figure, to_png
+from bushfit.report.plots import loops_figure, prediction_figure, sweeps_figure, to_image
 from bushfit.report.plots.style import dress
 
 
@@ -19,19 +19,19 @@ def test_same_figure_same_bytes_and_no_trace_of_when_or_with_what(paper_model: M
     prediction, curves = predicted(paper_model, Direction.AXIAL)
     settings = dict(matplotlib.rcParams)
     pictures = {
-        to_png(prediction_figure(prediction, [swept(paper_model)], "CMP 15 961", curves=curves)) for _ in range(2)
+        to_image(prediction_figure(prediction, [swept(paper_model)], "CMP 15 961", curves=curves)) for _ in range(2)
     }
     assert len(pictures) == 1
     assert pictures.pop()[:8] == b"\x89PNG\r\n\x1a\n"
     assert dict(matplotlib.rcParams) == settings
-    picture = to_png(prediction_figure(prediction, [], "x"))
+    picture = to_image(prediction_figure(prediction, [], "x"))
     assert not any(chunk in picture for chunk in (b"tEXt", b"iTXt", b"zTXt", b"tIME", b"Matplotlib"))
 
 
 @pytest.mark.parametrize("title", ["price in $ and 50 %, a_b^c\\", "衬套 61 Shore A", "x" * 300, ""])
 def test_any_name_can_be_a_title(paper_model: Model, title: str) -> None:
     prediction, _ = predicted(paper_model, Direction.AXIAL)
-    assert to_png(prediction_figure(prediction, [], title))
+    assert to_image(prediction_figure(prediction, [], title))
 
 
 def test_no_text_lies_on_another(paper_model: Model, swept: Swept, looped: Looped) -> None:

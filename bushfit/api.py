@@ -1,0 +1,230 @@
+"""What `import bushfit` offers in a notebook or a script: each function does what the command of its name does.
+
+Numbers are in SI: Hz, m, rad, N/m, and shares such as 0.01. See python.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.campaign import load_campaign as load_campaign
+from bushfit.campaign.schema import PredictSettings, SimulateSettings
+from bushfit.diagnosis.record import Settings
+from bushfit.effects.contract import Array
+from bushfit.errors import BushfitError, did_you_mean
+from bushfit.fitting.data import Data
+from bushfit.jobs import Outcome
+from bushfit.jobs.diagnose import Diagnose, Diagnosed
+from bushfit.jobs.fits import Fit, FitDynamic, FitStatic, Fitted
+from bushfit.jobs.predict import Predict, Predicted
+from bushfit.jobs.run import Ran, Run
+from bushfit.model.file import load_result
+from bushfit.model.model import Model
+from bushfit.model.result import Result
+from bushfit.report.contents import Formats
+from bushfit.report.folder import write_files
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+#: Frequencies or amplitudes.
+Numbers = Sequence[float] | Array
+
+
+def load_model(path: str | Path) -> Result:
+    """The model in a model.json, with its uncertainty.
+
+    Raises:
+        ModelError: no such file, or no model.
+    """
+    return load_result(Path(path))
+
+
+def fit(
+    campaign: Campaign, *, directions: Sequence[str] = (), effects: Sequence[str] = (), profile: bool = False
+) -> Fitted:
+    """All five parameters from the loops and sweeps of a campaign together: the fit to use.
+
+    Args:
+        directions: whose tests to fit, or specimens by name; axial, and all specimens, unless given.
+        effects: added to the paper's three, such as "inertia".
+        profile: whether to add 95 % intervals by profile likelihood, which takes some seconds.
+
+    Raises:
+        BushfitError: tests or settings that cannot support it.
+    """
+    return Fit(tuple(directions), tuple(effects), _untold if profile else None).run(Data.of(campaign))
+
+
+def fit_static(campaign: Campaign, *, dynamic: Result | Outcome | None = None) -> Fitted:
+    """mu, sigma_fmax and eps_half from the loops, with m and alpha held at a result where one is given."""
+    return FitStatic(_result(dynamic) if dynamic else None).run(Data.of(campaign))
+
+
+def fit_dynamic(campaign: Campaign, *, static: Result | Outcome | None = None) -> Fitted:
+    """m and alpha from the sweep of smallest amplitude, the rest held at a result, or at a fit of the loops."""
+    return FitDynamic(_result(static) if static else None).run(Data.of(campaign))
+
+
+def diagnose(
+    campaign: Campaign,
+    *,
+    model: Result | Outcome | None = None,
+    adopt: Sequence[str] = (),
+    without: Sequence[str] = (),
+    max_effects: int = 3,
+    tolerance: float = 0.01,
+) -> Diagnosed:
+    """Where model and tests disagree, what is missing, and the model with it.
+
+    Args:
+        model: whose effects to start from; the paper's three unless given.
+        adopt: effects to add by hand, whatever the evidence.
+        without: effects not to consider.
+        max_effects: effects added in turn at the most.
+        tolerance: gaps below this share of |K| do not count.
+
+    Raises:
+        BushfitError: tests or settings that cannot support it.
+    """
+    start = _result(model) if model else None
+    settings = Settings(max_effects, tolerance, tuple(adopt), tuple(without), start.unresolved if start else ())
+    return Diagnose(settings, start.model if start else None).run(Data.of(campaign))
+
+
+def run(campaign: Campaign) -> Ran:
+    """The whole chain: the fits, what is missing, and the prediction."""
+    return Run().run(Data.of(campaign))
+
+
+def predict(
+    model: Result | Outcome,
+    campaign: Campaign | None = None,
+    *,
+    directions: Sequence[str] | None = None,
+    frequencies: Numbers | None = None,
+    amplitudes: Numbers | None = None,
+    torsion_amplitudes: Numbers | None = None,
+    strain_amplitudes: Numbers | None = None,
+    temperature: float | None = None,
+) -> Predicted:
+    """Stiffness and loss factor over a grid, with 95 % bands.
+
+    Args:
+        model: a result, or what a fit or a diagnosis found.
+        campaign: whose sweeps to lay beside; its grid holds where none is given.
+        directions: or specimens by name; axial and radial, and all specimens, unless given.
+        frequencies: [Hz].
+        amplitudes, torsion_amplitudes, strain_amplitudes: zero-to-peak, of displacements [m], of rotations [rad], and
+            of a specimen's strain.
+        temperature: [K], where the model has an effect of it.
+
+    Raises:
+        ModelError: a place, frequency or amplitude that the model cannot have.
+    """
+    asked = PredictSettings(
+        frequencies=_values(frequencies),
+        amplitudes=_values(amplitudes),
+        torsion_amplitudes=_values(torsion_amplitudes),
+        strain_amplitudes=_values(strain_amplitudes),
+        directions=None if directions is None else tuple(directions),
+    )
+    return Predict(asked, temperature=temperature).run(_result(model), campaign)
+
+
+def simulate(
+    source: Model | Result | Outcome | Campaign, folder: str | Path, *, force: bool = False, **settings: Any
+) -> Campaign:
+    """Put a model on the virtual rig, write the campaign of its simulated tests, and load it.
+
+    Args:
+        source: a model, which is tested as the paper's bushing was, or a campaign with a [simulate] table.
+        folder: for campaign.toml, the test files, and the model behind them in truth.json.
+        force: replaces files that stand there.
+        settings: what the rig does otherwise, by the keys of [simulate]: noise = 0.005, repeats = 3, seed = 1.
+
+    Raises:
+        BushfitError: no model, or files that stand there.
+    """
+    from bushfit.simulation import model_of, to_files
+    from bushfit.simulation import simulate as measured
+
+    if isinstance(source, Campaign):
+        truth, plan = model_of(source), source.simulate or SimulateSettings()
+    else:
+        truth, plan = source if isinstance(source, Model) else _result(source).model, SimulateSettings()
+    write_files(Path(folder), to_files(measured(truth, replace(plan, **settings))), force=force)
+    return load_campaign(Path(folder) / "campaign.toml")
+
+
+def table(outcome: Outcome, name: str) -> pd.DataFrame:
+    """A table of what was found, by the name of its file: "axial" of a prediction, "sweeps" of a fit."""
+    tables = outcome.contents.tables
+    _require(name, list(tables), "table")
+    return tables[name]()
+
+
+def picture(outcome: Outcome, name: str) -> Figure:
+    """A picture of what was found, by the name of its file, as a figure of matplotlib."""
+    pictures = outcome.contents.pictures
+    _require(name, list(pictures), "picture")
+    return pictures[name]()
+
+
+def parameters(model: Result | Outcome) -> pd.DataFrame:
+    """The parameters in SI: value, standard error, ends of the 95 % interval, unit, and whether each was fitted."""
+    import pandas as pd
+
+    result = _result(model)
+    rows = {
+        name: (
+            result.model.values[name],  # noqa: PD011
+            result.covariance.stderr(name),
+            *(result.interval(name) or (None, None)),
+            parameter.unit,
+            name in result.fitted,
+        )
+        for name, parameter in result.model.parameters.items()
+    }
+    columns = ["value", "std error", "low", "high", "unit", "fitted"]
+    numbers = dict.fromkeys(columns[:4], float)
+    return pd.DataFrame.from_dict(rows, orient="index", columns=columns).astype(numbers)
+
+
+def save(
+    outcome: Outcome, folder: str | Path, *, tables: bool = True, pictures: bool = True, force: bool = False
+) -> Path:
+    """Write what was found into a folder, all of it or none, as the command would, and return the folder.
+
+    Args:
+        force: replaces results that stand there.
+
+    Raises:
+        OutputError: the folder cannot be written, or results stand there.
+    """
+    write_files(Path(folder), Formats(tables, pictures).files(outcome.contents), force=force)
+    return Path(folder)
+
+
+def _untold(name: str, left: int) -> None:
+    """Says nothing of a profile that is done."""
+
+
+def _values(axis: Numbers | None) -> tuple[float, ...] | None:
+    return None if axis is None else tuple(float(value) for value in axis)
+
+
+def _result(model: Result | Outcome) -> Result:
+    return model if isinstance(model, Result) else model.result
+
+
+def _require(name: str, known: Sequence[str], what: str) -> None:
+    if name not in known:
+        expected = "one of " + ", ".join(known) if known else f"an outcome with a {what}"
+        raise BushfitError(f"there is no such {what}", found=name, expected=expected, hint=did_you_mean(name, known))

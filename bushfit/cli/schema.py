@@ -1,0 +1,41 @@
+"""`bushfit schema`: what stands in the files, for other programs and for editors."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import click
+
+from bushfit.cli.common import Options, example, shared_options
+from bushfit.cli.show import new_table
+
+
+@click.command("schema", epilog=example("bushfit schema", "bushfit schema model"))
+@click.argument("name", required=False)
+@partial(shared_options, where="nothing is written", forms=())
+def command(name: str | None, options: Options) -> None:
+    """Print the JSON Schema (draft 2020-12) of NAME on standard output; without NAME, tell which there are.
+
+    They say of every key what it holds and in which unit. Those of JSON files are for programs that read results; those
+    of campaign, manifest and limits for editors of TOML, which then complete and check keys while you type.
+
+    With -o, writes <name>.schema.json: that of NAME, or without NAME those of all files.
+    """
+    from bushfit.errors import naming
+    from bushfit.report.folder import to_json
+    from bushfit.schemas import DESCRIBED, schema
+
+    with naming(place="NAME"):
+        made = {each: schema(each) for each in ([name] if name else DESCRIBED if options.output else ())}
+    if options.output:
+        options.write(options.output, {f"{each}.schema.json": to_json(found) for each, found in made.items()})
+    elif name:
+        options.say(f"{name} describes: {DESCRIBED[name].files}")
+    else:
+        table = new_table("schemas", "name", "describes", names=2)
+        for each, described in DESCRIBED.items():
+            table.add_row(each, described.files)
+        options.console.print(table)
+    listed = {each: described.files for each, described in DESCRIBED.items()}
+    if options.as_json or (name and not options.output):
+        click.echo(to_json(made[name] if name else made or listed).decode(), nl=False)

@@ -1,0 +1,205 @@
+"""An FMU: FMI 2.0 for co-simulation, displacement in and force out, with the libraries for three systems.
+
+The libraries are compiled when the export is made, not when the package is built: the model's numbers are compiled in,
+so that an FMU reads no file while it runs, and who writes none needs no compiler.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import re
+import uuid
+import zipfile
+from collections.abc import Collection, Mapping, Sequence
+from importlib.resources import files
+from xml.etree import ElementTree as ET
+
+from bushfit import __version__
+from bushfit.campaign.naming import folder_name
+from bushfit.export.compiler import SYSTEMS, libraries
+from bushfit.export.contract import Exported, Order
+from bushfit.export.in_time import FIELDS, InTime, in_time, neutral
+from bushfit.geometry import Place, Unit
+
+#: The sources that all FMUs share.
+_SHARED = ("fmu.c", "bushing.c", "bushing.h", "fmi2.h")
+#: Exponents of SI base units of the units that have whole ones; others are known by name alone.
+_BASE: Mapping[str, dict[str, int]] = {
+    "m": {"m": 1},
+    "rad": {"rad": 1},
+    "s": {"s": 1},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "N*m": {"kg": 1, "m": 2, "s": -2},
+    "N/m": {"kg": 1, "s": -2},
+    "m/N": {"kg": -1, "s": 2},
+    "Pa": {"kg": 1, "m": -1, "s": -2},
+    "Pa*s": {"kg": 1, "m": -1, "s": -1},
+    "1/m": {"m": -1},
+    "1/rad": {"rad": -1},
+}
+#: What XML cannot hold.
+_NO_XML = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+#: Letters of a library's name at most, less those of "bushfit_".
+_LONGEST = 40
+#: Values 0 and 1 stand first on the list of the C sources.
+_FIRST = 2
+#: Time of all entries of the archive: none, so that the same model gives the same bytes.
+_NO_DATE = (1980, 1, 1, 0, 0, 0)
+#: Step that an importer takes where it is not told [s]: fifteen in a cycle of 70 Hz.
+_STEP = 1e-3
+
+
+def export(order: Order, systems: Collection[str] = tuple(SYSTEMS)) -> Exported:
+    """The FMU of an order, with one input and one output a place.
+
+    Raises:
+        ModelError: the model cannot run in time.
+        OutputError: there is no compiler.
+    """
+    found = in_time(order)
+    name = f"bushfit_{re.sub(r'[^A-Za-z0-9]+', '_', folder_name(order.result.name))[:_LONGEST].strip('_').lower()}"
+    sources = {file: (files("bushfit.export") / "c" / file).read_bytes() for file in _SHARED}
+    sources |= {"model.c": model_c(found).encode()}
+    plain = description(order, found, name, "")
+    digest = hashlib.sha256(b"".join([*sources.values(), plain, model_h(found, "").encode()])).digest()
+    guid = f"{{{uuid.UUID(bytes=digest[:16])}}}"
+    sources |= {"model.h": model_h(found, guid).encode()}
+    content = {
+        "modelDescription.xml": description(order, found, name, guid),
+        **{f"binaries/{path}": library for path, library in libraries(sources, name, systems).items()},
+        **{f"sources/{file}": source for file, source in sources.items()},
+    }
+    return Exported({f"{name}.fmu": _archive(content)}, found.losses)
+
+
+def references(found: InTime) -> dict[str, int]:
+    """The reference of each value by its name."""
+    return {value.name: _FIRST + place for place, value in enumerate(found.values)}
+
+
+def model_h(found: InTime, guid: str) -> str:
+    """Sizes of the lists, and what an importer knows the FMU by."""
+    sizes = {
+        "VALUES": _FIRST + len(found.values),
+        "CONSTANTS": _FIRST + sum(not value.settable for value in found.values),
+        "DIRECTIONS": len(found.places),
+        "PARTS": max(1, len(found.parts)),
+        "ARMS": max(1, len(found.arms)),
+    }
+    listed = ", ".join(f"{name} = {size}" for name, size in sizes.items())
+    return f'#define GUID "{guid}"\nenum {{ {listed} }};\n'
+
+
+def model_c(found: InTime) -> str:
+    """The lists themselves."""
+    reference, values = references(found), found.values
+    lists = {
+        "start": [0.0, 1.0, *(value.value for value in values)],
+        "least": [0.0, 1.0, *(value.bounds[0] for value in values)],
+        "most": [0.0, 1.0, *(value.bounds[1] for value in values)],
+    }
+    lines = ['#include "bushing.h"', ""]
+    for name, numbers in lists.items():
+        lines += [f"const double {name}[VALUES] = {{", f"    {', '.join(f'{x!r}' for x in numbers)}", "};"]
+    lines.append("const Direction directions[DIRECTIONS] = {")
+    known = [field for own in FIELDS.values() for field in own]
+    for own, lever in zip(found.fields, found.levers, strict=True):
+        neutrals = {field: neutral(field) for field in known if field not in own}
+        set_ = {**neutrals, **{field: reference[name] for field, name in own.items()}}
+        lines.append(
+            f"    {{{', '.join(f'.{field} = {place}' for field, place in set_.items())}, .lever = {lever!r}}},"
+        )
+    lines += ["};", "const Arm arms[ARMS] = {"]
+    arms = found.arms or ((0, 0.0, 1.0),)
+    lines += [f"    {{{part}, {share!r}, {time!r}}}," for part, share, time in arms]
+    return "\n".join([*lines, "};", ""])
+
+
+def description(order: Order, found: InTime, name: str, guid: str) -> bytes:
+    """modelDescription.xml: what an importer is told."""
+    about = f"Rubber bushing, displacement in and force out, of {order.source.file} (SHA-256 {order.source.sha256})"
+    root = ET.Element("fmiModelDescription", {
+        "fmiVersion": "2.0", "modelName": _text(order.result.name), "guid": guid, "description": _text(about),
+        "generationTool": f"bushfit {__version__}", "variableNamingConvention": "flat", "numberOfEventIndicators": "0",
+    })  # fmt: skip
+    simulation = ET.SubElement(root, "CoSimulation", {
+        "modelIdentifier": name, "canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true",
+        "canGetAndSetFMUstate": "true", "canSerializeFMUstate": "true",
+    })  # fmt: skip
+    compiled = ET.SubElement(simulation, "SourceFiles")
+    for file in (*(file for file in _SHARED if file.endswith(".c")), "model.c"):
+        ET.SubElement(compiled, "File", {"name": file})
+    variables = _variables(found)
+    _units(ET.SubElement(root, "UnitDefinitions"), found, {str(each["unit"]) for _, each in variables})
+    ET.SubElement(root, "DefaultExperiment", {"startTime": "0", "stopTime": "1", "stepSize": repr(_STEP)})
+    listed = ET.SubElement(root, "ModelVariables")
+    for variable, real in variables:
+        scalar = ET.SubElement(listed, "ScalarVariable", variable)
+        ET.SubElement(scalar, "Real", {key: value for key, value in real.items() if value})
+    structure = ET.SubElement(root, "ModelStructure")
+    outputs = [k for k, (variable, _) in enumerate(variables, start=1) if variable["causality"] == "output"]
+    for kind in ("Outputs", "InitialUnknowns"):
+        unknown = ET.SubElement(structure, kind)
+        for k in outputs:
+            ET.SubElement(unknown, "Unknown", {"index": str(k)})
+    ET.indent(root)
+    return ET.tostring(root, encoding="utf-8", xml_declaration=True)
+
+
+def _variables(found: InTime) -> list[tuple[dict[str, str], dict[str, str]]]:
+    """The attributes of each scalar variable, and of its real value: inputs, outputs, then the values."""
+    count, displays, listed = _FIRST + len(found.values), _displays(found.places), []
+    for place in found.places:
+        moved, resisted, _ = place.motion.words
+        kinds: tuple[tuple[str, str, str, dict[str, str], dict[str, str]], ...] = (
+            (moved, "input", place.motion.displacement_unit, {"start": "0"}, {}),
+            (resisted, "output", place.motion.force_unit, {}, {"initial": "calculated"}),
+        )
+        for which, (word, causality, unit, start, initial) in enumerate(kinds):
+            reference = count + which * len(found.places) + found.places.index(place)
+            variable = {"name": _text(f"{word}.{place}"), "valueReference": str(reference), "causality": causality}
+            shown = displays[unit].name if unit in displays else ""
+            real = {"unit": "" if unit == "1" else unit, "displayUnit": shown, **start}
+            listed.append(({**variable, "variability": "continuous", **initial}, real))
+    for value, reference in zip(found.values, references(found).values(), strict=True):
+        kind = {"causality": "parameter", "variability": "tunable"} if value.settable else {
+            "causality": "local", "variability": "constant",
+        }  # fmt: skip
+        variable = {"name": _text(value.name), "valueReference": str(reference), "description": _text(value.meaning)}
+        limits = dict(zip(("min", "max"), map(repr, value.bounds), strict=True)) if value.settable else {}
+        unit = "" if value.unit == "1" else value.unit
+        listed.append(({**variable, **kind, "initial": "exact"}, {"unit": unit, **limits, "start": repr(value.value)}))
+    return listed
+
+
+def _units(definitions: ET.Element, found: InTime, used: Collection[str]) -> None:
+    """Every unit that is used, as far as it has whole exponents in SI base units, and what engineers read it in."""
+    displays = _displays(found.places)
+    for name in sorted(filter(None, used)):
+        unit = ET.SubElement(definitions, "Unit", {"name": name})
+        if name in _BASE:
+            ET.SubElement(unit, "BaseUnit", {base: str(power) for base, power in _BASE[name].items()})
+        if name in displays:
+            ET.SubElement(unit, "DisplayUnit", {"name": displays[name].name, "factor": repr(displays[name].factor)})
+
+
+def _displays(places: Sequence[Place]) -> dict[str, Unit]:
+    """The units in which engineers read motion and force, by those that the FMU has, where these differ."""
+    both = [((p.motion.displacement_unit, p.motion.force_unit), p.display[:2]) for p in places]
+    shown = {unit: display for units, displays in both for unit, display in zip(units, displays, strict=True)}
+    return {unit: display for unit, display in shown.items() if unit != "1" and display.factor != 1.0}
+
+
+def _text(text: str) -> str:
+    """A text without what XML cannot hold."""
+    return _NO_XML.sub("_", text)
+
+
+def _archive(content: Mapping[str, bytes]) -> bytes:
+    """A zip archive of the same bytes for the same content."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in content.items():
+            archive.writestr(zipfile.ZipInfo(name, _NO_DATE), data, zipfile.ZIP_DEFLATED)
+    return buffer.getvalue()

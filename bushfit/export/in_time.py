@@ -1,0 +1,238 @@
+"""What of a model runs in time, on lists that the C sources of an FMU read: values, directions and Maxwell arms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bushfit.effects import Branch, Effect, Level, Modifier, Parameter, place_of, qualified
+from bushfit.effects.contract import Array
+from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.errors import ModelError
+from bushfit.export.contract import Order
+from bushfit.export.losses import of_band
+from bushfit.geometry import Place
+from bushfit.model.arms import Arms, fading, model_arms, qualified_size
+from bushfit.model.model import Model
+from bushfit.prediction import Prediction
+from bushfit.units import number
+
+#: What of `Direction` in c/bushing.h each effect sets, by parameter; an effect of a place goes by its kind and a dot.
+FIELDS: Mapping[str, tuple[str, ...]] = {
+    "elastic": ("mu",),
+    "asymmetry": ("c2",),
+    "strain_stiffening": ("c3",),
+    "fifth_power_stiffening": ("c5",),
+    "friction": ("sigma_fmax[0]", "eps_half[0]"),
+    "second_friction": ("sigma_fmax[1]", "eps_half[1]"),
+    "sliders": ("sigma", "e_s", "spread"),
+    "strain_scale.": ("scale",),
+    "clearance": ("play",),
+    "interface_slip": ("slip",),
+    "bump_stop": ("gap", "stop"),
+    "one_sided_stop": ("one_gap", "one_stop"),
+    "stiffness_factor.": ("factor",),
+    "preload_stiffening.": ("preload",),
+    "sleeve_compliance": ("give",),
+    "sleeve_compliance.": ("own_give",),
+}
+#: Of these fields, those that are 1 where a direction has no such effect; the others are 0.
+_ONE = {"eps_half[0]", "eps_half[1]", "e_s", "spread", "scale", "factor", "preload"}
+#: How far below and above the frequencies of model and grid the arms go: loops are slow, and a triangle has overtones.
+_BELOW, _ABOVE = 100.0, 10.0
+#: Bounds of what a shape makes of strain and stiffness, and what these two are.
+_ANY = (1e-12, 1e12)
+_STRAIN = "equivalent strain per displacement, rotation or strain"
+_STIFFNESS = "stiffness per equivalent shear modulus"
+#: Error over the grid from which it is said: below this it is rounding.
+_TOLD = 1e-6
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number of the model: SI, its bounds, and whether it can be set from outside."""
+
+    name: str
+    unit: str
+    value: float
+    bounds: tuple[float, float]
+    meaning: str
+    settable: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class InTime:
+    """A model on lists.
+
+    Args:
+        values: constants first, then what can be set.
+        fields: of each place, the C field and the name of its value; what is missing is neutral.
+        levers: arm of a slip force at each place: 1, or a radius [m].
+        parts: what the moduli of each group of arms go with.
+        arms: number of its part, modulus over the size of that, and relaxation time [s] of each.
+        losses: what is left out or held, and the error of that.
+    """
+
+    places: tuple[Place, ...]
+    values: tuple[Value, ...]
+    fields: tuple[Mapping[str, str], ...]
+    levers: tuple[float, ...]
+    parts: tuple[str, ...]
+    arms: tuple[tuple[int, float, float], ...]
+    losses: tuple[str, ...]
+
+
+def neutral(field: str) -> int:
+    """0 or 1: what a field is without its effect."""
+    return int(field in _ONE)
+
+
+def in_time(order: Order) -> InTime:
+    """The model of an order as far as it runs in time.
+
+    Raises:
+        ModelError: an effect that has no law in time, or none in the C sources; or no arms within the accuracy.
+    """
+    model = order.result.model.without(Level.INSTRUMENT)
+    left = [effect.name for effect in model.records if _is_left(effect)]
+    kept = model.without(*left)
+    held = [effect.name for effect in kept.records if isinstance(effect, Modifier)]
+    for effect in kept.records:
+        _check(effect)
+    arms = model_arms(kept, band(order), order.accuracy)
+    middle = [kept.values_at(p.direction, _middle(p.frequency), _middle(p.amplitude)) for p in order.predictions]
+    values, names = _values(kept, order.places, middle, arms)
+    losses = [f"the whole memory of the rubber: {part.sentence}, fading below" for part in arms]
+    for prediction, own in zip(order.predictions, middle, strict=True):
+        losses += [*_lost(kept, held, left, prediction, own), *of_band(prediction)]
+    return InTime(
+        order.places,
+        values,
+        tuple(_fields(kept, place, own, arms) for place, own in zip(order.places, names, strict=True)),
+        tuple(kept.bushing.outer_radius if kept.bushing and p.is_rotation else 1.0 for p in order.places),
+        tuple(part.size for part in arms),
+        tuple(
+            (k, float(modulus / kept.values[part.size]), float(time))
+            for k, part in enumerate(arms)
+            for modulus, time in zip(part.modulus, part.time, strict=True)
+        ),
+        tuple(losses),
+    )
+
+
+def band(order: Order) -> tuple[float, float]:
+    """The band of the arms [Hz]: that of model and grid, and two decades below and one above."""
+    known = [prediction.frequency for prediction in order.predictions]
+    every = np.concatenate([*known, *([order.result.measured.frequency] if order.result.measured else [])])
+    return float(every.min()) / _BELOW, float(every.max()) * _ABOVE
+
+
+def _is_left(effect: Effect) -> bool:
+    """Whether an effect is left out: what has no name, and what is gone once settled."""
+    return effect.name == UNNAMED or effect.settles
+
+
+def _kind(effect: Effect) -> str:
+    """The key of an effect in FIELDS."""
+    return f"{effect.name.partition('.')[0]}." if place_of(effect.name) else effect.name
+
+
+def _check(effect: Effect) -> None:
+    """Refuse what cannot run in time."""
+    if effect.harmonic_only or not (
+        isinstance(effect, Modifier) or _kind(effect) in FIELDS or (isinstance(effect, Branch) and effect.size)
+    ):
+        raise ModelError(
+            "an FMU follows a motion through time, for which there is no law",
+            place=effect.name,
+            found="a law of the steady first harmonic alone" if effect.harmonic_only else "a law that no FMU has",
+            expected="effects with a law in time",
+            hint="fit a model without it, or export the stiffness over frequency and amplitude in another format",
+        )
+
+
+def _middle(values: Array) -> float:
+    """The geometric middle of a range."""
+    return float(np.sqrt(values.min() * values.max()))
+
+
+def _values(
+    model: Model, places: tuple[Place, ...], middle: list[dict[str, float]], arms: tuple[Arms, ...]
+) -> tuple[tuple[Value, ...], list[dict[str, str]]]:
+    """All values, and for each place the name of its own by that of the parameter: where modifiers make it differ from
+    place to place it is called `<parameter>.<place>`."""
+    sizes, parts = {part.size for part in arms}, {qualified_size(branch) for branch in fading(model)}
+    constants, settable = list[Value](), list[Value]()
+    names = [dict[str, str]() for _ in places]
+    for effect in model.records:
+        for parameter in () if isinstance(effect, Modifier) else effect.parameters:
+            name = qualified(effect, parameter)
+            of_arms = effect.size if isinstance(effect, Branch) else None
+            if isinstance(effect, Branch) and effect.size and qualified_size(effect) not in sizes:
+                continue
+            shared = len({own[name] for own in middle}) == 1
+            for place, own, called in zip(places, middle, names, strict=True):
+                called[name] = name if shared else f"{name}.{place}"
+                value = Value(
+                    called[name],
+                    parameter.unit,
+                    own[name],
+                    _allowed(parameter, own[name]),
+                    parameter.meaning,
+                    settable=not of_arms or name in parts,
+                )
+                target = settable if value.settable else constants
+                if value not in target:
+                    target.append(value)
+    for place, called in zip(places, names, strict=True):
+        motion = place.motion.displacement_unit
+        shape = {
+            "unit_strain": Value("", f"1/{motion}" if motion != "1" else "1", model.unit_strain(place), _ANY, _STRAIN),
+            "stiffness_per_modulus": Value("", "", model.stiffness_per_modulus(place), _ANY, _STIFFNESS),
+        }
+        called |= {key: f"{key}.{place}" for key in shape}
+        settable += [replace(value, name=called[key]) for key, value in shape.items()]
+    return (*constants, *settable), names
+
+
+def _allowed(parameter: Parameter, value: float) -> tuple[float, float]:
+    """The bounds of a parameter, its neutral value and what modifiers made of it included."""
+    held = (*parameter.bounds, value, value if parameter.neutral is None else parameter.neutral)
+    return min(held), max(held)
+
+
+def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Arms, ...]) -> dict[str, str]:
+    """The value of each C field at a place."""
+    layers = model.layers(model.setting(place))
+    fields = {key: names[key] for key in ("unit_strain", "stiffness_per_modulus")}
+    for k, part in enumerate(arms):
+        fields[f"size[{k}]"] = names[part.size]
+    for effect in model.records:
+        here = isinstance(effect, Branch) or effect in layers
+        if here and _kind(effect) in FIELDS and place_of(effect.name) in (None, str(place)):
+            own = (names[qualified(effect, parameter)] for parameter in effect.parameters)
+            fields |= dict(zip(FIELDS[_kind(effect)], own, strict=True))
+    return fields
+
+
+def _lost(
+    model: Model, held: list[str], left: list[str], prediction: Prediction, values: Mapping[str, float]
+) -> list[str]:
+    """What it costs in steady stiffness at a place that modifiers are held, and that some effects are left out."""
+    if not (held or left):
+        return []
+    plain = model.without(*held)
+    own = plain.with_values({name: values[name] for name in plain.values})
+    found = own.stiffness(prediction.direction, prediction.frequency, prediction.amplitude)
+    whole = prediction.storage_stiffness.value + 1j * prediction.loss_stiffness.value
+    error = float(np.max(np.abs(found / whole - 1.0)))
+    if error < _TOLD and not left:
+        return []
+    (length, factor), *_ = prediction.direction.display
+    frequency, amplitude = number(_middle(prediction.frequency), 3), number(factor * _middle(prediction.amplitude), 3)
+    said = [f"{', '.join(held)}, held as at {frequency} Hz and {amplitude} {length}"] * bool(held)
+    said += [", ".join(left)] * bool(left)
+    off = f"stiffness off by up to {number(100.0 * error, 2)} % over the grid"
+    return [f"{prediction.direction}: {'; '.join(said)}: {off}"]

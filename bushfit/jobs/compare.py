@@ -1,0 +1,282 @@
+"""compare: several results side by side, the first the reference; or model families on one campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
+from itertools import combinations
+from string import ascii_uppercase
+from typing import TYPE_CHECKING, Any
+
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import PredictSettings
+from bushfit.comparison import Comparison, compare, holm, with_holm
+from bushfit.diagnosis.evidence import result_of
+from bushfit.diagnosis.families import FittedFamily, fit_families, known_families
+from bushfit.errors import ModelError
+from bushfit.fitting.assess import lack_of_fit
+from bushfit.fitting.data import Data
+from bushfit.geometry import Direction, Specimen
+from bushfit.jobs.compare_document import ComparedEntry, ComparisonFile, Family, Pair
+from bushfit.jobs.fits import Fit
+from bushfit.jobs.grid import common_grid
+from bushfit.jobs.predict import AMPLITUDES, filled
+from bushfit.model.model import Model
+from bushfit.prediction import caveats
+from bushfit.report.artifacts import comparison_contents
+from bushfit.report.contents import Contents, Kinds
+from bushfit.report.tables import differences_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from bushfit.geometry import Place
+    from bushfit.model.result import Result
+    from bushfit.reading.measurement import Sweep
+
+#: Results that are compared at most: the colours of a picture, and the columns of a table.
+MOST = 8
+#: Where nothing is tested alike, the material is compared: its modulus over strain.
+_COMPOUND = Specimen("compound", "modulus")
+#: What is said of a family where the first has no gap.
+_NO_GAP = "the first family meets these tests within their noise: nothing in them asks for another"
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """What is compared: a result, what to call it, and the file or folder it came from.
+
+    `sweeps` are those of its campaign, for the grid.
+    """
+
+    name: str
+    source: str
+    result: Result
+    sweeps: Sequence[Sweep] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """The outcome: the entries, and each but the first against it; families where these are what is compared."""
+
+    entries: Sequence[Entry]
+    comparisons: Sequence[Comparison]
+    families: Sequence[FittedFamily] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def labels(self) -> list[str]:
+        """A, B and so on, as tables and sentences call the entries."""
+        return list(ascii_uppercase[: len(self.entries)])
+
+    @cached_property
+    def words(self) -> list[str]:
+        """What differs, a sentence an entry and place."""
+        first, *others = self.labels
+        pairs = zip(others, self.comparisons, strict=True)
+        return [f"{label} against {first}, {line}" for label, found in pairs for line in found.words()]
+
+    @property
+    def judged(self) -> list[str]:
+        """Of each family but the first, whether it is nearer to what was held out."""
+        pairs = list(zip(self.labels, self.families, strict=False))
+        return [f"{label}, {family.name}: {family.words}" for label, family in pairs[1:]]
+
+    @cached_property
+    def warnings(self) -> list[str]:
+        """What a user must know, each once, with the labels of those that it holds of."""
+        of_each: dict[str, list[str]] = {}
+        first, *others = self.labels
+        for label, found in zip(others, self.comparisons, strict=True):
+            for contrast in found.contrasts:
+                for who, prediction in ((first, contrast.reference), (label, contrast.other)):
+                    for line in prediction.warnings:
+                        of_each.setdefault(line, []).append(who)
+        for label, entry in zip(self.labels, self.entries, strict=True):
+            for line in (*caveats(entry.result), *(f"of the fit: {line}" for line in entry.result.warnings)):
+                of_each.setdefault(line, []).append(label)
+        told = [f"{', '.join(dict.fromkeys(who))}: {line}" for line, who in of_each.items()]
+        return [*self.notes, *self._shared(), *told]
+
+    def _shared(self) -> list[str]:
+        """That results were fitted to the same files, and what this does."""
+        if self.families:
+            return [
+                "families are fitted to the same tests: intervals of their differences take them as independent and "
+                "are too wide as a rule; what was held out compares them"
+            ]
+        pairs = zip(self.labels[1:], self.comparisons, strict=True)
+        return [
+            f"{self.labels[0]} and {label} were fitted to the same {', '.join(found.shared)}: intervals of their "
+            "difference take them as independent and are too wide as a rule"
+            for label, found in pairs
+            if found.shared
+        ]
+
+    @cached_property
+    def document(self) -> ComparisonFile:
+        compared = [_entry(*pair) for pair in zip(self.labels, self.entries, strict=True)]
+        pairs = [self._pair(*pair) for pair in zip(self.labels[1:], self.comparisons, strict=True)]
+        families = [_family(*pair) for pair in zip(self.labels, self.families, strict=False)]
+        return {
+            "schema": "bushfit/compare/1",
+            "compared": compared,
+            "pairs": pairs,
+            "families": families or None,
+            "words": [*self.judged, *self.words],
+            "warnings": self.warnings,
+        }
+
+    def _pair(self, label: str, found: Comparison) -> Pair:
+        """The numbers of one entry against the first."""
+        return {
+            "reference": self.labels[0],
+            "other": label,
+            "shared_inputs": list(found.shared),
+            "joint": {"p": found.joint[0], "parameters": found.joint[1]} if found.joint else None,
+            "parameters": [_plain(row) for row in found.parameters],
+            "places": {
+                str(each.place): _columns(differences_table([(label, found, each)]).iloc[:, 2:])
+                for each in found.contrasts
+            },
+        }
+
+    @property
+    def contents(self) -> Contents:
+        names = [entry.name for entry in self.entries]
+        names = names if len({*names}) == len(names) else [entry.source for entry in self.entries]
+        tables = comparison_contents(self.labels, names, self.comparisons, self.families)
+        return Contents({"compare": self.document}) | tables
+
+
+def _plain(record: Any) -> Any:
+    """A record as JSON has it."""
+    return asdict(record)
+
+
+def _columns(table: pd.DataFrame) -> dict[str, list[float | str | None]]:
+    """The columns of a table as JSON has them."""
+    return {name: [*column] for name, column in filled(table).items()}
+
+
+def _entry(label: str, entry: Entry) -> ComparedEntry:
+    """What an entry is."""
+    result = entry.result
+    return {
+        "label": label,
+        "name": entry.name,
+        "source": entry.source,
+        "effects": list(result.model.effects),
+        "reduced_chi_square": result.quality.reduced_chi_square if result.quality else None,
+        "nrmse": result.quality.nrmse if result.quality else None,
+        "measured": result.measured and _plain(result.measured),
+    }
+
+
+def _family(label: str, family: FittedFamily) -> Family:
+    """How a family meets the tests, and what was held out of them."""
+    evidence, held = family.evidence, family.held
+    return {
+        "label": label,
+        "name": family.name,
+        "parameters": evidence.parameters,
+        "reduced_chi_square": evidence.reduced,
+        "bic": evidence.bic,
+        "heldout": held.after,
+        "first_there": held.before,
+        "gain": family.gain,
+        "p": family.p,
+        "parts": [{"part": part.part, "first": part.before, "heldout": part.after} for part in held.parts],
+        "skipped": [_plain(skipped) for skipped in held.skipped],
+    }
+
+
+@dataclass(frozen=True)
+class Compare:
+    """Every entry against the first: at the places and over the grid asked for, else where all were fitted."""
+
+    asked: PredictSettings = field(default_factory=PredictSettings)
+
+    def kinds(self, families: bool = False) -> Kinds:
+        """The names of all that is written."""
+        tables = ("parameters", *(["families"] if families else []), "differences")
+        return Kinds(("compare",), tables, ("compare",))
+
+    def entry(self, opened: Campaign | Result, source: str) -> Entry:
+        """A result, or that of a campaign, which is fitted as `bushfit fit` does."""
+        if not isinstance(opened, Campaign):
+            return Entry(opened.name, source, opened)
+        result = Fit(self.asked.directions or ()).run(Data.of(opened)).result
+        return Entry(opened.name, source, result, opened.sweeps)
+
+    def run(
+        self, entries: Sequence[Entry], families: Sequence[FittedFamily] = (), notes: Sequence[str] = ()
+    ) -> Compared:
+        """The comparison of two entries or more.
+
+        Raises:
+            ModelError: a place that one of them does not know, or points that none can be predicted at.
+        """
+        results = [entry.result for entry in entries]
+        places = self._places(results)
+        grids = [self._grid(results, place, entries[0].sweeps) for place in places]
+        found = [
+            compare(results[0], result, [(place[0], place[i]) for place in places], grids)
+            for i, result in enumerate(results[1:], start=1)
+        ]
+        return Compared(entries, with_holm(found), families, tuple(notes))
+
+    def run_families(self, campaign: Campaign, source: str, names: Sequence[str] = ()) -> Compared:
+        """Families on one campaign, the model of its [fit] first; all that the library knows unless named.
+
+        Raises:
+            FitError: data that cannot support the fit of one.
+            ModelError: an unknown effect, or one that the model has already.
+        """
+        data = Data.of(campaign)
+        data_sets = [data_set.standing() for data_set in data.chosen(self.asked.directions)]
+        model = Model.started(campaign.bushing, data.effects, data.start(data_sets, {}))
+        held = [name for name, setting in campaign.fit.parameters.items() if not setting.vary]
+        families = fit_families(model, data_sets, names or known_families(), held, data.bounds)
+        tested = iter(holm([family.p for family in families if family.p is not None]))
+        families = [family if family.p is None else replace(family, p=next(tested)) for family in families]
+        entries = [
+            Entry(
+                family.name,
+                source,
+                replace(result_of(family.evidence, data.bounds, model.effects), specimens=campaign.specimens),
+                campaign.sweeps,
+            )
+            for family in families
+        ]
+        first = families[0].evidence
+        no_gap = lack_of_fit(first.model, data_sets, first.parameters) is None
+        return self.run(entries, families, [_NO_GAP] if no_gap else [])
+
+    def _places(self, results: Sequence[Result]) -> list[list[Place]]:
+        """Where to compare, each place as every result has it."""
+        if self.asked.directions:
+            return [[result.place(name) for result in results] for name in self.asked.directions]
+        known = [_known(result) for result in results]
+        common = [name for name in known[0] if all(name in names for names in known)]
+        places = [[result.place(name) for result in results] for name in common]
+        alike = [place for place in places if all(a.motion is b.motion for a, b in combinations(place, 2))]
+        return alike or [[_COMPOUND] * len(results)]
+
+    def _grid(self, results: Sequence[Result], places: Sequence[Place], sweeps: Sequence[Sweep]) -> Any:
+        """The points asked for, else those that all were fitted at."""
+        if len({place.motion for place in places}) > 1:
+            found = ", ".join(f"{place}: {place.motion.words[0]}" for place in places)
+            raise ModelError("a place that is not one kind of motion in all", found=found, expected="one kind")
+        frequencies, amplitudes = common_grid(results, places, sweeps)
+        asked = getattr(self.asked, AMPLITUDES[places[0].motion])
+        return self.asked.frequencies or frequencies, asked or amplitudes
+
+
+def _known(result: Result) -> list[str]:
+    """Places where a result was fitted; all that it can be asked about where it does not say."""
+    if result.measured and result.measured.directions:
+        return list(result.measured.directions)
+    directions = [Direction.AXIAL, Direction.RADIAL] if result.model.bushing else []
+    return [*map(str, directions), *(specimen.name for specimen in result.specimens)]

@@ -1,0 +1,228 @@
+"""Maxwell arms in place of what fades with memory: the law of a springpot in a form that steps through time.
+
+A springpot remembers its whole past, and most programs cannot. Over a band of frequencies a few springs with dashpots
+in series do the same within a stated error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from operator import itemgetter
+
+import numpy as np
+
+from bushfit.effects import Branch, qualified
+from bushfit.effects.contract import Array
+from bushfit.errors import ModelError
+from bushfit.model.model import Model, seen_by
+from bushfit.units import number
+
+#: Error that arms have at most where none is asked for, relative to the modulus: that of good tests.
+ACCURACY = 0.01
+#: Least error that may be asked for: below it rounding decides.
+LEAST_ACCURACY = 1e-6
+#: Arms at most: a thousandth over ten decades takes fewer.
+_MOST_ARMS = 30
+#: Share of the error that one arm more leaves at most where it counts as better.
+_BETTER = 0.95
+#: Arms in a row that may be no better: then no number of them will do.
+_PATIENCE = 3
+#: Evaluations of one least-squares fit at most: chosen, ten times what it takes from such a start.
+_EVALUATIONS = 200
+#: Frequencies per decade at which the error is judged: it ripples once an arm, and arms lie half a decade apart.
+_PER_DECADE = 30
+#: Frequencies at least, for a narrow band.
+_FEWEST = 40
+#: Least-squares fits in which the weights move to where the error is largest; chosen: more gain nothing.
+_ROUNDS = 25
+#: Error of a plain least-squares fit over that asked for, up to which these weights can make it good: they halve it.
+_WORTHWHILE = 4.0
+#: Share of a weight that stays where the error is 0.
+_KEPT = 1e-3
+#: How far relaxation times may lie beyond the band: there an arm is a spring or a dashpot to seven digits.
+_BEYOND = 1e7
+#: Distance from these ends at which a fit may start: it has to start inside.
+_INSIDE = 1e-9
+#: Nepers by which the first relaxation times reach over the ends of the band, one try each: which is best goes by the
+#: number of arms.
+_OVERHANGS = (0.0, 1.0, 2.0)
+#: Least modulus of an arm at the start, relative to what the arms are to be together.
+_SMALLEST = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Arms:
+    """Springs with dashpots in series, side by side: mu^ = sum_k G_k i w tau_k/(1 + i w tau_k), all G_k, tau_k > 0.
+
+    Args:
+        stands_for: the effects in whose place they are, in words.
+        size: name of the parameter that all moduli are proportional to.
+        modulus: G_k [Pa], of the shear modulus mu^, shortest relaxation time first, (k,).
+        time: tau_k [s], (k,).
+        band: lowest and highest frequency [Hz] at which they are judged.
+        error: largest relative error of the complex modulus there.
+
+    Notes: with no modulus and no time below zero the arms take up energy in any motion; nothing has to be checked.
+    """
+
+    stands_for: str
+    size: str
+    modulus: Array
+    time: Array
+    band: tuple[float, float]
+    error: float
+
+    def at(self, omega: Array) -> Array:
+        """mu^ [Pa] at angular frequencies [rad/s], (n,)."""
+        return _basis(omega, self.time) @ self.modulus
+
+    @property
+    def sentence(self) -> str:
+        """How many they are, what they stand for, and their error."""
+        count, (low, high) = self.time.size, (number(end, 3) for end in self.band)
+        arms = f"{count} Maxwell arm{'s' * (count > 1)} in place of the {self.stands_for}"
+        return f"{arms}: off by at most {number(100.0 * self.error, 2)} % of its modulus from {low} to {high} Hz"
+
+
+def fitted_arms(
+    modulus: Callable[[Array], Array],
+    band: tuple[float, float],
+    accuracy: float = ACCURACY,
+    *,
+    stands_for: str = "",
+    size: str = "",
+) -> Arms:
+    """The fewest arms that have a modulus [Pa], given over rad/s, within a relative error over a band [Hz].
+
+    Raises:
+        ModelError: no passive arms come as near, or an accuracy that is none.
+    """
+    if not LEAST_ACCURACY <= accuracy < 1.0:
+        raise ModelError("no error for arms", found=f"{100.0 * accuracy:g} %", expected="0.0001 % up to 100 %")
+    low, high = band
+    count = max(_FEWEST, int(_PER_DECADE * np.log10(high / low)))
+    omega = 2.0 * np.pi * np.geomspace(low, high, count)
+    target, best, stalled, arms = modulus(omega), np.inf, 0, 0
+    while arms < _MOST_ARMS and stalled < _PATIENCE:
+        arms += 1
+        fits = [_fit(omega, target, *start) for start in _starts(omega, target, arms)]
+        error, moduli, times = min(fits, key=itemgetter(0))
+        if error <= _WORTHWHILE * accuracy:
+            error, moduli, times = _fit(omega, target, moduli, times, _ROUNDS)
+        if error <= accuracy:
+            order = np.argsort(times)
+            return Arms(stands_for, size, moduli[order], times[order], band, error)
+        stalled = 0 if error < _BETTER * best else stalled + 1
+        best = min(best, error)
+    raise ModelError(
+        "no springs and dashpots come near enough to what depends on the rate",
+        found=f"an error of {100.0 * best:.3g} % with up to {arms} arms",
+        expected=f"{100.0 * accuracy:.3g} % from {low:g} to {high:g} Hz",
+        hint="allow a larger error",
+    )
+
+
+def model_arms(model: Model, band: tuple[float, float], accuracy: float = ACCURACY) -> tuple[Arms, ...]:
+    """Arms for each part of a model that fades with memory, the springpot first, at the model's values.
+
+    Effects that share a size, as the springpot and the spring in series with it, are one part. A size of 0 is none.
+    """
+    parts: dict[str, list[str]] = {}
+    for branch in fading(model):
+        parts.setdefault(qualified_size(branch), []).append(branch.name)
+    return tuple(
+        fitted_arms(partial(part_modulus, model, size), band, accuracy, stands_for=" and ".join(names), size=size)
+        for size, names in parts.items()
+        if model.values[size]
+    )
+
+
+def listed(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float]]:
+    """What each spring stands for, its modulus [Pa] and relaxation time [s]; first, without one, what is elastic."""
+    at_rest = [("elastic", model.values["mu"], np.nan)] if "mu" in model.values else []
+    every = ((part.stands_for, *pair) for part in arms for pair in zip(part.modulus, part.time, strict=True))
+    return at_rest + [(name, float(modulus), float(time)) for name, modulus, time in every]
+
+
+def fading(model: Model) -> tuple[Branch, ...]:
+    """The branches of a model that arms can stand for."""
+    return tuple(effect for effect in model.records if isinstance(effect, Branch) and effect.size)
+
+
+def qualified_size(branch: Branch) -> str:
+    """The parameter that a branch's modulus goes with, as files and reports name it."""
+    own = {parameter.name: qualified(branch, parameter) for parameter in branch.parameters}
+    assert branch.size is not None
+    return own.get(branch.size, branch.size)
+
+
+def part_modulus(model: Model, size: str, omega: Array) -> Array:
+    """mu^ [Pa] of the branches of one size at angular frequencies [rad/s], (n,)."""
+    still = np.zeros_like(omega)
+    own = (branch for branch in fading(model) if qualified_size(branch) == size)
+    return np.asarray(sum(branch.modulus(seen_by(branch, model.values, model.values), omega, still) for branch in own))
+
+
+def _basis(omega: Array, time: Array) -> Array:
+    """i w tau/(1 + i w tau), (n, k)."""
+    turn = 1j * omega[:, None] * time
+    return turn / (1.0 + turn)
+
+
+def _starts(omega: Array, target: Array, arms: int) -> Iterator[tuple[Array, Array]]:
+    """Moduli and relaxation times to start from: times evenly over the band or a little more, moduli by the loss.
+
+    Notes: arms d apart in ln tau have G = 2/pi G''(1/tau) d, where the loss modulus G'' changes little (J. D. Ferry,
+    Viscoelastic Properties of Polymers, 3rd ed., 1980, ch. 4).
+    """
+    for overhang in _OVERHANGS:
+        first, last = -np.log(omega[-1]) - overhang, -np.log(omega[0]) + overhang
+        apart = max(1.0, (last - first) / arms)
+        time = np.exp(first + (last - first) * (np.arange(arms) + 0.5) / arms)
+        loss = np.interp(-np.log(time), np.log(omega), target.imag)
+        yield np.maximum(2.0 / np.pi * loss * apart, _SMALLEST * np.abs(target).mean()), time
+
+
+def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 1) -> tuple[float, Array, Array]:
+    """Largest relative error of arms that are fitted to it, their moduli and times, from a start.
+
+    Notes: least squares in the logarithms, again and again, with weights times the error (Lawson's way to the smallest
+    largest error); the logarithms keep all moduli and times positive.
+    """
+    from scipy.optimize import least_squares
+
+    count = time.size
+    root = np.ones(omega.size)
+    unit = np.abs(target).mean()
+
+    def parts(x: Array) -> tuple[Array, Array]:
+        """Each arm over the target, (n, k), and its slope by the logarithm of its time."""
+        basis = _basis(omega, np.exp(x[count:]))
+        arm = basis * unit * np.exp(x[:count]) / target[:, None]
+        return arm, arm * (1.0 - basis)
+
+    def residual(x: Array) -> Array:
+        off = root * (parts(x)[0].sum(axis=1) - 1.0)
+        return np.concatenate((off.real, off.imag))
+
+    def slopes(x: Array) -> Array:
+        both = root[:, None] * np.concatenate(parts(x), axis=1)
+        return np.concatenate((both.real, both.imag))
+
+    ends = np.log([1.0 / (_BEYOND * omega[-1]), _BEYOND / omega[0]])
+    low, high = (np.repeat([reach, end], count) for reach, end in zip((-np.inf, np.inf), ends, strict=True))
+    x, best = np.concatenate((np.log(moduli / unit), np.log(time))), (np.inf, moduli, time)
+    for _ in range(rounds):
+        x = least_squares(
+            residual, np.clip(x, low + 1e-9, high - 1e-9), slopes, bounds=(low, high), max_nfev=_EVALUATIONS
+        ).x
+        off = np.abs(parts(x)[0].sum(axis=1) - 1.0)
+        if off.max() < best[0]:
+            best = off.max(), unit * np.exp(x[:count]), np.exp(x[count:])
+        if off.max() < LEAST_ACCURACY:
+            break
+        root = root * np.sqrt(off / off.max() + _KEPT)
+        root /= np.sqrt(np.mean(np.square(root)))
+    return best

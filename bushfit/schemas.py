@@ -1,0 +1,150 @@
+"""JSON Schemas (draft 2020-12) of the JSON files that bushfit writes, and of the TOML files that it is given.
+
+They are made on demand of the types by which these files are read and written, descriptions from their docstrings, so
+that none can be out of date.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, is_dataclass
+from typing import Any, Literal
+
+from bushfit.errors import BushfitError, did_you_mean
+
+
+@dataclass(frozen=True)
+class Described:
+    """What a schema describes.
+
+    Args:
+        files: by their names, and commands whose `--json` prints the same.
+        type: module of bushfit and name of the type of a whole file.
+        way: "written" where every key is there; "read" where what has a default may be left out, as in older files;
+            "toml" where people write it, and there is no null.
+    """
+
+    files: str
+    type: str
+    way: Literal["written", "read", "toml"]
+
+
+#: Every schema by its name.
+DESCRIBED = {
+    "model": Described(
+        "model.json, static.json, dynamic.json, joint.json, truth.json of simulate; --json of the fits",
+        "model.document.ModelFile",
+        "read",
+    ),
+    "diagnosis": Described("diagnosis.json; --json of diagnose", "diagnosis.document.DiagnosisFile", "written"),
+    "run": Described("--json of run", "jobs.run.RunDocument", "read"),
+    "prediction": Described("--json of predict", "jobs.predict.PredictionDocument", "written"),
+    "comparison": Described("compare.json; --json of compare", "jobs.compare_document.ComparisonFile", "written"),
+    "batch": Described("batch.json", "batch.document.BatchFile", "written"),
+    "summary": Described("--json of batch", "batch.document.BatchSummary", "written"),
+    "row": Described("bushings/<name>/row.json of batch", "batch.document.Record", "written"),
+    "scorecard": Described("scorecard.json; --json of scorecard", "scorecard.document.Scorecard", "written"),
+    "outcome": Described("a line of outcomes.jsonl of scorecard", "scorecard.document.Line", "written"),
+    "sealed": Described("campaigns/sealed/<campaign>.json of scorecard --keep", "scorecard.hidden.Sealed", "written"),
+    "campaign": Described("a campaign, in TOML", "campaign.schema.CampaignFile", "toml"),
+    "manifest": Described("a list of campaigns for batch, in TOML", "batch.manifest.ManifestFile", "toml"),
+    "limits": Described("--limits of batch, in TOML", "batch.limits.Limits", "toml"),
+}
+#: Keywords that pydantic leaves beside the type of a text that becomes a number; JSON Schema does not know them.
+_NO_KEYWORDS = frozenset({"gt", "ge", "lt", "le"})
+#: The list of arguments in a docstring, up to its end or the next heading.
+_ARGS = re.compile(r"^Args:\n(.*?)(?=^\S|\Z)", re.MULTILINE | re.DOTALL)
+#: An argument, or several, with what is said of them.
+_ARG = re.compile(r"^    (\S[^:]*): +(.*?)(?=^    \S|\Z)", re.MULTILINE | re.DOTALL)
+
+
+def schema(name: str) -> dict[str, Any]:
+    """The JSON Schema of this name.
+
+    Raises:
+        BushfitError: there is none.
+    """
+    from pydantic import TypeAdapter
+
+    if name not in DESCRIBED:
+        raise BushfitError(
+            "there is no such schema",
+            found=f'"{name}"',
+            expected="one of " + ", ".join(DESCRIBED),
+            hint=did_you_mean(name, DESCRIBED),
+        )
+    asked = DESCRIBED[name]
+    module, _, kind = asked.type.rpartition(".")
+    adapter = TypeAdapter[Any](getattr(importlib.import_module(f"bushfit.{module}"), kind))
+    made = adapter.json_schema(
+        mode="serialization" if asked.way == "written" else "validation", schema_generator=_generator(asked.way)
+    )
+    head = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": f"urn:bushfit:schema:{name}",
+        "title": f"bushfit {name}: {asked.files}",
+    }
+    return {**head, **{key: value for key, value in _tidied(made).items() if key != "title"}}
+
+
+def _generator(way: str) -> Any:
+    """pydantic's generator, which is slow to import, with descriptions from docstrings."""
+    from pydantic.json_schema import GenerateJsonSchema
+
+    class Generator(GenerateJsonSchema):
+        def field_title_should_be_set(self, _: Any) -> bool:
+            return False  # a title made of the key says nothing that the key does not
+
+        def field_is_required(self, field: Any, total: bool) -> bool:
+            return (way == "written" and field["type"] == "dataclass-field") or super().field_is_required(field, total)
+
+        def nullable_schema(self, schema: Any) -> dict[str, Any]:
+            return self.generate_inner(schema["schema"]) if way == "toml" else super().nullable_schema(schema)
+
+        def dataclass_schema(self, schema: Any) -> dict[str, Any]:
+            return _explained(super().dataclass_schema(schema), schema["cls"])
+
+        def typed_dict_schema(self, schema: Any) -> dict[str, Any]:
+            return _explained(super().typed_dict_schema(schema), schema["cls"])
+
+    return Generator
+
+
+def _explained(made: dict[str, Any], kind: type) -> dict[str, Any]:
+    """The schema of a table with what the docstrings of its type say of it and of its keys."""
+    from bushfit.validation import in_table
+
+    properties: dict[str, Any] = made["properties"]
+    told: dict[str, str] = {}
+    for each in reversed([kind, *getattr(kind, "__orig_bases__", kind.__mro__[1:])]):
+        told |= _arguments(inspect.cleandoc(each.__doc__ or ""))
+    for key in properties.keys() & told.keys():
+        properties[key] = {**properties[key], "description": told[key]}
+    for field, keys in (in_table(kind) if is_dataclass(kind) else {}).items():
+        value = properties.pop(field)
+        inner = value.get("additionalProperties", value)
+        made["required"] = [key for key in made.get("required", ()) if key != field]
+        said = {key: {"description": told[key]} for key in keys() if key in told}
+        made["properties"] |= {key: inner | said.get(key, {}) for key in keys()}
+        if inner is not value:  # places, such as specimens, have parameters that the library does not list
+            made["additionalProperties"] = inner
+    words = inspect.cleandoc(kind.__doc__ or "").partition("\n\nArgs:")[0]
+    return {**made, "description": " ".join(words.split())}
+
+
+def _arguments(docstring: str) -> dict[str, str]:
+    """What the docstring says of each argument, in the words of JSON."""
+    found = _ARGS.search(re.sub(r"\bNone\b", "null", docstring))
+    entries = _ARG.findall(found[1]) if found else []
+    return {name: " ".join(words.split()) for names, words in entries for name in names.split(", ")}
+
+
+def _tidied(node: Any) -> Any:
+    """A schema without what is no keyword of it, and without defaults that say nothing."""
+    if isinstance(node, Mapping):
+        said = (key for key, value in node.items() if key not in _NO_KEYWORDS and (key, value) != ("default", None))
+        return {key: _tidied(node[key]) for key in said}
+    return [_tidied(each) for each in node] if isinstance(node, list) else node

@@ -1,0 +1,149 @@
+"""Every command that writes tables or pictures writes them in the form asked for, by option or for all commands."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tomllib
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import click
+import numpy as np
+import pandas as pd
+import pytest
+from commandline import Done, call
+
+from bushfit.cli import cli
+from bushfit.geometry import Direction
+from bushfit.reading.sweeps import read_sweep
+
+Run = Callable[..., Done]
+CONTEXT = click.Context(cli)
+READ = {
+    "csv": pd.read_csv,
+    "decimal-comma": partial(pd.read_csv, sep=";", decimal=","),
+    "xlsx": partial(pd.read_excel, engine="openpyxl"),
+}
+CASE = "data/practice/case_000/bushing.toml"
+TESTS = ["data/cmp_15961/loop_axial_1.csv", "data/cmp_15961/sweep_axial.csv"]
+#: What is typed after the command.
+ARGUMENTS = {
+    **{name: [CASE] for name in ("run", "fit-static", "fit-dynamic", "fit", "diagnose")},
+    "simulate": ["model.json"],
+    "predict": ["model.json", "--wide"],
+    "compare": ["model.json", CASE],
+    "export": ["model.json", "--format", "csv"],
+    "reduce": ["data/cmp_15961_raw/stepped_sine_axial.csv"],
+    "inspect": TESTS,
+    "batch": [
+        "data/practice/case_00[01]/bushing.toml",
+        "--tables",
+        "--plots",
+        "--command",
+        "fit",
+        "--command",
+        "predict",
+    ],
+}
+
+
+def having(option: str) -> list[str]:
+    commands = {name: cli.get_command(CONTEXT, name) for name in cli.list_commands(CONTEXT)}
+    return [name for name, found in commands.items() if found and option in {each.name for each in found.params}]
+
+
+@pytest.fixture(scope="module")
+def place(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("forms")
+    shutil.copytree(root / "data", folder / "data")
+    shutil.copy(root / "data/arm_bushing/truth.json", folder / "model.json")
+    return folder
+
+
+def written(place: Path, name: str, *options: str) -> set[Path]:
+    """The files of a command, by their paths in its folder."""
+    done = call(place, name, *ARGUMENTS[name], *options)
+    assert done.returncode == 0, done.stderr
+    folder = place / options[1]
+    return {file.relative_to(folder) for file in folder.rglob("*") if file.is_file()}
+
+
+@pytest.mark.parametrize("name", having("table_format"))
+def test_tables_hold_the_same_in_every_form(place: Path, name: str) -> None:
+    files = {form: written(place, name, "-o", f"{name}-{form}", "--no-plots", "--table-format", form) for form in READ}
+    tables = [file for file in files["csv"] if file.suffix == ".csv"]
+    assert tables
+    assert files["decimal-comma"] == files["csv"]
+    only_csv = name == "export"  # where --format says it
+    end = ".csv" if only_csv else ".xlsx"
+    assert files["xlsx"] == {file.with_suffix(end) if file in tables else file for file in files["csv"]}
+    for table in tables:
+        plain = pd.read_csv(place / f"{name}-csv" / table)
+        for form in ("decimal-comma", "xlsx"):
+            file = place / f"{name}-{form}" / table.with_suffix(end if form == "xlsx" else ".csv")
+            found = READ["csv" if only_csv and form == "xlsx" else form](file)
+            pd.testing.assert_frame_equal(found, plain, check_dtype=False, rtol=1e-6, atol=1e-300)
+
+
+@pytest.mark.parametrize("name", having("plot_format"))
+def test_pictures_are_of_every_form_asked_for(place: Path, name: str) -> None:
+    files = written(place, name, "-o", f"{name}-drawn", "--plot-format", "svg", "--plot-format", "pdf")
+    drawn = {form: {file.with_suffix("") for file in files if file.suffix == form} for form in (".svg", ".pdf", ".png")}
+    assert drawn[".svg"] == drawn[".pdf"] != set()
+    assert drawn[".png"] == set()
+
+
+def test_a_variable_of_the_environment_holds_for_all_commands(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BUSHFIT_TABLE_FORMAT", "xlsx")
+    monkeypatch.setenv("BUSHFIT_PLOT_FORMAT", "svg png")
+    assert {file.name for file in written(place, "reduce", "-o", "of-all")} == {
+        "sweep.xlsx",
+        "reduce.png",
+        "reduce.svg",
+    }
+    over = written(place, "reduce", "-o", "over", "--table-format", "csv", "--plot-format", "pdf")
+    assert {file.name for file in over} == {"sweep.csv", "reduce.pdf"}
+    monkeypatch.setenv("BUSHFIT_TABLE_FORMAT", "")
+    assert Path("sweep.csv") in written(place, "reduce", "-o", "empty", "--no-plots")
+    monkeypatch.setenv("BUSHFIT_TABLE_FORMAT", "german")
+    done = call(place, "reduce", *ARGUMENTS["reduce"], "-o", "none")
+    assert done.returncode == 2
+    assert "BUSHFIT_TABLE_FORMAT" in done.stderr
+    assert not (place / "none").exists()
+
+
+@pytest.mark.parametrize("form", READ)
+def test_what_is_simulated_is_fitted(place: Path, form: str) -> None:
+    assert call(place, "simulate", "model.json", "-o", f"sim-{form}", "--table-format", form).returncode == 0
+    fitted = call(place, "fit", f"sim-{form}/campaign.toml", "-o", f"fitted-{form}", "--no-plots")
+    assert fitted.returncode == 0, fitted.stderr
+
+
+@pytest.mark.parametrize("form", READ)
+def test_what_is_reduced_is_read_as_the_text_for_the_campaign_says(place: Path, form: str) -> None:
+    options = ("--no-plots", "--table-format", form)
+    told = call(place, "reduce", *ARGUMENTS["reduce"], "-o", f"swept-{form}", *options, "--json")
+    document = json.loads(told.stdout)
+    (entry,) = tomllib.loads(document["campaign"])["sweeps"]
+    found = read_sweep(place / f"swept-{form}" / entry["file"], Direction(entry["direction"]))
+    assert np.abs(found.stiffness).tolist() == pytest.approx([1e3 * k for k in document["points"]["stiffness [N/mm]"]])
+
+
+@pytest.mark.parametrize("form", READ)
+def test_a_wide_table_is_read_back(place: Path, form: str) -> None:
+    options = ("--direction", "axial", "--amplitudes", "0.1, 0.25 mm", "--no-plots", "--table-format", form)
+    assert call(place, "predict", "model.json", "--wide", "-o", f"wide-{form}", *options).returncode == 0
+    end = "xlsx" if form == "xlsx" else "csv"
+    long, wide = (
+        READ[form](place / f"wide-{form}/axial{end}.{'xlsx' if form == 'xlsx' else 'csv'}") for end in ("", "_wide")
+    )
+    for amplitude in (0.1, 0.25):
+        of_level = long[long["amplitude [mm]"] == amplitude]
+        assert wide["frequency [Hz]"].tolist() == of_level["frequency [Hz]"].tolist()
+        assert wide[f"stiffness {amplitude} mm [N/mm]"].tolist() == of_level["stiffness [N/mm]"].tolist()
+        assert wide[f"loss factor {amplitude} mm [-]"].tolist() == of_level["loss factor [-]"].tolist()
+    seen = call(place, "inspect", f"wide-{form}/axial_wide.{end}", "--no-plots")
+    assert seen.returncode == 0, seen.stderr
+    assert "amplitudes: 0.1, 0.25 mm" in seen.stderr

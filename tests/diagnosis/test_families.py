@@ -1,0 +1,83 @@
+"""Model families: that which made the tests is found from any start, wins where held out, and equals are alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rigged import PLAN, in_closed_form
+
+from bushfit.diagnosis.families import FittedFamily, fit_families, known_families
+from bushfit.effects import BASE
+from bushfit.errors import ModelError
+from bushfit.fitting.data import Data
+from bushfit.model.model import Model
+from bushfit.simulation import measure, undisturbed
+
+TRUTHS: dict[str, dict[str, float]] = {
+    "kraus": {"delta": 6e5, "r": 0.15, "e_c": 8e-3, "n": 0.5},
+    "sliders": {"sigma": 1.2e4, "e_s": 1.5e-2, "spread": 1.0},
+    "fractional_zener": {"c": 0.3},
+    "intrinsic_time": {"d": 3.0},
+    "paper": {},
+}
+
+
+def families(model: Model, truth: str, values: Mapping[str, float], seed: int = 0) -> dict[str, FittedFamily]:
+    made = model if truth == "paper" else model.with_effect(truth, {f"{truth}.{k}": v for k, v in values.items()})
+    harmonic = any(effect.harmonic_only for effect in made.records)
+    clean = in_closed_form(made, PLAN) if harmonic else undisturbed(made, PLAN)
+    data = Data.of(measure(clean, PLAN).campaign())
+    tests = [*data.loops, *data.sweeps]
+    start = Model.started(model.bushing, BASE, data.start(tests, {}))
+    return {family.name: family for family in fit_families(start, tests, known_families(), (), {})}
+
+
+@pytest.mark.parametrize("truth", TRUTHS)
+def test_the_family_that_made_the_tests_is_the_best_and_known_to_be(paper_model: Model, truth: str) -> None:
+    found = families(paper_model, truth, TRUTHS[truth])
+    for family in found.values():
+        print(f"{truth}: {family.name}, chi2 {family.evidence.reduced:.3f}, held out {family.held.after:.3f}")
+    assert list(found) == ["paper", *known_families()]
+    assert found[truth].evidence.reduced == pytest.approx(1.0, abs=0.05)
+    assert min(found, key=lambda name: found[name].evidence.bic) == truth
+    assert found[truth].held.after == pytest.approx(1.0, abs=0.05)
+    if truth != "paper":
+        assert found[truth].words.endswith("better by more than chance")
+        values = found[truth].evidence.model.values
+        for key, value in TRUTHS[truth].items():
+            assert values[f"{truth}.{key}"] == pytest.approx(value, rel=0.1)
+    else:
+        assert "alike" in found["intrinsic_time"].words
+        assert found["kraus"].words.endswith("worse by more than chance")
+
+
+def test_the_interval_of_the_gain_is_that_of_noise(paper_model: Model) -> None:
+    """Two wrong families: redrawn noise moves the gain of one over the other as its interval says."""
+    gains = []
+    made = paper_model.with_effect("intrinsic_time", {"intrinsic_time.d": 1.0})
+    clean = undisturbed(made, PLAN)
+    for seed in range(12):
+        data = Data.of(measure(clean, replace(PLAN, seed=seed)).campaign())
+        tests = [*data.sweeps, *data.loops]
+        start = Model.started(paper_model.bushing, BASE, data.start(tests, {}))
+        _, other = fit_families(start, tests, ["fractional_zener"], (), {})
+        assert other.gain is not None
+        gains.append(other.gain)
+    value, low, high = np.array(gains).T
+    said, real = float(np.mean(high - low)) / 3.92, float(value.std(ddof=1))
+    print(f"standard error of the gain: said {said:.4f}, real {real:.4f}, gain {value.mean():.4f}")
+    assert 0.4 < said / real < 2.5
+
+
+def test_known_families_are_what_stands_in_place_of_a_branch() -> None:
+    assert {*known_families()} == {"kraus", "sliders", "fractional_zener", "intrinsic_time"}
+
+
+def test_two_effects_in_place_of_one_branch_are_no_family(paper_model: Model) -> None:
+    data = Data.of(measure(undisturbed(paper_model, PLAN), PLAN).campaign())
+    start = Model.started(paper_model.bushing, BASE, data.start(data.sweeps, {}))
+    with pytest.raises(ModelError, match="what this effect stands in place of is not in the model"):
+        fit_families(start, data.sweeps, ["kraus+sliders"], (), {})

@@ -1,0 +1,219 @@
+"""The FMU against the rig: sweeps, loops and random motions in every direction, and each effect that runs in time."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+from fmus import HERE, LEVELS, Running, off, order_of, wandering, written
+
+from bushfit.effects import LIBRARY, Branch, Layer, Level, qualified
+from bushfit.effects.contract import Array
+from bushfit.export.in_time import FIELDS
+from bushfit.geometry import Bushing, Direction
+from bushfit.model.model import Model
+from bushfit.model.rig import imposed, wave
+
+#: Root mean square error that the force may have, relative: asked for.
+LARGEST = 0.01
+#: Effects that the model of every law has at their neutral values, to be set one by one.
+SETTABLE = [
+    "asymmetry", "strain_stiffening", "fifth_power_stiffening", "second_friction", "sliders", "strain_scale.radial",
+    "clearance", "interface_slip", "bump_stop", "one_sided_stop", "stiffness_factor.radial",
+    "preload_stiffening.radial", "sleeve_compliance", "sleeve_compliance.radial",
+]  # fmt: skip
+#: Effects that Maxwell arms stand for, besides the springpot, at sizes that show.
+FADING = {
+    "viscous.eta": 150.0,
+    "maxwell.mu1": 8e4,
+    "maxwell.tau": 3e-3,
+    "second_maxwell.mu1": 5e4,
+    "second_maxwell.tau": 0.2,
+    "second_springpot.m": 3e3,
+    "second_springpot.alpha": 0.6,
+    "fractional_zener.c": 0.1,
+}
+
+
+def motions(what: str, level: int) -> tuple[Array, float, float]:
+    """Displacements of all directions, (n, 3), at a level, the time step [s] and the frequency [Hz]."""
+    sizes = np.array([amplitudes[level] for amplitudes in LEVELS.values()])
+    kind, _, number = what.partition(" ")
+    if kind == "random":
+        step, shape, frequency = 2e-4, wandering(10_001, 2e-4, seed=level), 10.0
+    else:
+        frequency, (steps, cycles) = float(number), {"sweep": (1024, 4), "sine": (2048, 2), "triangle": (2048, 2)}[kind]
+        step = 1.0 / (frequency * steps)
+        shape = wave("triangle" if kind == "triangle" else "sine", np.arange(steps * cycles + 1) / steps)
+    return shape[:, None] * sizes, step, frequency
+
+
+def on_the_rig(model: Model, motion: Array, step: float, frequency: float) -> Array:
+    """Forces of all directions, (n, 3)."""
+    return np.stack(
+        [imposed(model, place, motion[:, k], step, frequency).force for k, place in enumerate(LEVELS)], axis=-1
+    )
+
+
+@pytest.mark.parametrize("level", range(3))
+@pytest.mark.parametrize("what", ["sweep 5", "sweep 55", "sweep 155", "sine 0.1", "triangle 0.1", "random"])
+def test_force_follows_the_rig_in_every_direction(paper: Running, paper_model: Model, what: str, level: int) -> None:
+    motion, step, frequency = motions(what, level)
+    turns = int(np.sum(np.diff(np.sign(np.diff(motion[:, 0]))) != 0.0))
+    errors = [
+        off(found, expected)
+        for found, expected in zip(
+            paper.run(motion, step).T, on_the_rig(paper_model, motion, step, frequency).T, strict=True
+        )
+    ]
+    shown = ", ".join(f"{place} {100.0 * error:.2f} %" for place, error in zip(LEVELS, errors, strict=True))
+    print(f"{what}, level {level}, {turns} turning points: {shown} rms")
+    assert turns > 100 or what != "random"
+    assert max(errors) < LARGEST
+
+
+@pytest.fixture(scope="module")
+def every(paper_model: Model, tmp_path_factory: pytest.TempPathFactory) -> tuple[Model, Running]:
+    """A model with every law at its neutral values, and its FMU."""
+    folder = tmp_path_factory.mktemp("every")
+    model = Model.started(paper_model.bushing, (*paper_model.effects, *SETTABLE), paper_model.values)
+    return model, Running(written(order_of(model), folder), folder / "open")
+
+
+def test_every_law_of_the_sources_is_tested() -> None:
+    kinds = {name if "." not in name else f"{name.partition('.')[0]}." for name in SETTABLE}
+    assert kinds | {"elastic", "friction"} == set(FIELDS)
+
+
+@pytest.mark.parametrize("name", SETTABLE)
+def test_each_effect_follows_the_rig(every: tuple[Model, Running], name: str) -> None:
+    """At the sample of a turn itself dry friction has the sense of the step before it, and the rig that of both: such
+    samples do not count."""
+    neutral, running = every
+    effect = LIBRARY[name]
+    values = {qualified(effect, parameter): parameter.sized(1.0) for parameter in effect.parameters}
+    values |= {key: 1.5e-4 for key in values if key.endswith(".gap")}
+    model = neutral.with_values(values)
+    motion, step, frequency = motions("random", 1)
+    before = np.diff(motion[:, 0], prepend=0.0)
+    counted = (np.sign(before) == np.sign(np.gradient(motion[:, 0]))) | (name != "interface_slip")
+    expected, plain = (on_the_rig(each, motion, step, frequency)[counted] for each in (model, neutral))
+    errors = [off(*pair) for pair in zip(running.run(motion, step, values)[counted].T, expected.T, strict=True)]
+    changed = max(off(*pair) for pair in zip(plain.T, expected.T, strict=True))
+    shown = ", ".join(f"{100.0 * error:.2f} %" for error in errors)
+    print(f"{name}: off by {shown}; it changes {100.0 * changed:.1f} %; {counted.mean():.3f} of the samples count")
+    assert max(errors) < LARGEST
+    assert changed > 1e-3
+    assert counted.mean() > 0.98
+
+
+def test_what_fades_with_memory_follows_the_rig(paper_model: Model, opened: Path) -> None:
+    names = tuple(dict.fromkeys(name.partition(".")[0] for name in FADING))
+    model = Model.started(paper_model.bushing, (*paper_model.effects, *names), {**paper_model.values, **FADING})
+    running = Running(written(order_of(model, accuracy=2e-3), opened), opened / "fading")
+    motion, step, frequency = motions("random", 1)
+    errors = [
+        off(*pair)
+        for pair in zip(running.run(motion, step).T, on_the_rig(model, motion, step, frequency).T, strict=True)
+    ]
+    print(", ".join(f"{100.0 * error:.2f} %" for error in errors))
+    assert max(errors) < LARGEST
+    doubled = running.run(motion, step, {"maxwell.mu1": 2.0 * FADING["maxwell.mu1"]})
+    stiffer = on_the_rig(model.with_values({"maxwell.mu1": 2.0 * FADING["maxwell.mu1"]}), motion, step, frequency)
+    assert off(doubled, stiffer) < LARGEST
+
+
+def test_preload_of_one_direction_has_values_of_its_own(paper_model: Model, opened: Path) -> None:
+    model = paper_model.with_effect("elastic_preload.radial", {"elastic_preload.radial": 1.2})
+    running = Running(written(order_of(model), opened), opened / "preload")
+    assert {"mu.axial", "mu.radial", "mu.torsion"} <= set(running.reference)
+    motion, step, frequency = motions("random", 1)
+    assert off(running.run(motion, step), on_the_rig(model, motion, step, frequency)) < LARGEST
+
+
+def test_steps_of_any_length_agree_where_the_motion_is_straight(paper: Running) -> None:
+    rng = np.random.default_rng(5)
+    motion = 2e-4 * rng.uniform(-1.0, 1.0, (200, 3)) * np.array([1.0, 1.0, 50.0])
+    motion[0] = 0.0
+    steps = rng.uniform(1e-4, 5e-3, 199)
+    parts = 4
+    share = np.arange(1, parts + 1)[:, None] / parts
+    finer = np.concatenate([motion[:1], *(a + share * (b - a) for a, b in pairwise(motion))])
+    coarse, fine = paper.run(motion, steps), paper.run(finer, np.repeat(steps / parts, parts))
+    np.testing.assert_allclose(fine[::parts], coarse, rtol=1e-9, atol=1e-9 * np.abs(coarse).max())
+
+
+def test_steady_state_is_that_of_the_closed_form(paper: Running, paper_model: Model) -> None:
+    """At 64 samples a cycle, with a thousand times fewer operations than the rig."""
+    for place, k in zip(LEVELS, range(3), strict=True):
+        amplitude, frequency = LEVELS[place][1], 55.0
+        phase = np.arange(30 * 64 + 1) / 64
+        motion = np.zeros((phase.size, 3))
+        motion[:, k] = amplitude * np.sin(2.0 * np.pi * phase)
+        force = paper.run(motion, 1.0 / (64 * frequency))[-64:, k]
+        found = 2.0 * np.mean(force * np.exp(-2j * np.pi * phase[-64:])) / (-1j * amplitude)
+        expected = paper_model.stiffness(place, frequency, amplitude)
+        print(f"{place}: {100.0 * abs(found / expected - 1.0):.2f} % off")
+        assert abs(found / expected - 1.0) < LARGEST
+
+
+def test_a_held_input_is_answered_one_step_later(paper: Running, paper_model: Model) -> None:
+    """By FMPy's own simulation, which sets no derivatives."""
+    motion, step, frequency = motions("random", 1)
+    motion = motion[:2001]
+    time = np.arange(len(motion)) * step
+    signals = np.rec.fromarrays([time, *motion.T], names=["time", *paper.inputs])
+    found = fmpy.simulate_fmu(
+        str(paper.file), stop_time=time[-1], step_size=step, output_interval=step, input=signals, output=paper.outputs
+    )
+    expected = on_the_rig(paper_model, motion, step, frequency)
+    for k, name in enumerate(paper.outputs):
+        assert off(found[name][1:], expected[:-1, k]) < LARGEST
+
+
+def test_the_description_is_valid(paper: Running) -> None:
+    assert validate_fmu(str(paper.file)) == []
+    variables = {each.name: each for each in paper.description.modelVariables}
+    assert paper.inputs == ["displacement.axial", "displacement.radial", "rotation.torsion"]
+    assert paper.outputs == ["force.axial", "force.radial", "moment.torsion"]
+    assert {"mu", "m", "sigma_fmax", "eps_half"} <= {n for n, v in variables.items() if v.causality == "parameter"}
+    assert (variables["alpha"].variability, float(variables["alpha"].start)) == ("constant", 0.24)
+
+
+def test_every_effect_is_written_or_refused_in_one_error() -> None:
+    """No effect of the library is left out without a word: what is not in the sources has another way."""
+    for effect in LIBRARY.values():
+        known = effect.name if "." not in effect.name else f"{effect.name.partition('.')[0]}."
+        ways = (
+            known in FIELDS,
+            isinstance(effect, Branch) and effect.size is not None,
+            effect.harmonic_only,
+            effect.settles,
+            effect.level is Level.INSTRUMENT,
+            not isinstance(effect, Branch | Layer),
+        )
+        assert any(ways), effect.name
+
+
+def test_without_motion_there_is_no_force(paper: Running) -> None:
+    assert np.all(paper.run(np.zeros((5, 3)), 1e-3) == 0.0)
+
+
+def test_another_shape_is_set_by_its_two_numbers(paper: Running, paper_model: Model) -> None:
+    other = Bushing("other", 0.012, 0.020, 0.05)
+    values = {
+        **{f"unit_strain.{place}": other.unit_strain(place) for place in Direction},
+        **{f"stiffness_per_modulus.{place}": other.stiffness_per_modulus(place) for place in Direction},
+    }
+    motion, step, frequency = motions("random", 1)
+    model = Model(other, paper_model.effects, paper_model.values)
+    assert off(paper.run(motion, step, values), on_the_rig(model, motion, step, frequency)) < LARGEST
+
+
+def test_the_library_of_this_system_is_there(paper: Running) -> None:
+    assert HERE in {"linux", "windows", "macos"}
+    assert fmpy.platform in fmpy.supported_platforms(str(paper.file))

@@ -1,0 +1,219 @@
+"""What an FMU holds, whom it lets in, and what is said or refused instead."""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import fmpy
+import numpy as np
+import pytest
+from binaries import Library, elf, mach_o, pe
+from fmpy.validation import validate_fmu
+from fmus import HERE, LEVELS, Running, order_of, wandering, written
+
+from bushfit.effects import LIBRARY, Level
+from bushfit.errors import ModelError, OutputError
+from bushfit.export.contract import Exported
+from bushfit.export.fmu import export
+from bushfit.export.in_time import in_time
+from bushfit.geometry import Direction, Specimen
+from bushfit.model.model import Model
+
+#: The functions of FMI 2.0 that a slave has to export (version 2.0.4, sections 2.1 and 4.2).
+FUNCTIONS = {
+    f"fmi2{name}{kind}"
+    for names, kinds in (
+        (("Get", "Set"), ("Real", "Integer", "Boolean", "String", "FMUstate")),
+        (("Get",), ("TypesPlatform", "Version", "Status", "RealStatus", "IntegerStatus", "BooleanStatus")),
+        (("Get",), ("StringStatus", "DirectionalDerivative", "RealOutputDerivatives")),
+        (("Instantiate", "Terminate", "Reset", "SetupExperiment", "SetDebugLogging", "DoStep", "CancelStep"), ("",)),
+        (("Enter", "Exit"), ("InitializationMode",)),
+        (("Free",), ("Instance", "FMUstate")),
+        (("SerializeFMUstate", "DeSerializeFMUstate", "SerializedFMUstateSize", "SetRealInputDerivatives"), ("",)),
+    )
+    for name in names
+    for kind in kinds
+}
+
+
+def archive(exported: Exported) -> dict[str, bytes]:
+    """What the one file of an export holds."""
+    ((_, content),) = exported.files.items()
+    with zipfile.ZipFile(io.BytesIO(content)) as opened:
+        return {name: opened.read(name) for name in opened.namelist()}
+
+
+def test_libraries_of_three_systems_export_the_interface_and_need_nothing(exported: Exported) -> None:
+    held = archive(exported)
+    found: list[Library] = []
+    for path, content in held.items():
+        if path.startswith("binaries/linux64/"):
+            found.append(elf(content))
+        if path.startswith("binaries/win64/"):
+            found.append(pe(content))
+        if path.startswith("binaries/darwin64/"):
+            found += mach_o(content)
+    for library in found:
+        print(f"{library.kind} {library.machine}: {len(library.exports & FUNCTIONS)} functions, needs {library.needs}")
+        assert library.exports >= FUNCTIONS
+        assert all(name.startswith(("fmi2", "_")) for name in library.exports - {"DllMainCRTStartup"}), library.exports
+        assert [name for name in library.needs if "libSystem" not in name] == []
+    assert [(each.kind, each.machine) for each in found] == [
+        ("ELF", "x86-64"), ("PE", "x86-64"), ("Mach-O", "x86-64"), ("Mach-O", "arm64"),
+    ]  # fmt: skip
+    assert found[-1].signed  # a Mac with an arm64 processor loads no library without a signature
+
+
+def test_sources_stand_beside_the_libraries(exported: Exported) -> None:
+    held = archive(exported)
+    listed = {each.get("name") for each in ET.fromstring(held["modelDescription.xml"]).iter("File")}
+    assert listed == {"fmu.c", "bushing.c", "model.c"}
+    assert {f"sources/{name}" for name in (*listed, "bushing.h", "fmi2.h", "model.h")} <= set(held)
+
+
+def test_the_same_model_gives_the_same_bytes_and_another_its_own_guid(paper_model: Model) -> None:
+    once, again = (export(order_of(paper_model), (HERE,)).files for _ in range(2))
+    assert once == again
+    stiffer = archive(export(order_of(paper_model.with_values({"mu": 2e6})), (HERE,)))
+    own = ET.fromstring(archive(Exported(once))["modelDescription.xml"]).get("guid")
+    assert ET.fromstring(stiffer["modelDescription.xml"]).get("guid") != own
+
+
+def test_names_with_quotes_and_markup_come_through(paper_model: Model, opened: Path) -> None:
+    assert paper_model.bushing
+    bushing = replace(paper_model.bushing, name='"A" & <b>\'\x07é</b> ]]>')
+    mount = Specimen('<mount> "&1"', "shear", area=1e-3, thickness=5e-3)
+    model = Model(bushing, paper_model.effects, paper_model.values)
+    wanted = order_of(model, (Direction.AXIAL, mount), specimens=(mount,))
+    file = written(wanted, opened)
+    assert file.name == "bushfit_a_b_b.fmu"
+    assert validate_fmu(str(file)) == []
+    running = Running(file, opened / "named")
+    assert running.description.modelName == '"A" & <b>\'_é</b> ]]>'
+    assert running.inputs == ["displacement.axial", 'displacement.<mount> "&1"']
+    force = running.run(1e-4 * np.linspace(0.0, 1.0, 11)[:, None] * np.ones(2), 1e-3)
+    assert np.all(np.diff(force, axis=0) > 0.0)
+
+
+def test_a_specimen_of_the_material_takes_strain_and_gives_stress(paper_model: Model, opened: Path) -> None:
+    coupon = Specimen("DMA", "modulus")
+    wanted = order_of(Model(None, paper_model.effects, paper_model.values), (coupon,), specimens=(coupon,))
+    running = Running(written(wanted, opened), opened / "coupon")
+    assert (running.inputs, running.outputs) == (["strain.DMA"], ["stress.DMA"])
+    assert validate_fmu(str(running.file)) == []
+
+
+def test_instances_do_not_see_each_other_and_reset_forgets(paper: Running) -> None:
+    motion = 2e-4 * wandering(300, 1e-3, seed=3)[:, None] * np.array([1.0, 1.0, 50.0])
+    expected = paper.run(motion, 1e-3)
+    first, second = (paper.begun(paper.instance()) for _ in range(2))
+    half = paper.follow(first, motion[:150], 1e-3)
+    np.testing.assert_array_equal(paper.follow(second, motion, 1e-3), expected)
+    np.testing.assert_array_equal(half, expected[:150])
+    first.reset()
+    np.testing.assert_array_equal(paper.follow(paper.begun(first), motion, 1e-3), expected)
+    for each in (first, second):
+        each.terminate()
+        each.freeInstance()
+
+
+def test_a_state_is_taken_up_again_through_bytes_too(paper: Running) -> None:
+    motion = 2e-4 * wandering(300, 1e-3, seed=4)[:, None] * np.array([1.0, 1.0, 50.0])
+    made = paper.begun(paper.instance())
+    paper.follow(made, motion[:150], 1e-3)
+    state = made.getFMUState()
+    kept = made.serializeFMUState(state)
+    once = paper.follow(made, motion[149:], 1e-3)
+    made.setFMUState(state)
+    np.testing.assert_array_equal(paper.follow(made, motion[149:], 1e-3), once)
+    other = paper.begun(paper.instance())
+    revived = other.deSerializeFMUstate(kept)
+    other.setFMUState(revived)
+    np.testing.assert_array_equal(paper.follow(other, motion[149:], 1e-3), once)
+    made.freeFMUState(state)
+    other.freeFMUState(revived)
+    made.freeInstance()
+    other.freeInstance()
+
+
+def test_wrong_calls_are_refused(paper: Running, capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(Exception, match="instantiate"):
+        paper.instance(guid="{00000000-0000-0000-0000-000000000000}")
+    made = paper.begun(paper.instance())
+    for name, value in (("mu", -1.0), ("eps_half", 0.0), ("alpha", 0.3), ("force.axial", 1.0), ("mu", float("nan"))):
+        with pytest.raises(Exception, match="fmi2SetReal"):
+            made.setReal([paper.reference[name]], [value])
+    with pytest.raises(Exception, match="fmi2DoStep"):
+        made.doStep(0.0, -1e-3)
+    with pytest.raises(Exception, match="fmi2GetReal"):
+        made.getReal([10_000])
+    assert made.getReal([paper.reference["mu"]]) == [1.09e6]
+    made.freeInstance()
+
+
+def test_output_before_the_first_step_is_that_of_the_input(paper: Running, paper_model: Model) -> None:
+    made = paper.instance()
+    made.enterInitializationMode()
+    made.setReal([paper.reference["displacement.axial"]], [1e-4])
+    (asked,) = made.getReal([paper.reference["force.axial"]])
+    made.exitInitializationMode()
+    assert made.getReal([paper.reference["force.axial"]]) == [asked]
+    assert (
+        asked > 1e-4 * paper_model.stiffness("axial", 155.0, 1e-4).real
+    )  # what moves at once is stiffer than at 155 Hz
+    made.freeInstance()
+
+
+@pytest.mark.parametrize("name", ["kraus", "hysteretic_loss"])
+def test_effects_without_a_law_in_time_are_refused(paper_model: Model, name: str) -> None:
+    with pytest.raises(ModelError, match="for which there is no law") as refused:
+        in_time(order_of(paper_model.with_effect(name)))
+    assert refused.value.place == name
+
+
+@pytest.mark.parametrize("name", [name for name, effect in LIBRARY.items() if effect.level is Level.INSTRUMENT])
+def test_effects_of_the_rig_are_left_out(paper_model: Model, name: str) -> None:
+    found = in_time(order_of(paper_model.with_effect(name), (Direction.AXIAL,)))
+    assert [value.name for value in found.values] == [
+        v.name for v in in_time(order_of(paper_model, (Direction.AXIAL,))).values
+    ]
+
+
+def test_what_is_held_is_said_with_its_error(paper_model: Model) -> None:
+    """m (e0/0.01)^-q, held at the geometric middle of 0.1 and 0.5 mm: the whole error is that of the springpot."""
+    model = paper_model.with_effect("coupled_breakdown", {"coupled_breakdown.q": 0.3})
+    found = in_time(order_of(model, (Direction.AXIAL,)))
+    (line,) = (line for line in found.losses if "coupled_breakdown" in line)
+    strain = np.array(LEVELS[Direction.AXIAL])[:, None] * model.unit_strain(Direction.AXIAL)
+    middle = np.sqrt(strain[0] * strain[-1])
+    frequency = np.arange(5.0, 156.0, 10.0)
+    whole = model.stiffness("axial", frequency, np.array(LEVELS[Direction.AXIAL])[:, None])
+    springpot = 0.5 * 2e5 * (2j * np.pi * frequency) ** 0.24 * model.stiffness_per_modulus(Direction.AXIAL)
+    error = np.abs(springpot * ((middle / 0.01) ** -0.3 - (strain / 0.01) ** -0.3) / whole).max()
+    print(line)
+    assert f"off by up to {100.0 * error:.2g} %" in line
+    held = next(value for value in found.values if value.name == "m")
+    assert held.value == pytest.approx(2e5 * (middle.item() / 0.01) ** -0.3)
+
+
+def test_softening_of_first_cycles_is_left_out_and_said(paper_model: Model) -> None:
+    found = in_time(order_of(paper_model.with_effect("mullins_softening", {"mullins_softening.share": 0.1})))
+    assert [line for line in found.losses if "mullins_softening: stiffness off by up to" in line]
+
+
+def test_without_a_compiler_it_is_said_how_to_get_one(paper_model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    with pytest.raises(OutputError, match="no compiler") as refused:
+        export(order_of(paper_model))
+    assert refused.value.hint == 'pip install "bushfit[fmu]"'
+
+
+def test_fmpy_knows_the_three_systems(exported: Exported, opened: Path) -> None:
+    ((name, content),) = exported.files.items()
+    (opened / f"all_{name}").write_bytes(content)
+    assert {"linux64", "win64", "darwin64"} <= {*fmpy.supported_platforms(str(opened / f"all_{name}"))}

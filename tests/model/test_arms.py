@@ -1,0 +1,86 @@
+"""Maxwell arms: their number and error, that they give off no energy, and what they cannot stand for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bushfit.effects import BASE
+from bushfit.errors import ModelError
+from bushfit.geometry import Direction
+from bushfit.model.arms import Arms, fitted_arms, listed, model_arms, part_modulus
+from bushfit.model.model import Model
+
+
+def springpot(alpha: float, band: tuple[float, float], accuracy: float) -> Arms:
+    return fitted_arms(lambda omega: 0.5 * (1j * omega) ** alpha, band, accuracy)
+
+
+def error_of(arms: Arms, alpha: float) -> float:
+    """Largest relative error, worked out apart from the fit, between its frequencies too."""
+    omega = 2.0 * np.pi * np.geomspace(*arms.band, 3001)
+    made = sum(g * 1j * omega * t / (1.0 + 1j * omega * t) for g, t in zip(arms.modulus, arms.time, strict=True))
+    return float(np.abs(made / (0.5 * (1j * omega) ** alpha) - 1.0).max())
+
+
+@pytest.mark.parametrize(
+    ("band", "count", "largest"), [((5.0, 155.0), 4, 0.01), ((5.0, 155.0), 6, 0.002), ((0.05, 300.0), 8, 0.007)]
+)
+def test_so_many_arms_leave_so_much(band: tuple[float, float], count: int, largest: float) -> None:
+    """No more arms than others found for these errors, alpha 0.24."""
+    arms = springpot(0.24, band, largest)
+    print(f"{band[0]:g} to {band[1]:g} Hz, {100 * largest:g} %: {arms.time.size} arms leave {100 * arms.error:.3f} %")
+    assert arms.time.size <= count
+    assert arms.error <= largest
+    assert error_of(arms, 0.24) == pytest.approx(arms.error, rel=0.03)
+
+
+@given(alpha=st.floats(0.05, 0.95), decades=st.floats(0.5, 4.0), accuracy=st.sampled_from([0.05, 0.01, 0.002]))
+@settings(max_examples=15, deadline=None)
+def test_arms_keep_within_their_error_and_give_off_no_energy(alpha: float, decades: float, accuracy: float) -> None:
+    arms = springpot(alpha, (1.0, 10.0**decades), accuracy)
+    assert np.all(arms.modulus > 0.0)
+    assert np.all(arms.time > 0.0)
+    assert np.all(arms.at(np.geomspace(1e-6, 1e9, 200)).imag > 0.0)
+    assert error_of(arms, alpha) <= accuracy * 1.03
+
+
+def test_a_maxwell_arm_is_found_as_it_is(paper_model: Model) -> None:
+    model = paper_model.with_effect("maxwell", {"maxwell.mu1": 5e4, "maxwell.tau": 2e-3})
+    springpots, arm = model_arms(model, (5.0, 155.0))
+    assert (springpots.stands_for, arm.stands_for, arm.size) == ("springpot", "maxwell", "maxwell.mu1")
+    np.testing.assert_allclose([arm.modulus, arm.time], [[5e4], [2e-3]], rtol=1e-4)
+
+
+def test_a_dashpot_is_an_arm_faster_than_the_band(paper_model: Model) -> None:
+    _, arm = model_arms(paper_model.with_effect("viscous", {"viscous.eta": 100.0}), (5.0, 155.0))
+    assert arm.time.size == 1
+    assert arm.modulus[0] * arm.time[0] == pytest.approx(100.0, rel=0.01)
+
+
+def test_the_springpot_and_the_spring_in_series_are_one_part(paper_model: Model) -> None:
+    model = paper_model.with_effect("fractional_zener", {"fractional_zener.c": 0.3})
+    (part,) = model_arms(model, (1.0, 1000.0), 0.005)
+    assert part.stands_for == "springpot and fractional_zener"
+    omega = 2.0 * np.pi * np.geomspace(1.0, 1000.0, 50)
+    shape = model.stiffness_per_modulus(Direction.AXIAL)
+    whole = model.stiffness(Direction.AXIAL, omega / (2.0 * np.pi), 1.0) / shape
+    rest = paper_model.without("springpot").stiffness(Direction.AXIAL, 1.0, 1.0) / shape
+    np.testing.assert_allclose(part_modulus(model, "m", omega), whole - rest, rtol=1e-6)
+    assert np.abs(part.at(omega) / (whole - rest) - 1.0).max() <= 0.005
+
+
+def test_a_model_without_memory_has_none(paper_model: Model) -> None:
+    still = Model.started(paper_model.bushing, BASE, {**paper_model.values, "m": 0.0})
+    assert model_arms(still, (5.0, 155.0)) == ()
+    assert listed(still, ()) == [("elastic", 1.09e6, pytest.approx(float("nan"), nan_ok=True))]
+
+
+def test_what_no_passive_arms_can_do_is_refused() -> None:
+    with pytest.raises(ModelError, match="no springs and dashpots") as refused:
+        fitted_arms(lambda omega: 1e4j + 0.0 * omega, (5.0, 155.0), 0.01)
+    assert "an error of" in str(refused.value)
+    with pytest.raises(ModelError, match="no error for arms"):
+        springpot(0.24, (5.0, 155.0), 1e-9)

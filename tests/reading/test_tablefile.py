@@ -1,0 +1,98 @@
+"""Tables in every form: what the reader takes back, and what a spreadsheet sees."""
+
+from __future__ import annotations
+
+import io
+from functools import partial
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import openpyxl
+import pandas as pd
+import pytest
+
+from bushfit.errors import OutputError
+from bushfit.geometry import Direction
+from bushfit.reading.csvfile import raw_loop_table, raw_sweep_table
+from bushfit.reading.loops import read_loop
+from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.sweeps import read_sweep
+from bushfit.reading.tablefile import Form, ending, opened, to_bytes
+from bushfit.reading.xlsxfile import streamed
+
+FORMS: tuple[Form, ...] = get_args(Form)
+PHASE = np.linspace(0.0, 12.0, 50)
+TABLE = pd.DataFrame(
+    {"x [mm], low": [1.0 / 3.0, np.nan, -1e-12], "n": [1, 2, 3], "=text": ["=1+1", "a; b, c", "Prüfling"]}
+)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("direction", list(Direction))
+def test_tests_are_read_back(form: Form, direction: Direction, tmp_path: Path) -> None:
+    loop = Loop("loop", direction, PHASE, 1e-3 * np.sin(PHASE), 50.0 * np.sin(PHASE + 0.2))
+    frequency, repeat = np.tile([5.0, 15.0, 25.0], 2), np.repeat([2, 7], 3)
+    sweep = Sweep("s", direction, frequency, np.full(6, 2e-4), 5e5 * np.exp(0.1j) * (1.0 + frequency / 100.0), repeat)
+    files = [tmp_path / f"{name}.{ending(form)}" for name in ("loop", "sweep")]
+    for file, table in zip(files, (raw_loop_table(loop), raw_sweep_table(sweep)), strict=True):
+        file.write_bytes(to_bytes(file.stem, table, form))
+    found, swept = read_loop(files[0], direction), read_sweep(files[1], direction)
+    for column in ("time", "displacement", "force"):
+        written = getattr(loop, column)
+        np.testing.assert_allclose(getattr(found, column), written, rtol=1e-6, atol=1e-9 * np.abs(written).max())
+    assert np.array_equal(swept.repeat, repeat)
+    np.testing.assert_allclose(swept.amplitude, sweep.amplitude, rtol=1e-6)
+    np.testing.assert_allclose(swept.stiffness, sweep.stiffness, rtol=1e-6)
+
+
+def test_decimal_commas_stand_between_semicolons_after_the_mark_of_utf_8() -> None:
+    written = to_bytes("t", TABLE, "decimal-comma")
+    assert written.startswith(b"\xef\xbb\xbfx [mm], low;n;'=text\n0,3333333;1;'=1+1\n;2;\"a; b, c\"\n-1e-12;3;Pr")
+    found = pd.read_csv(io.BytesIO(written), sep=";", decimal=",")
+    np.testing.assert_allclose(found["x [mm], low"], TABLE["x [mm], low"], rtol=1e-6)
+
+
+def test_a_workbook_has_numbers_in_full_and_texts_that_nothing_runs() -> None:
+    book = openpyxl.load_workbook(io.BytesIO(to_bytes("my table", TABLE, "xlsx")))
+    (sheet,) = book
+    header, *rows = sheet.iter_rows()
+    assert (sheet.title, sheet.freeze_panes) == ("my table", "A2")
+    assert [cell.value for cell in header] == list(TABLE.columns)
+    assert [[cell.value for cell in row] for row in rows] == [
+        [1.0 / 3.0, 1, "=1+1"], [None, 2, "a; b, c"], [-1e-12, 3, "Prüfling"],
+    ]  # fmt: skip
+    assert rows[0][2].data_type == "s", "a text, no formula"
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_rows_as_they_come_are_the_table(form: Form, tmp_path: Path) -> None:
+    file = tmp_path / f"t.{ending(form)}"
+    with opened(file, form, TABLE.columns) as write:
+        for cells in TABLE.itertuples(index=False):
+            write(cells)
+    assert list(tmp_path.iterdir()) == [file], "nothing is left beside it"
+    read = partial(pd.read_excel, engine="openpyxl") if form == "xlsx" else pd.read_csv
+    pd.testing.assert_frame_equal(read(file), read(io.BytesIO(to_bytes("t", TABLE, form))))
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_the_same_table_is_the_same_bytes(form: Form) -> None:
+    assert len({to_bytes("t", TABLE, form) for _ in range(2)}) == 1
+
+
+def test_what_a_sheet_does_not_hold_is_refused_and_not_cut(tmp_path: Path) -> None:
+    wide = pd.DataFrame(np.ones((1, 16_385)), columns=[f"c{n}" for n in range(16_385)])
+    with pytest.raises(OutputError, match="too large for a sheet"):
+        to_bytes("t", wide, "xlsx")
+    assert to_bytes("t", wide, "csv")
+
+
+def test_a_sheet_that_is_full_is_an_error_and_leaves_no_file_of_its_rows(tmp_path: Path) -> None:
+    with streamed(tmp_path / "t.xlsx", ["n"]) as sheet:
+        sheet._count = 1_048_576  # as after so many rows, which take their time
+        with pytest.raises(OutputError, match="too large"):
+            sheet.add([1.0])
+    with pytest.raises(OutputError), streamed(tmp_path / "t.xlsx", map(str, range(16_385))):
+        pass
+    assert [file.name for file in tmp_path.iterdir()] == ["t.xlsx"]

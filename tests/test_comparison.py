@@ -1,0 +1,180 @@
+"""Two results compared: known differences are found and covered, equal bushings are equal, m waits for alpha."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, false_discovery_control, norm
+
+from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.comparison import Comparison, ParameterContrast, compare, holm, with_holm
+from bushfit.effects.contract import Array
+from bushfit.fitting.data import Data
+from bushfit.fitting.procedures import fit_joint
+from bushfit.geometry import Direction
+from bushfit.model.covariance import Covariance
+from bushfit.model.model import FIVE, Model
+from bushfit.model.result import Result
+from bushfit.simulation import Undisturbed, measure, undisturbed
+
+AXIAL = Direction.AXIAL
+GRID = (np.array([1.0, 5.0, 35.0, 155.0]), np.array([1e-4, 5e-4]))
+#: A short campaign, quick to fit.
+PLAN = SimulateSettings(
+    repeats=3,
+    noise=5e-3,
+    force_noise=3e-3,
+    loops=(SimulatedLoop(AXIAL, 1e-3, 0.1, cycles=2),),
+    sweeps=(SimulatedSweep(AXIAL, (1e-4, 5e-4), (5.0, 25.0, 65.0, 105.0, 155.0)),),
+)
+#: The bushing of another supplier: values over those of the paper's.
+OTHER = {"mu": 1.08, "m": 1.05, "alpha": 1.04, "sigma_fmax": 0.9}
+PAIRS = 40
+
+
+def fitted(clean: Undisturbed, seed: int) -> Result:
+    return fit_joint(Data.of(measure(clean, replace(PLAN, seed=seed)).campaign()))
+
+
+def against(reference: Result, other: Result) -> Comparison:
+    return with_holm([compare(reference, other, [(AXIAL, AXIAL)], [GRID])])[0]
+
+
+def known(model: Model, covariance: Array) -> Result:
+    return Result(model, fitted=FIVE, covariance=Covariance(FIVE, covariance))
+
+
+def rows(found: Comparison) -> dict[str, ParameterContrast]:
+    return {row.name: row for row in found.parameters}
+
+
+@pytest.fixture(scope="module")
+def campaigns(paper_model: Model) -> tuple[Undisturbed, Undisturbed]:
+    changed = {name: factor * paper_model.values[name] for name, factor in OTHER.items()}
+    return undisturbed(paper_model, PLAN), undisturbed(paper_model.with_values(changed), PLAN)
+
+
+@pytest.fixture(scope="module")
+def fits(campaigns: tuple[Undisturbed, Undisturbed]) -> list[tuple[Result, Result, Result]]:
+    """The paper's bushing twice, of other noise, and the other one, for every seed."""
+    one, other = campaigns
+    return [(fitted(one, 3 * k), fitted(one, 3 * k + 1), fitted(other, 3 * k + 2)) for k in range(PAIRS)]
+
+
+def test_equal_bushings_differ_no_oftener_than_said(fits: list[tuple[Result, Result, Result]]) -> None:
+    """By parameters (Holm), by all together, and by any word on stiffness or loss: 5 % of the pairs each."""
+    found = [against(one, two) for one, two, _ in fits]
+    alarms = {
+        "a parameter, Holm": sum(any(row.holm is not None and row.holm < 0.05 for row in f.parameters) for f in found),
+        "all together": sum(f.joint is not None and f.joint[0] < 0.05 for f in found),
+        "words": sum(any("higher" in line or "lower" in line for line in f.words()) for f in found),
+    }
+    print(f"false alarms of {PAIRS} pairs: {alarms}")
+    assert max(alarms.values()) <= 6  # of 40 at 5 %: 7 or more in 3 of a thousand
+
+
+def test_known_differences_are_found_and_covered(fits: list[tuple[Result, Result, Result]], paper_model: Model) -> None:
+    truth = {name: factor - 1.0 for name, factor in OTHER.items()} | {"eps_half": 0.0}
+    truth["alpha"] *= paper_model.values["alpha"]
+    changed = paper_model.with_values({name: factor * paper_model.values[name] for name, factor in OTHER.items()})
+    x, f = (axis.ravel() for axis in np.meshgrid(GRID[1], GRID[0], indexing="ij"))
+    stiffness, before = (model.stiffness(AXIAL, f, x) for model in (changed, paper_model))
+    ratio = np.log(np.abs(stiffness / before))
+    loss = stiffness.imag / stiffness.real - before.imag / before.real
+    covered, curves, everywhere, seen = list[bool](), list[float](), list[bool](), list[bool]()
+    for one, _, other in fits:
+        found = against(one, other)
+        for name, row in rows(found).items():
+            if name in truth and row.interval:
+                covered.append(row.interval[0] <= truth[name] <= row.interval[1])
+        (each,) = found.contrasts
+        inside = [(b.low <= t) & (t <= b.high) for b, t in ((each.stiffness, ratio), (each.loss_factor, loss))]
+        wide = [found.widened(each.stiffness), found.widened(each.loss_factor)]
+        curves.append(float(np.mean(inside)))
+        everywhere.append(all(((b.low <= t) & (t <= b.high)).all() for b, t in zip(wide, (ratio, loss), strict=True)))
+        seen.append((rows(found)["mu"].holm or 0.0) < 0.05)
+    print(
+        f"of {PAIRS} pairs: intervals of parameters cover {np.mean(covered):.1%}, bands {np.mean(curves):.1%}, at all "
+        f"points at once {np.mean(everywhere):.1%}; mu 8 % higher seen in {np.mean(seen):.0%}"
+    )
+    assert np.mean(covered) >= 0.90
+    assert np.mean(curves) >= 0.88
+    assert np.mean(everywhere) >= 0.85
+    assert all(seen)
+
+
+def test_figures_are_those_of_independent_normal_errors(paper_model: Model) -> None:
+    """Against scipy: the z of each parameter, and chi-square of all together with their correlations."""
+    random = np.random.default_rng(1)
+    values = np.array([paper_model.values[name] for name in FIVE])
+    parts = [1e-2 * values[:, None] * random.standard_normal((5, 9)) for _ in range(2)]
+    one, other = (part @ part.T for part in parts)
+    moved = values * np.array([1.02, 0.99, 1.01, 1.03, 0.98])
+    found = against(
+        known(paper_model, one), known(paper_model.with_values(dict(zip(FIVE, moved.tolist(), strict=True))), other)
+    )
+    logarithmic = np.array([name != "alpha" for name in FIVE])
+    slopes = [np.diag(np.where(logarithmic, 1.0 / at, 1.0)) for at in (values, moved)]
+    covariance = slopes[0] @ one @ slopes[0] + slopes[1] @ other @ slopes[1]
+    difference = np.where(logarithmic, np.log(moved / values), moved - values)
+    assert found.joint is not None
+    assert found.joint[1] == 5
+    expected = chi2.sf(difference @ np.linalg.solve(covariance, difference), 5)
+    assert found.joint[0] == pytest.approx(expected, rel=1e-3)
+    error = np.sqrt(np.diag(covariance))
+    for i, name in enumerate(FIVE):
+        row = rows(found)[name]
+        if name != "m":
+            assert row.p == pytest.approx(2.0 * norm.sf(abs(difference[i]) / error[i]), rel=1e-3)
+
+
+def test_m_is_compared_at_a_frequency_where_alpha_is_free_and_alone_where_it_is_held(paper_model: Model) -> None:
+    one = known(paper_model, np.diag([1e8, 1e6, 1e-6, 1e4, 1e-8]))
+    other = replace(one, model=paper_model.with_values({"alpha": 0.25, "m": 1.9e5}))
+    found = rows(against(one, other))
+    assert found["m"].note == "only at equal alpha"
+    assert found["m"].p is None
+    omega = 2.0 * np.pi * np.sqrt(155.0)
+    row = found["m at 12.4 Hz"]
+    assert (row.reference, row.other) == pytest.approx((2e5 * omega**0.24, 1.9e5 * omega**0.25))
+    assert row.unit == "Pa"
+    held = [replace(each, covariance=each.covariance.restricted(["mu", "m"])) for each in (one, one)]
+    found = rows(against(*held))
+    assert list(found) == list(FIVE)
+    assert found["m"].p == pytest.approx(1.0)
+    assert found["alpha"].note == "held in both"
+
+
+def test_a_parameter_at_its_bound_is_not_tested(paper_model: Model) -> None:
+    one = known(paper_model, np.diag([1e8, 1e6, 1e-6, 1e4, 1e-8]))
+    row = rows(against(one, replace(one, at_bound={"mu": "min"})))["mu"]
+    assert (row.note, row.p, row.holm) == ("at its min", None, None)
+
+
+def test_words_say_what_is_sure_and_how_much_may_differ_where_nothing_is(paper_model: Model) -> None:
+    covariance = np.diag([1e6, 1.0, 1e-12, 1.0, 1e-14])
+    one = known(paper_model, covariance)
+    (line,) = against(one, one).words()
+    assert line.startswith("axial: stiffness no difference shown, none above 0.")
+    scaled = {name: 1.25 * paper_model.values[name] for name in ("mu", "m", "sigma_fmax")}
+    (line,) = against(one, replace(one, model=paper_model.with_values(scaled))).words()
+    assert line.startswith("axial: stiffness 25.0 % (24.")
+    assert "throughout; loss factor no difference shown, none above 0.000" in line
+    (line,) = against(Result(paper_model), Result(paper_model.with_values(scaled))).words()
+    assert line == "axial: stiffness +25 % by value, of unknown error; loss factor +0 by value, of unknown error"
+
+
+def test_bands_that_hold_at_once_are_those_of_bonferroni_at_the_widest(paper_model: Model) -> None:
+    found = against(*[known(paper_model, np.diag([1e8, 1e8, 1e-6, 1e4, 1e-8]))] * 2)
+    points = 2 * found.contrasts[0].reference.frequency.size
+    assert 1.0 < found.widening <= norm.isf(0.025 / points) / norm.isf(0.025)
+
+
+def test_holm_is_holm() -> None:
+    """His example of four tests, by hand; more than Benjamini and Hochberg's."""
+    p = [0.01, 0.04, 0.03, 0.005]
+    assert holm(p) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert (np.array(holm(p)) >= false_discovery_control(p)).all()
+    assert holm([]) == []

@@ -1,0 +1,236 @@
+"""The JSON Schemas: what the commands write validates by a program that is not ours, and what is spoiled does not."""
+
+from __future__ import annotations
+
+import copy
+import json
+import shutil
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from commandline import call
+from jsonschema import Draft202012Validator
+
+from bushfit.errors import BushfitError
+from bushfit.schemas import DESCRIBED, schema
+
+Documents = dict[str, list[Any]]
+INPUTS = ("campaign", "manifest", "limits")
+OUTPUTS = tuple(name for name in DESCRIBED if name not in INPUTS)
+
+
+def closed(node: Any) -> Any:
+    """A schema in which every table has the keys that are described and no others: what is written has no others."""
+    if isinstance(node, Mapping):
+        ends = {"additionalProperties": False} if "properties" in node and "additionalProperties" not in node else {}
+        return {key: closed(value) for key, value in node.items()} | ends
+    return [closed(each) for each in node] if isinstance(node, list) else node
+
+
+def complaints(name: str, document: Any, *, whole: bool = False) -> list[str]:
+    """What jsonschema finds wrong with a document; with `whole`, keys that are not described too."""
+    described = closed(schema(name)) if whole else schema(name)
+    return [f"{error.json_path}: {error.message}" for error in Draft202012Validator(described).iter_errors(document)]
+
+
+@pytest.fixture(scope="module")
+def written(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Documents:
+    """Documents that commands wrote or printed, by the schema that describes them."""
+    folder = tmp_path_factory.mktemp("written")
+    for name in ("configs", "data"):
+        shutil.copytree(root / name, folder / name)
+    found: Documents = {name: [] for name in DESCRIBED}
+
+    def run(printed: str, *arguments: str, status: int = 0) -> None:
+        done = call(folder, *arguments, "--json", "-q", "--no-plots")
+        assert done.returncode == status, done.stderr
+        found[printed].append(json.loads(done.stdout))
+
+    def read(name: str, pattern: str) -> None:
+        files = sorted(folder.glob(pattern))
+        assert files, pattern
+        found[name] += [json.loads(file.read_text(encoding="utf-8")) for file in files]
+
+    run("run", "run", "configs/cmp_15961.toml", "-o", "run")
+    run("run", "run", "data/practice/case_001/bushing.toml", "-o", "named")
+    run("model", "fit", "configs/cmp_15961.toml", "--profile", "--loss", "soft_l1", "-o", "profile")
+    run("model", "fit", "configs/epdm_70.toml", "--direction", "DMA", "-o", "specimens")
+    run("prediction", "predict", "run/model.json", "--campaign", "configs/cmp_15961.toml", "-o", "predicted")
+    shaken = ("--mass", "1 kg", "--base-acceleration", "0.1 g", "--direction", "mount")
+    run("prediction", "predict", "specimens/model.json", *shaken, "-o", "shaken")
+    run("comparison", "compare", "run", "configs/arm_bushing.toml", "-o", "compared")
+    run("comparison", "compare", "configs/cmp_15961.toml", "-o", "families", "--families", "sliders")
+    (folder / "broken.toml").write_text("[bushing]\n")
+    batch = ("batch", "configs/cmp_15961.toml", "data/practice/case_001/bushing.toml", "broken.toml")
+    asked = ("--command", "fit", "--command", "diagnose", "--at", "axial 25 Hz 0.1 mm", "--jobs", "1")
+    run("batch", *batch, *asked, "--limits", "configs/limits.toml", "-o", "batch", status=1)
+    card = ("--family", "amplitude_sweeps", "--campaigns", "5", "--jobs", "1", "--keep")
+    run("scorecard", "scorecard", *card, "-o", "card")
+    assert call(folder, "simulate", "run/model.json", "-o", "simulated", "-q").returncode == 0
+    for names in ("model", "static", "dynamic", "joint", "truth"):
+        read("model", f"*/{names}.json")
+    read("diagnosis", "*/diagnosis.json")
+    read("row", "batch/bushings/*/row.json")
+    read("scorecard", "card/scorecard.json")
+    read("sealed", "card/campaigns/sealed/*.json")
+    lines = (folder / "card/outcomes.jsonl").read_text(encoding="utf-8").splitlines()
+    found["outcome"] = [json.loads(line) for line in lines]
+    known = {"model", "static", "dynamic", "joint", "truth", "diagnosis", "row", "scorecard", "compare"}
+    strange = [file for file in folder.glob("*/**/*.json") if file.stem not in known and "sealed" not in file.parts]
+    assert [file for file in strange if "data" not in file.parts] == [], "a file that no schema describes"
+    return found
+
+
+def keys_without_a_word(node: Any, place: str) -> Iterator[str]:
+    """Places of keys that a schema lists and says nothing of."""
+    if isinstance(node, Mapping):
+        for key, value in node.get("properties", {}).items():
+            if "description" not in value and "description" not in str(value.get("anyOf")) and "$ref" not in value:
+                yield f"{place}.{key}"
+        for key, value in node.items():
+            yield from keys_without_a_word(value, f"{place}.{key}")
+
+
+@pytest.mark.parametrize("name", DESCRIBED)
+def test_a_schema_is_valid_and_says_what_every_key_holds(name: str) -> None:
+    made = schema(name)
+    Draft202012Validator.check_schema(made)
+    assert made["$id"] == f"urn:bushfit:schema:{name}"
+    assert made["title"].startswith(f"bushfit {name}: ")
+    assert [*keys_without_a_word(made, name)] == []
+
+
+def test_a_schema_that_is_not_there_is_told_with_the_nearest() -> None:
+    with pytest.raises(BushfitError, match='did you mean "diagnosis"'):
+        schema("diagnoses")
+
+
+@pytest.mark.parametrize("name", OUTPUTS)
+def test_what_is_written_has_the_keys_that_are_described_and_no_others(written: Documents, name: str) -> None:
+    documents = written[name]
+    print(name, len(documents))
+    assert documents
+    for document in documents:
+        assert complaints(name, document, whole=True) == []
+
+
+def test_the_documents_are_of_every_kind(written: Documents) -> None:
+    """So that keys which are there now and then have been seen."""
+    assert {document["schema"] for document in written["model"]} == {"bushfit/model/1", "bushfit/model/2"}
+    assert {document["status"] for document in written["row"]} == {"done", "failed"}
+    assert {"consistent", "named"} <= {document["verdict"] for document in written["diagnosis"]}
+    assert any("profile95" in entry for document in written["model"] for entry in document["parameters"].values())
+    assert any(document["failed"] for document in written["batch"])
+    assert any("joint" in document for document in written["run"])
+
+
+@pytest.mark.parametrize("name", [name for name in OUTPUTS if name != "prediction"])
+def test_what_is_spoiled_is_refused(written: Documents, name: str) -> None:
+    """Every key that has to be there taken away in turn, and every key given what is no value of it."""
+    described, document = schema(name), written[name][-1]
+    required = described.get("required", [])
+    assert required or name == "outcome"
+    for key in required:
+        assert complaints(name, {other: value for other, value in document.items() if other != key}), key
+    for key in document:
+        assert complaints(name, {**document, key: [[{}]]}), key
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        (("schema",), "bushfit/model/3"),
+        (("bushing", "inner_radius_m"), "10 mm"),
+        (("parameters", "mu", "value"), None),
+        (("parameters", "mu", "ci95"), [1.0]),
+        (("parameters", "mu", "at_bound"), "middle"),
+        (("covariance", "matrix", 0, 0), "1"),
+        (("fit", "points"), 1.5),
+        (("fit", "tests", 0, "held"), "temperature"),
+        (("warnings",), "one"),
+        (("provenance", "inputs", 0, "sha256"), 1),
+    ],
+)
+def test_a_wrong_value_in_a_model_is_refused(written: Documents, place: tuple[Any, ...], value: object) -> None:
+    document = copy.deepcopy(written["model"][0])
+    table = document
+    for key in place[:-1]:
+        table = table[key]
+    table[place[-1]] = value
+    assert complaints("model", document)
+
+
+def described_by(file: Path) -> str:
+    """The schema of a TOML file of the repository."""
+    return file.stem if file.stem == "limits" else "manifest" if file.stem == "batch" else "campaign"
+
+
+def test_every_model_and_campaign_of_the_repository_validates(root: Path) -> None:
+    truths = sorted((root / "data").glob("**/truth.json"))
+    tables = [file for top in ("configs", "data") for file in sorted((root / top).glob("**/*.toml"))]
+    assert len(truths) > 1
+    assert len(tables) > 20
+    for file in truths:
+        assert complaints("model", json.loads(file.read_text(encoding="utf-8"))) == [], file
+    for file in tables:
+        assert complaints(described_by(file), tomllib.loads(file.read_text(encoding="utf-8"))) == [], file
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ('inner_radius = "10 mm"', "inner_radius = 10"),
+        ('inner_radius = "10 mm"', 'inner_radios = "10 mm"'),
+        ('shape = "calibrated"', 'shape = "square"'),
+        ('direction = "axial"', 'direction = "axil"'),
+        ('columns = { force = "Kraft" }', 'columns = { forces = "Kraft" }'),
+        ('delimiter = "semicolon"', 'delimiter = ";"'),
+        ('step = "10 Hz" }', "step = 10 }"),
+        ('step = "10 Hz" }', 'steps = "10 Hz" }'),
+        ("vary = true", 'vary = "yes"'),
+        ('min = "0.5 MPa"', 'least = "0.5 MPa"'),
+        ("seed = 1 ", "seed = 1.5 "),
+        ('specimen = "DMA"', "specimen = 1"),
+        ('mass = "0.25 kg"', "mass = 0.25"),
+        ('loss = "linear"', 'loss = "huber"'),
+        ('amplitude = "peak-to-peak"', 'amplitude = "rms"'),
+    ],
+)
+def test_what_is_mistyped_in_a_campaign_is_refused(root: Path, right: str, wrong: str) -> None:
+    text = (root / "configs/reference.toml").read_text(encoding="utf-8")
+    assert right in text
+    assert complaints("campaign", tomllib.loads(text)) == []
+    assert complaints("campaign", tomllib.loads(text.replace(right, wrong, 1)))
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("manifest", 'bushings = [{ campaign = "a.toml", comand = "fit" }]'),
+        ("manifest", 'bushings = [{ name = "a" }]'),
+        ("manifest", 'bushings = [{ campaign = "a.toml" }]\nat = [25]'),
+        ("limits", "[parameters.mu]\nmaximum = 2"),
+        ("limits", '[[stiffness]]\nmax = "1 kN/mm"'),
+        ("limits", 'verdicts = ["fine"]'),
+    ],
+)
+def test_what_is_mistyped_in_a_manifest_or_limits_is_refused(name: str, text: str) -> None:
+    assert complaints(name, tomllib.loads(text))
+
+
+def test_printed_and_written_are_the_same(root: Path, tmp_path: Path) -> None:
+    printed = call(tmp_path, "schema", "diagnosis", "-q")
+    assert (printed.returncode, printed.stderr) == (0, "")
+    assert json.loads(printed.stdout) == schema("diagnosis")
+    assert call(tmp_path, "schema", "-o", "all").returncode == 0
+    files = {file.name.removesuffix(".schema.json"): file for file in (tmp_path / "all").iterdir()}
+    assert set(files) == set(DESCRIBED)
+    assert files["diagnosis"].read_text(encoding="utf-8") == printed.stdout
+    listed = call(tmp_path, "schema", "--json", "-q")
+    assert json.loads(listed.stdout) == {name: described.files for name, described in DESCRIBED.items()}
+    wrong = call(tmp_path, "schema", "diagnoses")
+    assert (wrong.returncode, wrong.stdout) == (2, "")
+    assert 'did you mean "diagnosis"' in wrong.stderr
