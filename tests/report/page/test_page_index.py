@@ -29,11 +29,11 @@ def test_a_batch_writes_its_page_and_the_folder_gives_the_same(batch: Path) -> N
     assert sorted(links) == [f"bushings/c{n}/report.html" for n in range(3)]
     assert all((batch / link).is_file() for link in links)
     summary = json.loads((batch / "batch.json").read_text(encoding="utf-8"))
-    mu = summary["quantities"]["mu [Pa]"]
-    assert mu["allowed"] == [1.2e6, None]
+    mu = summary["quantities"]["mu [MPa]"]
+    assert mu["allowed"] == [1.2, None]
     table = pd.read_csv(batch / "batch.csv")
-    assert mu["median"] == pytest.approx(table["mu [Pa]"].median())
-    out = table["mu [Pa]"] < 1.2e6
+    assert mu["median"] == pytest.approx(table["mu [MPa]"].median())
+    out = table["mu [MPa]"] < 1.2
     assert f"{int(out.sum())} out of limits" in page
     rows = re.findall(r'<tr><th scope="row" align="left">(?:<a [^>]*>)?([^<]*)', page)
     assert rows[0] == "=1+1 &lt;b&gt;", "what failed comes first"
@@ -51,7 +51,7 @@ def test_many_bushings_stay_small(batch: Path) -> None:
     contents = read_batch(batch)
     table = contents.tables["batch"]()
     random = np.random.default_rng(1)
-    many = table.iloc[[0] * 20_000].assign(**{"mu [Pa]": random.normal(1.3e6, 5e4, 20_000)}).reset_index(drop=True)
+    many = table.iloc[[0] * 20_000].assign(**{"mu [MPa]": random.normal(1.3, 0.05, 20_000)}).reset_index(drop=True)
     page = index_page(contents.documents, {"batch": many})
     print(f"20000 bushings in {len(page.encode())} bytes")
     assert len(page.encode()) < 500_000
