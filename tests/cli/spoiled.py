@@ -10,7 +10,16 @@ from typing import Any
 
 import numpy as np
 from spoiled_exports import EXPORTS
-from spoiled_rows import IN_CAMPAIGN, IN_MODEL, IN_MORE, IN_RESONANCE, USAGE, WHOLE_CAMPAIGNS, WHOLE_MODELS
+from spoiled_rows import (
+    IN_CAMPAIGN,
+    IN_MODEL,
+    IN_MORE,
+    IN_PREDICTED,
+    IN_RESONANCE,
+    USAGE,
+    WHOLE_CAMPAIGNS,
+    WHOLE_MODELS,
+)
 from spoiled_tables import IN_LOOP, IN_SWEEP
 
 CAMPAIGN = """\
@@ -163,7 +172,7 @@ class Spoiled:
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        return (self.command[0], "-o", "x", *self.command[1:])
+        return (self.command[0], *(() if self.command[0] == "schema" else ("-o", "x")), *self.command[1:])
 
 
 def campaigns() -> Iterator[Spoiled]:
@@ -186,10 +195,11 @@ def campaigns() -> Iterator[Spoiled]:
 def models() -> Iterator[Spoiled]:
     """One entry of the model file changed; the commands that take a model in turn, and export each."""
     commands = cycle(TAKING_MODELS)
-    for name, change, *says in IN_MODEL:
-        document = json.loads(json.dumps(MODEL))
-        change(document)
-        yield from given(name, next(commands), says, json.dumps(document))
+    for rows, taking in ((IN_MODEL, commands), (IN_PREDICTED, cycle(TAKING_MODELS[:1]))):
+        for name, change, *says in rows:
+            document = json.loads(json.dumps(MODEL))
+            change(document)
+            yield from given(name, next(taking), says, json.dumps(document))
     for name, content, *says in WHOLE_MODELS:
         yield from given(name, next(commands), says, content)
 

@@ -189,7 +189,6 @@ IN_MODEL = [
     ("name of half a character", entry("bushing", "name", value="a\ud800"), "model.json, bushing.name: this value is not understood", "found: a\\ud800", "text in Unicode"),
     ("name without end", entry("bushing", "name", value="x" * 5000), "model.json, bushing.name: this value is not understood", "at most 200 characters"),
     ("empty name", entry("bushing", "name", value=""), "model.json, bushing.name: this value is not understood", "a text that is not empty"),
-    ("no bushing and no specimen", entry("bushing", value=None), "there is no bushing", "bushfit predict MODEL.json --bushing other.toml"),
     ("tests is a text", entry("fit", "tests", value="all"), "model.json, fit.tests: this value is not understood", "a list"),
     ("place of a test is missing", entry("fit", "usable", value=[{"stiffness": 0.1, "loss_factor": 0.1, "points": 9, "held_out": True}]), "model.json, fit.usable #1.place: a key is missing"),
     ("no effects", without("effects"), "model.json, effects: a key is missing", "effects = ..."),
@@ -230,6 +229,10 @@ IN_MODEL = [
     ("warnings is a text", entry("warnings", value="none"), "model.json, warnings: this value is not understood", "a list"),
     ("file of an input is a number", entry("provenance", "inputs", value=[{"file": 3, "sha256": "0"}]), "model.json, provenance.inputs #1.file: this value is not understood", "a text in quotes"),
     ("inputs without checksum", entry("provenance", "inputs", value=[{"file": "a.csv"}]), "model.json, provenance.inputs #1.sha256: a key is missing", "sha256 = ..."),
+]
+#: The same for predict alone: a compound without a body still holds the other parameters of a fit.
+IN_PREDICTED = [
+    ("no bushing and no specimen", entry("bushing", value=None), "there is no bushing", "bushfit predict MODEL.json --bushing other.toml"),
 ]
 #: (name, content of the model file, what the error says ...)
 WHOLE_MODELS = [
@@ -345,6 +348,7 @@ USAGE = [
     ("simulate|model.json|--effect|inertia.weight=1 kg", "--effect: not an effect with a value", 'such as "inertia.mass=0.1 kg"; parameters of inertia: mass'),
     ("simulate|model.json|--effect|inertia.mass=-1 kg", "inertia.mass: impossible value", "0 to 100 kg (moving mass)"),
     ("simulate|model.json|--effect|=", "unknown effect", "one of elastic, springpot, friction, viscous, hysteretic_loss, second_springpot, maxwell,"),
+    ("schema|modle", "there is no such schema", 'did you mean "model"?'),
     ("scorecard|--campaigns|1", "Invalid value for '--campaigns': 1 is not in the range x>=5."),
     ("scorecard|--family|fault", "Invalid value for '--family': 'fault' is not one of 'effects', 'mistakes', 'amplitude_sweeps', 'awkward', 'faults', 'outside', 'library', 'all'."),
     ("scorecard|--jobs|0", "Invalid value for '--jobs': 0 is not in the range x>=1."),
