@@ -22,7 +22,7 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.locate import largest_smooth_misfit
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
-from bushfit.effects import twins_of
+from bushfit.effects import effect_of, twins_of
 from bushfit.effects.mistakes import mistake_named
 from bushfit.errors import MeasurementError
 from bushfit.fitting.data import Data
@@ -108,8 +108,8 @@ def _failed(task: Task, wrong: Exception) -> Outcome:
 def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) -> Outcome:
     result, document = diagnosis.result, diagnosis.to_document()
     heldout = document["gap"]["heldout"] or {"before": None, "after": None}
-    added = tuple(f"{name}." for name in task.hidden if name in result.model.effects)
-    asked = [name for name in truth.values if task.kind == "swept" or (added and name.startswith(added))]
+    added = {name for name in task.hidden if name in result.model.effects}
+    asked = [name for name in truth.values if task.kind == "swept" or effect_of(name) in added]
     intervals = {name: result.interval(name) for name in asked}
     covered = [ends[0] <= truth.values[name] <= ends[1] for name, ends in intervals.items() if ends is not None]
     return Outcome(
