@@ -63,7 +63,7 @@ _SECONDS_A_LINE = 10.0
 )
 @click.option("--tables", is_flag=True, help="Write each bushing's loops.csv, sweeps.csv and the like too.")
 @click.option("--plots", is_flag=True, help="Write each bushing's plots too.")
-@click.option("--reports", is_flag=True, help="Write report.html of each bushing that is diagnosed too.")
+@click.option("--reports", is_flag=True, help="Write report.html of each that is diagnosed too.")
 @click.option("--no-report", is_flag=True, help="Write no index.html.")
 @shared_options
 def command(
