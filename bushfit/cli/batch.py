@@ -61,7 +61,7 @@ _SECONDS_A_LINE = 10.0
     is_flag=True,
     help="Go on with the results that stand: do what is missing, failed, or has changed (a test, a setting, bushfit).",
 )
-@click.option("--tables", is_flag=True, help="Write each bushing's loops.csv, sweeps.csv and the like too.")
+@click.option("--tables", is_flag=True, help="Write loops.csv, sweeps.csv and the like of each too.")
 @click.option("--plots", is_flag=True, help="Write each bushing's plots too.")
 @click.option("--reports", is_flag=True, help="Write report.html of each that is diagnosed too.")
 @click.option("--no-report", is_flag=True, help="Write no index.html.")

@@ -12,7 +12,7 @@ from bushfit.cli.common import Options, example, shared_options
 
 @click.command("report", epilog=example("bushfit report data/reports/mystery_mount -o results/page"))
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@partial(shared_options, where="DIR")
+@partial(shared_options, where="DIR", forms=())
 def command(folder: Path, options: Options) -> None:
     """Make one page of DIR, the results of run, diagnose, a fit, or of a batch: to show, to print, to mail.
 
