@@ -194,7 +194,7 @@ def test_limits_on_what_a_row_does_not_have(typed: Callable[..., Any], shop: Pat
     again = typed("batch", "m.csv", "-o", "all", "--force", "--no-plots")
     assert again.returncode == 0
     assert not (shop / "all/batch.png").exists(), "a picture of another run"
-    assert "wrote batch.csv, batch.json, index.html, bushings/ to" in again.stderr
+    assert "wrote batch.json, batch.csv, index.html, bushings/ to" in again.stderr
 
 
 def test_results_that_stand_are_refused_resumed_or_replaced(typed: Callable[..., Any], shop: Path) -> None:
@@ -224,8 +224,13 @@ def test_another_form_replaces_the_table_and_does_again_only_what_has_tables_of_
     assert "batch.csv" in refused.stderr
     again = typed("batch", few, "-o", "all", "--resume", "--json", "--table-format", "xlsx", "--plot-format", "svg")
     assert json.loads(again.stdout)["kept"] == 2, "no bushing has a table or a picture"
-    assert "wrote batch.xlsx, bushings/ to" in again.stderr
-    assert sorted(file.name for file in (shop / "all").iterdir()) == ["batch.xlsx", "bushings"], "batch.csv is gone"
+    assert "wrote batch.json, batch.xlsx, index.html, bushings/ to" in again.stderr
+    assert sorted(file.name for file in (shop / "all").iterdir()) == [
+        "batch.json",
+        "batch.xlsx",
+        "bushings",
+        "index.html",
+    ], "batch.csv is gone"
     (sheet,) = openpyxl.load_workbook(shop / "all/batch.xlsx")
     header, *lines = sheet.iter_rows(values_only=True)
     model = json.loads((shop / "all/bushings/b1/model.json").read_text())
