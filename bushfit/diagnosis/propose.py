@@ -64,6 +64,9 @@ def proposals(evidence: Evidence, excluded: Collection[str], held: Sequence[str]
     there = {*told, *(effect.replaces for effect in evidence.model.records)}
     possible = [effect for effect in library.values() if not (isinstance(effect, Branch) and {*effect.uses} - values)]
     missing = [effect for effect in possible if effect.name not in there]
+    series = {name for effect in evidence.model.records for name in effect.never_with}
+    series |= {effect.name for effect in missing if {*effect.never_with} & {*present}}
+    missing = [effect for effect in missing if effect.name not in series]
     asked = [effect for effect in missing if effect.replaces is None and effect.after in present]
     probed = [_probed(evidence, effect) for effect in asked]
     ends = np.cumsum([0, *(len(columns) for _, columns in probed)])

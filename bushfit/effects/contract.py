@@ -186,6 +186,8 @@ class Effect:
         harmonic_only: whether it has no law in time: of a loop it answers the first harmonic alone, by
             `harmonic_response`, and the rig refuses it.
         after: the effect without which it is no other: it is looked for beside that one only.
+        never_with: effects beside which it is not looked for: the two together are a series that follows any law
+            between them, and so no name.
     """
 
     name: str
@@ -207,6 +209,7 @@ class Effect:
     harmonic_only: bool = False
     in_place_of: Callable[[Values], dict[str, float]] | None = None
     after: str | None = None
+    never_with: tuple[str, ...] = ()
 
     @property
     def amount(self) -> Parameter:

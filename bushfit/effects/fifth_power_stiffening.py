@@ -28,6 +28,7 @@ EFFECT = Branch(
     confirmed_by="sweep or loop at one and a half times the largest amplitude: the rise must be five times as large, "
     "where strain_stiffening makes it 2.25 times as large and a stop about three times",
     uses=("mu",),
+    never_with=("strain_stiffening",),
     modulus=modulus,
     stress=stress,
 )

@@ -158,3 +158,12 @@ def test_more_candidates_cost_a_higher_threshold(clean: Evidence) -> None:
     one, every = critical_gain(clean, proposed[:1]), critical_gain(clean, proposed)
     print(f"one candidate {one:.1f}, all {len(proposed)} {every:.1f}")
     assert every > one + 2.0
+
+
+def test_two_powers_that_would_follow_any_law_between_them_are_not_looked_for_together(clean: Evidence) -> None:
+    """Stiffening with the square and with the fourth power of amplitude: one of them is asked of each model."""
+    powers = {"strain_stiffening", "fifth_power_stiffening"}
+    assert powers <= {proposal.name for proposal in proposals(clean, (), ())}
+    for power in powers:
+        solution = replace(clean.solution, model=clean.model.with_effect(power))
+        assert not powers & {proposal.name for proposal in proposals(replace(clean, solution=solution), (), ())}
