@@ -66,19 +66,20 @@ def written(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Documents:
     (folder / "broken.toml").write_text("[bushing]\n")
     batch = ("batch", "configs/cmp_15961.toml", "data/practice/case_001/bushing.toml", "broken.toml")
     asked = ("--command", "fit", "--command", "diagnose", "--at", "axial 25 Hz 0.1 mm", "--jobs", "1")
-    run("batch", *batch, *asked, "--limits", "configs/limits.toml", "-o", "batch", status=1)
+    run("summary", *batch, *asked, "--limits", "configs/limits.toml", "-o", "batch", status=1)
     card = ("--family", "amplitude_sweeps", "--campaigns", "5", "--jobs", "1", "--keep")
     run("scorecard", "scorecard", *card, "-o", "card")
     assert call(folder, "simulate", "run/model.json", "-o", "simulated", "-q").returncode == 0
     for names in ("model", "static", "dynamic", "joint", "truth"):
         read("model", f"*/{names}.json")
     read("diagnosis", "*/diagnosis.json")
+    read("batch", "batch/batch.json")
     read("row", "batch/bushings/*/row.json")
     read("scorecard", "card/scorecard.json")
     read("sealed", "card/campaigns/sealed/*.json")
     lines = (folder / "card/outcomes.jsonl").read_text(encoding="utf-8").splitlines()
     found["outcome"] = [json.loads(line) for line in lines]
-    known = {"model", "static", "dynamic", "joint", "truth", "diagnosis", "row", "scorecard", "compare"}
+    known = {"model", "static", "dynamic", "joint", "truth", "diagnosis", "row", "scorecard", "compare", "batch"}
     strange = [file for file in folder.glob("*/**/*.json") if file.stem not in known and "sealed" not in file.parts]
     assert [file for file in strange if "data" not in file.parts] == [], "a file that no schema describes"
     return found

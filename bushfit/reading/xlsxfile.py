@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from xlsxwriter import Workbook
     from xlsxwriter.format import Format
 
-#: Characters that the name of a sheet must not have.
-_UNSAFE_IN_SHEETS = re.compile(r"[\[\]:*?/\\\x00-\x1f]")
-#: Characters of the name of a sheet at most.
+#: Characters that the name of a sheet must not have: Excel's, and those that XML has none of.
+_UNSAFE_IN_SHEETS = re.compile(r"[\[\]:*?/\\\x00-\x1f\ufffe\uffff]")
+#: Characters of the name of a sheet at most, of which rare ones count twice: units of UTF-16.
 _LONGEST_SHEET = 31
 #: The name of a sheet that Excel keeps for itself.
 _RESERVED = "history"
@@ -118,13 +118,18 @@ def _text(text: str) -> str:
     return text.encode("utf-8", "replace").decode()[:_LONGEST_TEXT]
 
 
+def _cut(text: str, most: int) -> str:
+    """As many first characters of a text as have so many units of UTF-16 at most."""
+    return text.encode("utf-16-le")[: 2 * most].decode("utf-16-le", "ignore")
+
+
 def _sheet_name(title: str, taken: set[str]) -> str:
     """A name that Excel takes and no other sheet has, its capitals aside; it joins those that are taken."""
-    plain = _UNSAFE_IN_SHEETS.sub("_", _text(title))[:_LONGEST_SHEET].strip(" '") or "table"
+    plain = _cut(_UNSAFE_IN_SHEETS.sub("_", _text(title)), _LONGEST_SHEET).strip(" '") or "table"
     name, count = plain, 1
     while name.lower() in taken or name.lower() == _RESERVED:
         count += 1
         end = f"_{count}"
-        name = plain[: _LONGEST_SHEET - len(end)] + end
+        name = _cut(plain, _LONGEST_SHEET - len(end)) + end
     taken.add(name.lower())
     return name

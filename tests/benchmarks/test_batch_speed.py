@@ -25,6 +25,7 @@ from bushfit.batch.run import Plan, run
 from bushfit.batch.work import Orders
 from bushfit.campaign.schema import SimulateSettings
 from bushfit.model.model import Model
+from bushfit.report.contents import Formats
 from bushfit.simulation import simulate, to_files
 
 _PROGRAM = str(Path(sys.executable).with_name("bushfit"))
@@ -57,8 +58,8 @@ def manifest(bushings: Path, count: int, name: str = "campaign") -> Path:
 
 
 def seconds(bushings: Path, count: int, jobs: int, folder: Path) -> float:
-    rows = read_manifest(str(manifest(bushings, count)), Settings()).rows
-    plan = Plan("benchmark", rows, Orders(folder, (), (), resume=False), None, None, picture=False)
+    rows, none = read_manifest(str(manifest(bushings, count)), Settings()).rows, Formats(False, False, False)
+    plan = Plan("benchmark", rows, Orders(folder, (), none, resume=False), None, None, none)
     begin = time.perf_counter()
     summary = run(plan, LocalPool(jobs), str)
     assert summary.status["done"] == count
