@@ -73,8 +73,18 @@ def test_another_name_without_a_part_takes_the_name_back(measured: Measured, mon
         diagnosis = asked(measured(INERTIA, SHARED))
     assert diagnosis.verdict == "unexplained"
     assert diagnosis.to_document()["gap"]["name_again"] == [1, 3]
-    del again[1]
-    assert said(asked(measured(INERTIA, SHARED))) == "named inertia"
+    again[1:2] = [Again(f"repeat {n}", True, ()) for n in (1, 2)]
+    assert said(asked(measured(INERTIA, SHARED))) == "named inertia", "without one part of four another comes out"
+
+
+def test_a_name_that_seldom_comes_out_again_is_taken_back(measured: Measured, monkeypatch: pytest.MonkeyPatch) -> None:
+    again = [Again(f"amplitude level {n}", came_again=n < 3, others=()) for n in (1, 2, 3)]
+    monkeypatch.setattr(verdict, "searched_again", lambda *_: again)
+    monkeypatch.setattr(verdict, "describe", lambda *_: None)
+    diagnosis = asked(measured(INERTIA, SHARED))
+    assert diagnosis.verdict == "unexplained"
+    assert "without a part of the tests inertia seldom comes out again" in diagnosis.summary
+    assert diagnosis.holdout.name_again == (2, 3)
 
 
 def test_the_name_comes_out_again_without_each_part(measured: Measured) -> None:
