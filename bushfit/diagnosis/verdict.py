@@ -38,8 +38,8 @@ _NO_PHYSICS = ("frequency", "repeat", "row")
 #: Parts without which another name comes out, from which on a single name is doubted: one may do so by chance. Of
 #: several effects one part is enough: wrong ones are mostly added several at a time.
 _ELSEWHERE = 2
-#: Share of the parts without which a name has to come out again, more than this: of 64 simulated campaigns right ones came
-#: out in four of seven or more, a wrong one in three of six.
+#: Share of the parts without which a name has to come out again, more than this: of 64 simulated campaigns right ones
+#: did in four of seven or more, a wrong one in three of six.
 _STANDS = 0.5
 #: What is said where there is no gap.
 _NOTHING = "nothing is missing beyond noise and tolerance"
