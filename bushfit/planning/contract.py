@@ -57,7 +57,7 @@ class Knowledge:
         covariance: of their relative changes, (k, k), from what is known now.
         noise: of the rig.
         source: where all this comes from, in words.
-        rivals: models that explain what is known as well, the model among them; none where there is no doubt.
+        rivals: what is known if another model is the right one, this one's model first; none where there is no doubt.
         strain: least and largest equivalent strain amplitude measured so far; None where nothing was.
         specimens: bodies of the compound that can be tested in place of the bushing.
         tests: of the campaign so far.
@@ -68,7 +68,7 @@ class Knowledge:
     covariance: Array
     source: str
     noise: Noise = field(default_factory=Noise)
-    rivals: tuple[Model, ...] = ()
+    rivals: tuple[Knowledge, ...] = ()
     strain: tuple[float, float] | None = None
     specimens: tuple[Specimen, ...] = ()
     tests: tuple[Test, ...] = ()
