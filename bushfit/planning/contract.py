@@ -1,0 +1,184 @@
+"""What a plan is made of: what is known before, what is wanted, and what tests would tell.
+
+A test is one run of the rig: a stepped sine that holds one amplitude or one frequency (`SimulatedSweep`), or a loop
+(`SimulatedLoop`). A test that is repeated stands in the plan again: its points share their errors anew. Standard errors
+are of relative changes of parameters, as `fitting.information` counts them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
+from bushfit.effects.contract import Array
+from bushfit.fitting.noise import ASSUMED_SHARED
+from bushfit.geometry import Place, Specimen
+from bushfit.model.model import Model
+
+#: What a plan is for.
+Aim = Literal["parameters", "predictions", "rivals"]
+#: One run of the rig: a sweep has one amplitude and several frequencies, or one frequency and several amplitudes.
+Test = SimulatedLoop | SimulatedSweep
+
+#: Standard deviation of a loop's force from row to row, over half its range, where nothing is known; chosen: that of
+#: most force sensors.
+ASSUMED_FORCE = 5e-3
+
+
+@dataclass(frozen=True)
+class Noise:
+    """How well the rig measures, standard deviations; gain and phase [rad] are those of ln K.
+
+    Args:
+        scatter: of a sweep's point, (gain, phase).
+        shared: of all points of one run, (gain, phase).
+        level: of all runs of one line, which hold the same in the same direction, (gain, phase).
+        force: of a row of a loop, over half the force range; there are `ROWS` rows a cycle.
+        rows_as_one: so many rows of a loop tell as much as an independent one.
+    """
+
+    scatter: tuple[float, float] = (ASSUMED_SHARED[0], ASSUMED_SHARED[0])
+    shared: tuple[float, float] = ASSUMED_SHARED
+    level: tuple[float, float] = (0.0, 0.0)
+    force: float = ASSUMED_FORCE
+    rows_as_one: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Knowledge:
+    """What is known before the tests.
+
+    Args:
+        model: the likeliest values.
+        names: of its k parameters that the tests are to tell.
+        covariance: of their relative changes, (k, k), from what is known now.
+        noise: of the rig.
+        source: where all this comes from, in words.
+        rivals: models that explain what is known as well, the model among them; none where there is no doubt.
+        strain: least and largest equivalent strain amplitude measured so far; None where nothing was.
+        specimens: bodies of the compound that can be tested in place of the bushing.
+        tests: of the campaign so far.
+    """
+
+    model: Model
+    names: tuple[str, ...]
+    covariance: Array
+    source: str
+    noise: Noise = field(default_factory=Noise)
+    rivals: tuple[Model, ...] = ()
+    strain: tuple[float, float] | None = None
+    specimens: tuple[Specimen, ...] = ()
+    tests: tuple[Test, ...] = ()
+
+    @property
+    def errors(self) -> Array:
+        """Standard error of each parameter's relative change, (k,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Operating points of one direction whose stiffness is wanted.
+
+    Args:
+        frequency: [Hz], (n,).
+        amplitude: zero-to-peak [m or rad, or strain], (n,).
+    """
+
+    place: Place
+    frequency: Array
+    amplitude: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """What the plan is for.
+
+    Args:
+        parameters: names whose errors count, of aim "parameters".
+        points: where the stiffness is wanted; predictions are told for them whatever the aim.
+        hours: of the rig, at most.
+        rig: its limits, and its time for a point and for a set-up.
+        places: directions, or specimens, in which it can test.
+    """
+
+    aim: Aim
+    hours: float
+    rig: RigSettings
+    places: tuple[Place, ...]
+    points: tuple[Points, ...]
+    parameters: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Visible:
+    """The smallest amount of an effect that a programme finds.
+
+    Args:
+        effect: of the library, that the model lacks.
+        parameter: whose amount it is.
+        unit: of the amount, SI.
+        amount: that is found in nine of ten cases (by a test that a sound model fails in one of twenty).
+    """
+
+    effect: str
+    parameter: str
+    unit: str
+    amount: float
+
+
+@dataclass(frozen=True, eq=False)
+class Programme:
+    """Tests in their order, and what they would tell together with what is known.
+
+    Args:
+        tests: runs of the rig, in the order in which they are made.
+        minutes: that each test takes, with the change of direction before it, (tests,).
+        errors: standard error of each parameter's relative change, (k,).
+        covariance: of these, (k, k).
+        alone: the errors by these tests without what is known, (k,).
+        stiffness: standard error of |K| at the points wanted, relative, all points of all directions, (n,).
+        loss: the same of the loss factor, in loss factor, (n,).
+        apart: how far the two nearest rivals are apart: expected chi-square after the best refit of either; None without
+            rivals.
+        visible: of the effects that the standard programme can show, the smallest amount found.
+        drift: largest shift of a parameter, over its standard error, by a drift of the gain of 1 % over the session.
+        rivals: names of the effects that each of the two nearest rivals adds.
+    """
+
+    tests: tuple[Test, ...]
+    minutes: Array
+    errors: Array
+    covariance: Array
+    alone: Array
+    stiffness: Array
+    loss: Array
+    apart: float | None
+    visible: tuple[Visible, ...]
+    drift: float
+    rivals: tuple[str, ...] = ()
+
+    @property
+    def hours(self) -> float:
+        """That the tests take."""
+        return float(np.sum(self.minutes)) / 60.0
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Tests chosen for an aim, and the standard programme of as many hours beside them.
+
+    Args:
+        planned: the tests chosen.
+        standard: the paper's tests, as often as the hours allow.
+        notes: what a user must know.
+    """
+
+    knowledge: Knowledge
+    wanted: Wanted
+    planned: Programme
+    standard: Programme
+    notes: tuple[str, ...] = ()
