@@ -121,16 +121,31 @@ class ParameterSetting:
 
 @dataclass(frozen=True)
 class RigSettings:
-    """[rig]: the class of the test machine, standard deviations of errors that all repeats of a test may share.
+    """[rig]: the class of the test machine, and what it can do.
 
     Args:
-        gain_error, displacement_error: of the force's and of the displacement's calibration, relative.
-        phase_error: [rad].
+        gain_error, displacement_error: standard deviations of the force's and of the displacement's calibration,
+            relative, which all repeats of a test may share.
+        phase_error: likewise [rad].
+        max_force, max_moment: zero-to-peak [N, N m]; None where nothing is stated, as of all that follows.
+        max_displacement, max_rotation: zero-to-peak [m, rad].
+        max_frequency: [Hz].
+        max_velocity: zero-to-peak [m/s].
+        minutes_per_point: of a sweep, with settling [s].
+        minutes_per_setup: to mount the bushing in another direction [s].
     """
 
     gain_error: Share | None = None
     phase_error: Annotated[float, si("rad"), Field(ge=0)] | None = None
     displacement_error: Share | None = None
+    max_force: Annotated[float, si("N"), Field(gt=0)] | None = None
+    max_moment: Annotated[float, si("N*m"), Field(gt=0)] | None = None
+    max_displacement: Length | None = None
+    max_rotation: Angle | None = None
+    max_frequency: Frequency | None = None
+    max_velocity: Annotated[float, si("m/s"), Field(gt=0)] | None = None
+    minutes_per_point: Annotated[float, si("s"), Field(gt=0)] | None = None
+    minutes_per_setup: Annotated[float, si("s"), Field(ge=0)] | None = None
 
     @property
     def stated(self) -> tuple[float | None, float | None]:
