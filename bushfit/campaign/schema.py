@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import ConfigDict, Field, InstanceOf, WithJsonSchema
 
+from bushfit.campaign.compound import Compound
 from bushfit.campaign.files import LoopFile, SweepFile
 from bushfit.campaign.parameters import Size, effect_values, parameter_settings, parameter_values
 from bushfit.campaign.places import KEYS, with_places
@@ -350,7 +351,8 @@ class CampaignFile:
         loops: hysteresis loops.
         sweeps: stepped sines.
         simulate: what the virtual rig tests, and how well it measures; for bushfit simulate alone.
-        rig: class of the test machine.
+        rig: the test machine.
+        compound: of a bushing that was not tested yet.
         fit: how the model is fitted.
         predict: what to predict, and where.
     """
@@ -363,6 +365,7 @@ class CampaignFile:
     loops: tuple[LoopFile, ...] = ()
     sweeps: tuple[SweepFile, ...] = ()
     rig: RigSettings = field(default_factory=RigSettings)
+    compound: Compound | None = None
     fit: Annotated[FitSettings, table(_fit_table)] = field(default_factory=FitSettings)
     predict: PredictSettings = field(default_factory=PredictSettings)
     simulate: Annotated[SimulateSettings | None, _SIMULATED_PLACES] = None
