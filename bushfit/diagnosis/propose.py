@@ -57,18 +57,9 @@ def proposals(evidence: Evidence, excluded: Collection[str], held: Sequence[str]
 
     `held` are parameters of the model that do not move.
     """
-    library = at_places(str(data_set.direction) for data_set in evidence.data_sets)
-    present = (None, *evidence.model.effects)
-    told = {name for known in (*evidence.model.effects, *excluded) for name in twins_of(known)}
-    values = {*evidence.model.values}
-    there = {*told, *(effect.replaces for effect in evidence.model.records)}
-    possible = [effect for effect in library.values() if not (isinstance(effect, Branch) and {*effect.uses} - values)]
-    missing = [effect for effect in possible if effect.name not in there]
-    series = {name for effect in evidence.model.records for name in effect.never_with}
-    series |= {effect.name for effect in missing if {*effect.never_with} & {*present}}
-    missing = [effect for effect in missing if effect.name not in series]
-    asked = [effect for effect in missing if effect.replaces is None and effect.after in present]
-    probed = [_probed(evidence, effect) for effect in asked]
+    missing = missing_effects(evidence.model, [str(data_set.direction) for data_set in evidence.data_sets], excluded)
+    asked = [effect for effect in missing if effect.replaces is None]
+    probed = [sensitivity(evidence.model, evidence.data_sets, evidence.residual, effect) for effect in asked]
     ends = np.cumsum([0, *(len(columns) for _, columns in probed)])
     every = np.concatenate([np.empty((0, evidence.residual.size)), *(columns for _, columns in probed)])
     test = ScoreTest(evidence, every, list(np.arange(len(every))[:, None]), SENSITIVITY_LEFT)
@@ -91,6 +82,29 @@ def proposals(evidence: Evidence, excluded: Collection[str], held: Sequence[str]
     return sorted(found, key=lambda proposal: -proposal.score)
 
 
+def missing_effects(model: Model, places: Collection[str], excluded: Collection[str] = ()) -> list[Effect]:
+    """Every effect of the library that a model lacks and tests at these places could show, of twins the bushing's.
+
+    Args:
+        places: directions, or specimens by name.
+        excluded: names of effects not to consider, with their twins.
+    """
+    present, values = (None, *model.effects), {*model.values}
+    told = {name for known in (*model.effects, *excluded) for name in twins_of(known)}
+    there = {*told, *(effect.replaces for effect in model.records)}
+    possible = [
+        effect for effect in at_places(places).values() if not (isinstance(effect, Branch) and {*effect.uses} - values)
+    ]
+    missing = [effect for effect in possible if effect.name not in there]
+    series = {name for effect in model.records for name in effect.never_with}
+    series |= {effect.name for effect in missing if {*effect.never_with} & {*present}}
+    return [
+        effect
+        for effect in missing
+        if effect.name not in series and (effect.replaces is not None or effect.after in present)
+    ]
+
+
 def _replacing(evidence: Evidence, effect: Effect, held: Sequence[str]) -> Proposal:
     """An effect in place of a branch, as its first step from where that branch stood would leave it."""
     model = evidence.model.with_effect(effect.name)
@@ -101,11 +115,16 @@ def _replacing(evidence: Evidence, effect: Effect, held: Sequence[str]) -> Propo
     return Proposal(effect.name, model, max(score, 0.0), columns, 0, visible=True)
 
 
-def _probed(evidence: Evidence, effect: Effect) -> tuple[list[dict[str, float]], Array]:
-    """Shapes of an effect on a grid that the tests suggest, and its whitened sensitivity at next to no amount."""
-    model = evidence.model.with_effect(effect.name)
+def sensitivity(
+    model: Model, data_sets: Sequence[DataSet], residual: Array, effect: Effect
+) -> tuple[list[dict[str, float]], Array]:
+    """Shapes of an effect on a grid that the tests suggest, and its whitened sensitivity in each, (shapes, n).
+
+    It is that at next to no amount, per typical amount; the residuals are those of the model without the effect, (n,).
+    """
+    model = model.with_effect(effect.name)
     axes = {
-        qualified(effect, parameter): probes(evidence.data_sets, model, parameter)
+        qualified(effect, parameter): probes(data_sets, model, parameter)
         for parameter in effect.parameters
         if parameter.neutral is None
     }
@@ -115,10 +134,9 @@ def _probed(evidence: Evidence, effect: Effect) -> tuple[list[dict[str, float]],
     grids = {name: np.array([[shape[name]] for shape in shapes]) for name in axes}
     values = {**model.values, **grids, qualified(effect, amount): little}
     answers = [
-        np.broadcast_to(data_set.residual(model, values), (len(shapes), data_set.size))
-        for data_set in evidence.data_sets
+        np.broadcast_to(data_set.residual(model, values), (len(shapes), data_set.size)) for data_set in data_sets
     ]
-    return shapes, (np.concatenate(answers, axis=-1) - evidence.residual) / _STEP
+    return shapes, (np.concatenate(answers, axis=-1) - residual) / _STEP
 
 
 def probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> Array:

@@ -13,11 +13,10 @@ import numpy as np
 
 from bushfit.fitting.assess import measured_range
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, parted
-from bushfit.fitting.drive import Drive
 from bushfit.fitting.information import Information, percent
-from bushfit.fitting.noise import ASSUMED_SHARED, SweepNoise
+from bushfit.fitting.new_tests import new_loop, new_sweep
+from bushfit.fitting.noise import ASSUMED_SHARED
 from bushfit.model.model import Model
-from bushfit.reading.measurement import Loop, Sweep
 
 #: Rate of a proposed loop where there is none [Hz]: quasi-static on most rigs.
 _NEW_RATE = 0.1
@@ -84,21 +83,10 @@ def _new_loops(model: Model, data_sets: Sequence[DataSet]) -> Iterator[tuple[str
     direction = data_sets[0].direction
     largest = max(float(data_set.amplitude.max()) for data_set in data_sets if data_set.direction == direction)
     for times, words in ((1.0, ""), (3.0, "three times "), (10.0, "ten times ")):
-        phase = _NEW_CYCLES * np.arange(_NEW_ROWS) / _NEW_ROWS
-        motion, nil = times * largest * np.sin(2.0 * np.pi * phase), np.zeros(_NEW_ROWS)
-        silent = Drive(
-            loop=Loop("new", direction, phase / _NEW_RATE, motion, nil),
-            frequency=_NEW_RATE,
-            cycles=_NEW_CYCLES,
-            from_rest=True,
-            phase=phase,
-            force=nil,
-            weight=np.ones(_NEW_ROWS),
-            noise=1.0,
-            coefficients=np.array([0.0, -1j * (times * largest)]),
-            half_range=1.0,
+        size = times * largest
+        loop = new_loop(
+            model, direction, _NEW_RATE, size, _FORCE_NOISE, cycles=_NEW_CYCLES, rows=_NEW_ROWS, from_rest=True
         )
-        loop = LoopData(silent).noise_free(model).with_noise(_FORCE_NOISE)
         yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", loop
 
 
@@ -137,8 +125,6 @@ def _sweep(
     """A sweep as the model would have it, as noisy as the campaign's or most rigs', in its direction or `like`'s."""
     frequency, amplitude = (x.ravel() for x in np.meshgrid(np.geomspace(*band, _NEW_FREQUENCIES), amplitudes))
     direction = sweeps[0].direction if sweeps else like.direction
-    stiffness = model.stiffness(direction, frequency, amplitude)
     shared = sweeps[0].noise.shared if sweeps else ASSUMED_SHARED
     random = sweeps[0].relative_noise if sweeps else ASSUMED_SHARED[0]
-    noise = SweepNoise({("new", float(x)): (random, random) for x in amplitudes}, shared, "stated", 0)
-    return SweepData(Sweep("new", direction, frequency, amplitude, stiffness), noise)
+    return new_sweep(model, direction, frequency, amplitude, (random, random), shared)

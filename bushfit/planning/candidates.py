@@ -1,0 +1,151 @@
+"""Runs that a rig could make within its limits, what they cost, and the standard programme."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
+from bushfit.effects.contract import Array
+from bushfit.errors import ModelError
+from bushfit.geometry import ROTATION, TRANSLATION, Direction, Place
+from bushfit.planning.contract import Knowledge, Test, Wanted
+from bushfit.simulation import PAPER_LOOPS, PAPER_SWEEPS
+
+#: Time of a sweep's point where the rig states none [s]; chosen: some cycles to settle, and some to average.
+POINT_SECONDS = 30.0
+#: Time to bring the rig to another run, for its control to settle [s]; chosen.
+RUN_SECONDS = 120.0
+#: Time to mount the bushing in another direction where the rig states none [s]; chosen.
+SETUP_SECONDS = 1800.0
+#: Strain that a bushing can be asked to bear in a test, unless it has borne more.
+BEARABLE = 0.5
+#: Amplitudes of the runs that are considered in each direction.
+_AMPLITUDES = 6
+#: Largest amplitude considered over the largest of the standard programme.
+_LARGER = 2.0
+#: Frequencies of the runs that are considered.
+_FREQUENCIES = 7
+#: Lowest frequency considered over the lowest of the standard programme.
+_LOWER = 0.2
+#: Rates of the loops that are considered [Hz]: quasi-static, and as fast as most rigs still record a loop.
+_LOOP_RATES = (0.1, 1.0)
+#: Which of the seven frequencies a run steps through: all, few, the ends, and either end more densely.
+_CHOICES = ((0, 1, 2, 3, 4, 5, 6), (0, 2, 4, 6), (0, 3, 6), (0, 6), (0, 1, 2), (4, 5, 6))
+#: Which of them a run holds that steps through all amplitudes.
+_HELD = (0, 2, 4, 6)
+#: Largest stated force, motion or speed of a test over the limit of the rig: rounding.
+_ROUNDING = 1.0 + 1e-9
+
+
+def minutes(test: Test, rig: RigSettings) -> float:
+    """Time that one run takes, without a change of direction before it."""
+    if isinstance(test, SimulatedLoop):
+        return (RUN_SECONDS + test.cycles / test.frequency) / 60.0
+    return (RUN_SECONDS + (rig.minutes_per_point or POINT_SECONDS) * test.points[0].size) / 60.0
+
+
+def setup_minutes(rig: RigSettings) -> float:
+    """Time of a change of direction."""
+    return (SETUP_SECONDS if rig.minutes_per_setup is None else rig.minutes_per_setup) / 60.0
+
+
+def standard_tests(known: Knowledge, wanted: Wanted) -> list[Test]:
+    """Every run of the standard programme once: the paper's, axial and radial; of specimens, the axial ones.
+
+    Displacements are those that make the paper's axial strains, within the limits of the rig.
+    """
+    if known.model.bushing is None:
+        return [test for place in wanted.places for test in _of_paper(known, wanted.rig, place)]
+    loops = [test for test in _of_paper(known, wanted.rig, Direction.AXIAL) if isinstance(test, SimulatedLoop)]
+    sweeps = [test for place in (Direction.AXIAL, Direction.RADIAL) for test in _of_paper(known, wanted.rig, place)]
+    return [*loops, *(test for test in sweeps if isinstance(test, SimulatedSweep))]
+
+
+def candidates(known: Knowledge, wanted: Wanted) -> list[Test]:
+    """Runs to choose from: the standard programme's, and others of few points, over its amplitudes and beyond.
+
+    Raises:
+        ModelError: there is none within the limits of the rig.
+    """
+    found = [test for test in standard_tests(known, wanted) if test.direction in wanted.places]
+    for place in wanted.places:
+        wished = [points for points in wanted.points if points.place == place]
+        usual = [test for test in _of_paper(known, wanted.rig, place) if isinstance(test, SimulatedSweep)]
+        sizes = [*(points.amplitude for points in wished), *(test.amplitudes for test in usual)]
+        rates = [*(points.frequency for points in wished), *(test.frequencies for test in usual)]
+        if usual:
+            found += _runs(known, wanted.rig, place, np.concatenate(sizes), np.concatenate(rates))
+    if not found:
+        places = " and ".join(map(str, wanted.places))
+        raise ModelError(
+            "the rig can make no test of this bushing",
+            place="[rig]",
+            found=f"limits below every test that is considered, {places}",
+            expected="limits that let it make two points of a sweep, or a loop",
+        )
+    return list(dict.fromkeys(found))
+
+
+def _of_paper(known: Knowledge, rig: RigSettings, place: Place) -> list[Test]:
+    """The paper's loop and axial sweeps at a place, as far as the rig can make them; a run for each amplitude."""
+    of_strain = (
+        Direction.AXIAL if place is Direction.RADIAL else place
+    )  # the paper's radial displacements are its axial
+    scale = _PAPER_STRAIN / known.model.unit_strain(of_strain)
+    loops = [replace(loop, direction=place, amplitude=_rounded(loop.amplitude * scale)) for loop in PAPER_LOOPS]
+    sweep = PAPER_SWEEPS[0]
+    sweeps = [replace(sweep, direction=place, amplitudes=(_rounded(x * scale),)) for x in sweep.amplitudes]
+    return [kept for test in (*loops, *sweeps) if (kept := _within(known, rig, test)) is not None]
+
+
+def _runs(known: Knowledge, rig: RigSettings, place: Place, sizes: Array, rates: Array) -> Iterator[Test]:
+    """Sweeps and loops at one place over amplitudes [m or rad] and frequencies [Hz], and beyond."""
+    amplitudes = [_rounded(x) for x in np.geomspace(sizes.min(), _LARGER * sizes.max(), _AMPLITUDES)]
+    top = min(float(rates.max()), rig.max_frequency or np.inf)
+    frequencies = [_rounded(f) for f in np.geomspace(_LOWER * rates.min(), top, _FREQUENCIES)]
+    runs: list[Test] = [
+        SimulatedSweep(place, (x,), tuple(frequencies[i] for i in chosen)) for x in amplitudes for chosen in _CHOICES
+    ]
+    runs += [SimulatedSweep(place, tuple(amplitudes), (frequencies[i],), "amplitude") for i in _HELD]
+    runs += [SimulatedLoop(place, x, f) for x in amplitudes for f in _LOOP_RATES]
+    yield from (kept for run in runs if (kept := _within(known, rig, run)) is not None)
+
+
+def _within(known: Knowledge, rig: RigSettings, test: Test) -> Test | None:
+    """A test less the steps that are beyond the limits of the rig or what rubber bears; None where too few are left."""
+    if isinstance(test, SimulatedLoop):
+        bearable = _bearable(known, rig, test.direction, np.array([test.frequency]), np.array([test.amplitude]))
+        return test if bearable.all() else None
+    frequency, amplitude = (values.ravel() for values in test.points)
+    kept = np.array(test.steps)[_bearable(known, rig, test.direction, frequency, amplitude)]
+    if kept.size < 2:
+        return None
+    steps = tuple(kept.tolist())
+    return replace(test, frequencies=steps) if test.stepped == "frequency" else replace(test, amplitudes=steps)
+
+
+def _bearable(known: Knowledge, rig: RigSettings, place: Place, frequency: Array, size: Array) -> Array:
+    """Which operating points the rig and the rubber can do, (n,) bool."""
+    strain = size * known.model.unit_strain(place)
+    fine = strain <= max((BEARABLE, *(known.strain or ())))
+    fine &= frequency <= (rig.max_frequency or np.inf) * _ROUNDING
+    force = np.abs(known.model.stiffness(place, frequency, size)) * size
+    if place.motion is TRANSLATION:
+        fine &= force <= (rig.max_force or np.inf) * _ROUNDING
+        fine &= size <= (rig.max_displacement or np.inf) * _ROUNDING
+        fine &= 2.0 * np.pi * frequency * size <= (rig.max_velocity or np.inf) * _ROUNDING
+    elif place.motion is ROTATION:
+        fine &= (force <= (rig.max_moment or np.inf) * _ROUNDING) & (size <= (rig.max_rotation or np.inf) * _ROUNDING)
+    return fine
+
+
+def _rounded(value: float) -> float:
+    """To two digits, as a set point is typed."""
+    return float(f"{value:.2g}")
+
+
+#: Axial strain per displacement of the paper's bushing [1/m]: 1/sqrt(2 (b^2 - a^2) ln(b/a)), a = 10 mm, b = 18 mm.
+_PAPER_STRAIN = float(1.0 / np.sqrt(2.0 * (0.018**2 - 0.010**2) * np.log(1.8)))

@@ -1,0 +1,184 @@
+"""What each test would tell, all tests in one go: inner products of whitened sensitivities, which add up over tests.
+
+Notes:
+    The stiffness is asked once at all operating points of a place. Each run then takes its points, whitened as a fit
+    whitens them (`fitting.whitening`): what all its points share is counted as noise there. An error that all runs of a
+    line share is no noise of a run; its unit columns stay beside the parameters until the runs of a line are added up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep
+from bushfit.diagnosis.propose import missing_effects, sensitivity
+from bushfit.effects import Effect
+from bushfit.effects.contract import Array
+from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.information import relative_sizes
+from bushfit.fitting.new_tests import new_loop, new_sweep
+from bushfit.fitting.noise import SweepNoise
+from bushfit.fitting.solve import jacobian, residual
+from bushfit.fitting.whitening import Whitening
+from bushfit.geometry import Place
+from bushfit.planning.contract import Knowledge, Noise, Test
+
+#: Rows of a loop's cycle that its sensitivities are taken at; chosen: its force is smooth over them.
+_ROWS = 128
+#: Rows of a cycle as rigs, and `simulate`, record it.
+ROWS_PER_CYCLE = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """Inner products of the whitened columns of tests: k parameters, gain and phase of a line, and e further columns.
+
+    They add up over tests, along the first axis.
+
+    Args:
+        own: of parameters and line, (tests, k + 2, k + 2).
+        cross: of these with the further columns, (tests, k + 2, e).
+        size: of each further column with itself, (tests, e).
+    """
+
+    own: Array
+    cross: Array
+    size: Array
+
+    @classmethod
+    def of(cls, columns: Sequence[Array], count: int) -> Told:
+        """Of the whitened columns of each test, (k + 2 + e, n), of which the first k + 2 = `count` are its own."""
+        products = np.array([rows[:count] @ rows.T for rows in columns])
+        size = np.array([np.square(rows[count:]).sum(axis=1) for rows in columns])
+        return cls(products[..., :count], products[..., count:], size)
+
+    def __add__(self, other: Told) -> Told:
+        return Told(self.own + other.own, self.cross + other.cross, self.size + other.size)
+
+    def __sub__(self, other: Told) -> Told:
+        return Told(self.own - other.own, self.cross - other.cross, self.size - other.size)
+
+    def at(self, tests: Array | int | slice) -> Told:
+        """Those of some tests."""
+        return Told(self.own[tests], self.cross[tests], self.size[tests])
+
+    def times(self, counts: Array) -> Told:
+        """Each test so many times, (tests,)."""
+        return Told(self.own * counts[:, None, None], self.cross * counts[:, None, None], self.size * counts[:, None])
+
+    def total(self) -> Told:
+        """All tests together, (1, ...)."""
+        return Told(*(part.sum(axis=0, keepdims=True) for part in (self.own, self.cross, self.size)))
+
+    def beside(self, level: tuple[float, float]) -> Told:
+        """Less what an error of the line, gain and phase of this standard deviation, takes away; parameters alone.
+
+        Notes: with U the line's columns, of standard deviations T, a product a^T b becomes
+        a^T b - a^T U T (1 + T U^T U T)^-1 T U^T b.
+        """
+        k = self.own.shape[-1] - 2
+        own, cross, size = self.own[..., :k, :k], self.cross[..., :k, :], self.size
+        if any(level):
+            scale = np.array(level)
+            line = scale[:, None] * np.concatenate((self.own[..., k:, :], self.cross[..., k:, :]), axis=-1)
+            solved = np.linalg.solve(np.eye(2) + line[..., k : k + 2] * scale, line)
+            mine, others = line[..., :k], line[..., k + 2 :]
+            own = own - np.swapaxes(mine, -1, -2) @ solved[..., :k]
+            cross = cross - np.swapaxes(mine, -1, -2) @ solved[..., k + 2 :]
+            size = size - np.sum(others * solved[..., k + 2 :], axis=-2)
+        return Told(own, cross, size)
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Tests that are not made yet, and the data sets that they share: a loop each, and all points of each place.
+
+    Args:
+        known: its model's stiffness is what the tests would measure.
+        tests: runs of the rig.
+    """
+
+    known: Knowledge
+    tests: tuple[Test, ...]
+
+    @cached_property
+    def data_sets(self) -> list[DataSet]:
+        """The loops in units of their noise, and of each place one sweep of all points, in units of ln K."""
+        model, loops, sweeps = self.known.model, list[DataSet](), list[DataSet]()
+        for test in self.tests:
+            if isinstance(test, SimulatedLoop):
+                force = _per_row(test, self.known.noise)
+                loops.append(new_loop(model, test.direction, test.frequency, test.amplitude, force, rows=_ROWS))
+        for place, points in self._points.items():
+            sweeps.append(new_sweep(model, place, points[:, 1], points[:, 0], (1.0, 1.0), (0.0, 0.0)))
+        return [*loops, *sweeps]
+
+    @cached_property
+    def _points(self) -> dict[Place, Array]:
+        """Amplitude and frequency of the distinct operating points of all sweeps at each place, (n, 2), sorted."""
+        of_place: dict[Place, list[Array]] = {}
+        for test in self.tests:
+            if isinstance(test, SimulatedSweep):
+                of_place.setdefault(test.direction, []).append(_points_of(test))
+        return {place: np.unique(np.concatenate(points), axis=0) for place, points in of_place.items()}
+
+    def told(self, own: Array, further: Array) -> Told:
+        """What each test tells by columns of all data sets' residuals: of parameters, (k, n), and others, (e, n)."""
+        ends = np.cumsum([data_set.size for data_set in self.data_sets])
+        parts = np.split(np.concatenate((own, further)), ends[:-1], axis=-1)
+        of_loops = iter(zip(self.data_sets, parts, strict=True))
+        of_places = dict(zip(self._points, parts[len(parts) - len(self._points) :], strict=True))
+        columns = []
+        for test in self.tests:
+            if isinstance(test, SimulatedLoop):
+                loop, rows = next(of_loops)
+                unit = loop.moved(np.array([[1.0], [1.0j]]) * loop.measured, self.known.model)
+            else:
+                known = {tuple(point): place for place, point in enumerate(self._points[test.direction].tolist())}
+                chosen = [known[tuple(point)] for point in _points_of(test).tolist()]
+                whitening = _of_run(self.known.noise, len(chosen))
+                rows, unit = (
+                    of_places[test.direction],
+                    whitening.whiten(np.array([[1.0], [1.0j]]) * np.ones(len(chosen))),
+                )
+                gain, phase = np.split(rows, 2, axis=-1)
+                rows = whitening.whiten(gain[:, chosen] + 1j * phase[:, chosen])
+            columns.append(np.concatenate((rows[: len(own)], unit, rows[len(own) :])))
+        return Told.of(columns, len(own) + 2)
+
+    @cached_property
+    def effects(self) -> list[tuple[Effect, Array]]:
+        """Effects that the model lacks, which these tests could show, and their columns, (shapes, n) per typical
+        amount; what depends on the order of the tests or on temperature is not among them."""
+        places = {str(test.direction) for test in self.tests}
+        missing = [
+            effect for effect in missing_effects(self.known.model, places) if not (effect.replaces or effect.under)
+        ]
+        blank = residual(self.known.model, self.data_sets)
+        found = [(effect, sensitivity(self.known.model, self.data_sets, blank, effect)[1]) for effect in missing]
+        return [(effect, columns) for effect, columns in found if np.isfinite(columns).all()]
+
+
+def relative_slopes(known: Knowledge, data_sets: Sequence[DataSet]) -> Array:
+    """Derivatives of whitened residuals by relative change of each parameter, (k, n)."""
+    return jacobian(known.model, data_sets, known.names) * relative_sizes(known.model, known.names)[:, None]
+
+
+def _points_of(test: SimulatedSweep) -> Array:
+    """Amplitude and frequency of each point of a run, (n, 2)."""
+    return np.stack([values.ravel() for values in reversed(test.points)], axis=-1)
+
+
+def _per_row(test: SimulatedLoop, noise: Noise) -> float:
+    """Noise of a row where all cycles of a loop count as one of fewer rows, relative to half the force range."""
+    return noise.force * float(np.sqrt(_ROWS * noise.rows_as_one / (ROWS_PER_CYCLE * test.cycles)))
+
+
+def _of_run(noise: Noise, points: int) -> Whitening:
+    """The whitening of one run of so many points."""
+    first, random = np.array([0]), np.repeat(np.array(noise.scatter)[:, None], points, axis=1)
+    return Whitening(first, first, random, SweepNoise({}, noise.shared, "stated", 0), np.ones(points))
