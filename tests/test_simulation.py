@@ -88,7 +88,7 @@ def test_noise_of_a_loop_is_correlated_as_asked_for(clean: Undisturbed, correlat
 
 
 def test_level_errors_are_shared_by_all_repeats_of_a_level(clean: Undisturbed) -> None:
-    """Over many seeds: all repeats of what a sweep holds are off by one factor, those at another amplitude by another."""
+    """All repeats of what a sweep holds are off by one factor, those at another amplitude by another."""
     (test, _), *_ = clean.sweeps
     own = replace(clean, sweeps=((replace(test, repeats=4), clean.sweeps[0][1]), *clean.sweeps[1:]))
     ideal = measure(clean, PLAN).sweeps[0].stiffness.reshape(2, 1, 3)

@@ -31,11 +31,12 @@ def parameter_value(place: str, name: str, raw: Any) -> float:
     with naming(place=place):
         if not is_parameter(name):
             raise unknown_key(name, parameter_names())
-        unit = _S_TO_ALPHA.sub("", parameter_named(name).unit)
+        stated = parameter_named(name).unit
+        unit = _S_TO_ALPHA.sub("", stated)
         is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
         if is_number and (unit == "1" or "." in name) and abs(raw) <= _LARGEST_NUMBER:
             return float(raw)
-        return quantity(_S_TO_ALPHA.sub("", raw) if name == "m" and isinstance(raw, str) else raw, unit)
+        return quantity(_S_TO_ALPHA.sub("", raw) if unit != stated and isinstance(raw, str) else raw, unit)
 
 
 def parameter_values(raw: dict[str, Any]) -> dict[str, float]:

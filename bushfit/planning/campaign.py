@@ -1,4 +1,4 @@
-"""A plan as a campaign that `bushfit simulate` runs: its tests, the rig's errors, and the model they are planned for."""
+"""A plan as a campaign that `bushfit simulate` runs: its tests, the errors of the rig, and the model."""
 
 from __future__ import annotations
 

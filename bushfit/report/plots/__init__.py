@@ -10,6 +10,7 @@ from bushfit.report.plots.comparison import comparison_figure
 from bushfit.report.plots.fits import loops_figure, sweeps_figure
 from bushfit.report.plots.gap import gap_figure
 from bushfit.report.plots.inspection import inspection_figure
+from bushfit.report.plots.plan import plan_figure
 from bushfit.report.plots.prediction import fine_grid, prediction_figure
 from bushfit.report.plots.reduction import reduction_figure
 from bushfit.report.plots.resonance import resonance_figure
@@ -22,6 +23,7 @@ __all__ = [
     "gap_figure",
     "inspection_figure",
     "loops_figure",
+    "plan_figure",
     "prediction_figure",
     "reduction_figure",
     "resonance_figure",

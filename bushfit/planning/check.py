@@ -1,0 +1,119 @@
+"""Does a plan keep what it promises? It is simulated many times on the virtual rig, and each campaign is fitted anew.
+
+Notes:
+    What is simulated is all that a fit would see: noise that it has to estimate from the repeats, errors of runs and
+    levels, start values read off the data. Nothing is told to the fit but the rig's class, which a campaign states too.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from scipy.special import chdtri
+from threadpoolctl import threadpool_limits
+
+from bushfit.campaign.schema import RigSettings, SimulateSettings
+from bushfit.effects.contract import Array
+from bushfit.errors import FitError
+from bushfit.fitting.data import Data
+from bushfit.fitting.information import relative_sizes
+from bushfit.fitting.procedures import fit_joint
+from bushfit.fitting.solve import Coordinates
+from bushfit.model.model import Model
+from bushfit.planning.campaign import settings_of
+from bushfit.planning.contract import Knowledge, Plan, Test
+from bushfit.simulation import Undisturbed, measure, undisturbed
+
+#: Campaigns that a worker simulates and fits in one go; chosen: seconds, so that all cores end together.
+_CHUNK = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """Standard errors of relative changes of k parameters: those promised, and those that simulated campaigns show.
+
+    Args:
+        names: of the parameters.
+        predicted: by the plan, (k,).
+        off: found less true values of each campaign, relative, (campaigns, k).
+        stated: what each fit says of its own error, (campaigns, k).
+        failed: campaigns that could not be fitted.
+        seed: of the first campaign; the others count on.
+        together: whether the tests made before were simulated too.
+    """
+
+    names: tuple[str, ...]
+    predicted: Array
+    off: Array
+    stated: Array
+    failed: int
+    seed: int
+    together: bool
+
+    @property
+    def found(self) -> Array:
+        """Standard deviation of what the campaigns show about the truth, (k,)."""
+        return np.sqrt(np.mean(np.square(self.off), axis=0))
+
+    @property
+    def interval(self) -> tuple[Array, Array]:
+        """95 % interval of each standard error found, (k,) each: of n campaigns, n found^2 / chi-square of n."""
+        n = len(self.off)
+        low, high = (self.found * np.sqrt(n / chdtri(n, p)) for p in (0.025, 0.975))
+        return low, high
+
+
+def check(plan: Plan, count: int, seed: int, progress: Callable[[int], None] = lambda _: None) -> Check:
+    """Simulate and fit a plan `count` times, on all cores; `progress` is told how many are done.
+
+    A plan that adds to tests of a campaign is simulated with those, as it will be fitted with them.
+
+    Raises:
+        FitError: none of the campaigns could be fitted.
+    """
+    known = plan.knowledge
+    settings = settings_of((*known.tests, *plan.planned.tests), known.noise)
+    work = partial(_chunk, undisturbed(known.model, settings), settings, plan.wanted.rig, known.names)
+    seeds = range(seed, seed + count)
+    chunks = [seeds[first : first + _CHUNK] for first in range(0, count, _CHUNK)]
+    rows: list[tuple[Array, Array] | None] = []
+    with ProcessPoolExecutor(os.cpu_count(), multiprocessing.get_context("spawn")) as pool:
+        for done in pool.map(work, chunks):
+            rows += done
+            progress(len(rows))
+    fitted = [row for row in rows if row is not None]
+    if not fitted:
+        raise FitError("no simulated campaign of this plan could be fitted", found=f"{count} campaigns")
+    off, stated = (np.array(part) for part in zip(*fitted, strict=True))
+    predicted = plan.planned.errors if known.tests else plan.planned.alone
+    return Check(known.names, predicted, off, stated, count - len(fitted), seed, bool(known.tests))
+
+
+def _chunk(
+    clean: Undisturbed, settings: SimulateSettings, rig: RigSettings, names: Sequence[str], seeds: Sequence[int]
+) -> list[tuple[Array, Array] | None]:
+    """Of each seed the parameters found less the true ones, and their stated errors, relative; None without a fit."""
+    with threadpool_limits(1):
+        return [_campaign(clean, replace(settings, seed=seed), rig, names) for seed in seeds]
+
+
+def _campaign(
+    clean: Undisturbed, settings: SimulateSettings, rig: RigSettings, names: Sequence[str]
+) -> tuple[Array, Array] | None:
+    truth = clean.truth
+    campaign = replace(measure(clean, settings).campaign(), rig=rig)
+    places = list(dict.fromkeys(str(test.direction) for test in (*campaign.loops, *campaign.sweeps)))
+    try:
+        result = fit_joint(Data.of(campaign), effects=truth.effects, directions=places)
+    except FitError:
+        return None
+    coordinates, sizes = Coordinates.of(truth, names), relative_sizes(truth, names)
+    off = (coordinates.point(result.model.values) - coordinates.point(truth.values)) / sizes
+    stated = np.array([result.covariance.stderr(name) or np.nan for name in names])
+    return off, stated / coordinates.slopes(truth.values) / sizes

@@ -1,0 +1,40 @@
+"""What each test of a plan is for: the parameter that would be known least without it."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.planning.contract import Plan, Test
+from bushfit.planning.criterion import View
+from bushfit.planning.sensitivity import Grid, relative_slopes
+from bushfit.units import number
+
+#: Growth of a parameter's standard error without a test from which on the test is for that parameter; chosen.
+_MATTERS = 1.05
+
+
+def purposes(plan: Plan) -> dict[Test, str]:
+    """In words, of each test with all its repeats, what would be lost without it."""
+    known, counts = plan.knowledge, Counter(plan.planned.tests)
+    grid = Grid(known, tuple(counts))
+    slopes = relative_slopes(known, grid.data_sets)
+    told = grid.told(slopes, np.empty((0, slopes.shape[-1])))
+    view = View(told, np.linalg.inv(known.covariance), np.tile(known.noise.level, (len(counts), 1)))
+    runs = np.array(list(counts.values()))
+    whole = _errors(view, runs)
+    rest = "tells the rivals apart" if plan.wanted.aim == "rivals" else "shows effects that the model lacks"
+    found = {}
+    for place, test in enumerate(counts):
+        growth = _errors(view, np.where(np.arange(runs.size) == place, 0, runs)) / whole
+        worst = int(np.argmax(growth))
+        told_by_it = f"{known.names[worst]}: error x{number(float(growth[worst]), 3)} without it"
+        found[test] = told_by_it if growth[worst] >= _MATTERS else rest
+    return found
+
+
+def _errors(view: View, runs: Array) -> Array:
+    """Standard error of each parameter's relative change, after so many runs of each test."""
+    return np.sqrt(np.diag(np.linalg.inv(view.together(runs).own[0])))

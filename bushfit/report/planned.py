@@ -1,0 +1,78 @@
+"""A plan as a sheet for who runs the rig, and as a picture."""
+
+from __future__ import annotations
+
+from collections import Counter
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bushfit.campaign.schema import SimulatedLoop
+from bushfit.planning.contract import Plan, Test
+from bushfit.planning.purpose import purposes
+from bushfit.report.contents import Contents
+from bushfit.units import number
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+def plan_contents(plan: Plan) -> Contents:
+    """`plan`: the sheet as a table, and the picture."""
+
+    def picture() -> Figure:
+        from bushfit.report.plots import plan_figure
+
+        return plan_figure(plan)
+
+    return Contents({}, {"plan": partial(plan_sheet, plan)}, {"plan": picture})
+
+
+def plan_sheet(plan: Plan) -> pd.DataFrame:
+    """A row for each run of the rig, in the order in which they are made.
+
+    Amplitudes count zero-to-peak. The force is what the model expects at most, so that a load cell can be chosen.
+    """
+    import pandas as pd
+
+    tests, reasons = plan.planned.tests, purposes(plan)
+    counts, seen, rows = Counter(tests), Counter[Test](), []
+    for order, (test, minutes) in enumerate(zip(tests, plan.planned.minutes, strict=True), start=1):
+        seen[test] += 1
+        rows.append(
+            {
+                "order": order,
+                "direction": str(test.direction),
+                "test": "loop" if isinstance(test, SimulatedLoop) else f"sweep over {test.stepped}",
+                **_motion(test),
+                "cycles": str(test.cycles) if isinstance(test, SimulatedLoop) else "until steady",
+                "repeat": f"{seen[test]} of {counts[test]}",
+                **_force(plan, test),
+                "minutes": round(float(minutes), 1),
+                "minutes so far": round(float(np.sum(plan.planned.minutes[:order])), 1),
+                "what for": reasons[test],
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _motion(test: Test) -> dict[str, str]:
+    """Amplitudes and frequencies in the units of engineers."""
+    loop = isinstance(test, SimulatedLoop)
+    sizes, rates = ((test.amplitude,), (test.frequency,)) if loop else (test.amplitudes, test.frequencies)
+    unit, factor = test.direction.display.displacement
+    return {
+        "amplitude": f"{' '.join(number(factor * size, 4) for size in sizes)} {unit}",
+        "frequency [Hz]": " ".join(number(rate, 4) for rate in rates),
+    }
+
+
+def _force(plan: Plan, test: Test) -> dict[str, str]:
+    """The largest force, moment or stress expected, zero-to-peak."""
+    loop = isinstance(test, SimulatedLoop)
+    frequency, amplitude = (np.array([test.frequency]), np.array([test.amplitude])) if loop else test.points
+    stiffness = np.abs(plan.knowledge.model.stiffness(test.direction, frequency.ravel(), amplitude.ravel()))
+    unit, factor = test.direction.display.force
+    return {"force up to": f"{number(factor * float(np.max(stiffness * amplitude.ravel())), 2)} {unit}"}

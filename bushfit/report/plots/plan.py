@@ -1,0 +1,120 @@
+"""A plan beside the standard programme: operating points by direction, and the errors that both would leave."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from bushfit.campaign.schema import SimulatedLoop
+from bushfit.effects.contract import Array
+from bushfit.geometry import Place
+from bushfit.planning.contract import Plan, Programme, Test
+from bushfit.report.plots import style
+from bushfit.units import number
+
+#: Colours of the plan, of the standard programme and of what is known before: apart in grey print too.
+_COLORS = {"planned": "#1b6ca8", "standard programme": "#d98324", "known now": style.GREY}
+#: Markers of sweeps and loops.
+_MARKERS = {False: "o", True: "D"}
+#: Diameter of the marker of one run [point]; that of n runs grows with the root of n, so that its area counts them.
+_ONE_RUN = 3.2
+#: Numbers of runs whose markers are explained at most.
+_MOST_SIZES = 4
+#: Markers on a line, or a few more.
+_MARKS = 5
+#: Room around the outermost points, as a factor on a logarithmic axis.
+_ROOM = 1.6
+
+
+def plan_figure(plan: Plan) -> Figure:
+    """Two panels a direction, the plan left and the standard programme right, and below the errors of both."""
+    programmes = {"planned": plan.planned, "standard programme": plan.standard}
+    tests = [test for programme in programmes.values() for test in programme.tests]
+    places = list(dict.fromkeys(test.direction for test in tests))
+    figure = style.new_figure(f"{plan.knowledge.model.name}: planned tests", (len(places) + 1) * style.ROW)
+    grid = figure.subplots(len(places) + 1, 2, squeeze=False)
+    sizes = sorted({n for programme in programmes.values() for n in Counter(programme.tests).values()})
+    for row, place in zip(grid, places, strict=False):
+        ends = np.concatenate([_points(test) for test in tests if test.direction == place])
+        for axes, (name, programme) in zip(row, programmes.items(), strict=True):
+            _draw(axes, [test for test in programme.tests if test.direction == place], _COLORS[name])
+            _dress(axes, place, ends)
+    for axes, (name, programme) in zip(grid[0], programmes.items(), strict=True):
+        title = f"{name}: {len(programme.tests)} runs in {number(programme.hours, 2)} h"
+        axes.set_title(title, loc="left", **style.NAMES)
+    _name_sizes(grid[0, 1], sizes)
+    _draw_errors(grid[-1, 0], plan, programmes)
+    _draw_stiffness(grid[-1, 1], plan, programmes)
+    style.explain(
+        figure,
+        "Above: what each run of the rig measures; a line joins the points of a sweep. Below: relative standard errors "
+        "of the parameters and of the stiffness at the points that are wanted, with what either programme would add to "
+        "what is known now. All of it is computed from a model: nothing was tested.",
+    )
+    return figure
+
+
+def _points(test: Test) -> Array:
+    """Frequency [Hz] and amplitude [mm, deg or %] of the points of a run, (n, 2)."""
+    factor = test.direction.display.displacement.factor
+    if isinstance(test, SimulatedLoop):
+        return np.array([(frequency, factor * size) for frequency, size in test.parts])
+    frequency, amplitude = test.points
+    return np.stack([frequency.ravel(), factor * amplitude.ravel()], axis=-1)
+
+
+def _draw(axes: Axes, tests: Sequence[Test], color: str) -> None:
+    """The points of each run, the larger the more often it is repeated; runs of many points first."""
+    for test, count in sorted(Counter(tests).items(), key=lambda pair: -len(_points(pair[0]))):
+        loop = isinstance(test, SimulatedLoop)
+        diameter = _ONE_RUN * np.sqrt(count)
+        drawn = {"color": color, "lw": 0.8, "mec": "white", "mew": 0.3, "clip_on": False}
+        axes.plot(*_points(test).T, marker=_MARKERS[loop], ms=diameter, **drawn)
+
+
+def _dress(axes: Axes, place: Place, ends: Array) -> None:
+    style.dress(axes, "frequency [Hz]", f"{place} amplitude [{place.display.displacement.name}]")
+    for along, values in zip(("x", "y"), ends.T, strict=True):
+        style.logarithmic(axes, values, along)  # type: ignore[arg-type]
+        axes.set(**{f"{along}lim": (values.min() / _ROOM, values.max() * _ROOM)})
+
+
+def _name_sizes(axes: Axes, sizes: Sequence[int]) -> None:
+    """Say what markers stand for."""
+    shown = [sizes[place] for place in np.unique(np.linspace(0, len(sizes) - 1, _MOST_SIZES).round().astype(int))]
+    looks = {"color": style.GREY, "ls": "", "mec": "white", "mew": 0.3}
+    handles = [Line2D([], [], marker="o", ms=_ONE_RUN * np.sqrt(size), **looks) for size in shown]
+    words = [f"sweep, {size} run{'s' * (size > 1)}" for size in shown]
+    loop = {"loop": Line2D([], [], marker="D", ms=_ONE_RUN, **looks)}
+    style.legend(axes, handles, words, "", besides=loop)
+
+
+def _draw_errors(axes: Axes, plan: Plan, programmes: dict[str, Programme]) -> None:
+    """The error of each parameter: now, planned, standard."""
+    errors = {name: programme.errors for name, programme in programmes.items()} | {"known now": plan.knowledge.errors}
+    places = np.arange(len(plan.knowledge.names))
+    for (name, values), marker in zip(errors.items(), "os^", strict=True):
+        axes.plot(100.0 * values, places, marker, color=_COLORS[name], label=name, **style.POINT)
+    style.dress(axes, "standard error [%]", "")
+    axes.set_yticks(places, plan.knowledge.names, **style.WORDS)
+    axes.invert_yaxis()
+    style.logarithmic(axes, 100.0 * np.concatenate(list(errors.values())))
+
+
+def _draw_stiffness(axes: Axes, plan: Plan, programmes: dict[str, Programme]) -> None:
+    """The error of the stiffness at each point that is wanted, from the smallest to the largest."""
+    for (name, programme), marker in zip(programmes.items(), "os", strict=True):
+        values = 100.0 * np.sort(programme.stiffness)
+        share = 100.0 * (np.arange(values.size) + 0.5) / values.size
+        each = max(values.size // _MARKS, 1)
+        axes.plot(share, values, color=_COLORS[name], lw=1.3, marker=marker, markevery=each, **style.POINT)
+    style.dress(axes, "share of the points wanted [%]", "standard error of stiffness [%]")
+    axes.set_ylim(bottom=0.0)
+    marks = zip(_COLORS.items(), "os^", strict=True)
+    handles = [Line2D([], [], color=color, marker=mark, ls="", **style.POINT) for (_, color), mark in marks]
+    style.legend(axes, handles, list(_COLORS), "")
