@@ -66,31 +66,28 @@ class Told:
         """Those of some tests."""
         return Told(self.own[tests], self.cross[tests], self.size[tests])
 
-    def times(self, counts: Array) -> Told:
-        """Each test so many times, (tests,)."""
-        return Told(self.own * counts[:, None, None], self.cross * counts[:, None, None], self.size * counts[:, None])
+    def added(self, matrix: Array) -> Told:
+        """Sums over tests, each so many times: matrix is (sums, tests)."""
+        return Told(*(np.tensordot(matrix, part, 1) for part in (self.own, self.cross, self.size)))
 
-    def total(self) -> Told:
-        """All tests together, (1, ...)."""
-        return Told(*(part.sum(axis=0, keepdims=True) for part in (self.own, self.cross, self.size)))
+    def beside(self, level: Array) -> Told:
+        """Less what an error of the line, gain and phase of these standard deviations, takes away; parameters alone.
 
-    def beside(self, level: tuple[float, float]) -> Told:
-        """Less what an error of the line, gain and phase of this standard deviation, takes away; parameters alone.
+        Args:
+            level: of each, (tests, 2).
 
         Notes: with U the line's columns, of standard deviations T, a product a^T b becomes
         a^T b - a^T U T (1 + T U^T U T)^-1 T U^T b.
         """
         k = self.own.shape[-1] - 2
-        own, cross, size = self.own[..., :k, :k], self.cross[..., :k, :], self.size
-        if any(level):
-            scale = np.array(level)
-            line = scale[:, None] * np.concatenate((self.own[..., k:, :], self.cross[..., k:, :]), axis=-1)
-            solved = np.linalg.solve(np.eye(2) + line[..., k : k + 2] * scale, line)
-            mine, others = line[..., :k], line[..., k + 2 :]
-            own = own - np.swapaxes(mine, -1, -2) @ solved[..., :k]
-            cross = cross - np.swapaxes(mine, -1, -2) @ solved[..., k + 2 :]
-            size = size - np.sum(others * solved[..., k + 2 :], axis=-2)
-        return Told(own, cross, size)
+        line = level[..., None] * np.concatenate((self.own[..., k:, :], self.cross[..., k:, :]), axis=-1)
+        solved = np.linalg.solve(np.eye(2) + line[..., k : k + 2] * level[..., None, :], line)
+        mine = np.swapaxes(line[..., :k], -1, -2)
+        return Told(
+            self.own[..., :k, :k] - mine @ solved[..., :k],
+            self.cross[..., :k, :] - mine @ solved[..., k + 2 :],
+            self.size - np.sum(line[..., k + 2 :] * solved[..., k + 2 :], axis=-2),
+        )
 
 
 @dataclass(frozen=True, eq=False)
