@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.naming import folder_name
-from bushfit.campaign.noise import filtered_noise, reached_over_asked, with_noise
+from bushfit.campaign.noise import filtered_noise, of_levels, reached_over_asked, with_noise
 from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulatedTest, SimulateSettings
 from bushfit.campaign.session import planned_session
 from bushfit.campaign.written import body_lines, table_lines
@@ -310,6 +310,7 @@ def _sweep(
     under: Circumstances,
 ) -> Sweep:
     """All repeats of a sweep; where the amplitude is stepped, with the levels that a reader finds in those reached."""
+    plan = replace(plan, repeats=test.repeats or plan.repeats)
     shape = (len(test.held), plan.repeats, len(test.steps))
     frequency, level = (np.broadcast_to(values[:, None], shape).ravel() for values in test.points)
     repeat = np.broadcast_to(np.arange(1, plan.repeats + 1)[:, None], shape).ravel()
@@ -320,6 +321,7 @@ def _sweep(
         planned = frequency, level, stiffness.ravel(), Circumstances(test.temperature)
         near = _near(truth, test.direction, *planned, under)
         stiffness = near(level if reached is None else reached).reshape(shape)
+    stiffness = stiffness * of_levels(len(test.held), plan, random)
     measured = np.stack([with_noise(stiffness[:, number], plan, random) for number in range(plan.repeats)], axis=1)
     if test.stepped == "amplitude" and reached is not None:
         level = runs_of(frequency, reached, repeat).amplitude

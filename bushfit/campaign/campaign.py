@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from bushfit.campaign.compound import Compound
 from bushfit.campaign.files import LoopFile, SweepFile
 from bushfit.campaign.naming import folder_name
 from bushfit.campaign.places import place_tested
@@ -47,7 +48,7 @@ class Campaign:
         path: the campaign file.
         sha256: of its bytes; empty where there is no such file.
         bushing: None where specimens alone were tested.
-        simulate: None where the file has no such table.
+        simulate, compound: None where the file has no such table.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Campaign:
     simulate: SimulateSettings | None = None
     specimens: tuple[Specimen, ...] = ()
     rig: RigSettings = field(default_factory=RigSettings)
+    compound: Compound | None = None
     sha256: str = ""
 
     def __repr__(self) -> str:
@@ -85,11 +87,11 @@ def load_campaign(path: str | Path) -> Campaign:
     path = Path(path)
     refuse_tests([path])
     content = read_toml(path, CampaignFile)
-    if not (content.loops or content.sweeps or content.simulate):
+    if not (content.loops or content.sweeps or content.simulate or content.compound):
         raise CampaignError(
             "the campaign has no tests",
             file=path,
-            expected="[[loops]] or [[sweeps]] tables, or a [simulate] table",
+            expected="[[loops]] or [[sweeps]] tables, or a [simulate] or a [compound] table",
             hint='add [[loops]] with file = "..." and direction = "axial"',
         )
     with naming(path):
@@ -115,6 +117,7 @@ def load_campaign(path: str | Path) -> Campaign:
         content.simulate,
         specimens,
         content.rig,
+        content.compound,
         hashlib.sha256(path.read_bytes()).hexdigest(),
     )
 

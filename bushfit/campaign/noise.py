@@ -33,6 +33,14 @@ def with_noise(clean: Array, plan: SimulateSettings, random: Generator) -> Array
     return clean * (1.0 + gain) * np.exp(1j * phase) * (1.0 + scatter)
 
 
+def of_levels(held: int, plan: SimulateSettings, random: Generator) -> Array:
+    """What all repeats of each level of a sweep are multiplied with, (held, 1, 1): the errors that they share."""
+    if not (plan.level_gain_error or plan.level_phase_error):
+        return np.ones((held, 1, 1))
+    gain, phase = random.standard_normal((2, held, 1, 1))
+    return (1.0 + plan.level_gain_error * gain) * np.exp(1j * plan.level_phase_error * phase)
+
+
 def reached_over_asked(test: SimulatedSweep, plan: SimulateSettings, random: Generator) -> Array:
     """Amplitude reached over that asked for, (held x repeats x steps,): off by as much at each frequency as at each
     point; lognormal, so that it stays above zero."""

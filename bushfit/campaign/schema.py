@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import ConfigDict, Field, InstanceOf, WithJsonSchema
 
+from bushfit.campaign.compound import Compound
 from bushfit.campaign.files import LoopFile, SweepFile
 from bushfit.campaign.parameters import Size, effect_values, parameter_settings, parameter_values
 from bushfit.campaign.places import KEYS, with_places
@@ -258,12 +259,14 @@ class SimulatedSweep(SimulatedTest):
         frequencies: [Hz].
         stepped: what changes from point to point of a run; the other is held.
         reached: standard deviation of the amplitude that a point really reached, relative to the one that was asked.
+        repeats: of this sweep; None for those of all.
     """
 
     amplitudes: Annotated[tuple[Displacement, ...], FIRST_ERROR, Field(min_length=1)]
     frequencies: Frequencies
     stepped: Stepped = "frequency"
     reached: Share = 0.0
+    repeats: Count | None = None
 
     @property
     def held(self) -> tuple[float, ...]:
@@ -314,13 +317,15 @@ class SimulateSettings:
         parameters: values by name [SI].
         effects: added effects, each with the values of its parameters [SI].
         seed: of the random numbers.
-        repeats: of each sweep and resonance test.
+        repeats: of each sweep and resonance test, unless it states its own.
         noise: standard deviation of a sweep point's real and imaginary part, relative to |K|; of a resonance test's
             transmissibility likewise.
         force_noise, displacement_noise: standard deviation of a loop's samples, relative to the amplitude.
         force_correlation: of the noise of one row's force with that of the next, as a filter makes it (AR(1)).
         gain_error: standard deviation of the gain of a run: of one repeat of what is held, or of a resonance test.
         phase_error: standard deviation of the phase of a run [rad].
+        level_gain_error: standard deviation of the gain that all repeats share of what a sweep holds.
+        level_phase_error: of the phase that they share [rad].
         loops, sweeps, resonances: the tests; empty for the rig's own choice.
     """
 
@@ -334,6 +339,8 @@ class SimulateSettings:
     displacement_noise: Share = 0.0
     gain_error: Share = 0.0
     phase_error: Annotated[float, si("rad"), Field(ge=0)] = 0.0
+    level_gain_error: Share = 0.0
+    level_phase_error: Annotated[float, si("rad"), Field(ge=0)] = 0.0
     loops: tuple[SimulatedLoop, ...] = ()
     sweeps: tuple[SimulatedSweep, ...] = ()
     resonances: tuple[SimulatedResonance, ...] = ()
@@ -350,7 +357,8 @@ class CampaignFile:
         loops: hysteresis loops.
         sweeps: stepped sines.
         simulate: what the virtual rig tests, and how well it measures; for bushfit simulate alone.
-        rig: class of the test machine.
+        rig: the test machine.
+        compound: of a bushing that was not tested yet.
         fit: how the model is fitted.
         predict: what to predict, and where.
     """
@@ -363,6 +371,7 @@ class CampaignFile:
     loops: tuple[LoopFile, ...] = ()
     sweeps: tuple[SweepFile, ...] = ()
     rig: RigSettings = field(default_factory=RigSettings)
+    compound: Compound | None = None
     fit: Annotated[FitSettings, table(_fit_table)] = field(default_factory=FitSettings)
     predict: PredictSettings = field(default_factory=PredictSettings)
     simulate: Annotated[SimulateSettings | None, _SIMULATED_PLACES] = None

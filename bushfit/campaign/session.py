@@ -54,7 +54,7 @@ def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], rep
 
     def amplitudes(test: SimulatedTest) -> Array:
         if isinstance(test, SimulatedSweep):
-            return np.repeat(test.points[1], repeats, axis=0).ravel()
+            return np.repeat(test.points[1], test.repeats or repeats, axis=0).ravel()
         if isinstance(test, SimulatedLoop):
             return np.array([amplitude for _, amplitude in test.parts])
         assert isinstance(test, SimulatedResonance)

@@ -1,0 +1,102 @@
+"""The guess of a compound: Gent's table, and whether what is known of real and simulated rubbers lies inside."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bushfit.campaign.campaign import load_campaign
+from bushfit.campaign.compound import Compound, Polymer, filler, hardness
+from bushfit.errors import BushfitError, CampaignError, UnitError
+from bushfit.fitting.data import Data
+from bushfit.fitting.procedures import fit_joint
+from bushfit.geometry import Bushing
+from bushfit.model.covariance import Z95
+from bushfit.planning.contract import Knowledge
+from bushfit.planning.guess import gent_modulus, guess
+
+BUSHING = Bushing("guessed", 0.010, 0.018, 0.034)
+#: Table 1 of Garcia Tarrago et al. 2007; the compound is that of its section 2: 61 Shore A, 27 phr, natural rubber.
+TABLE_1 = {"mu": 1.09e6, "m": 2e5, "alpha": 0.24, "sigma_fmax": 14.6e3, "eps_half": 0.013}
+#: Names of the five parameters in the answers to the practice campaigns.
+ANSWERS = {"mu": "mu", "m": "m", "alpha": "alpha", "sigma_fmax": "sfmax", "eps_half": "ehalf"}
+
+
+def off(known: Knowledge, truth: dict[str, float]) -> np.ndarray:
+    """How far true values lie from those guessed, in standard errors of their logarithms."""
+    return np.array([np.log(truth[name] / known.model.values[name]) for name in known.names]) / known.errors
+
+
+@pytest.mark.parametrize(("shore", "megapascal"), [(30, 1.147), (40, 1.697), (50, 2.466), (60, 3.621), (70, 5.544)])
+def test_gents_relation(shore: float, megapascal: float) -> None:
+    """Young's modulus by the formula, worked out by hand: 0.0981 (56 + 7.66 S)/(0.137505 (254 - 2.54 S))."""
+    assert 3e-6 * gent_modulus(shore) == pytest.approx(megapascal, rel=5e-4)
+
+
+def test_the_papers_bushing_lies_inside() -> None:
+    found = off(guess(BUSHING, Compound(61, 27)), TABLE_1)
+    print("paper, in standard errors", found.round(2))
+    assert np.abs(found).max() < Z95
+
+
+@pytest.mark.parametrize("phr", [40.0, 50.0, 60.0])
+def test_a_measured_coupon_lies_inside(root: Path, phr: float) -> None:
+    """An EPDM of 70 Shore A whose filler nobody states; its strain sweeps alone, which the five parameters can meet."""
+    fitted = fit_joint(Data.of(load_campaign(root / "configs/epdm_70.toml")), directions=["DMA"]).model
+    found = off(guess(BUSHING, Compound(70, phr, "EPDM")), dict(fitted.values))
+    print(f"coupon, taken for {phr:g} phr, in standard errors", found.round(2))
+    assert np.abs(found).max() < Z95
+
+
+def test_practice_rubbers_lie_inside(root: Path) -> None:
+    """Simulated, so without a hardness: that of their modulus is taken, and 30 phr for all. Their shape is tested."""
+    answers = json.loads((root / "data/practice/answers.json").read_text(encoding="utf-8"))
+    shores = np.linspace(20.0, 90.0, 1001)
+    moduli = np.array([gent_modulus(shore) for shore in shores])
+    every = []
+    for case in answers.values():
+        truth = {name: case["material"][key] for name, key in ANSWERS.items()}
+        shore = float(shores[np.argmin(np.abs(moduli - 1.06 * truth["mu"]))])
+        every.append(off(guess(BUSHING, Compound(shore, 30.0)), truth))
+    print("practice, largest of each in standard errors", np.abs(every).max(axis=0).round(2))
+    assert np.mean(np.abs(every) < Z95) >= 0.95
+
+
+@pytest.mark.parametrize("rubber", ["natural", "EPDM"])
+def test_width_follows_from_the_law(rubber: Polymer) -> None:
+    """The covariance is that of values drawn as the file says: hardness moved by its error moves mu as the formula."""
+    known = guess(BUSHING, Compound(61, 27, rubber))
+    harder = guess(BUSHING, Compound(63.5, 27, rubber))
+    by_hardness = np.log(harder.model.values["mu"] / known.model.values["mu"])
+    assert known.errors[0] == pytest.approx(np.hypot(0.2, by_hardness), rel=0.05)
+    assert np.linalg.eigvalsh(known.covariance).min() > 0.0
+    assert known.covariance[1, 2] < 0.0  # m and alpha, told at 10 Hz, trade off
+
+
+@pytest.mark.parametrize("text", ["61", "61 Shore D", "61 IRHD", "shore a", "1e1 Shore A", "-61 Shore A", 61, None])
+def test_what_is_no_hardness(text: object) -> None:
+    with pytest.raises(UnitError, match="61 Shore A"):
+        hardness(text)
+
+
+@pytest.mark.parametrize("text", ["27", "27 %", "27 phr silica", "phr", 27, True])
+def test_what_is_no_filler(text: object) -> None:
+    with pytest.raises(UnitError, match="27 phr"):
+        filler(text)
+
+
+@pytest.mark.parametrize(("read", "text"), [(hardness, "95 Shore A"), (hardness, "10 ShA"), (filler, "500 phr")])
+def test_what_no_bushing_is_made_of(read: type, text: str) -> None:
+    with pytest.raises(CampaignError, match=text):
+        read(text)
+
+
+def test_a_campaign_states_its_compound(tmp_path: Path) -> None:
+    table = '[bushing]\nname = "new"\ninner_radius = "10 mm"\nouter_radius = "18 mm"\nlength = "34 mm"\n[compound]\n'
+    file = tmp_path / "new.toml"
+    file.write_text(table + 'hardness = "61 Shore A"\nfiller = "27 phr carbon black"\n', encoding="utf-8")
+    assert load_campaign(file).compound == Compound(61.0, 27.0)
+    file.write_text(table + 'hardness = "61"\nfiller = "27 phr"\n', encoding="utf-8")
+    with pytest.raises(BushfitError, match=r"compound\.hardness"):
+        load_campaign(file)
