@@ -24,31 +24,25 @@ class View:
     Args:
         told: by every candidate test, made once.
         prior: information on relative changes of the parameters before, (k, k).
-        lines: number of the line that each test belongs to, (tests,).
-        level: error of each line, gain and phase, (lines, 2).
+        level: error that all runs of a test share, gain and phase, (tests, 2).
     """
 
     told: Told
     prior: Array
-    lines: Array
     level: Array
 
     def together(self, counts: Array) -> Told:
         """What so many runs of each test, (tests,), tell together with what is known, (1, ...)."""
-        return self._known(self._sums(counts).beside(self.level).added(np.ones((1, len(self.level)))))
+        total = self._each(counts).total()
+        return replace(total, own=total.own + self.prior)
 
     def one_more(self, counts: Array) -> Told:
         """The same with one run more of each test in turn, (tests, ...)."""
-        sums, own = self._sums(counts), self.lines
-        more = (sums.at(own) + self.told).beside(self.level[own])
-        return self.together(counts) + (more - sums.beside(self.level).at(own))
+        return self.together(counts) + (self._each(counts + 1) - self._each(counts))
 
-    def _sums(self, counts: Array) -> Told:
-        """What so many runs tell, line by line."""
-        return self.told.added((self.lines == np.arange(len(self.level))[:, None]) * counts)
-
-    def _known(self, told: Told) -> Told:
-        return replace(told, own=told.own + self.prior)
+    def _each(self, counts: Array) -> Told:
+        """What so many runs of each test tell about the parameters, test by test."""
+        return self.told.times(counts).beside(self.level)
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,12 +22,14 @@ class Budget:
     Args:
         minutes: of each test, (tests,).
         place: number of the place of each test, (tests,).
+        line: number of what each test holds, (tests,): of tests that hold the same, one is chosen.
         setup: minutes to mount the bushing at a place, once for each place that is tested.
         most: minutes in all.
     """
 
     minutes: Array
     place: Array
+    line: Array
     setup: float
     most: float
 
@@ -36,44 +38,44 @@ class Budget:
         return float(self.minutes @ counts) + self.setup * np.unique(self.place[counts > 0]).size
 
     def further(self, counts: Array) -> Array:
-        """Minutes that one run more of each test adds, (tests,)."""
-        return self.minutes + self.setup * ~np.isin(self.place, self.place[counts > 0])
+        """Minutes that one run more of each test adds, (tests,); beyond all limits where it may not be chosen."""
+        more = self.minutes + self.setup * ~np.isin(self.place, self.place[counts > 0])
+        barred = np.isin(self.line, self.line[counts > 0]) & (counts == 0)
+        return np.where(barred | (self.spent(counts) + more > self.most), np.inf, more)
 
 
 def chosen(criterion: Criterion, budget: Budget, start: Array) -> Array:
     """So many runs of each test within the budget, (tests,), that the criterion is small.
 
-    Notes: greedy from `start` by what the logarithm falls per minute, then exchanges of one run for another, each after
-    Fedorov (1972): the best of all for each run in turn, and what time is left over is filled again.
+    Notes: greedy from `start`, by what the logarithm falls per minute; then exchanges (Fedorov 1972): one run of each
+    test, and all of them, are given up for the best that can be had in their time, as long as that helps.
     """
     counts = _filled(criterion, budget, start)
     best = criterion.together(counts)
     for _ in range(_PASSES):
         before = best
         for test in np.flatnonzero(counts):
-            fewer = counts.copy()
-            fewer[test] -= 1
-            other = _filled(criterion, budget, fewer, first_of_all=True)
-            value = criterion.together(other)
-            if value < best - _WORTH:
-                counts, best = other, value
+            for fewer in {1, int(counts[test])}:
+                less = counts - fewer * (np.arange(counts.size) == test)
+                other = _filled(criterion, budget, less)
+                value = criterion.together(other)
+                if fewer and value < best - _WORTH:
+                    counts, best = other, value
+                    break
         if before - best < _WORTH:
             break
     return counts
 
 
-def _filled(criterion: Criterion, budget: Budget, counts: Array, *, first_of_all: bool = False) -> Array:
-    """Runs added one after the other, each the best per minute, or the first the best of all, as long as time is left."""
+def _filled(criterion: Criterion, budget: Budget, counts: Array) -> Array:
+    """Runs added one after the other, each the best per minute, as long as time is left."""
     counts, so_far = counts.copy(), criterion.together(counts)
-    while True:
-        further = budget.further(counts)
-        fits = budget.spent(counts) + further <= budget.most
-        if not fits.any():
-            return counts
+    while np.isfinite(further := budget.further(counts)).any():
         values = criterion.one_more(counts)
-        fall = np.where(fits, so_far - values, -np.inf) / (1.0 if first_of_all else further)
-        best = int(np.argmax(fall))
+        fall = (so_far - values) / further
+        best = int(np.argmax(np.where(np.isfinite(further), fall, -np.inf)))
         if fall[best] <= 0.0:
-            return counts
+            break
         counts[best] += 1
-        so_far, first_of_all = values[best], False
+        so_far = values[best]
+    return counts
