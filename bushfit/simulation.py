@@ -290,12 +290,14 @@ def _near(
 
 def _loop(test: SimulatedLoop, clean: rig.Record, number: int, plan: SimulateSettings, random: Generator) -> Loop:
     largest = max(amplitude for _, amplitude in test.parts)
+    gain = 1.0 + plan.level_gain_error * random.standard_normal() if plan.level_gain_error else 1.0
     return Loop(
         f"loop_{test.direction}_{number}",
         test.direction,
         clean.time,
         clean.displacement + plan.displacement_noise * largest * random.standard_normal(clean.time.size),
-        clean.force + plan.force_noise * np.ptp(clean.force) / 2.0 * filtered_noise(clean.time.size, plan, random),
+        gain * clean.force
+        + plan.force_noise * np.ptp(clean.force) / 2.0 * filtered_noise(clean.time.size, plan, random),
         temperature=test.temperature,
     )
 

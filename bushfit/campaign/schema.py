@@ -324,7 +324,8 @@ class SimulateSettings:
         force_correlation: of the noise of one row's force with that of the next, as a filter makes it (AR(1)).
         gain_error: standard deviation of the gain of a run: of one repeat of what is held, or of a resonance test.
         phase_error: standard deviation of the phase of a run [rad].
-        level_gain_error: standard deviation of the gain that all repeats share of what a sweep holds.
+        level_gain_error: standard deviation of the gain that all repeats share of what a sweep holds, and of the gain
+            of a loop's record.
         level_phase_error: of the phase that they share [rad].
         loops, sweeps, resonances: the tests; empty for the rig's own choice.
     """

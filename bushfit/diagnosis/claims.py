@@ -83,7 +83,7 @@ class Claim:
         for place in self.tests:
             test = self.mistake.mended([*data.loops, *data.sweeps][place].test)
             if isinstance(test, Loop):
-                loops[place] = loop_data([test], without_outliers=data.robust)[0]
+                loops[place] = loop_data([test], data.campaign.rig, without_outliers=data.robust)[0]
             elif isinstance(test, Sweep):
                 sweeps[place - count] = test
         data = replace(data, loops=tuple(loops))

@@ -49,7 +49,7 @@ class Data:
             Model.started(None, with_base(campaign.fit.effects), {})
         return cls(
             campaign,
-            tuple(loop_data(campaign.loops, without_outliers=campaign.fit.loss != "linear")),
+            tuple(loop_data(campaign.loops, campaign.rig, without_outliers=campaign.fit.loss != "linear")),
             tuple(sweep_data(campaign.sweeps, campaign.fit.residuals, campaign.rig)),
             {name: (setting.min, setting.max) for name, setting in campaign.fit.parameters.items()},
         ).in_session()

@@ -11,7 +11,7 @@ from bushfit.campaign.schema import UNSTATED, Residuals, RigSettings
 from bushfit.fitting.data_set import DataSet
 from bushfit.fitting.drive import drive_of
 from bushfit.fitting.loop_data import LoopData
-from bushfit.fitting.noise import sweep_noise
+from bushfit.fitting.noise import of_class, sweep_noise
 from bushfit.fitting.sweep_data import SweepData
 from bushfit.geometry import Specimen
 from bushfit.reading.measurement import Loop, Source, Sweep
@@ -19,10 +19,13 @@ from bushfit.reading.measurement import Loop, Source, Sweep
 __all__ = ["DataSet", "LoopData", "SweepData", "loop_data", "parted", "sources", "sweep_data"]
 
 
-def loop_data(loops: Sequence[Loop], *, without_outliers: bool = False) -> list[LoopData]:
+def loop_data(
+    loops: Sequence[Loop], stated: RigSettings = UNSTATED, *, without_outliers: bool = False
+) -> list[LoopData]:
     """One data set per loop; rows that are outliers carry no weight where they are to be left out."""
+    gain, _ = of_class(stated, (0.0, 0.0))
     drives = [drive_of(loop, without_outliers=without_outliers) for loop in loops]
-    return [LoopData(drive).weighted(np.array(drive.loop.weight)) for drive in drives]
+    return [LoopData(drive, gain_error=gain).weighted(np.array(drive.loop.weight)) for drive in drives]
 
 
 def sweep_data(

@@ -31,11 +31,13 @@ class LoopData(DataSet):
     Args:
         fundamental_only: whether all but the first harmonic of its residuals is left out, so that it counts as one
             operating point, with two residuals: of an addition without a law in time nothing else is known.
+        gain_error: standard deviation of the gain of the whole record, where the class of its rig is stated.
     """
 
     drive: Drive
     under: Circumstances = UNKNOWN
     fundamental_only: bool = False
+    gain_error: float = 0.0
     kind = "loop"
     components = ("force",)
 
@@ -155,10 +157,11 @@ class LoopData(DataSet):
                 yield Outlier(self.name, file, row + before + 1, column, off)
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
-        whole = influence @ self._fundamental.T if self.fundamental_only else influence
-        by_noise = [self._counted(part) for part in self.drive.row_noise.unsure(whole)]
+        own = self._less_gain(influence)
+        whole = own @ self._fundamental.T if self.fundamental_only else own
+        by_noise = [self._less_gain(self._counted(part)) for part in self.drive.row_noise.unsure(whole)]
         if not by_noise and self.test.noise is None:
-            by_noise = [np.sqrt(2.0 / self._rows) * influence]
+            by_noise = [np.sqrt(2.0 / self._rows) * self._less_gain(own)]
         return {(self.name, which): part for which, part in enumerate(by_noise)}
 
     def contrasts(self) -> Array:
@@ -193,7 +196,18 @@ class LoopData(DataSet):
 
     def _whitened(self, rows: Array) -> Array:
         """Rows in units of noise, (..., n), as independent numbers, 0 where one is told from a row left out."""
-        return self._counted(self.drive.row_noise.whiten(rows) * self._told)
+        return self._less_gain(self._counted(self.drive.row_noise.whiten(rows) * self._told))
+
+    def _less_gain(self, white: Array) -> Array:
+        """Whitened rows less the share of what lies along the error of the gain, which makes them white again.
+
+        Notes: the covariance is 1 + g g^T with g the error that a standard deviation of the gain makes.
+        """
+        if not self.gain_error:
+            return white
+        weight = self.gain_error**2 * float(self.unit_gain @ self.unit_gain)
+        share = (1.0 - 1.0 / np.sqrt(1.0 + weight)) * self.gain_error**2 / weight
+        return white - share * (white @ self.unit_gain)[..., None] * self.unit_gain
 
     def _counted(self, white: Array) -> Array:
         """Of whitened rows, (..., n), what counts as its residuals."""
@@ -204,6 +218,12 @@ class LoopData(DataSet):
         """What 1 and i of a change of stiffness do to the residuals, (2, n)."""
         wave = self.drive.coefficients[1] * np.exp(2j * np.pi * self.drive.phase)
         return self._whitened(np.array([wave.real, -wave.imag]) * self._per_noise)
+
+    @cached_property
+    def unit_gain(self) -> Array:
+        """What a unit of gain makes of the residuals, (n,)."""
+        rows = self.drive.row_noise.whiten(self.drive.force * self._per_noise) * self._told
+        return self._counted(rows)
 
     @cached_property
     def _fundamental(self) -> Array:

@@ -35,14 +35,15 @@ class Noise:
     Args:
         scatter: of a sweep's point, (gain, phase).
         shared: of all points of one run, (gain, phase).
-        level: of all runs of one line, which hold the same in the same direction, (gain, phase).
-        force: of a row of a loop, over half the force range; there are `ROWS` rows a cycle.
+        level: of all runs of one test, and the gain of a loop's record, (gain, phase): the class of the rig. In a fit
+            [rig] states it, so that loops and repeated sweeps count it as noise.
+        force: of a row of a loop, over half the force range; there are 1000 rows a cycle, as `simulate` has them.
         rows_as_one: so many rows of a loop tell as much as an independent one.
     """
 
     scatter: tuple[float, float] = (ASSUMED_SHARED[0], ASSUMED_SHARED[0])
     shared: tuple[float, float] = ASSUMED_SHARED
-    level: tuple[float, float] = (0.0, 0.0)
+    level: tuple[float, float] = ASSUMED_SHARED
     force: float = ASSUMED_FORCE
     rows_as_one: float = 1.0
 

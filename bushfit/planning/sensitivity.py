@@ -18,7 +18,7 @@ from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.propose import missing_effects, sensitivity
 from bushfit.effects import Effect
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.new_tests import new_loop, new_sweep
 from bushfit.fitting.noise import SweepNoise
@@ -62,10 +62,6 @@ class Told:
     def __sub__(self, other: Told) -> Told:
         return Told(self.own - other.own, self.cross - other.cross, self.size - other.size)
 
-    def at(self, tests: Array | int | slice) -> Told:
-        """Those of some tests."""
-        return Told(self.own[tests], self.cross[tests], self.size[tests])
-
     def times(self, counts: Array) -> Told:
         """Each test so many times, (tests,)."""
         return Told(self.own * counts[:, None, None], self.cross * counts[:, None, None], self.size * counts[:, None])
@@ -74,23 +70,24 @@ class Told:
         """All tests together, (1, ...)."""
         return Told(*(part.sum(axis=0, keepdims=True) for part in (self.own, self.cross, self.size)))
 
-    def beside(self, level: tuple[float, float]) -> Told:
-        """Less what an error of the line, gain and phase of this standard deviation, takes away; parameters alone.
+    def beside(self, level: Array) -> Told:
+        """Less what an error of the line, gain and phase of these standard deviations, takes away; parameters alone.
+
+        Args:
+            level: of each, (tests, 2).
 
         Notes: with U the line's columns, of standard deviations T, a product a^T b becomes
         a^T b - a^T U T (1 + T U^T U T)^-1 T U^T b.
         """
         k = self.own.shape[-1] - 2
-        own, cross, size = self.own[..., :k, :k], self.cross[..., :k, :], self.size
-        if any(level):
-            scale = np.array(level)
-            line = scale[:, None] * np.concatenate((self.own[..., k:, :], self.cross[..., k:, :]), axis=-1)
-            solved = np.linalg.solve(np.eye(2) + line[..., k : k + 2] * scale, line)
-            mine, others = line[..., :k], line[..., k + 2 :]
-            own = own - np.swapaxes(mine, -1, -2) @ solved[..., :k]
-            cross = cross - np.swapaxes(mine, -1, -2) @ solved[..., k + 2 :]
-            size = size - np.sum(others * solved[..., k + 2 :], axis=-2)
-        return Told(own, cross, size)
+        line = level[..., None] * np.concatenate((self.own[..., k:, :], self.cross[..., k:, :]), axis=-1)
+        solved = np.linalg.solve(np.eye(2) + line[..., k : k + 2] * level[..., None, :], line)
+        mine = np.swapaxes(line[..., :k], -1, -2)
+        return Told(
+            self.own[..., :k, :k] - mine @ solved[..., :k],
+            self.cross[..., :k, :] - mine @ solved[..., k + 2 :],
+            self.size - np.sum(line[..., k + 2 :] * solved[..., k + 2 :], axis=-2),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,13 +127,13 @@ class Grid:
         """What each test tells by columns of all data sets' residuals: of parameters, (k, n), and others, (e, n)."""
         ends = np.cumsum([data_set.size for data_set in self.data_sets])
         parts = np.split(np.concatenate((own, further)), ends[:-1], axis=-1)
-        of_loops = iter(zip(self.data_sets, parts, strict=True))
+        of_loops = iter(zip(parted(self.data_sets)[0], parts, strict=False))
         of_places = dict(zip(self._points, parts[len(parts) - len(self._points) :], strict=True))
         columns = []
         for test in self.tests:
             if isinstance(test, SimulatedLoop):
                 loop, rows = next(of_loops)
-                unit = loop.moved(np.array([[1.0], [1.0j]]) * loop.measured, self.known.model)
+                unit = np.array([loop.unit_gain, np.zeros(loop.size)])
             else:
                 known = {tuple(point): place for place, point in enumerate(self._points[test.direction].tolist())}
                 chosen = [known[tuple(point)] for point in _points_of(test).tolist()]
@@ -149,6 +146,12 @@ class Grid:
                 rows = whitening.whiten(gain[:, chosen] + 1j * phase[:, chosen])
             columns.append(np.concatenate((rows[: len(own)], unit, rows[len(own) :])))
         return Told.of(columns, len(own) + 2)
+
+    @cached_property
+    def level(self) -> Array:
+        """Standard deviations of what all runs of each test share, gain and phase, (tests, 2): a loop's lag is known."""
+        gain, phase = self.known.noise.level
+        return np.array([(gain, 0.0 if isinstance(test, SimulatedLoop) else phase) for test in self.tests])
 
     @cached_property
     def effects(self) -> list[tuple[Effect, Array]]:

@@ -1,0 +1,89 @@
+"""How good a choice of tests is: one number for its aim, and what it falls short of the standard programme."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.planning.sensitivity import Told
+
+#: Weight of the logarithm of each lack of power, beside the logarithm of the aim's variance; chosen: a plan that lacks
+#: power is then not worth what it gains for its aim.
+_PENALTY = 3.0
+#: Noncentrality relative to the one asked for below which a lack counts no further: logarithms stay finite.
+_LEAST = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What tests tell about the parameters of one model, and how well further columns show beside these.
+
+    Args:
+        told: by every candidate test, made once.
+        prior: information on relative changes of the parameters before, (k, k).
+        level: error that all runs of a test share, gain and phase, (tests, 2).
+    """
+
+    told: Told
+    prior: Array
+    level: Array
+
+    def together(self, counts: Array) -> Told:
+        """What so many runs of each test, (tests,), tell together with what is known, (1, ...)."""
+        total = self._each(counts).total()
+        return replace(total, own=total.own + self.prior)
+
+    def one_more(self, counts: Array) -> Told:
+        """The same with one run more of each test in turn, (tests, ...)."""
+        return self.together(counts) + (self._each(counts + 1) - self._each(counts))
+
+    def _each(self, counts: Array) -> Told:
+        """What so many runs of each test tell about the parameters, test by test."""
+        return self.told.times(counts).beside(self.level)
+
+
+@dataclass(frozen=True, eq=False)
+class Criterion:
+    """What is made small by a choice of tests.
+
+    Args:
+        views: the likeliest model's, whose further columns are effects that it lacks; then those of its rivals.
+        weight: of the parameters' covariance in the variance that is wanted small, (k, k); None where rivals are to be
+            told apart.
+        least: noncentrality of each effect that the tests are to reach at least, (e,); 0 where none is asked for.
+    """
+
+    views: Sequence[View]
+    weight: Array | None
+    least: Array
+
+    def together(self, counts: Array) -> float:
+        """Of so many runs of each test, (tests,)."""
+        return float(self._of([view.together(counts) for view in self.views])[0])
+
+    def one_more(self, counts: Array) -> Array:
+        """The same with one run more of each test in turn, (tests,)."""
+        return self._of([view.one_more(counts) for view in self.views])
+
+    def _of(self, told: Sequence[Told]) -> Array:
+        covariance = np.linalg.inv(told[0].own)
+        if self.weight is None:
+            aim = -np.log(np.maximum(apart(told[1:]), np.finfo(float).tiny))
+        else:
+            aim = np.log(np.einsum("tij,ij->t", covariance, self.weight))
+        asked = self.least > 0.0
+        reached = shown(told[0], covariance)[:, asked] / self.least[asked]
+        return aim - _PENALTY * np.sum(np.log(np.clip(reached, _LEAST, 1.0)), axis=1)
+
+
+def shown(told: Told, covariance: Array) -> Array:
+    """Noncentrality of each further column beside the parameters, (tests, e): chi-square that a unit of it makes."""
+    return np.maximum(told.size - np.sum(told.cross * (covariance @ told.cross), axis=-2), 0.0)
+
+
+def apart(told: Sequence[Told]) -> Array:
+    """Expected chi-square between the two nearest rivals after the best refit of either, (tests,)."""
+    return np.min([shown(each, np.linalg.inv(each.own)).min(axis=1) for each in told], axis=0)
