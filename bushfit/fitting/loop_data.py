@@ -221,8 +221,13 @@ class LoopData(DataSet):
 
     @cached_property
     def unit_gain(self) -> Array:
-        """What a unit of gain makes of the residuals, (n,)."""
-        rows = self.drive.row_noise.whiten(self.drive.force * self._per_noise) * self._told
+        """What a unit of gain makes of the residuals, (n,).
+
+        It is that of the force's first harmonics: a gain of the noise of n rows would pull the fit by n gain_error^2.
+        """
+        root = np.sqrt(self.drive.weight)
+        sizes = np.linalg.lstsq((self._waves * root).T, self.drive.force * root, rcond=None)[0]
+        rows = self.drive.row_noise.whiten(sizes @ self._waves * self._per_noise) * self._told
         return self._counted(rows)
 
     @cached_property
