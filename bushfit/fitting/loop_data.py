@@ -221,8 +221,15 @@ class LoopData(DataSet):
 
     @cached_property
     def unit_gain(self) -> Array:
-        """What a unit of gain makes of the residuals, (n,)."""
-        rows = self.drive.row_noise.whiten(self.drive.force * self._per_noise) * self._told
+        """What a unit of gain makes of the residuals, (n,).
+
+        Notes: of the force without its noise. With it, a fit would take the noise for what the gain makes, and make
+        the model smaller than it is (Peelle's puzzle: R. Fruehwirth, D. Neudecker, H. Leeb, EPJ Web of Conferences 27
+        (2012) 00008).
+        """
+        waves, counted = self._waves.T, self.drive.weight > 0.0
+        smooth = waves @ np.linalg.lstsq(waves[counted], self.drive.force[counted], rcond=None)[0]
+        rows = self.drive.row_noise.whiten(smooth * self._per_noise) * self._told
         return self._counted(rows)
 
     @cached_property

@@ -25,9 +25,8 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.solve import Coordinates
-from bushfit.model.model import Model
 from bushfit.planning.campaign import settings_of
-from bushfit.planning.contract import Knowledge, Plan, Test
+from bushfit.planning.contract import Plan
 from bushfit.simulation import Undisturbed, measure, undisturbed
 
 #: Campaigns that a worker simulates and fits in one go; chosen: seconds, so that all cores end together.

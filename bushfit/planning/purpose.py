@@ -22,7 +22,7 @@ def purposes(plan: Plan) -> dict[Test, str]:
     grid = Grid(known, tuple(counts))
     slopes = relative_slopes(known, grid.data_sets)
     told = grid.told(slopes, np.empty((0, slopes.shape[-1])))
-    view = View(told, np.linalg.inv(known.covariance), np.tile(known.noise.level, (len(counts), 1)))
+    view = View(told, np.linalg.inv(known.covariance), grid.level)
     runs = np.array(list(counts.values()))
     whole = _errors(view, runs)
     rest = "tells the rivals apart" if plan.wanted.aim == "rivals" else "shows effects that the model lacks"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -49,7 +50,7 @@ def plan_figure(plan: Plan) -> Figure:
         axes.set_title(title, loc="left", **style.NAMES)
     _name_sizes(grid[0, 1], sizes)
     _draw_errors(grid[-1, 0], plan, programmes)
-    _draw_stiffness(grid[-1, 1], plan, programmes)
+    _draw_stiffness(grid[-1, 1], programmes)
     style.explain(
         figure,
         "Above: what each run of the rig measures; a line joins the points of a sweep. Below: relative standard errors "
@@ -87,7 +88,7 @@ def _dress(axes: Axes, place: Place, ends: Array) -> None:
 def _name_sizes(axes: Axes, sizes: Sequence[int]) -> None:
     """Say what markers stand for."""
     shown = [sizes[place] for place in np.unique(np.linspace(0, len(sizes) - 1, _MOST_SIZES).round().astype(int))]
-    looks = {"color": style.GREY, "ls": "", "mec": "white", "mew": 0.3}
+    looks: dict[str, Any] = {"color": style.GREY, "ls": "", "mec": "white", "mew": 0.3}
     handles = [Line2D([], [], marker="o", ms=_ONE_RUN * np.sqrt(size), **looks) for size in shown]
     words = [f"sweep, {size} run{'s' * (size > 1)}" for size in shown]
     loop = {"loop": Line2D([], [], marker="D", ms=_ONE_RUN, **looks)}
@@ -106,7 +107,7 @@ def _draw_errors(axes: Axes, plan: Plan, programmes: dict[str, Programme]) -> No
     style.logarithmic(axes, 100.0 * np.concatenate(list(errors.values())))
 
 
-def _draw_stiffness(axes: Axes, plan: Plan, programmes: dict[str, Programme]) -> None:
+def _draw_stiffness(axes: Axes, programmes: dict[str, Programme]) -> None:
     """The error of the stiffness at each point that is wanted, from the smallest to the largest."""
     for (name, programme), marker in zip(programmes.items(), "os", strict=True):
         values = 100.0 * np.sort(programme.stiffness)
