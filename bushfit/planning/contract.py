@@ -147,7 +147,6 @@ class Programme:
             rivals.
         visible: of the effects that the standard programme can show, the smallest amount found.
         drift: largest shift of a parameter, over its standard error, by a drift of the gain of 1 % over the session.
-        rivals: names of the effects that each of the two nearest rivals adds.
     """
 
     tests: tuple[Test, ...]
@@ -160,7 +159,6 @@ class Programme:
     apart: float | None
     visible: tuple[Visible, ...]
     drift: float
-    rivals: tuple[str, ...] = ()
 
     @property
     def hours(self) -> float:

@@ -10,9 +10,6 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.planning.sensitivity import Told
 
-#: Weight of the logarithm of each lack of power, beside the logarithm of the aim's variance; chosen: a plan that lacks
-#: power is then not worth what it gains for its aim.
-_PENALTY = 3.0
 #: Noncentrality relative to the one asked for below which a lack counts no further: logarithms stay finite.
 _LEAST = 1e-12
 
@@ -54,11 +51,13 @@ class Criterion:
         weight: of the parameters' covariance in the variance that is wanted small, (k, k); None where rivals are to be
             told apart.
         least: noncentrality of each effect that the tests are to reach at least, (e,); 0 where none is asked for.
+        penalty: weight of the logarithm of each lack of it, beside the logarithm of the variance that is wanted small.
     """
 
     views: Sequence[View]
     weight: Array | None
     least: Array
+    penalty: float
 
     def together(self, counts: Array) -> float:
         """Of so many runs of each test, (tests,)."""
@@ -76,7 +75,7 @@ class Criterion:
             aim = np.log(np.einsum("tij,ij->t", covariance, self.weight))
         asked = self.least > 0.0
         reached = shown(told[0], covariance)[:, asked] / self.least[asked]
-        return aim - _PENALTY * np.sum(np.log(np.clip(reached, _LEAST, 1.0)), axis=1)
+        return aim - self.penalty * np.sum(np.log(np.clip(reached, _LEAST, 1.0)), axis=1)
 
 
 def shown(told: Told, covariance: Array) -> Array:

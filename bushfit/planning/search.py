@@ -11,8 +11,8 @@ from bushfit.planning.criterion import Criterion
 
 #: Passes of exchanges at most; nearly all plans take three.
 _PASSES = 8
-#: Fall of the logarithm of the criterion that is worth an exchange.
-_WORTH = 1e-3
+#: Fall of the logarithm of the variance that a run, or an exchange, is worth; chosen: a quarter per cent of the error.
+_WORTH = 5e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +23,7 @@ class Budget:
         minutes: of each test, (tests,).
         place: number of the place of each test, (tests,).
         line: number of what each test holds, (tests,): of tests that hold the same, one is chosen.
+        allowed: whether each test may be chosen, (tests,) bool.
         setup: minutes to mount the bushing at a place, once for each place that is tested.
         most: minutes in all.
     """
@@ -30,6 +31,7 @@ class Budget:
     minutes: Array
     place: Array
     line: Array
+    allowed: Array
     setup: float
     most: float
 
@@ -40,14 +42,14 @@ class Budget:
     def further(self, counts: Array) -> Array:
         """Minutes that one run more of each test adds, (tests,); beyond all limits where it may not be chosen."""
         more = self.minutes + self.setup * ~np.isin(self.place, self.place[counts > 0])
-        barred = np.isin(self.line, self.line[counts > 0]) & (counts == 0)
+        barred = np.isin(self.line, self.line[counts > 0]) & (counts == 0) | ~self.allowed
         return np.where(barred | (self.spent(counts) + more > self.most), np.inf, more)
 
 
 def chosen(criterion: Criterion, budget: Budget, start: Array) -> Array:
     """So many runs of each test within the budget, (tests,), that the criterion is small.
 
-    Notes: greedy from `start`, by what the logarithm falls per minute; then exchanges (Fedorov 1972): one run of each
+    Notes: greedy from `start` by what the logarithm falls per minute; then exchanges (Fedorov 1972): one run of each
     test, and all of them, are given up for the best that can be had in their time, as long as that helps.
     """
     counts = _filled(criterion, budget, start)
@@ -59,7 +61,7 @@ def chosen(criterion: Criterion, budget: Budget, start: Array) -> Array:
                 less = counts - fewer * (np.arange(counts.size) == test)
                 other = _filled(criterion, budget, less)
                 value = criterion.together(other)
-                if fewer and value < best - _WORTH:
+                if value < best - _WORTH:
                     counts, best = other, value
                     break
         if before - best < _WORTH:
@@ -74,7 +76,7 @@ def _filled(criterion: Criterion, budget: Budget, counts: Array) -> Array:
         values = criterion.one_more(counts)
         fall = (so_far - values) / further
         best = int(np.argmax(np.where(np.isfinite(further), fall, -np.inf)))
-        if fall[best] <= 0.0:
+        if so_far - values[best] <= _WORTH:
             break
         counts[best] += 1
         so_far = values[best]

@@ -91,6 +91,20 @@ class Told:
 
 
 @dataclass(frozen=True, eq=False)
+class Column:
+    """An effect that a model lacks, in one shape: its whitened sensitivity, (n,) per typical amount."""
+
+    effect: Effect
+    values: Array
+
+    @property
+    def reach(self) -> float:
+        """Largest amount that a bushing or a rig can have, in typical amounts."""
+        amount = self.effect.amount
+        return max(abs(end - (amount.neutral or 0.0)) for end in amount.bounds) / amount.typical
+
+
+@dataclass(frozen=True, eq=False)
 class Grid:
     """Tests that are not made yet, and the data sets that they share: a loop each, and all points of each place.
 
@@ -149,21 +163,22 @@ class Grid:
 
     @cached_property
     def level(self) -> Array:
-        """Standard deviations of what all runs of each test share, gain and phase, (tests, 2): a loop's lag is known."""
+        """Standard deviations of what all runs of a test share, gain and phase, (tests, 2); a loop's lag is known."""
         gain, phase = self.known.noise.level
         return np.array([(gain, 0.0 if isinstance(test, SimulatedLoop) else phase) for test in self.tests])
 
     @cached_property
-    def effects(self) -> list[tuple[Effect, Array]]:
-        """Effects that the model lacks, which these tests could show, and their columns, (shapes, n) per typical
-        amount; what depends on the order of the tests or on temperature is not among them."""
-        places = {str(test.direction) for test in self.tests}
-        missing = [
-            effect for effect in missing_effects(self.known.model, places) if not (effect.replaces or effect.under)
-        ]
-        blank = residual(self.known.model, self.data_sets)
-        found = [(effect, sensitivity(self.known.model, self.data_sets, blank, effect)[1]) for effect in missing]
-        return [(effect, columns) for effect, columns in found if np.isfinite(columns).all()]
+    def columns(self) -> list[Column]:
+        """Effects that the model lacks and these tests might show, a column for each shape.
+
+        What depends on the order of the tests or on their temperature is not among them, nor what stands in place of a
+        branch: it has no amount that could be small.
+        """
+        model, places = self.known.model, {str(test.direction) for test in self.tests}
+        missing = [effect for effect in missing_effects(model, places) if not (effect.replaces or effect.under)]
+        blank = residual(model, self.data_sets)
+        of_effects = [(effect, sensitivity(model, self.data_sets, blank, effect)[1]) for effect in missing]
+        return [Column(effect, row) for effect, rows in of_effects for row in rows if np.isfinite(row).all()]
 
 
 def relative_slopes(known: Knowledge, data_sets: Sequence[DataSet]) -> Array:

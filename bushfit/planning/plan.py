@@ -1,0 +1,272 @@
+"""The plan: tests chosen for an aim, in their order, and the standard programme of as many hours beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from bushfit.campaign.schema import SimulatedLoop
+from bushfit.effects import qualified
+from bushfit.effects.contract import Array
+from bushfit.errors import ModelError
+from bushfit.fitting.new_tests import new_sweep
+from bushfit.fitting.solve import residual
+from bushfit.model.covariance import Z95
+from bushfit.planning.candidates import candidates, minutes, setup_minutes, standard_tests
+from bushfit.planning.contract import Knowledge, Plan, Programme, Test, Visible, Wanted
+from bushfit.planning.criterion import Criterion, View, apart, shown
+from bushfit.planning.order import Drifting, ordered
+from bushfit.planning.search import Budget, chosen
+from bushfit.planning.sensitivity import Column, Grid, Told, relative_slopes
+from bushfit.reading.measurement import loss_factor
+from bushfit.units import number
+
+#: Amount of an effect over its standard error that a test of one in twenty finds in nine of ten cases: the 97.5 % and
+#: the 90 % quantile of the normal distribution.
+FOUND = Z95 + 1.2815515655446004
+#: Weight of the logarithm of each lack of power, beside the logarithm of the variance that is wanted small; chosen.
+_PENALTY = 3.0
+#: The same where that leaves a lack.
+_STRICT = 30.0
+#: Power relative to that of the standard programme that counts as the same: what the numbers are good for.
+_AS_WELL = 0.995
+#: Drift of the gain over a session whose harm is told.
+_DRIFT = 0.01
+#: Information, relative to the largest, below which tests alone leave a combination of parameters open.
+_OPEN = 1e-14
+
+
+def plan(known: Knowledge, wanted: Wanted) -> Plan:
+    """Tests for an aim within the hours and the limits of the rig.
+
+    Raises:
+        ModelError: no test is possible, none fits into the hours, or there are no rivals to be told apart.
+    """
+    return _Planner(known, wanted).plan()
+
+
+@dataclass(frozen=True, eq=False)
+class _Planner:
+    known: Knowledge
+    wanted: Wanted
+
+    @cached_property
+    def standard(self) -> list[Test]:
+        return standard_tests(self.known, self.wanted)
+
+    @cached_property
+    def tests(self) -> tuple[Test, ...]:
+        """The candidates first, then what only the standard programme has."""
+        return tuple(dict.fromkeys([*candidates(self.known, self.wanted), *self.standard]))
+
+    @cached_property
+    def grid(self) -> Grid:
+        return Grid(self.known, self.tests)
+
+    @cached_property
+    def columns(self) -> list[Column]:
+        return self.grid.columns
+
+    @cached_property
+    def views(self) -> list[View]:
+        """The likeliest model's, beside the effects that it lacks; each rival's, beside what the others differ by."""
+        data_sets = self.grid.data_sets
+        effects = np.array([column.values for column in self.columns])
+        views = [self._view(self.known, effects)]
+        left = [residual(rival.model, data_sets) for rival in self.known.rivals]
+        for i, rival in enumerate(self.known.rivals):
+            views.append(self._view(rival, np.array([other - left[i] for j, other in enumerate(left) if j != i])))
+        return views
+
+    def _view(self, known: Knowledge, further: Array) -> View:
+        told = self.grid.told(relative_slopes(known, self.grid.data_sets), further)
+        return View(told, np.linalg.inv(known.covariance), self.grid.level)
+
+    @cached_property
+    def slopes(self) -> Array:
+        """Gain and phase of the stiffness at the points wanted by relative change of the parameters, (k, 2, n)."""
+        sweeps = [
+            new_sweep(self.known.model, points.place, points.frequency, points.amplitude, (1.0, 1.0), (0.0, 0.0))
+            for points in self.wanted.points
+        ]
+        each = [relative_slopes(self.known, [sweep]).reshape(len(self.known.names), 2, -1) for sweep in sweeps]
+        return np.concatenate(each, axis=-1)
+
+    @cached_property
+    def weight(self) -> Array | None:
+        """Of the parameters' covariance in what is to be small; None where rivals are to be told apart."""
+        if self.wanted.aim == "rivals":
+            return None
+        if self.wanted.aim == "predictions":
+            return np.asarray(np.einsum("kcn,lcn->kl", self.slopes, self.slopes) / self.slopes.shape[-1])
+        return np.diag(np.isin(self.known.names, self.wanted.parameters).astype(float))
+
+    @cached_property
+    def budget(self) -> Budget:
+        places = list(dict.fromkeys([*self.wanted.places, *(test.direction for test in self.tests)]))
+        lines = [_line(test) for test in self.tests]
+        known = list(dict.fromkeys(lines))
+        return Budget(
+            np.array([minutes(test, self.wanted.rig) for test in self.tests]),
+            np.array([places.index(test.direction) for test in self.tests]),
+            np.array([known.index(line) for line in lines]),
+            np.array([test.direction in self.wanted.places for test in self.tests]),
+            setup_minutes(self.wanted.rig),
+            60.0 * self.wanted.hours,
+        )
+
+    def plan(self) -> Plan:
+        """See the function."""
+        if self.wanted.aim == "rivals" and len(self.known.rivals) < 2:
+            raise ModelError(
+                "there are no rivals to be told apart",
+                found=self.known.source,
+                expected="a diagnosis that is ambiguous",
+                hint="plan for parameters or predictions",
+            )
+        best = self._with_repeats(self._best())
+        if not best.any():
+            raise ModelError(
+                "no test fits into the hours",
+                place="--hours",
+                found=f"{number(self.wanted.hours, 3)} h",
+                expected=f"at least {number((self.budget.minutes.min() + self.budget.setup) / 60.0, 2)} h",
+            )
+        planned = self._programme(ordered(best, self.budget.place, self._drifting(best)))
+        return Plan(self.known, self.wanted, planned, self._programme(self.standard_runs), tuple(self._notes(planned)))
+
+    def _best(self) -> Array:
+        """So many runs of each test, (tests,), that all effects show as in the standard programme, if that can be."""
+        nothing, standard = np.zeros(len(self.tests), dtype=int), self._counts(self.standard_runs)
+        best = chosen(self._criterion(_PENALTY), self.budget, nothing)
+        if self._lacking(best):
+            strict = self._criterion(_STRICT)
+            starts = [best, standard] if self.budget.allowed[standard > 0].all() else [best]
+            best = min((chosen(strict, self.budget, start) for start in starts), key=strict.together)
+        return best
+
+    def _with_repeats(self, counts: Array) -> Array:
+        """The runs with one test of each place made twice, that a drift shows, in place of the least useful run."""
+        strict, one = self._criterion(_STRICT), np.eye(len(self.tests), dtype=int)
+        for place in np.unique(self.budget.place[counts > 0]):
+            mine = np.flatnonzero((counts > 0) & (self.budget.place == place))
+            if mine.size > 2 and counts[mine].max() < 2:
+                changed = [counts + one[twice] - one[less] for twice in mine for less in mine if less != twice]
+                fitting = [each for each in changed if self.budget.spent(each) <= self.budget.most]
+                counts = min(fitting, key=strict.together, default=counts)
+        return counts
+
+    def _criterion(self, penalty: float) -> Criterion:
+        return Criterion(self.views, self.weight, self.least, penalty)
+
+    def _counts(self, runs: Sequence[int]) -> Array:
+        """How often each test stands among the runs, (tests,)."""
+        return np.bincount(runs, minlength=len(self.tests))
+
+    def _lacking(self, counts: Array) -> list[str]:
+        """Effects that so many runs of each test show less well than the standard programme."""
+        told = self.views[0].together(counts)
+        reached = shown(told, np.linalg.inv(told.own))[0]
+        short = np.sqrt(reached) < _AS_WELL * np.sqrt(self.least)
+        return list(dict.fromkeys(self.columns[i].effect.name for i in np.flatnonzero(short)))
+
+    @cached_property
+    def standard_runs(self) -> list[int]:
+        """The standard programme over and over, as long as it fits into the hours; by direction, as labs do."""
+        places = [self.tests.index(test) for test in self.standard]
+        counts, runs = np.zeros(len(self.tests), dtype=int), list[int]()
+        while places:
+            counts[test := places[len(runs) % len(places)]] += 1
+            if self.budget.spent(counts) > self.budget.most:
+                break
+            runs.append(test)
+        return sorted(runs, key=lambda test: self.budget.place[test])
+
+    @cached_property
+    def least(self) -> Array:
+        """Noncentrality of each effect that the standard programme can show, 0 of others, (e,)."""
+        told = self.views[0].together(self._counts(self.standard_runs))
+        reached = shown(told, np.linalg.inv(told.own))[0]
+        seen = [column.reach * np.sqrt(size) >= FOUND for column, size in zip(self.columns, reached, strict=True)]
+        return np.where(seen, reached, 0.0)
+
+    def _drifting(self, counts: Array) -> Drifting:
+        """What a drift does to so many runs of each test."""
+        view, k = self.views[0], len(self.known.names)
+        own, seen = view.told.own, view.told.own[:, k, k]
+        one = Told(own * counts[:, None, None], own[..., k : k + 1], seen[:, None])  # by the gain of one run
+        level = np.square(view.level[:, 0])
+        root = np.linalg.cholesky(np.linalg.inv(view.together(counts).own[0]))
+        pull = one.beside(view.level).cross[..., 0] @ root
+        return Drifting(seen, level * seen**2 / (1.0 + counts * level * seen), pull)
+
+    def _programme(self, runs: Sequence[int]) -> Programme:
+        """What runs in their order tell."""
+        counts = self._counts(runs)
+        told, phase_per_loss = self.views[0].together(counts), 1.0 / (1.0 + np.square(self._loss_factor))
+        covariance = np.linalg.inv(told.own[0])
+        gain, phase = np.sqrt(np.einsum("kcn,kl,lcn->cn", self.slopes, covariance, self.slopes))
+        drifting = self._drifting(counts)
+        moved = np.linalg.cholesky(covariance) @ drifting.shift(runs) / np.sqrt(np.diag(covariance))
+        places = self.budget.place[list(runs)]
+        mounted = np.diff(places, prepend=-1) != 0
+        return Programme(
+            tuple(self.tests[run] for run in runs),
+            self.budget.minutes[list(runs)] + self.budget.setup * mounted,
+            np.sqrt(np.diag(covariance)),
+            covariance,
+            _alone(told.own[0] - self.views[0].prior),
+            gain,
+            phase / phase_per_loss,
+            float(apart([view.together(counts) for view in self.views[1:]])[0]) if self.views[1:] else None,
+            tuple(self._visible(shown(told, covariance[None])[0], drifting.noncentrality(runs))),
+            _DRIFT * float(np.abs(moved).max()),
+        )
+
+    @cached_property
+    def _loss_factor(self) -> Array:
+        """Of the model at the points wanted, (n,)."""
+        model = self.known.model
+        stiffness = [model.stiffness(each.place, each.frequency, each.amplitude) for each in self.wanted.points]
+        return np.concatenate([loss_factor(each) for each in stiffness])
+
+    def _visible(self, reached: Array, drifting: float) -> Iterator[Visible]:
+        """The smallest amount found of each effect that the standard programme shows, in the shape it shows best."""
+        for effect in dict.fromkeys(column.effect for column in self.columns):
+            mine = [i for i, column in enumerate(self.columns) if column.effect is effect]
+            best = mine[int(np.argmax(self.least[mine]))]
+            if self.least[best] > 0.0:
+                amount = effect.amount
+                smallest = FOUND * amount.typical / float(np.sqrt(reached[best]))
+                yield Visible(effect.name, qualified(effect, amount), amount.unit, smallest)
+        if drifting > 0.0:
+            yield Visible("drift", "drift.gain", "1", FOUND / float(np.sqrt(drifting)))
+
+    def _notes(self, planned: Programme) -> Iterator[str]:
+        """What a user must know."""
+        if planned.hours < self.wanted.hours - float(self.budget.minutes.max() + self.budget.setup) / 60.0:
+            yield (
+                f"{number(planned.hours, 2)} of {number(self.wanted.hours, 3)} h are planned: no further run would take a "
+                "quarter per cent off the error"
+            )
+        if planned.apart is not None and planned.apart < FOUND**2:
+            yield (
+                f"the rivals stay {number(planned.apart, 2)} apart in expected chi-square, which is less than the "
+                f"{number(FOUND**2, 2)} that tells them in nine of ten cases: no run of this rig tells them for sure"
+            )
+
+
+def _line(test: Test) -> tuple[object, ...]:
+    """What a test holds; a loop all of it."""
+    if isinstance(test, SimulatedLoop):
+        return test.direction, test.amplitude, test.frequency
+    return test.direction, test.stepped, test.held
+
+
+def _alone(information: Array) -> Array:
+    """Standard errors by tests alone, (k,)."""
+    values, vectors = np.linalg.eigh(information)
+    return np.linalg.norm(vectors / np.sqrt(np.maximum(values, _OPEN * values.max())), axis=1)
