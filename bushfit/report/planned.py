@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bushfit.campaign.schema import SimulatedLoop
-from bushfit.planning.contract import Plan, Test
+from bushfit.effects.contract import Array
+from bushfit.planning.contract import Plan, Test, operating_points
 from bushfit.planning.purpose import purposes
 from bushfit.report.contents import Contents
 from bushfit.units import number
@@ -62,8 +63,12 @@ def _motion(test: Test) -> dict[str, str]:
     """Amplitudes and frequencies in the units of engineers."""
     unit, factor = test.direction.display.displacement
     frequency, amplitude = operating_points(test)
-    sizes, rates = (" ".join(number(each, 4) for each in dict.fromkeys(values)) for values in (factor * amplitude, frequency))
-    return {"amplitude": f"{sizes} {unit}", "frequency [Hz]": rates}
+    return {"amplitude": f"{_listed(factor * amplitude)} {unit}", "frequency [Hz]": _listed(frequency)}
+
+
+def _listed(values: Array) -> str:
+    """The distinct numbers among some, in their order."""
+    return " ".join(dict.fromkeys(number(value, 4) for value in values.tolist()))
 
 
 def _force(plan: Plan, test: Test) -> dict[str, str]:

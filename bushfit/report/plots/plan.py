@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from bushfit.campaign.schema import SimulatedLoop
 from bushfit.effects.contract import Array
 from bushfit.geometry import Place
-from bushfit.planning.contract import Plan, Programme, Test
+from bushfit.planning.contract import Plan, Programme, Test, operating_points
 from bushfit.report.plots import style
 from bushfit.units import number
 
@@ -23,7 +23,7 @@ _COLORS = {"planned": "#1b6ca8", "standard programme": "#d98324", "known now": s
 #: Markers of sweeps and loops.
 _MARKERS = {False: "o", True: "D"}
 #: Diameter of the marker of one run [point]; that of n runs grows with the root of n, so that its area counts them.
-_ONE_RUN = 3.2
+_ONE_RUN = 2.8
 #: Numbers of runs whose markers are explained at most.
 _MOST_SIZES = 4
 #: Markers on a line, or a few more.
@@ -62,11 +62,8 @@ def plan_figure(plan: Plan) -> Figure:
 
 def _points(test: Test) -> Array:
     """Frequency [Hz] and amplitude [mm, deg or %] of the points of a run, (n, 2)."""
-    factor = test.direction.display.displacement.factor
-    if isinstance(test, SimulatedLoop):
-        return np.array([(frequency, factor * size) for frequency, size in test.parts])
-    frequency, amplitude = test.points
-    return np.stack([frequency.ravel(), factor * amplitude.ravel()], axis=-1)
+    frequency, amplitude = operating_points(test)
+    return np.stack([frequency, test.direction.display.displacement.factor * amplitude], axis=-1)
 
 
 def _draw(axes: Axes, tests: Sequence[Test], color: str) -> None:
@@ -74,7 +71,7 @@ def _draw(axes: Axes, tests: Sequence[Test], color: str) -> None:
     for test, count in sorted(Counter(tests).items(), key=lambda pair: -len(_points(pair[0]))):
         loop = isinstance(test, SimulatedLoop)
         diameter = _ONE_RUN * np.sqrt(count)
-        drawn = {"color": color, "lw": 0.8, "mec": "white", "mew": 0.3, "clip_on": False}
+        drawn: dict[str, Any] = {"color": color, "lw": 0.8, "mec": "white", "mew": 0.3, "clip_on": False}
         axes.plot(*_points(test).T, marker=_MARKERS[loop], ms=diameter, **drawn)
 
 
