@@ -223,11 +223,13 @@ class LoopData(DataSet):
     def unit_gain(self) -> Array:
         """What a unit of gain makes of the residuals, (n,).
 
-        It is that of the force's first harmonics: a gain of the noise of n rows would pull the fit by n gain_error^2.
+        Notes: of the force without its noise. With it, a fit would take the noise for what the gain makes, and make
+        the model smaller than it is (Peelle's puzzle: R. Fruehwirth, D. Neudecker, H. Leeb, EPJ Web of Conferences 27
+        (2012) 00008).
         """
-        root = np.sqrt(self.drive.weight)
-        sizes = np.linalg.lstsq((self._waves * root).T, self.drive.force * root, rcond=None)[0]
-        rows = self.drive.row_noise.whiten(sizes @ self._waves * self._per_noise) * self._told
+        waves, counted = self._waves.T, self.drive.weight > 0.0
+        smooth = waves @ np.linalg.lstsq(waves[counted], self.drive.force[counted], rcond=None)[0]
+        rows = self.drive.row_noise.whiten(smooth * self._per_noise) * self._told
         return self._counted(rows)
 
     @cached_property

@@ -25,9 +25,8 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.solve import Coordinates
-from bushfit.model.model import Model
 from bushfit.planning.campaign import settings_of
-from bushfit.planning.contract import Knowledge, Plan, Test
+from bushfit.planning.contract import Plan
 from bushfit.simulation import Undisturbed, measure, undisturbed
 
 #: Campaigns that a worker simulates and fits in one go; chosen: seconds, so that all cores end together.
@@ -108,9 +107,10 @@ def _campaign(
 ) -> tuple[Array, Array] | None:
     truth = clean.truth
     campaign = replace(measure(clean, settings).campaign(), rig=rig)
-    places = list(dict.fromkeys(str(test.direction) for test in (*campaign.loops, *campaign.sweeps)))
     try:
-        result = fit_joint(Data.of(campaign), effects=truth.effects, directions=places)
+        data = Data.of(campaign)
+        places = list(dict.fromkeys(str(data_set.direction) for data_set in [*data.loops, *data.sweeps]))
+        result = fit_joint(data, effects=truth.effects, directions=places)
     except FitError:
         return None
     coordinates, sizes = Coordinates.of(truth, names), relative_sizes(truth, names)

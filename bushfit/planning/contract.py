@@ -28,6 +28,15 @@ Test = SimulatedLoop | SimulatedSweep
 ASSUMED_FORCE = 5e-3
 
 
+def operating_points(test: Test) -> tuple[Array, Array]:
+    """Frequency [Hz] and amplitude, zero-to-peak [m or rad, or strain], of each point of a run, (n,) each."""
+    if isinstance(test, SimulatedLoop):
+        frequency, amplitude = np.array(test.parts).T
+        return frequency, amplitude
+    frequency, amplitude = test.points
+    return frequency.ravel(), amplitude.ravel()
+
+
 @dataclass(frozen=True)
 class Noise:
     """How well the rig measures, standard deviations; gain and phase [rad] are those of ln K.

@@ -13,7 +13,7 @@ from bushfit.planning.sensitivity import Grid, relative_slopes
 from bushfit.units import number
 
 #: Growth of a parameter's standard error without a test from which on the test is for that parameter; chosen.
-_MATTERS = 1.05
+_MATTERS = 1.005
 
 
 def purposes(plan: Plan) -> dict[Test, str]:
@@ -22,7 +22,7 @@ def purposes(plan: Plan) -> dict[Test, str]:
     grid = Grid(known, tuple(counts))
     slopes = relative_slopes(known, grid.data_sets)
     told = grid.told(slopes, np.empty((0, slopes.shape[-1])))
-    view = View(told, np.linalg.inv(known.covariance), np.tile(known.noise.level, (len(counts), 1)))
+    view = View(told, np.linalg.inv(known.covariance), grid.level)
     runs = np.array(list(counts.values()))
     whole = _errors(view, runs)
     rest = "tells the rivals apart" if plan.wanted.aim == "rivals" else "shows effects that the model lacks"
@@ -30,7 +30,8 @@ def purposes(plan: Plan) -> dict[Test, str]:
     for place, test in enumerate(counts):
         growth = _errors(view, np.where(np.arange(runs.size) == place, 0, runs)) / whole
         worst = int(np.argmax(growth))
-        told_by_it = f"{known.names[worst]}: error x{number(float(growth[worst]), 3)} without it"
+        lost = 100.0 * float(growth[worst] - 1.0)
+        told_by_it = f"{known.names[worst]}: error {number(lost, 2)} % larger without it"
         found[test] = told_by_it if growth[worst] >= _MATTERS else rest
     return found
 

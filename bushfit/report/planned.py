@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bushfit.campaign.schema import SimulatedLoop
-from bushfit.planning.contract import Plan, Test
+from bushfit.effects.contract import Array
+from bushfit.planning.contract import Plan, Test, operating_points
 from bushfit.planning.purpose import purposes
 from bushfit.report.contents import Contents
 from bushfit.units import number
@@ -60,19 +61,19 @@ def plan_sheet(plan: Plan) -> pd.DataFrame:
 
 def _motion(test: Test) -> dict[str, str]:
     """Amplitudes and frequencies in the units of engineers."""
-    loop = isinstance(test, SimulatedLoop)
-    sizes, rates = ((test.amplitude,), (test.frequency,)) if loop else (test.amplitudes, test.frequencies)
     unit, factor = test.direction.display.displacement
-    return {
-        "amplitude": f"{' '.join(number(factor * size, 4) for size in sizes)} {unit}",
-        "frequency [Hz]": " ".join(number(rate, 4) for rate in rates),
-    }
+    frequency, amplitude = operating_points(test)
+    return {"amplitude": f"{_listed(factor * amplitude)} {unit}", "frequency [Hz]": _listed(frequency)}
+
+
+def _listed(values: Array) -> str:
+    """The distinct numbers among some, in their order."""
+    return " ".join(dict.fromkeys(number(value, 4) for value in values.tolist()))
 
 
 def _force(plan: Plan, test: Test) -> dict[str, str]:
     """The largest force, moment or stress expected, zero-to-peak."""
-    loop = isinstance(test, SimulatedLoop)
-    frequency, amplitude = (np.array([test.frequency]), np.array([test.amplitude])) if loop else test.points
-    stiffness = np.abs(plan.knowledge.model.stiffness(test.direction, frequency.ravel(), amplitude.ravel()))
+    frequency, amplitude = operating_points(test)
+    stiffness = np.abs(plan.knowledge.model.stiffness(test.direction, frequency, amplitude))
     unit, factor = test.direction.display.force
-    return {"force up to": f"{number(factor * float(np.max(stiffness * amplitude.ravel())), 2)} {unit}"}
+    return {"force up to": f"{number(factor * float(np.max(stiffness * amplitude)), 2)} {unit}"}

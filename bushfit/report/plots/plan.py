@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,7 +14,7 @@ from matplotlib.lines import Line2D
 from bushfit.campaign.schema import SimulatedLoop
 from bushfit.effects.contract import Array
 from bushfit.geometry import Place
-from bushfit.planning.contract import Plan, Programme, Test
+from bushfit.planning.contract import Plan, Programme, Test, operating_points
 from bushfit.report.plots import style
 from bushfit.units import number
 
@@ -22,7 +23,7 @@ _COLORS = {"planned": "#1b6ca8", "standard programme": "#d98324", "known now": s
 #: Markers of sweeps and loops.
 _MARKERS = {False: "o", True: "D"}
 #: Diameter of the marker of one run [point]; that of n runs grows with the root of n, so that its area counts them.
-_ONE_RUN = 3.2
+_ONE_RUN = 2.8
 #: Numbers of runs whose markers are explained at most.
 _MOST_SIZES = 4
 #: Markers on a line, or a few more.
@@ -49,7 +50,7 @@ def plan_figure(plan: Plan) -> Figure:
         axes.set_title(title, loc="left", **style.NAMES)
     _name_sizes(grid[0, 1], sizes)
     _draw_errors(grid[-1, 0], plan, programmes)
-    _draw_stiffness(grid[-1, 1], plan, programmes)
+    _draw_stiffness(grid[-1, 1], programmes)
     style.explain(
         figure,
         "Above: what each run of the rig measures; a line joins the points of a sweep. Below: relative standard errors "
@@ -61,11 +62,8 @@ def plan_figure(plan: Plan) -> Figure:
 
 def _points(test: Test) -> Array:
     """Frequency [Hz] and amplitude [mm, deg or %] of the points of a run, (n, 2)."""
-    factor = test.direction.display.displacement.factor
-    if isinstance(test, SimulatedLoop):
-        return np.array([(frequency, factor * size) for frequency, size in test.parts])
-    frequency, amplitude = test.points
-    return np.stack([frequency.ravel(), factor * amplitude.ravel()], axis=-1)
+    frequency, amplitude = operating_points(test)
+    return np.stack([frequency, test.direction.display.displacement.factor * amplitude], axis=-1)
 
 
 def _draw(axes: Axes, tests: Sequence[Test], color: str) -> None:
@@ -73,7 +71,7 @@ def _draw(axes: Axes, tests: Sequence[Test], color: str) -> None:
     for test, count in sorted(Counter(tests).items(), key=lambda pair: -len(_points(pair[0]))):
         loop = isinstance(test, SimulatedLoop)
         diameter = _ONE_RUN * np.sqrt(count)
-        drawn = {"color": color, "lw": 0.8, "mec": "white", "mew": 0.3, "clip_on": False}
+        drawn: dict[str, Any] = {"color": color, "lw": 0.8, "mec": "white", "mew": 0.3, "clip_on": False}
         axes.plot(*_points(test).T, marker=_MARKERS[loop], ms=diameter, **drawn)
 
 
@@ -87,7 +85,7 @@ def _dress(axes: Axes, place: Place, ends: Array) -> None:
 def _name_sizes(axes: Axes, sizes: Sequence[int]) -> None:
     """Say what markers stand for."""
     shown = [sizes[place] for place in np.unique(np.linspace(0, len(sizes) - 1, _MOST_SIZES).round().astype(int))]
-    looks = {"color": style.GREY, "ls": "", "mec": "white", "mew": 0.3}
+    looks: dict[str, Any] = {"color": style.GREY, "ls": "", "mec": "white", "mew": 0.3}
     handles = [Line2D([], [], marker="o", ms=_ONE_RUN * np.sqrt(size), **looks) for size in shown]
     words = [f"sweep, {size} run{'s' * (size > 1)}" for size in shown]
     loop = {"loop": Line2D([], [], marker="D", ms=_ONE_RUN, **looks)}
@@ -106,7 +104,7 @@ def _draw_errors(axes: Axes, plan: Plan, programmes: dict[str, Programme]) -> No
     style.logarithmic(axes, 100.0 * np.concatenate(list(errors.values())))
 
 
-def _draw_stiffness(axes: Axes, plan: Plan, programmes: dict[str, Programme]) -> None:
+def _draw_stiffness(axes: Axes, programmes: dict[str, Programme]) -> None:
     """The error of the stiffness at each point that is wanted, from the smallest to the largest."""
     for (name, programme), marker in zip(programmes.items(), "os", strict=True):
         values = 100.0 * np.sort(programme.stiffness)
