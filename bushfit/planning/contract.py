@@ -180,6 +180,7 @@ class Plan:
     """Tests chosen for an aim, and the standard programme of as many hours beside them.
 
     Args:
+        before: no tests, and so what is known without them.
         planned: the tests chosen.
         standard: the paper's tests, as often as the hours allow.
         notes: what a user must know.
@@ -187,6 +188,7 @@ class Plan:
 
     knowledge: Knowledge
     wanted: Wanted
+    before: Programme
     planned: Programme
     standard: Programme
     notes: tuple[str, ...] = ()
