@@ -100,9 +100,8 @@ def command(
     if aim not in (None, "parameters") and parameters:
         raise click.UsageError("'--parameters' goes with '--for parameters'.")
     chosen = cast("Aim", aim) if aim else ("rivals" if rivals else "parameters" if parameters else "predictions")
-    job = PlanTests(
-        chosen, hours, directions, _names(parameters), _names(rivals), PredictSettings(**parse_grids(grids))
-    )
+    asked = PredictSettings(directions=None, **parse_grids(grids))
+    job = PlanTests(chosen, hours, directions, _names(parameters), _names(rivals), asked)
     if source.suffix.lower() == ".json":
         result = open_model(source)
         beside = load_campaign(campaign) if campaign else None
@@ -156,15 +155,17 @@ def _tell(options: Options, outcome: Planned) -> None:
 def _tell_tests(options: Options, outcome: Planned) -> None:
     """Each test with the number of its runs; the sheet has them in their order."""
     from bushfit.campaign.schema import SimulatedLoop
+    from bushfit.planning.contract import motions
 
     programme = outcome.plan.planned
-    table = new_table(f"{len(programme.tests)} runs", "direction", "test", "amplitude", "frequency [Hz]", "runs", names=4)
+    table = new_table(
+        f"{len(programme.tests)} runs", "direction", "test", "amplitude", "frequency [Hz]", "runs", names=4
+    )
     for test, runs in Counter(programme.tests).items():
-        loop = isinstance(test, SimulatedLoop)
         unit, factor = test.direction.display.displacement
-        sizes, rates = ((test.amplitude,), (test.frequency,)) if loop else (test.amplitudes, test.frequencies)
-        kind = f"loop, {test.cycles} cycles" if loop else f"sweep over {test.stepped}"
-        table.add_row(str(test.direction), kind, f"{_listed(sizes, factor)} {unit}", _listed(rates, 1.0), str(runs))
+        sizes, rates = motions(test)
+        what = f"loop, {test.cycles} cycles" if isinstance(test, SimulatedLoop) else f"sweep over {test.stepped}"
+        table.add_row(str(test.direction), what, f"{_listed(sizes, factor)} {unit}", _listed(rates, 1.0), str(runs))
     options.console.print(table)
 
 

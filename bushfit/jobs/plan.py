@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -20,7 +20,7 @@ from bushfit.jobs.predict import AMPLITUDES
 from bushfit.model.result import Result
 from bushfit.planning.campaign import campaign_toml
 from bushfit.planning.check import Check
-from bushfit.planning.contract import Aim, Knowledge, Plan, Points, Programme, Test, Visible, Wanted
+from bushfit.planning.contract import Aim, Knowledge, Plan, Points, Programme, Test, Wanted, motions
 from bushfit.planning.guess import guess
 from bushfit.planning.knowledge import of_campaign, of_result, rig_of
 from bushfit.planning.plan import FOUND, plan
@@ -122,7 +122,7 @@ class PlanTests:
     directions: tuple[str, ...] = ()
     parameters: tuple[str, ...] = ()
     rivals: tuple[str, ...] = ()
-    asked: PredictSettings = PredictSettings()
+    asked: PredictSettings = field(default_factory=PredictSettings)
 
     def kinds(self) -> Kinds:
         """The names of all that the outcome will hold."""
@@ -186,15 +186,15 @@ class PlanTests:
 
 def _run(test: Test, minutes: float) -> PlannedRun:
     """One run as the document has it."""
-    loop = isinstance(test, SimulatedLoop)
+    amplitudes, frequencies = map(list, motions(test))
     return {
         "place": str(test.direction),
-        "kind": "loop" if loop else "sweep",
-        "stepped": None if loop else test.stepped,
-        "amplitudes": [test.amplitude] if loop else list(test.amplitudes),
+        "kind": "loop" if isinstance(test, SimulatedLoop) else "sweep",
+        "stepped": None if isinstance(test, SimulatedLoop) else test.stepped,
+        "amplitudes": amplitudes,
         "unit": test.direction.motion.displacement_unit,
-        "frequencies_Hz": [test.frequency] if loop else list(test.frequencies),
-        "cycles": test.cycles if loop else None,
+        "frequencies_Hz": frequencies,
+        "cycles": test.cycles if isinstance(test, SimulatedLoop) else None,
         "minutes": minutes,
     }
 

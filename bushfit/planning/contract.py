@@ -37,6 +37,13 @@ def operating_points(test: Test) -> tuple[Array, Array]:
     return frequency.ravel(), amplitude.ravel()
 
 
+def motions(test: Test) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Amplitudes [m or rad, or strain] and frequencies [Hz] of a test."""
+    if isinstance(test, SimulatedLoop):
+        return (test.amplitude,), (test.frequency,)
+    return test.amplitudes, test.frequencies
+
+
 @dataclass(frozen=True)
 class Noise:
     """How well the rig measures, standard deviations; gain and phase [rad] are those of ln K.

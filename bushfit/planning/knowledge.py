@@ -127,8 +127,9 @@ def _tests(data: Data) -> Iterator[Test]:
             loop.direction, loop.drive.amplitude, loop.drive.frequency, max(round(loop.drive.cycles), 1)
         )
     for sweep in data.sweeps:
-        for block in np.split(np.arange(sweep.frequency.size), sweep.block_starts[1:]) if sweep.sweep.stepped else ():
-            stepped, steps = sweep.sweep.stepped, tuple(sweep.step[block].tolist())
+        stepped = sweep.sweep.stepped
+        for block in np.split(np.arange(sweep.frequency.size), sweep.block_starts[1:]) if stepped else ():
+            steps = tuple(sweep.step[block].tolist())
             held = (float(sweep.held[block[0]]),)
             amplitudes, frequencies = (held, steps) if stepped == "frequency" else (steps, held)
-            yield SimulatedSweep(sweep.direction, amplitudes, frequencies, stepped)
+            yield SimulatedSweep(sweep.direction, amplitudes, frequencies, stepped or "frequency")

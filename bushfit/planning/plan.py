@@ -241,15 +241,17 @@ class _Planner:
             best = mine[int(np.argmax(self.least[mine]))]
             if self.least[best] > 0.0:
                 amount = effect.amount
-                yield Visible(effect.name, qualified(effect, amount), amount.unit, amount.typical * _found(reached[best]))
+                yield Visible(
+                    effect.name, qualified(effect, amount), amount.unit, amount.typical * _found(reached[best])
+                )
         yield Visible("drift", "drift.gain", "1", _found(drifting))
 
     def _notes(self, planned: Programme) -> Iterator[str]:
         """What a user must know."""
         if planned.hours < self.wanted.hours - float(self.budget.minutes.max() + self.budget.setup) / 60.0:
             yield (
-                f"{number(planned.hours, 2)} of {number(self.wanted.hours, 3)} h are planned: no further run would take "
-                "a quarter per cent off the error"
+                f"{number(planned.hours, 2)} of {number(self.wanted.hours, 3)} h are planned: no further run would "
+                "take a quarter per cent off the error"
             )
         if planned.apart is not None and planned.apart < FOUND**2:
             yield (
@@ -259,7 +261,7 @@ class _Planner:
 
 
 def _found(noncentrality: float) -> float:
-    """The smallest amount that is found, of a column with this noncentrality for a unit; inf of one that is not seen."""
+    """The smallest amount that is found, of a column with this noncentrality for a unit; inf where it is not seen."""
     return FOUND / float(np.sqrt(noncentrality)) if noncentrality > 0.0 else np.inf
 
 
