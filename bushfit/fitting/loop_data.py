@@ -174,9 +174,9 @@ class LoopData(DataSet):
 
     def suspects(self) -> Iterator[Suspect]:
         """The loop as a whole, wrong in gain or offset."""
-        wrong = np.stack((self.drive.force, np.full(self.drive.force.size, self.drive.half_range)))
+        offset = np.full(self.drive.force.size, self.drive.half_range)
         ends = (self.drive.frequency,) * 2, (self.drive.amplitude,) * 2
-        columns = list(self._whitened(wrong * self._per_noise))
+        columns = [self._less_gain(self.unit_gain), self._whitened(offset * self._per_noise)]
         yield Suspect(f"the loop {self.name}", "loop", columns, self.direction, *ends)
 
     def columns(self) -> dict[str, Any]:

@@ -110,7 +110,7 @@ def _runs(known: Knowledge, rig: RigSettings, place: Place, sizes: Array, rates:
     """Sweeps and loops at one place over amplitudes [m or rad] and frequencies [Hz], and beyond."""
     amplitudes = [_rounded(x) for x in np.geomspace(sizes.min(), _LARGER * sizes.max(), _AMPLITUDES)]
     top = min(float(rates.max()), rig.max_frequency or np.inf)
-    frequencies = [_rounded(f) for f in np.geomspace(_LOWER * rates.min(), top, _FREQUENCIES)]
+    frequencies = [min(_rounded(f), top) for f in np.geomspace(_LOWER * rates.min(), top, _FREQUENCIES)]
     runs: list[Test] = [
         SimulatedSweep(place, (x,), tuple(frequencies[i] for i in chosen)) for x in amplitudes for chosen in _CHOICES
     ]

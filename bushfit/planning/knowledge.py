@@ -56,7 +56,7 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
         FitError: data that cannot support the fit.
         ModelError: effects that these tests could not show, or a diagnosis without rivals.
     """
-    noise = noise_of(data)
+    names, noise = None if rivals is None else tuple(rivals) or _alike(data), noise_of(data)
     data = Data.of(replace(data.campaign, rig=rig_of(data.campaign.rig, noise)))
     data_sets = [*data.loops, *data.sweeps]
     model = Model.started(data.campaign.bushing, data.effects, data.start(data_sets, {}))
@@ -67,9 +67,8 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
     def known(result: Result) -> Knowledge:
         return of_result(replace(result, specimens=data.campaign.specimens), noise, source)
 
-    if rivals is None:
+    if names is None:
         return replace(known(result_of(plain, data.bounds, ())), tests=tuple(_tests(data)))
-    names = tuple(rivals) or _alike(data)
     proposed = [proposal for proposal in proposals(plain, (), held) if proposal.name in names]
     found = {candidate.name: candidate for candidate in refits(plain, proposed, [], {}, held, data.bounds)}
     if unknown := [name for name in names if name not in found]:

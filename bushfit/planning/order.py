@@ -37,13 +37,13 @@ class Drifting:
 
     def noncentrality(self, runs: Sequence[int]) -> float:
         """Of a drift of 1 by runs in their order, by the numbers of their tests."""
-        first, second = self._sums(np.array(runs))
+        first, second = self._sums(np.array(runs, dtype=int))
         shift = first @ self.pull
         return float(self.seen @ second - self.shared @ first**2 - shift @ shift)
 
     def shift(self, runs: Sequence[int]) -> Array:
         """What the parameters take of a drift of 1, (k,)."""
-        return self._sums(np.array(runs))[0] @ self.pull
+        return self._sums(np.array(runs, dtype=int))[0] @ self.pull
 
     def _sums(self, runs: Array) -> tuple[Array, Array]:
         first, second = (np.bincount(runs, turns(runs.size) ** power, self.seen.size) for power in (1, 2))

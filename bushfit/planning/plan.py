@@ -37,6 +37,8 @@ _AS_WELL = 0.995
 _DRIFT = 0.01
 #: Information, relative to the largest, below which tests alone leave a combination of parameters open.
 _OPEN = 1e-14
+#: The same where there are no tests: errors are then beyond all use.
+_LEAST = 1e-12
 
 
 def plan(known: Knowledge, wanted: Wanted) -> Plan:
@@ -165,7 +167,7 @@ class _Planner:
 
     def _counts(self, runs: Sequence[int]) -> Array:
         """How often each test stands among the runs, (tests,)."""
-        return np.bincount(runs, minlength=len(self.tests))
+        return np.bincount(np.array(runs, dtype=int), minlength=len(self.tests))
 
     def _lacking(self, counts: Array) -> list[str]:
         """Effects that so many runs of each test show less well than the standard programme."""
@@ -275,4 +277,5 @@ def _line(test: Test) -> tuple[object, ...]:
 def _alone(information: Array) -> Array:
     """Standard errors by tests alone, (k,)."""
     values, vectors = np.linalg.eigh(information)
-    return np.linalg.norm(vectors / np.sqrt(np.maximum(values, _OPEN * values.max())), axis=1)
+    least = max(_OPEN * float(values.max()), _LEAST)
+    return np.linalg.norm(vectors / np.sqrt(np.maximum(values, least)), axis=1)
