@@ -43,6 +43,7 @@ DESCRIBED = {
     "run": Described("--json of run", "jobs.run.RunDocument", "read"),
     "prediction": Described("--json of predict", "jobs.predict.PredictionDocument", "written"),
     "comparison": Described("compare.json; --json of compare", "jobs.compare_document.ComparisonFile", "written"),
+    "plan": Described("plan.json; --json of plan", "jobs.plan_document.PlanFile", "written"),
     "batch": Described("batch.json", "batch.document.BatchFile", "written"),
     "summary": Described("--json of batch", "batch.document.BatchSummary", "written"),
     "row": Described("bushings/<name>/row.json of batch", "batch.document.Record", "written"),

@@ -23,6 +23,7 @@ _COMMANDS = {
     "compare": ("compare", "Results side by side, or model families: what differs, and is it more than chance?"),
     "export": ("export", "Model -> files of solvers, multibody codes and spreadsheets."),
     "diagnose": ("diagnose", "Where do model and tests disagree? What is missing? Add it, show the gap shrink."),
+    "plan": ("plan", "Which tests next? Chosen for what they would tell, with errors beforehand."),
     "report": ("report", "A folder of results -> one page to show, to print and to mail."),
     "batch": ("batch", "Many campaigns at once -> one table, limits, a report for CI."),
     "scorecard": ("scorecard", "How often is diagnose right? Judged on hidden campaigns."),

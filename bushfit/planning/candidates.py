@@ -74,10 +74,14 @@ def candidates(known: Knowledge, wanted: Wanted) -> list[Test]:
     for place in wanted.places:
         wished = [points for points in wanted.points if points.place == place]
         usual = [test for test in _of_paper(known, wanted.rig, place) if isinstance(test, SimulatedSweep)]
-        sizes = [*(points.amplitude for points in wished), *(test.amplitudes for test in usual)]
-        rates = [*(points.frequency for points in wished), *(test.frequencies for test in usual)]
         if usual:
-            found += _runs(known, wanted.rig, place, np.concatenate(sizes), np.concatenate(rates))
+            sizes = np.concatenate(
+                [*(each.amplitude for each in wished), *(np.array(each.amplitudes) for each in usual)]
+            )
+            rates = np.concatenate(
+                [*(each.frequency for each in wished), *(np.array(each.frequencies) for each in usual)]
+            )
+            found += _runs(known, wanted.rig, place, sizes, rates)
     if not found:
         places = " and ".join(map(str, wanted.places))
         raise ModelError(
@@ -98,7 +102,8 @@ def _of_paper(known: Knowledge, rig: RigSettings, place: Place) -> list[Test]:
     loops = [replace(loop, direction=place, amplitude=_rounded(loop.amplitude * scale)) for loop in PAPER_LOOPS]
     sweep = PAPER_SWEEPS[0]
     sweeps = [replace(sweep, direction=place, amplitudes=(_rounded(x * scale),)) for x in sweep.amplitudes]
-    return [kept for test in (*loops, *sweeps) if (kept := _within(known, rig, test)) is not None]
+    tests: list[Test] = [*loops, *sweeps]
+    return [kept for test in tests if (kept := _within(known, rig, test)) is not None]
 
 
 def _runs(known: Knowledge, rig: RigSettings, place: Place, sizes: Array, rates: Array) -> Iterator[Test]:

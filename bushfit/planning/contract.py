@@ -37,6 +37,13 @@ def operating_points(test: Test) -> tuple[Array, Array]:
     return frequency.ravel(), amplitude.ravel()
 
 
+def motions(test: Test) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Amplitudes [m or rad, or strain] and frequencies [Hz] of a test."""
+    if isinstance(test, SimulatedLoop):
+        return (test.amplitude,), (test.frequency,)
+    return test.amplitudes, test.frequencies
+
+
 @dataclass(frozen=True)
 class Noise:
     """How well the rig measures, standard deviations; gain and phase [rad] are those of ln K.
@@ -180,6 +187,7 @@ class Plan:
     """Tests chosen for an aim, and the standard programme of as many hours beside them.
 
     Args:
+        before: no tests, and so what is known without them.
         planned: the tests chosen.
         standard: the paper's tests, as often as the hours allow.
         notes: what a user must know.
@@ -187,6 +195,7 @@ class Plan:
 
     knowledge: Knowledge
     wanted: Wanted
+    before: Programme
     planned: Programme
     standard: Programme
     notes: tuple[str, ...] = ()

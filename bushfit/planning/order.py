@@ -13,8 +13,8 @@ from bushfit.effects.contract import Array
 _ROUNDS = 100
 #: Relative gain of an exchange below which there is none: rounding.
 _LEAST = 1e-9
-#: Weight of what the parameters take of a drift, beside what shows of it; chosen: orders then keep it below a fifth of a
-#: standard error for 1 % over the session.
+#: Weight of what the parameters take of a drift, beside what shows of it; chosen: orders then keep it below a fifth of
+#: a standard error for 1 % over the session.
 _STEADY = 100.0
 
 
@@ -50,8 +50,10 @@ class Drifting:
         return first, second
 
     def exchanged(self, runs: Array) -> Array:
-        """By how much the noncentrality grows where two runs change places, (runs, runs); what the parameters take of the
-        drift counts _STEADY times."""
+        """By how much the noncentrality grows where two runs change places, (runs, runs).
+
+        What the parameters take of the drift counts _STEADY times.
+        """
         turn = turns(runs.size)
         first = self._sums(runs)[0]
         moved, squared = turn - turn[:, None], turn**2 - turn[:, None] ** 2  # of the run in the row

@@ -136,7 +136,8 @@ class _Planner:
                 expected=f"at least {number((self.budget.minutes.min() + self.budget.setup) / 60.0, 2)} h",
             )
         planned = self._programme(ordered(best, self.budget.place, self._drifting(best)))
-        return Plan(self.known, self.wanted, planned, self._programme(self.standard_runs), tuple(self._notes(planned)))
+        before, standard = self._programme([]), self._programme(self.standard_runs)
+        return Plan(self.known, self.wanted, before, planned, standard, tuple(self._notes(planned)))
 
     def _best(self) -> Array:
         """So many runs of each test, (tests,), that all effects show as in the standard programme, if that can be."""
@@ -240,23 +241,28 @@ class _Planner:
             best = mine[int(np.argmax(self.least[mine]))]
             if self.least[best] > 0.0:
                 amount = effect.amount
-                smallest = FOUND * amount.typical / float(np.sqrt(reached[best]))
-                yield Visible(effect.name, qualified(effect, amount), amount.unit, smallest)
-        if drifting > 0.0:
-            yield Visible("drift", "drift.gain", "1", FOUND / float(np.sqrt(drifting)))
+                yield Visible(
+                    effect.name, qualified(effect, amount), amount.unit, amount.typical * _found(reached[best])
+                )
+        yield Visible("drift", "drift.gain", "1", _found(drifting))
 
     def _notes(self, planned: Programme) -> Iterator[str]:
         """What a user must know."""
         if planned.hours < self.wanted.hours - float(self.budget.minutes.max() + self.budget.setup) / 60.0:
             yield (
-                f"{number(planned.hours, 2)} of {number(self.wanted.hours, 3)} h are planned: no further run would take a "
-                "quarter per cent off the error"
+                f"{number(planned.hours, 2)} of {number(self.wanted.hours, 3)} h are planned: no further run would "
+                "take a quarter per cent off the error"
             )
         if planned.apart is not None and planned.apart < FOUND**2:
             yield (
                 f"the rivals stay {number(planned.apart, 2)} apart in expected chi-square, which is less than the "
                 f"{number(FOUND**2, 2)} that tells them in nine of ten cases: no run of this rig tells them for sure"
             )
+
+
+def _found(noncentrality: float) -> float:
+    """The smallest amount that is found, of a column with this noncentrality for a unit; inf where it is not seen."""
+    return FOUND / float(np.sqrt(noncentrality)) if noncentrality > 0.0 else np.inf
 
 
 def _line(test: Test) -> tuple[object, ...]:

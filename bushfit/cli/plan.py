@@ -1,0 +1,213 @@
+"""`bushfit plan`: which tests next, before the rig is booked."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import click
+
+from bushfit.cli.common import Options, example, open_model, path_option, place_option, shared_options
+from bushfit.cli.grids import grid_options, parse_grids
+from bushfit.cli.show import new_table, warn
+from bushfit.errors import naming
+from bushfit.units import for_people, number
+
+if TYPE_CHECKING:
+    from bushfit.jobs.plan import Planned
+    from bushfit.jobs.plan_document import PlanFile, Shown
+    from bushfit.planning.check import Check
+    from bushfit.planning.contract import Aim
+
+#: Hours of the rig at most: months, as a typing error.
+_MOST_HOURS = 2000.0
+#: Effects that the terminal shows at most without -v: those that the plan shows least well beside the standard.
+_MOST_EFFECTS = 6
+#: Amplitudes or frequencies of a test that are listed in full at most.
+_MOST_VALUES = 6
+
+
+@click.command(
+    "plan",
+    epilog=example(
+        "bushfit plan configs/arm_bushing.toml --hours 4",
+        "bushfit plan configs/planned.toml --for parameters --check 20",
+    ),
+)
+@click.argument("source", metavar="CAMPAIGN|MODEL.json", type=click.Path(path_type=Path))
+@click.option(
+    "--for",
+    "aim",
+    type=click.Choice(["parameters", "predictions", "rivals"]),
+    help="What the tests are to tell best [predictions; with --rivals, rivals].",
+)
+@click.option(
+    "--hours",
+    type=click.FloatRange(0.0, _MOST_HOURS, min_open=True),
+    default=8.0,
+    show_default=True,
+    help="Of the rig, at most.",
+)
+@place_option("directions", multiple=True, help="In which the rig can test; may be given again [axial and radial].")
+@click.option("--parameters", metavar="NAME,...", help="Whose errors count, with --for parameters [all].")
+@click.option(
+    "--rivals",
+    metavar="NAME,...",
+    help="Effects to be told apart [those that a diagnosis of the campaign cannot tell].",
+)
+@grid_options
+@path_option("--campaign", help="Of MODEL.json: take the [rig] and [predict] of this campaign.")
+@click.option(
+    "--check", "count", type=click.IntRange(2, 100_000), metavar="N", help="Simulate the plan N times, and fit each."
+)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of --check.")
+@shared_options
+def command(
+    source: Path,
+    aim: str | None,
+    hours: float,
+    directions: tuple[str, ...],
+    parameters: str | None,
+    rivals: str | None,
+    campaign: Path | None,
+    count: int | None,
+    seed: int,
+    options: Options,
+    **grids: str | None,
+) -> None:
+    """Choose the tests that would tell most, within the hours and the limits of the rig.
+
+    What is known before comes from the tests of CAMPAIGN, from its [compound] (hardness, filler) where there are no
+    tests, or from MODEL.json. The tests are chosen for the errors of parameters, of the stiffness where it is wanted
+    (the grid of predict), or to tell rival effects apart; effects that the model lacks show at least as well as in
+    the standard programme, the paper's tests, of as many hours. [rig] has the limits and the times of the rig.
+
+    Writes plan.csv, a sheet for who runs the rig, plan.png, plan.json, and campaign.toml, which `bushfit simulate`
+    takes. --check simulates and fits it many times: are the errors as predicted?
+    """
+    from bushfit.campaign.campaign import load_campaign
+    from bushfit.campaign.naming import folder_name
+    from bushfit.campaign.schema import PredictSettings
+    from bushfit.jobs.plan import CAMPAIGN_FILE, PlanTests
+
+    if aim not in (None, "rivals") and rivals:
+        raise click.UsageError("'--rivals' goes with '--for rivals'.")
+    if aim not in (None, "parameters") and parameters:
+        raise click.UsageError("'--parameters' goes with '--for parameters'.")
+    chosen = cast("Aim", aim) if aim else ("rivals" if rivals else "parameters" if parameters else "predictions")
+    asked = PredictSettings(directions=None, **parse_grids(grids))
+    job = PlanTests(chosen, hours, directions, _names(parameters), _names(rivals), asked)
+    if source.suffix.lower() == ".json":
+        result = open_model(source)
+        beside = load_campaign(campaign) if campaign else None
+        folder = options.folder(f"plan {folder_name(result.name)}")
+        work = partial(job.of_result, result, beside)
+    else:
+        if campaign:
+            raise click.UsageError("'--campaign' goes with MODEL.json.")
+        loaded = load_campaign(source)
+        folder = options.folder(f"plan {loaded.slug}")
+        work = partial(job.of_campaign, loaded)
+    options.require_free(folder, [*options.formats.names(job.kinds()), CAMPAIGN_FILE])
+    with naming(source):
+        outcome = work()
+    _tell(options, outcome)
+    if count:
+        outcome = replace(outcome, check=_checked(options, outcome, count, seed))
+    options.write(folder, {**options.formats.files(outcome.contents), CAMPAIGN_FILE: outcome.campaign})
+    options.say(f"next: make the tests in the order of {folder / options.formats.table('plan')}")
+    options.tell(outcome.document)
+
+
+def _names(text: str | None) -> tuple[str, ...]:
+    """Names between commas, each once."""
+    return tuple(dict.fromkeys(filter(None, (name.strip() for name in (text or "").split(",")))))
+
+
+def _tell(options: Options, outcome: Planned) -> None:
+    """The tests, what they would tell beside the standard programme, and what a user must know."""
+    document = outcome.document
+    options.say(f"known before: {document['source']}")
+    _tell_tests(options, outcome)
+    standard = f"standard, {number(document['hours_standard'], 3)} h"
+    columns = ("before", f"plan, {number(document['hours_planned'], 3)} h", standard)
+    table = new_table("standard errors [%]", "of", *columns)
+    rows = {**document["parameters"], **{f"stiffness, {place}": row for place, row in document["stiffness"].items()}}
+    rows |= {f"loss factor, {place} [-/100]": row for place, row in document["loss_factor"].items()}
+    for name, row in rows.items():
+        table.add_row(name, *(number(100.0 * row[key], 2) for key in ("before", "planned", "standard")))
+    options.console.print(table)
+    _tell_effects(options, document)
+    if rivals := document["rivals"]:
+        apart = ", ".join(f"{number(rivals[key], 3)} by the {key} tests" for key in ("planned", "standard"))
+        options.say(
+            f"{' and '.join(rivals['effects'])}: {apart} apart in expected chi-square; from "
+            f"{number(rivals['enough'], 3)} on they are told apart in nine of ten cases"
+        )
+    warn(options, document["warnings"])
+
+
+def _tell_tests(options: Options, outcome: Planned) -> None:
+    """Each test with the number of its runs; the sheet has them in their order."""
+    from bushfit.campaign.schema import SimulatedLoop
+    from bushfit.planning.contract import motions
+
+    programme = outcome.plan.planned
+    table = new_table(
+        f"{len(programme.tests)} runs", "direction", "test", "amplitude", "frequency [Hz]", "runs", names=4
+    )
+    for test, runs in Counter(programme.tests).items():
+        unit, factor = test.direction.display.displacement
+        sizes, rates = motions(test)
+        what = f"loop, {test.cycles} cycles" if isinstance(test, SimulatedLoop) else f"sweep over {test.stepped}"
+        table.add_row(str(test.direction), what, f"{_listed(sizes, factor)} {unit}", _listed(rates, 1.0), str(runs))
+    options.console.print(table)
+
+
+def _listed(values: Sequence[float], factor: float) -> str:
+    """Few values in full, many as their ends."""
+    words = [number(factor * value, 3) for value in values]
+    return ", ".join(words) if len(words) <= _MOST_VALUES else f"{words[0]} to {words[-1]} ({len(words)})"
+
+
+def _tell_effects(options: Options, document: PlanFile) -> None:
+    """The smallest amounts of effects that the plan finds, those first that it shows least well beside the standard."""
+
+    def least_well(shown: Shown) -> float:
+        return (shown["standard"] or math.inf) / (shown["planned"] or math.inf)
+
+    ranked = sorted(document["visible"].items(), key=lambda item: least_well(item[1]))
+    kept = ranked if options.verbose else ranked[:_MOST_EFFECTS]
+    title = f"smallest amounts found in nine of ten cases, {len(kept)} of {len(ranked)} effects"
+    table = new_table(title, "effect", "amount", "plan", "standard", "unit", names=2)
+    for name, shown in kept:
+        sizes = [shown["planned"], shown["standard"]]
+        unit, factor = for_people(shown["unit"], 1.0, next(filter(None, sizes), 1.0))
+        words = ["none" if size is None else number(size * factor, 3) for size in sizes]
+        table.add_row(name, shown["parameter"], *words, unit)
+    options.console.print(table)
+
+
+def _checked(options: Options, outcome: Planned, count: int, seed: int) -> Check:
+    """The plan simulated, with a table of what was predicted and found."""
+    from rich.progress import Progress
+
+    from bushfit.planning.check import check
+
+    with Progress(console=options.console, transient=True) as progress:
+        task = progress.add_task("simulated", total=count)
+        found = check(outcome.plan, count, seed, lambda done: progress.update(task, completed=done))
+    table = new_table(f"{len(found.off)} simulated campaigns: standard errors [%]", "of", "predicted", "found", "95 %")
+    low, high = found.interval
+    for name, *sizes in zip(found.names, found.predicted, found.found, low, high, strict=True):
+        predicted, scatter, *ends = (number(100.0 * size, 3) for size in sizes)
+        table.add_row(name, predicted, scatter, " to ".join(ends))
+    options.console.print(table)
+    if found.failed:
+        options.say(f"{found.failed} could not be fitted")
+    return found

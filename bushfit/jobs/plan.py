@@ -1,0 +1,217 @@
+"""plan: which tests next, chosen for what they would tell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import PredictSettings, RigSettings, SimulatedLoop
+from bushfit.errors import ModelError, did_you_mean
+from bushfit.fitting.data import Data
+from bushfit.geometry import Direction, place_named
+from bushfit.jobs.grid import default_grid
+from bushfit.jobs.plan_document import Checked, PlanFile, PlannedRun, Reached, Rivalry, Shown
+from bushfit.jobs.predict import AMPLITUDES
+from bushfit.model.result import Result
+from bushfit.planning.campaign import campaign_toml
+from bushfit.planning.check import Check
+from bushfit.planning.contract import Aim, Knowledge, Plan, Points, Programme, Test, Wanted, motions
+from bushfit.planning.guess import guess
+from bushfit.planning.knowledge import of_campaign, of_result, rig_of
+from bushfit.planning.plan import FOUND, plan
+from bushfit.report.contents import Contents, Kinds
+from bushfit.report.planned import plan_contents
+
+if TYPE_CHECKING:
+    from bushfit.effects.contract import Array
+    from bushfit.geometry import Place
+
+#: File of the plan that `simulate` takes.
+CAMPAIGN_FILE = "campaign.toml"
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """The outcome: the plan, and its check by simulation where it was asked for."""
+
+    plan: Plan
+    check: Check | None = None
+
+    @property
+    def result(self) -> Result:
+        """What is known before."""
+        return Result(self.plan.knowledge.model, specimens=self.plan.knowledge.specimens)
+
+    @property
+    def campaign(self) -> bytes:
+        """The plan as a campaign file for `bushfit simulate`."""
+        return campaign_toml(self.plan).encode()
+
+    @cached_property
+    def document(self) -> PlanFile:
+        known, wanted, found = self.plan.knowledge, self.plan.wanted, self.plan
+        every = (found.before, found.planned, found.standard)
+        return {
+            "schema": "bushfit/plan/1",
+            "source": known.source,
+            "aim": wanted.aim,
+            "hours": wanted.hours,
+            "tests": [_run(*pair) for pair in zip(found.planned.tests, found.planned.minutes.tolist(), strict=True)],
+            "hours_planned": found.planned.hours,
+            "hours_standard": found.standard.hours,
+            "parameters": {
+                name: _reached([programme.errors[place] for programme in every])
+                for place, name in enumerate(known.names)
+            },
+            "stiffness": dict(self._means([programme.stiffness for programme in every])),
+            "loss_factor": dict(self._means([programme.loss for programme in every])),
+            "visible": dict(self._shown()),
+            "drift": {"planned": found.planned.drift, "standard": found.standard.drift},
+            "rivals": self._rivalry(found.planned, found.standard),
+            "check": _checked(self.check) if self.check else None,
+            "warnings": list(found.notes),
+        }
+
+    def _means(self, errors: Sequence[Array]) -> Iterator[tuple[str, Reached]]:
+        """Root mean square of errors at the points of each place, of each programme."""
+        points = self.plan.wanted.points
+        ends = np.cumsum([each.frequency.size for each in points])[:-1]
+        for each, *parts in zip(points, *(np.split(error, ends) for error in errors), strict=True):
+            yield str(each.place), _reached([float(np.sqrt(np.mean(np.square(part)))) for part in parts])
+
+    def _shown(self) -> Iterator[tuple[str, Shown]]:
+        """The smallest amounts that either programme finds of each effect."""
+        for planned, standard in zip(self.plan.planned.visible, self.plan.standard.visible, strict=True):
+            amounts = [each.amount if np.isfinite(each.amount) else None for each in (planned, standard)]
+            entry: Shown = {
+                "parameter": planned.parameter,
+                "unit": planned.unit,
+                "planned": amounts[0],
+                "standard": amounts[1],
+            }
+            yield planned.effect, entry
+
+    def _rivalry(self, planned: Programme, standard: Programme) -> Rivalry | None:
+        if planned.apart is None or standard.apart is None:
+            return None
+        effects = [rival.model.effects[-1] for rival in self.plan.knowledge.rivals]
+        return {"effects": effects, "planned": planned.apart, "standard": standard.apart, "enough": FOUND**2}
+
+    @property
+    def contents(self) -> Contents:
+        return Contents({"plan": self.document}) | plan_contents(self.plan)
+
+
+@dataclass(frozen=True)
+class PlanTests:
+    """Which tests next: for an aim, within hours, in these directions [axial and radial, or all specimens].
+
+    Args:
+        parameters: whose errors count; none for all.
+        rivals: effects to be told apart; none for those that the diagnosis cannot tell.
+        asked: where predictions are wanted.
+    """
+
+    aim: Aim = "predictions"
+    hours: float = 8.0
+    directions: tuple[str, ...] = ()
+    parameters: tuple[str, ...] = ()
+    rivals: tuple[str, ...] = ()
+    asked: PredictSettings = field(default_factory=PredictSettings)
+
+    def kinds(self) -> Kinds:
+        """The names of all that the outcome will hold."""
+        return Kinds(("plan",), ("plan",), ("plan",))
+
+    def of_campaign(self, campaign: Campaign) -> Planned:
+        """Of a campaign with tests; or of one without, by its model or else by what its [compound] lets one guess.
+
+        Raises:
+            CampaignError: nothing is known of the rubber.
+            FitError: tests that cannot support a fit.
+            ModelError: see `of_result` and `planning.plan.plan`.
+        """
+        if campaign.loops or campaign.sweeps:
+            known = of_campaign(Data.of(campaign), self.rivals if self.aim == "rivals" else None)
+        elif campaign.bushing and campaign.compound:
+            known = guess(campaign.bushing, campaign.compound)
+        else:
+            from bushfit.simulation import model_of
+
+            known = of_result(Result(model_of(campaign), specimens=campaign.specimens))
+        return self._of(known, campaign)
+
+    def of_result(self, result: Result, campaign: Campaign | None = None) -> Planned:
+        """Of a model; a campaign has its rig and what is to be predicted.
+
+        Raises:
+            ModelError: a parameter that is not fitted, a direction without a body, or no tests for this aim.
+        """
+        return self._of(of_result(result), campaign)
+
+    def _of(self, known: Knowledge, campaign: Campaign | None) -> Planned:
+        for name in self.parameters:
+            if name not in known.names:
+                raise ModelError(
+                    "this parameter is not among those that tests are to tell",
+                    place="--parameters",
+                    found=name,
+                    expected=", ".join(known.names),
+                    hint=did_you_mean(name, known.names),
+                )
+        result = Result(known.model, specimens=known.specimens)
+        usual = [Direction.AXIAL, Direction.RADIAL] if known.model.bushing else list(known.specimens)
+        places = tuple(place_named(name, known.specimens) for name in self.directions) or tuple(usual)
+        points = tuple(self._points(result, campaign, usual))
+        rig = rig_of(campaign.rig if campaign else RigSettings(), known.noise)
+        wanted = Wanted(self.aim, self.hours, rig, places, points, self.parameters or known.names)
+        return Planned(plan(known, wanted))
+
+    def _points(self, result: Result, campaign: Campaign | None, usual: Sequence[Place]) -> Iterator[Points]:
+        """Where the stiffness is wanted: as asked, as the campaign's [predict] says, or on the grid of `predict`."""
+        given = {key: value for key, value in vars(self.asked).items() if value is not None}
+        settings = replace(campaign.predict if campaign else PredictSettings(), **given)
+        places = [place_named(name, result.specimens) for name in settings.directions or ()]
+        for place in places or usual:
+            frequencies, amplitudes = default_grid(result, place, campaign.sweeps if campaign else ())
+            sizes = np.unique(getattr(settings, AMPLITUDES[place.motion]) or amplitudes)
+            amplitude, frequency = np.meshgrid(sizes, np.unique(settings.frequencies or frequencies), indexing="ij")
+            yield Points(place, frequency.ravel(), amplitude.ravel())
+
+
+def _run(test: Test, minutes: float) -> PlannedRun:
+    """One run as the document has it."""
+    amplitudes, frequencies = map(list, motions(test))
+    return {
+        "place": str(test.direction),
+        "kind": "loop" if isinstance(test, SimulatedLoop) else "sweep",
+        "stepped": None if isinstance(test, SimulatedLoop) else test.stepped,
+        "amplitudes": amplitudes,
+        "unit": test.direction.motion.displacement_unit,
+        "frequencies_Hz": frequencies,
+        "cycles": test.cycles if isinstance(test, SimulatedLoop) else None,
+        "minutes": minutes,
+    }
+
+
+def _reached(errors: Sequence[float]) -> Reached:
+    before, planned, standard = map(float, errors)
+    return {"before": before, "planned": planned, "standard": standard}
+
+
+def _checked(check: Check) -> Checked:
+    """A check as the document has it."""
+    low, high = check.interval
+    return {
+        "campaigns": len(check.off) + check.failed,
+        "failed": check.failed,
+        "seed": check.seed,
+        "predicted": dict(zip(check.names, check.predicted.tolist(), strict=True)),
+        "found": dict(zip(check.names, check.found.tolist(), strict=True)),
+        "ci95": {name: list(ends) for name, *ends in zip(check.names, low.tolist(), high.tolist(), strict=True)},
+    }

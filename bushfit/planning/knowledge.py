@@ -1,0 +1,135 @@
+"""What is known before tests are planned: from a campaign and its diagnosis, or from a model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
+from bushfit.diagnosis.evidence import fit, result_of
+from bushfit.diagnosis.propose import proposals
+from bushfit.diagnosis.refit import refits
+from bushfit.diagnosis.workflow import diagnose
+from bushfit.effects import LIBRARY
+from bushfit.errors import ModelError, did_you_mean
+from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import parted
+from bushfit.fitting.information import relative_sizes
+from bushfit.fitting.noise import ASSUMED_SHARED, of_class
+from bushfit.fitting.solve import Coordinates
+from bushfit.model.model import Model
+from bushfit.model.result import Result
+from bushfit.planning.contract import Knowledge, Noise, Test
+from bushfit.planning.sensitivity import ROWS_PER_CYCLE
+
+#: Standard error of the relative change of a parameter that is given without one; chosen: a value given by hand is
+#: right within a factor of 2.7.
+_BY_HAND = 0.5
+
+
+def of_result(result: Result, noise: Noise | None = None, source: str = "") -> Knowledge:
+    """What a fitted model tells; of one that was not fitted, the values within a factor of 2.7."""
+    model, fitted = result.model, result.covariance
+    names = tuple(name for name in fitted.names if fitted.stderr(name)) or tuple(model.parameters)
+    size = Coordinates.of(model, names).slopes(model.values) * relative_sizes(model, names)
+    matrix = (
+        fitted.restricted(names).matrix / np.outer(size, size) if fitted.names else _BY_HAND**2 * np.eye(len(names))
+    )
+    words = source or (
+        "a fitted model" if fitted.names else "values given by hand, taken as right within a factor of 2.7"
+    )
+    strain = result.measured.strain if result.measured else None
+    return Knowledge(model, names, matrix, words, noise or Noise(), strain=strain, specimens=result.specimens)
+
+
+def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
+    """What the tests of a campaign tell, fitted together; and of each rival effect, added to the model in turn.
+
+    The class of the rig counts as noise, stated or not, as it does in what is planned.
+
+    Args:
+        rivals: names of effects; none for those that a diagnosis of these tests cannot tell apart, None for no rivals.
+
+    Raises:
+        FitError: data that cannot support the fit.
+        ModelError: effects that these tests could not show, or a diagnosis without rivals.
+    """
+    noise = noise_of(data)
+    data = Data.of(replace(data.campaign, rig=rig_of(data.campaign.rig, noise)))
+    data_sets = [*data.loops, *data.sweeps]
+    model = Model.started(data.campaign.bushing, data.effects, data.start(data_sets, {}))
+    held = [name for name in model.parameters if name not in data.free(tuple(model.parameters))]
+    plain = fit(model, data_sets, held, data.bounds)
+    source = f"the tests of {data.campaign.name}"
+
+    def known(result: Result) -> Knowledge:
+        return of_result(replace(result, specimens=data.campaign.specimens), noise, source)
+
+    if rivals is None:
+        return replace(known(result_of(plain, data.bounds, ())), tests=tuple(_tests(data)))
+    names = tuple(rivals) or _alike(data)
+    proposed = [proposal for proposal in proposals(plain, (), held) if proposal.name in names]
+    found = {candidate.name: candidate for candidate in refits(plain, proposed, [], {}, held, data.bounds)}
+    if unknown := [name for name in names if name not in found]:
+        raise ModelError(
+            "this is no rival in these tests",
+            place="--rivals",
+            found=", ".join(unknown),
+            expected="effects of the library that the model lacks, and the tests could show",
+            hint=did_you_mean(unknown[0], LIBRARY),
+        )
+    every = [known(result_of(found[name].evidence, data.bounds, ())) for name in names]
+    return replace(every[0], rivals=tuple(every), tests=tuple(_tests(data)))
+
+
+def _alike(data: Data) -> tuple[str, ...]:
+    """The effects that a diagnosis of these tests cannot tell apart."""
+    found = diagnose(data)
+    sets = [(named.name, *named.alternatives) for named in found.effects if named.alternatives and not named.test]
+    if not sets:
+        raise ModelError(
+            "there are no rivals to be told apart",
+            file=data.campaign.path,
+            found=f"the diagnosis of these tests is {found.verdict}",
+            expected="ambiguous",
+            hint="name effects with --rivals, or plan for parameters or predictions",
+        )
+    return sets[0]
+
+
+def noise_of(data: Data) -> Noise:
+    """How well the rig of a campaign measures, as its tests show; what they do not show is assumed."""
+    loops, sweeps = parted([*data.loops, *data.sweeps])
+    found = replace(Noise(), level=of_class(data.campaign.rig, ASSUMED_SHARED))
+    if sweeps:
+        noise = sweeps[0].noise
+        gain, phase = np.sqrt(np.mean(np.square(list(noise.random.values())), axis=0)).tolist()
+        found = replace(found, scatter=(gain, phase), shared=noise.shared)
+    if loops:
+        rows = [loop.test.time.size / loop.drive.cycles for loop in loops]
+        each = [loop.relative_noise * np.sqrt(ROWS_PER_CYCLE / count) for loop, count in zip(loops, rows, strict=True)]
+        as_one = float(np.mean([loop.drive.row_noise.rows_as_one for loop in loops]))
+        found = replace(found, force=float(np.sqrt(np.mean(np.square(each)))), rows_as_one=as_one)
+    return found
+
+
+def rig_of(rig: RigSettings, noise: Noise) -> RigSettings:
+    """The rig with its class stated as a plan counts it."""
+    return replace(rig, gain_error=noise.level[0], phase_error=noise.level[1], displacement_error=None)
+
+
+def _tests(data: Data) -> Iterator[Test]:
+    """The runs of a campaign, as a plan has them; what swings free is none."""
+    for loop in data.loops:
+        yield SimulatedLoop(
+            loop.direction, loop.drive.amplitude, loop.drive.frequency, max(round(loop.drive.cycles), 1)
+        )
+    for sweep in data.sweeps:
+        stepped = sweep.sweep.stepped
+        for block in np.split(np.arange(sweep.frequency.size), sweep.block_starts[1:]) if stepped else ():
+            steps = tuple(sweep.step[block].tolist())
+            held = (float(sweep.held[block[0]]),)
+            amplitudes, frequencies = (held, steps) if stepped == "frequency" else (steps, held)
+            yield SimulatedSweep(sweep.direction, amplitudes, frequencies, stepped or "frequency")
