@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -197,11 +198,17 @@ def _checked(options: Options, outcome: Planned, count: int, seed: int) -> Check
     """The plan simulated, with a table of what was predicted and found."""
     from rich.progress import Progress
 
-    from bushfit.planning.check import check
+    from bushfit.batch import pool
+    from bushfit.planning.check import Found, check
+
+    def every(seeds: Sequence[int], work: Callable[[Sequence[int]], list[Found]]) -> Iterator[tuple[int, Found]]:
+        for done in pool.run(seeds, work, lambda _: None, pool.LocalPool(os.cpu_count() or 1)):
+            progress.advance(task)
+            yield done
 
     with Progress(console=options.console, transient=True) as progress:
         task = progress.add_task("simulated", total=count)
-        found = check(outcome.plan, count, seed, lambda done: progress.update(task, completed=done))
+        found = check(outcome.plan, count, seed, every)
     table = new_table(f"{len(found.off)} simulated campaigns: standard errors [%]", "of", "predicted", "found", "95 %")
     low, high = found.interval
     for name, *sizes in zip(found.names, found.predicted, found.found, low, high, strict=True):

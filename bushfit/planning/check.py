@@ -7,10 +7,7 @@ Notes:
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -29,8 +26,10 @@ from bushfit.planning.campaign import settings_of
 from bushfit.planning.contract import Plan
 from bushfit.simulation import Undisturbed, measure, undisturbed
 
-#: Campaigns that a worker simulates and fits in one go; chosen: seconds, so that all cores end together.
-_CHUNK = 10
+#: Of one campaign what was found less the truth, and its stated errors, (k,) each; None where no fit was possible.
+Found = tuple[Array, Array] | None
+#: Does work(seeds) for parts of the seeds, in some order, and gives the number and the result of each.
+Every = Callable[[Sequence[int], Callable[[Sequence[int]], list[Found]]], Iterable[tuple[int, Found]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,25 +67,23 @@ class Check:
         return low, high
 
 
-def check(plan: Plan, count: int, seed: int, progress: Callable[[int], None] = lambda _: None) -> Check:
-    """Simulate and fit a plan `count` times, on all cores; `progress` is told how many are done.
+def check(plan: Plan, count: int, seed: int, every: Every) -> Check:
+    """Simulate and fit a plan `count` times.
 
     A plan that adds to tests of a campaign is simulated with those, as it will be fitted with them.
+
+    Args:
+        seed: of the first campaign; the others count on.
+        every: gives work(seeds) of parts of the seeds, each with its number: as `batch.pool.run` does on all cores.
 
     Raises:
         FitError: none of the campaigns could be fitted.
     """
     known = plan.knowledge
     settings = settings_of((*known.tests, *plan.planned.tests), known.noise)
-    work = partial(_chunk, undisturbed(known.model, settings), settings, plan.wanted.rig, known.names)
-    seeds = range(seed, seed + count)
-    chunks = [seeds[first : first + _CHUNK] for first in range(0, count, _CHUNK)]
-    rows: list[tuple[Array, Array] | None] = []
-    with ProcessPoolExecutor(os.cpu_count(), multiprocessing.get_context("spawn")) as pool:
-        for done in pool.map(work, chunks):
-            rows += done
-            progress(len(rows))
-    fitted = [row for row in rows if row is not None]
+    work = partial(_several, undisturbed(known.model, settings), settings, plan.wanted.rig, known.names)
+    found = dict(every(range(seed, seed + count), work))
+    fitted = [row for _, row in sorted(found.items()) if row is not None]
     if not fitted:
         raise FitError("no simulated campaign of this plan could be fitted", found=f"{count} campaigns")
     off, stated = (np.array(part) for part in zip(*fitted, strict=True))
@@ -94,17 +91,15 @@ def check(plan: Plan, count: int, seed: int, progress: Callable[[int], None] = l
     return Check(known.names, predicted, off, stated, count - len(fitted), seed, bool(known.tests))
 
 
-def _chunk(
+def _several(
     clean: Undisturbed, settings: SimulateSettings, rig: RigSettings, names: Sequence[str], seeds: Sequence[int]
-) -> list[tuple[Array, Array] | None]:
+) -> list[Found]:
     """Of each seed the parameters found less the true ones, and their stated errors, relative; None without a fit."""
     with threadpool_limits(1):
         return [_campaign(clean, replace(settings, seed=seed), rig, names) for seed in seeds]
 
 
-def _campaign(
-    clean: Undisturbed, settings: SimulateSettings, rig: RigSettings, names: Sequence[str]
-) -> tuple[Array, Array] | None:
+def _campaign(clean: Undisturbed, settings: SimulateSettings, rig: RigSettings, names: Sequence[str]) -> Found:
     truth = clean.truth
     campaign = replace(measure(clean, settings).campaign(), rig=rig)
     try:
