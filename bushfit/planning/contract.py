@@ -159,8 +159,8 @@ class Programme:
         alone: the errors by these tests without what is known, (k,).
         stiffness: standard error of |K| at the points wanted, relative, all points of all directions, (n,).
         loss: the same of the loss factor, in loss factor, (n,).
-        apart: how far the two nearest rivals are apart: expected chi-square after the best refit; None without
-            rivals.
+        apart: expected chi-square between the two nearest rivals that any tests tell apart, after the best refit of
+            either; None without rivals.
         visible: of the effects that the standard programme can show, the smallest amount found.
         drift: largest shift of a parameter, over its standard error, by a drift of the gain of 1 % over the session.
     """

@@ -50,12 +50,14 @@ class Criterion:
         views: the likeliest model's, whose further columns are effects that it lacks; then those of its rivals.
         weight: of the parameters' covariance in the variance that is wanted small, (k, k); None where rivals are to be
             told apart.
+        pairs: of rivals that are to be told apart, by their numbers, (2, pairs).
         least: noncentrality of each effect that the tests are to reach at least, (e,); 0 where none is asked for.
         penalty: weight of the logarithm of each lack of it, beside the logarithm of the variance that is wanted small.
     """
 
     views: Sequence[View]
     weight: Array | None
+    pairs: Array
     least: Array
     penalty: float
 
@@ -70,7 +72,7 @@ class Criterion:
     def _of(self, told: Sequence[Told]) -> Array:
         covariance = np.linalg.inv(told[0].own)
         if self.weight is None:
-            aim = -np.log(np.maximum(apart(told[1:]), np.finfo(float).tiny))
+            aim = -np.log(np.maximum(distances(told[1:])[:, *self.pairs].min(axis=1), np.finfo(float).tiny))
         else:
             aim = np.log(np.einsum("tij,ij->t", covariance, self.weight))
         asked = self.least > 0.0
@@ -83,6 +85,8 @@ def shown(told: Told, covariance: Array) -> Array:
     return np.maximum(told.size - np.sum(told.cross * (covariance @ told.cross), axis=-2), 0.0)
 
 
-def apart(told: Sequence[Told]) -> Array:
-    """Expected chi-square between the two nearest rivals after the best refit of either, (tests,)."""
-    return np.min([shown(each, np.linalg.inv(each.own)).min(axis=1) for each in told], axis=0)
+def distances(told: Sequence[Told]) -> Array:
+    """Expected chi-square between any two rivals after the best refit of either, (tests, rivals, rivals)."""
+    each = [shown(one, np.linalg.inv(one.own)) for one in told]
+    one_way = np.stack([np.insert(row, place, np.inf, axis=1) for place, row in enumerate(each)], axis=1)
+    return np.minimum(one_way, np.swapaxes(one_way, 1, 2))

@@ -17,7 +17,7 @@ from bushfit.fitting.solve import residual
 from bushfit.model.covariance import Z95
 from bushfit.planning.candidates import candidates, minutes, setup_minutes, standard_tests
 from bushfit.planning.contract import Knowledge, Plan, Programme, Test, Visible, Wanted
-from bushfit.planning.criterion import Criterion, View, apart, shown
+from bushfit.planning.criterion import Criterion, View, distances, shown
 from bushfit.planning.order import Drifting, ordered
 from bushfit.planning.search import Budget, chosen
 from bushfit.planning.sensitivity import Column, Grid, Told, relative_slopes
@@ -163,7 +163,27 @@ class _Planner:
         return counts
 
     def _criterion(self, penalty: float) -> Criterion:
-        return Criterion(self.views, self.weight, self.least, penalty)
+        return Criterion(self.views, self.weight, self._tellable, self.least, penalty)
+
+    @cached_property
+    def _pairs(self) -> Array:
+        """Any two rivals by their numbers, (2, pairs)."""
+        return np.stack(np.triu_indices(len(self.known.rivals), 1))
+
+    @cached_property
+    def _tellable(self) -> Array:
+        """Those that all tests together would tell apart, (2, pairs); all where none are."""
+        if not self.known.rivals:
+            return self._pairs
+        every = np.ones(len(self.tests), dtype=int)
+        told = distances([view.together(every) for view in self.views[1:]])[0, *self._pairs] >= FOUND**2
+        return self._pairs[:, told] if told.any() else self._pairs
+
+    def _apart(self, counts: Array) -> float | None:
+        """Expected chi-square between the nearest rivals that tests could tell apart; None without rivals."""
+        if not self.known.rivals:
+            return None
+        return float(distances([view.together(counts) for view in self.views[1:]])[0, *self._tellable].min())
 
     def _counts(self, runs: Sequence[int]) -> Array:
         """How often each test stands among the runs, (tests,)."""
@@ -224,7 +244,7 @@ class _Planner:
             _alone(told.own[0] - self.views[0].prior),
             gain,
             phase / phase_per_loss,
-            float(apart([view.together(counts) for view in self.views[1:]])[0]) if self.views[1:] else None,
+            self._apart(counts),
             tuple(self._visible(shown(told, covariance[None])[0], drifting.noncentrality(runs))),
             _DRIFT * float(np.abs(moved).max()),
         )
@@ -255,10 +275,15 @@ class _Planner:
                 f"{number(planned.hours, 2)} of {number(self.wanted.hours, 3)} h are planned: no further run would "
                 "take a quarter per cent off the error"
             )
+        tellable = {tuple(pair) for pair in self._tellable.T.tolist()}
+        for one, other in self._pairs.T.tolist():
+            if (one, other) not in tellable:
+                names = (self.known.rivals[place].model.effects[-1] for place in (one, other))
+                yield f"no test of this rig would tell {' from '.join(names)}: they are left out"
         if planned.apart is not None and planned.apart < FOUND**2:
             yield (
-                f"the rivals stay {number(planned.apart, 2)} apart in expected chi-square, which is less than the "
-                f"{number(FOUND**2, 2)} that tells them in nine of ten cases: no run of this rig tells them for sure"
+                f"the nearest rivals are {number(planned.apart, 2)} apart in expected chi-square, less than the "
+                f"{number(FOUND**2, 3)} that tell them in nine of ten cases"
             )
 
 
