@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
-from bushfit.errors import FitError
+from bushfit.errors import FitError, typed
 from bushfit.jobs.about import about, asked, document_of
 from bushfit.model.model import Model
 from bushfit.report.artifacts import diagnosis_contents
@@ -66,7 +67,8 @@ class Diagnose:
                 found="every parameter is held with vary = false",
                 hint="bushfit fit says how well the values given meet the tests; free one to diagnose",
             )
-        return Diagnosed(about(data, "diagnose", self._options()), diagnose(data, self.model, self.settings))
+        found = _with_plan(diagnose(data, self.model, self.settings), data.campaign.path)
+        return Diagnosed(about(data, "diagnose", self._options()), found)
 
     def _options(self) -> tuple[str, ...]:
         """What was asked for, as it is typed."""
@@ -75,3 +77,12 @@ class Diagnose:
         if mine.max_effects != usual.max_effects:
             options += ("--max-effects", str(mine.max_effects))
         return options + (("--tolerance", f"{mine.tolerance:g}") if mine.tolerance != usual.tolerance else ())
+
+
+def _with_plan(found: Diagnosis, path: Path) -> Diagnosis:
+    """The diagnosis with the command that plans tests to tell look-alikes apart, where there are some."""
+    sets = [(named.name, *named.alternatives) for named in found.effects if named.alternatives and not named.test]
+    if found.verdict != "ambiguous" or not sets or path.suffix != ".toml":
+        return found
+    command = f"bushfit plan {typed(Path(path.name))} --rivals {','.join(sets[0])}"
+    return replace(found, next_test=f"{found.next_test}; {command} chooses tests that tell them apart")

@@ -30,6 +30,8 @@ _LARGER = 2.0
 _FREQUENCIES = 7
 #: Lowest frequency considered over the lowest of the standard programme.
 _LOWER = 0.2
+#: Highest frequency considered over the highest of the standard programme, where [rig] says that the rig can.
+_FASTER = 2.0
 #: Rates of the loops that are considered [Hz]: quasi-static, and as fast as most rigs still record a loop.
 _LOOP_RATES = (0.1, 1.0)
 #: Which of the seven frequencies a run steps through: all, few, the ends, and either end more densely.
@@ -109,7 +111,7 @@ def _of_paper(known: Knowledge, rig: RigSettings, place: Place) -> list[Test]:
 def _runs(known: Knowledge, rig: RigSettings, place: Place, sizes: Array, rates: Array) -> Iterator[Test]:
     """Sweeps and loops at one place over amplitudes [m or rad] and frequencies [Hz], and beyond."""
     amplitudes = [_rounded(x) for x in np.geomspace(sizes.min(), _LARGER * sizes.max(), _AMPLITUDES)]
-    top = min(float(rates.max()), rig.max_frequency or np.inf)
+    top = min(_FASTER * float(rates.max()), rig.max_frequency or float(rates.max()))
     frequencies = [min(_rounded(f), top) for f in np.geomspace(_LOWER * rates.min(), top, _FREQUENCIES)]
     runs: list[Test] = [
         SimulatedSweep(place, (x,), tuple(frequencies[i] for i in chosen)) for x in amplitudes for chosen in _CHOICES
