@@ -35,6 +35,8 @@ _STRICT = 30.0
 _AS_WELL = 0.995
 #: Drift of the gain over a session whose harm is told.
 _DRIFT = 0.01
+#: Runs of a sweep at most: more than fit into any session.
+_MOST_RUNS = 1000
 #: Information, relative to the largest, below which tests alone leave a combination of parameters open.
 _OPEN = 1e-14
 #: The same where there are no tests: errors are then beyond all use.
@@ -115,7 +117,7 @@ class _Planner:
             np.array([minutes(test, self.wanted.rig) for test in self.tests]),
             np.array([places.index(test.direction) for test in self.tests]),
             np.array([known.index(line) for line in lines]),
-            np.array([test.direction in self.wanted.places for test in self.tests]),
+            np.array([_most_runs(test) * (test.direction in self.wanted.places) for test in self.tests]),
             setup_minutes(self.wanted.rig),
             60.0 * self.wanted.hours,
         )
@@ -147,7 +149,7 @@ class _Planner:
         best = chosen(self._criterion(_PENALTY), self.budget, nothing)
         if self._lacking(best):
             strict = self._criterion(_STRICT)
-            starts = [best, standard] if self.budget.allowed[standard > 0].all() else [best]
+            starts = best, np.minimum(standard, self.budget.runs)
             best = min((chosen(strict, self.budget, start) for start in starts), key=strict.together)
         return best
 
@@ -156,8 +158,9 @@ class _Planner:
         strict, one = self._criterion(_STRICT), np.eye(len(self.tests), dtype=int)
         for place in np.unique(self.budget.place[counts > 0]):
             mine = np.flatnonzero((counts > 0) & (self.budget.place == place))
+            again = mine[self.budget.runs[mine] > 1]
             if mine.size > 2 and counts[mine].max() < 2:
-                changed = [counts + one[twice] - one[less] for twice in mine for less in mine if less != twice]
+                changed = [counts + one[twice] - one[less] for twice in again for less in mine if less != twice]
                 fitting = [each for each in changed if self.budget.spent(each) <= self.budget.most]
                 counts = min(fitting, key=strict.together, default=counts)
         return counts
@@ -293,6 +296,12 @@ class _Planner:
 def _found(noncentrality: float) -> float:
     """The smallest amount that is found, of a column with this noncentrality for a unit; inf where it is not seen."""
     return FOUND / float(np.sqrt(noncentrality)) if noncentrality > 0.0 else np.inf
+
+
+def _most_runs(test: Test) -> int:
+    """How often a test may be made: a loop once. More of it shares its gain error, which a fit takes for one of each
+    record."""
+    return 1 if isinstance(test, SimulatedLoop) else _MOST_RUNS
 
 
 def _line(test: Test) -> tuple[object, ...]:

@@ -23,7 +23,7 @@ class Budget:
         minutes: of each test, (tests,).
         place: number of the place of each test, (tests,).
         line: number of what each test holds, (tests,): of tests that hold the same, one is chosen.
-        allowed: whether each test may be chosen, (tests,) bool.
+        runs: of each test at most, (tests,); 0 where it may not be chosen.
         setup: minutes to mount the bushing at a place, once for each place that is tested.
         most: minutes in all.
     """
@@ -31,7 +31,7 @@ class Budget:
     minutes: Array
     place: Array
     line: Array
-    allowed: Array
+    runs: Array
     setup: float
     most: float
 
@@ -42,7 +42,7 @@ class Budget:
     def further(self, counts: Array) -> Array:
         """Minutes that one run more of each test adds, (tests,); beyond all limits where it may not be chosen."""
         more = self.minutes + self.setup * ~np.isin(self.place, self.place[counts > 0])
-        barred = np.isin(self.line, self.line[counts > 0]) & (counts == 0) | ~self.allowed
+        barred = np.isin(self.line, self.line[counts > 0]) & (counts == 0) | (counts >= self.runs)
         return np.where(barred | (self.spent(counts) + more > self.most), np.inf, more)
 
 
