@@ -61,6 +61,9 @@ def written(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Documents:
     run("prediction", "predict", "run/model.json", "--campaign", "configs/cmp_15961.toml", "-o", "predicted")
     shaken = ("--mass", "1 kg", "--base-acceleration", "0.1 g", "--direction", "mount")
     run("prediction", "predict", "specimens/model.json", *shaken, "-o", "shaken")
+    run(
+        "plan", "plan", "data/practice/case_001/bushing.toml", "--rivals", "inertia,delay", "--hours", "1", "-o", "plan"
+    )
     run("comparison", "compare", "run", "configs/arm_bushing.toml", "-o", "compared")
     run("comparison", "compare", "configs/cmp_15961.toml", "-o", "families", "--families", "sliders")
     (folder / "broken.toml").write_text("[bushing]\n")
@@ -79,7 +82,19 @@ def written(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Documents:
     read("sealed", "card/campaigns/sealed/*.json")
     lines = (folder / "card/outcomes.jsonl").read_text(encoding="utf-8").splitlines()
     found["outcome"] = [json.loads(line) for line in lines]
-    known = {"model", "static", "dynamic", "joint", "truth", "diagnosis", "row", "scorecard", "compare", "batch"}
+    known = {
+        "model",
+        "static",
+        "dynamic",
+        "joint",
+        "truth",
+        "diagnosis",
+        "row",
+        "scorecard",
+        "compare",
+        "batch",
+        "plan",
+    }
     strange = [file for file in folder.glob("*/**/*.json") if file.stem not in known and "sealed" not in file.parts]
     assert [file for file in strange if "data" not in file.parts] == [], "a file that no schema describes"
     return found

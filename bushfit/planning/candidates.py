@@ -34,6 +34,8 @@ _LOWER = 0.2
 _FASTER = 2.0
 #: Rates of the loops that are considered [Hz]: quasi-static, and as fast as most rigs still record a loop.
 _LOOP_RATES = (0.1, 1.0)
+#: Cycles of these loops: few, and so many that the noise of the rows hardly counts.
+_LOOP_CYCLES = (3, 20)
 #: Which of the seven frequencies a run steps through: all, few, the ends, and either end more densely.
 _CHOICES = ((0, 1, 2, 3, 4, 5, 6), (0, 2, 4, 6), (0, 3, 6), (0, 6), (0, 1, 2), (4, 5, 6))
 #: Which of them a run holds that steps through all amplitudes.
@@ -117,7 +119,7 @@ def _runs(known: Knowledge, rig: RigSettings, place: Place, sizes: Array, rates:
         SimulatedSweep(place, (x,), tuple(frequencies[i] for i in chosen)) for x in amplitudes for chosen in _CHOICES
     ]
     runs += [SimulatedSweep(place, tuple(amplitudes), (frequencies[i],), "amplitude") for i in _HELD]
-    runs += [SimulatedLoop(place, x, f) for x in amplitudes for f in _LOOP_RATES]
+    runs += [SimulatedLoop(place, x, f, n) for x in amplitudes for f in _LOOP_RATES for n in _LOOP_CYCLES]
     yield from (kept for run in runs if (kept := _within(known, rig, run)) is not None)
 
 

@@ -37,6 +37,8 @@ _AS_WELL = 0.995
 _DRIFT = 0.01
 #: Runs of a sweep at most: more than fit into any session.
 _MOST_RUNS = 1000
+#: Tests of a place that are considered for its repeat, the quickest first; chosen for time.
+_REPEATED = 4
 #: Information, relative to the largest, below which tests alone leave a combination of parameters open.
 _OPEN = 1e-14
 #: The same where there are no tests: errors are then beyond all use.
@@ -154,15 +156,21 @@ class _Planner:
         return best
 
     def _with_repeats(self, counts: Array) -> Array:
-        """The runs with one test of each place made twice, that a drift shows, in place of the least useful run."""
-        strict, one = self._criterion(_STRICT), np.eye(len(self.tests), dtype=int)
+        """The runs with a sweep of each place made twice, that a drift shows, in place of what is least useful."""
+        one, strict = np.eye(len(self.tests), dtype=int), self._criterion(_STRICT)
         for place in np.unique(self.budget.place[counts > 0]):
             mine = np.flatnonzero((counts > 0) & (self.budget.place == place))
             again = mine[self.budget.runs[mine] > 1]
             if mine.size > 2 and counts[mine].max() < 2:
-                changed = [counts + one[twice] - one[less] for twice in again for less in mine if less != twice]
-                fitting = [each for each in changed if self.budget.spent(each) <= self.budget.most]
-                counts = min(fitting, key=strict.together, default=counts)
+                few = again[np.argsort(self.budget.minutes[again])][:_REPEATED]
+                counts = min((self._fitting(counts + one[twice]) for twice in few), key=strict.together, default=counts)
+        return counts
+
+    def _fitting(self, counts: Array) -> Array:
+        """The runs that fit into the hours: of tests that are made once, the least useful are left out in turn."""
+        one, strict = np.eye(len(self.tests), dtype=int), self._criterion(_STRICT)
+        while self.budget.spent(counts) > self.budget.most:
+            counts = min((counts - one[test] for test in np.flatnonzero(counts == 1)), key=strict.together)
         return counts
 
     def _criterion(self, penalty: float) -> Criterion:
@@ -220,11 +228,11 @@ class _Planner:
         return np.where(seen, reached, 0.0)
 
     def _drifting(self, counts: Array) -> Drifting:
-        """What a drift does to so many runs of each test; the gain of a loop is then no surer than that of a sweep."""
+        """What a drift does to so many runs of each test; of a loop each record then has a gain error of its own."""
         view, k = self.views[0], len(self.known.names)
         own, seen = view.told.own, view.told.own[:, k, k]
         loops = np.array([isinstance(test, SimulatedLoop) for test in self.tests])
-        share = 1.0 / (1.0 + loops * self.known.noise.shared[0] ** 2 * seen)
+        share = 1.0 / (1.0 + loops * self.known.noise.level[0] ** 2 * seen)
         seen, gain = seen * share, own[..., k : k + 1] * share[:, None, None]
         one = Told(own * counts[:, None, None], gain, seen[:, None])  # by the gain of one run
         level = np.square(view.level[:, 0])

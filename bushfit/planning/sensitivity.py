@@ -118,15 +118,21 @@ class Grid:
 
     @cached_property
     def data_sets(self) -> list[DataSet]:
-        """The loops in units of their noise, and of each place one sweep of all points, in units of ln K."""
-        model, loops, sweeps = self.known.model, list[DataSet](), list[DataSet]()
-        for test in self.tests:
-            if isinstance(test, SimulatedLoop):
-                force = _per_row(test, self.known.noise)
-                loops.append(new_loop(model, test.direction, test.frequency, test.amplitude, force, rows=_ROWS))
-        for place, points in self._points.items():
-            sweeps.append(new_sweep(model, place, points[:, 1], points[:, 0], (1.0, 1.0), (0.0, 0.0)))
+        """A cycle of each loop, in units of its noise, and of each place one sweep of all points, in units of ln K."""
+        model, noise = self.known.model, self.known.noise
+        per_row = noise.force * float(np.sqrt(_ROWS * noise.rows_as_one / ROWS_PER_CYCLE))
+        loops = [new_loop(model, *motion, per_row, rows=_ROWS) for motion in self._loops]
+        sweeps = [
+            new_sweep(model, place, points[:, 1], points[:, 0], (1.0, 1.0), (0.0, 0.0))
+            for place, points in self._points.items()
+        ]
         return [*loops, *sweeps]
+
+    @cached_property
+    def _loops(self) -> list[tuple[Place, float, float]]:
+        """Place, frequency and amplitude of the distinct loops."""
+        loops = [test for test in self.tests if isinstance(test, SimulatedLoop)]
+        return list(dict.fromkeys((test.direction, test.frequency, test.amplitude) for test in loops))
 
     @cached_property
     def _points(self) -> dict[Place, Array]:
@@ -141,13 +147,14 @@ class Grid:
         """What each test tells by columns of all data sets' residuals: of parameters, (k, n), and others, (e, n)."""
         ends = np.cumsum([data_set.size for data_set in self.data_sets])
         parts = np.split(np.concatenate((own, further)), ends[:-1], axis=-1)
-        of_loops = iter(zip(parted(self.data_sets)[0], parts, strict=False))
-        of_places = dict(zip(self._points, parts[len(parts) - len(self._points) :], strict=True))
+        of_loops = dict(zip(self._loops, zip(parted(self.data_sets)[0], parts, strict=False), strict=True))
+        of_places = dict(zip(self._points, parts[len(self._loops) :], strict=True))
         columns = []
         for test in self.tests:
             if isinstance(test, SimulatedLoop):
-                loop, rows = next(of_loops)
-                unit = np.array([loop.unit_gain, np.zeros(loop.size)])
+                loop, rows = of_loops[test.direction, test.frequency, test.amplitude]
+                cycles = float(np.sqrt(test.cycles))
+                rows, unit = cycles * rows, cycles * np.array([loop.unit_gain, np.zeros(loop.size)])
             else:
                 known = {tuple(point): place for place, point in enumerate(self._points[test.direction].tolist())}
                 chosen = [known[tuple(point)] for point in _points_of(test).tolist()]
@@ -189,11 +196,6 @@ def relative_slopes(known: Knowledge, data_sets: Sequence[DataSet]) -> Array:
 def _points_of(test: SimulatedSweep) -> Array:
     """Amplitude and frequency of each point of a run, (n, 2)."""
     return np.stack([values.ravel() for values in reversed(test.points)], axis=-1)
-
-
-def _per_row(test: SimulatedLoop, noise: Noise) -> float:
-    """Noise of a row where all cycles of a loop count as one of fewer rows, relative to half the force range."""
-    return noise.force * float(np.sqrt(_ROWS * noise.rows_as_one / (ROWS_PER_CYCLE * test.cycles)))
 
 
 def _of_run(noise: Noise, points: int) -> Whitening:
