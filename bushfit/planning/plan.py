@@ -220,10 +220,13 @@ class _Planner:
         return np.where(seen, reached, 0.0)
 
     def _drifting(self, counts: Array) -> Drifting:
-        """What a drift does to so many runs of each test."""
+        """What a drift does to so many runs of each test; the gain of a loop is then no surer than that of a sweep."""
         view, k = self.views[0], len(self.known.names)
         own, seen = view.told.own, view.told.own[:, k, k]
-        one = Told(own * counts[:, None, None], own[..., k : k + 1], seen[:, None])  # by the gain of one run
+        loops = np.array([isinstance(test, SimulatedLoop) for test in self.tests])
+        share = 1.0 / (1.0 + loops * self.known.noise.shared[0] ** 2 * seen)
+        seen, gain = seen * share, own[..., k : k + 1] * share[:, None, None]
+        one = Told(own * counts[:, None, None], gain, seen[:, None])  # by the gain of one run
         level = np.square(view.level[:, 0])
         root = np.linalg.cholesky(np.linalg.inv(view.together(counts).own[0]))
         pull = one.beside(view.level).cross[..., 0] @ root

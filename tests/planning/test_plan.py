@@ -1,0 +1,264 @@
+"""A plan against what is worked out another way: full covariances, every choice there is, and fits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+
+from bushfit.campaign.compound import Compound
+from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
+from bushfit.effects.contract import Array
+from bushfit.errors import ModelError
+from bushfit.fitting.data_sets import SweepData
+from bushfit.fitting.new_tests import new_loop, new_sweep
+from bushfit.fitting.solve import residual, solve
+from bushfit.geometry import Bushing, Direction, Place
+from bushfit.model.model import Model
+from bushfit.planning.candidates import candidates, minutes
+from bushfit.planning.contract import Aim, Knowledge, Noise, Plan, Points, Test, Wanted, motions
+from bushfit.planning.criterion import Criterion, View, distances, shown
+from bushfit.planning.guess import guess
+from bushfit.planning.order import Drifting, ordered
+from bushfit.planning.plan import FOUND, plan
+from bushfit.planning.search import Budget, chosen
+from bushfit.planning.sensitivity import Grid, relative_slopes
+
+AXIAL, RADIAL = Direction.AXIAL, Direction.RADIAL
+BAND = (5.0, 20.0, 60.0, 150.0)
+NOISE = Noise(scatter=(4e-3, 6e-3), shared=(5e-3, 3e-3), level=(7e-3, 2e-3))
+SWEEPS = (
+    SimulatedSweep(AXIAL, (2e-4,), BAND),
+    SimulatedSweep(RADIAL, (1e-4,), BAND[::3]),
+    SimulatedSweep(AXIAL, (1e-4, 5e-4, 1e-3), (20.0,), "amplitude"),
+    SimulatedSweep(AXIAL, (1e-3,), BAND[::3]),
+    SimulatedSweep(RADIAL, (5e-4,), BAND),
+)
+TESTS: tuple[Test, ...] = (*SWEEPS, SimulatedLoop(AXIAL, 1e-3, 0.1), SimulatedLoop(RADIAL, 2e-4, 1.0))
+POINTS = tuple(Points(at, np.tile(BAND, 3), np.repeat([1e-4, 2e-4, 5e-4], len(BAND))) for at in (AXIAL, RADIAL))
+
+
+@pytest.fixture(scope="module")
+def known() -> Knowledge:
+    return replace(guess(Bushing("paper's", 0.010, 0.018, 0.034), Compound(61.0, 27.0)), noise=NOISE)
+
+
+@pytest.fixture(scope="module")
+def planned(known: Knowledge) -> Plan:
+    return plan(known, wanted("predictions", 2.5))
+
+
+def wanted(aim: Aim, hours: float, **rig: float) -> Wanted:
+    return Wanted(aim, hours, RigSettings(**rig), (AXIAL, RADIAL), POINTS, ("sigma_fmax",))
+
+
+def view_of(known: Knowledge, tests: tuple[Test, ...]) -> View:
+    """What each of some tests tells, and as further columns about each effect of a load cell that lags."""
+    grid = Grid(known, tests)
+    delayed = [column.values for column in grid.columns if column.effect.name == "delay"]
+    told = grid.told(relative_slopes(known, grid.data_sets), np.array(delayed))
+    return View(told, np.linalg.inv(known.covariance), grid.level)
+
+
+def points_of(test: SimulatedSweep) -> tuple[Place, Array, Array]:
+    amplitudes, frequencies = motions(test)
+    frequency, amplitude = (a.ravel() for a in np.meshgrid(frequencies, amplitudes))
+    return test.direction, frequency, amplitude
+
+
+def slopes_of(model: Model, test: SimulatedSweep) -> Array:
+    """Gain and phase of the stiffness by the logarithm of each parameter, by central differences, (k, 2, n)."""
+
+    def stiffness(name: str, factor: float) -> Array:
+        return np.log(model.with_values({name: factor * model.values[name]}).stiffness(*points_of(test)))
+
+    rows = [(stiffness(name, np.exp(1e-4)) - stiffness(name, np.exp(-1e-4))) / 2e-4 for name in model.parameters]
+    return np.stack([np.real(rows), np.imag(rows)], axis=1)
+
+
+def test_the_information_is_that_of_the_full_covariance_of_all_points(known: Knowledge) -> None:
+    """Point by point: scatter, what a run shares and what all runs of a test share, in one matrix for each test."""
+    counts, found = np.array([3, 2, 1, 0, 4, 0, 0]), np.linalg.inv(known.covariance)
+    for test, count in zip(SWEEPS, counts[:5].tolist(), strict=True):
+        slopes = np.tile(slopes_of(known.model, test), count)
+        run = np.repeat(np.arange(count), slopes.shape[-1] // max(count, 1))
+        for part in (0, 1):
+            covariance = NOISE.level[part] ** 2 + NOISE.shared[part] ** 2 * (run[:, None] == run)
+            covariance += NOISE.scatter[part] ** 2 * np.eye(run.size)
+            found = found + slopes[:, part] @ np.linalg.solve(covariance, slopes[:, part].T)
+    told = view_of(known, TESTS).together(counts).own[0]
+    assert list(known.names) == list(known.model.parameters)
+    np.testing.assert_allclose(told, found, rtol=2e-4)
+
+
+def test_the_gain_of_a_loop_is_no_surer_than_the_class_of_the_rig(known: Knowledge) -> None:
+    """As a fit counts it where [rig] states the class: one whitened loop in place of a line with its error."""
+    loop = TESTS[-2]
+    assert isinstance(loop, SimulatedLoop)
+    rows = 1000 * loop.cycles
+    whole = new_loop(known.model, AXIAL, 0.1, 1e-3, NOISE.force, cycles=3.0, rows=rows)
+    slopes = relative_slopes(known, [replace(whole, gain_error=NOISE.level[0])])
+    told = view_of(known, (loop,)).together(np.array([1])).own[0] - np.linalg.inv(known.covariance)
+    np.testing.assert_allclose(told, slopes @ slopes.T, rtol=0.02, atol=1e-3 * np.max(np.abs(told)))
+
+
+def test_one_run_more_is_counted_as_when_it_is_made(known: Knowledge) -> None:
+    view, counts = view_of(known, TESTS), np.array([1, 0, 2, 0, 1, 1, 0])
+    more = view.one_more(counts)
+    for test in range(counts.size):
+        alone = view.together(counts + (np.arange(counts.size) == test))
+        for one, other in zip((more.own, more.cross, more.size), (alone.own, alone.cross, alone.size), strict=True):
+            np.testing.assert_allclose(one[test], other[0], rtol=1e-9, atol=1e-6)
+
+
+def test_an_effect_shows_as_a_fit_without_it_misses_it(known: Knowledge) -> None:
+    """Noncentrality against chi-square of the best fit of the model to noise-free tests with a little of the effect."""
+    counts = np.array([2, 1, 1, 1, 2, 0, 0])
+    view = view_of(replace(known, noise=replace(NOISE, level=(0.0, 0.0)), covariance=1e8 * np.eye(5)), TESTS)
+    told = view.together(counts)
+    expected = shown(told, np.linalg.inv(told.own))[0, 0]
+    truth = known.model.with_effect("delay", {"delay.tau": 2e-6})
+    each = np.repeat(np.arange(5), counts[:5])
+    sweeps = [_noise_free(known.model, truth, SWEEPS[i]) for i in each]
+    found = solve(known.model, sweeps, known.names).chi_square
+    amount = next(c.effect.amount for c in Grid(known, TESTS).columns if c.effect.name == "delay")
+    assert found == pytest.approx(expected * (2e-6 / amount.typical) ** 2, rel=0.02)
+
+
+def _noise_free(model: Model, truth: Model, test: SimulatedSweep) -> SweepData:
+    """One run of a sweep, as the truth has it."""
+    place, frequency, amplitude = points_of(test)
+    sweep = new_sweep(model, place, frequency, amplitude, NOISE.scatter, NOISE.shared)
+    if test.stepped == "amplitude":
+        held = replace(sweep.sweep, stepped="amplitude")
+        noise = replace(sweep.noise, random={("new", test.frequencies[0]): NOISE.scatter})
+        sweep = replace(sweep, sweep=held, noise=noise)
+    return sweep.noise_free(truth)
+
+
+def test_rivals_are_as_far_apart_as_the_best_refit_of_either_leaves_them(known: Knowledge) -> None:
+    """Linear distances against chi-square of full fits: inertia, and the delay that is nearest to it in few tests."""
+    counts = np.array([1, 1, 1, 1, 2])
+    one = known.model.with_effect("inertia", {"inertia.mass": 0.03})
+    few = [_noise_free(known.model, one, test) for test in SWEEPS[:3]]
+    other = solve(known.model.with_effect("delay"), few, (*known.names, "delay.tau")).model
+    rivals = [replace(known, model=m, names=tuple(m.parameters), covariance=1e6 * np.eye(6)) for m in (one, other)]
+    grid = Grid(replace(known, noise=replace(NOISE, level=(0.0, 0.0))), SWEEPS)
+    left = [residual(rival.model, grid.data_sets) for rival in rivals]
+    views = [
+        View(grid.told(relative_slopes(rival, grid.data_sets), further[None]), 1e-6 * np.eye(6), grid.level)
+        for rival, further in zip(rivals, (left[1] - left[0], left[0] - left[1]), strict=True)
+    ]
+    linear = distances([view.together(counts) for view in views])[0, 0, 1]
+    runs = [test for test, count in zip(SWEEPS, counts, strict=True) for _ in range(count)]
+    fits = [
+        solve(own, [_noise_free(known.model, truth, run) for run in runs], tuple(own.parameters)).chi_square
+        for own, truth in ((one, other), (other, one))
+    ]
+    print("linear", linear, "fits", fits)
+    assert linear == pytest.approx(min(fits), rel=0.1)
+
+
+def test_no_choice_is_much_better_than_the_one_found(known: Knowledge) -> None:
+    """Every choice of runs of five tests in as many minutes."""
+    view = view_of(known, SWEEPS)
+    weight = np.diag([1.0, 0.0, 0.0, 1.0, 1.0])
+    criterion = Criterion([view], weight, np.empty((2, 0), dtype=int), np.zeros(view.told.size.shape[1]), 3.0)
+    spent = np.array([minutes(test, RigSettings()) for test in SWEEPS])
+    budget = Budget(spent, np.array([0, 1, 0, 0, 1]), np.arange(5), np.ones(5, dtype=bool), 5.0, 32.0)
+    found = chosen(criterion, budget, np.zeros(5, dtype=int))
+    every = (np.array(counts) for counts in product(range(9), repeat=5) if np.dot(counts, spent) <= budget.most)
+    values = [criterion.together(counts) for counts in every if budget.spent(counts) <= budget.most]
+    print("found", criterion.together(found), "best", min(values), "of", len(values), found)
+    assert budget.spent(found) <= budget.most
+    assert min(values) - 1e-9 <= criterion.together(found) <= min(values) + 0.02
+
+
+def test_no_order_shows_a_drift_much_better(known: Knowledge) -> None:
+    """Six runs of four tests at one place in every order that begins and ends with one test."""
+    random = np.random.default_rng(1)
+    drifting = Drifting(random.uniform(2e4, 4e4, 4), random.uniform(1e3, 9e3, 4), random.normal(0.0, 60.0, (4, 3)))
+    counts = np.array([2, 1, 1, 2])
+    runs = ordered(counts, np.zeros(4, dtype=int), drifting)
+
+    def worth(order: tuple[int, ...]) -> float:
+        return drifting.noncentrality(order) - 99.0 * float(np.sum(np.square(drifting.shift(order))))
+
+    every = [order for order in permutations(sorted(runs)) if order[0] == order[-1] == runs[0]]
+    assert runs[0] == runs[-1]
+    assert np.bincount(runs).tolist() == counts.tolist()
+    assert worth(tuple(runs)) >= 0.9 * max(map(worth, every))
+
+
+def test_a_drift_counts_as_its_noncentrality_says(known: Knowledge) -> None:
+    """The sums of an exchange against the noncentrality of the order with two runs exchanged."""
+    random = np.random.default_rng(2)
+    drifting = Drifting(random.uniform(1.0, 2.0, 3), random.uniform(0.0, 0.1, 3), np.zeros((3, 2)))
+    runs = np.array([0, 1, 2, 1, 0])
+    gains = drifting.exchanged(runs)
+    for i, j in permutations(range(5), 2):
+        other = runs.copy()
+        other[[i, j]] = other[[j, i]]
+        grown = drifting.noncentrality(other.tolist()) - drifting.noncentrality(runs.tolist())
+        assert gains[i, j] == pytest.approx(grown, abs=1e-12)
+
+
+def test_a_plan_is_better_than_the_standard_programme_and_no_blinder(planned: Plan) -> None:
+    """At equal hours: errors of the stiffness at most 70 %, every effect found as small, and a drift no worse."""
+    mean = [float(np.sqrt(np.mean(np.square(each.stiffness)))) for each in (planned.planned, planned.standard)]
+    pairs = zip(planned.planned.visible, planned.standard.visible, strict=True)
+    worst = {one.effect: one.amount / other.amount for one, other in pairs}
+    print(f"stiffness {mean[0] / mean[1]:.2f}", max(worst.items(), key=lambda item: item[1]), len(worst))
+    assert planned.planned.hours <= 2.5
+    assert mean[0] < 0.7 * mean[1]
+    assert len(worst) > 20
+    assert max(worst.values()) < 1.02
+    assert planned.planned.drift < 0.3
+
+
+def test_a_session_begins_and_ends_with_one_test_in_each_direction(planned: Plan) -> None:
+    tests = planned.planned.tests
+    for place in (AXIAL, RADIAL):
+        mine = [test for test in tests if test.direction is place]
+        assert mine[0] == mine[-1]
+        assert tests.index(mine[0]) + len(mine) <= len(tests)
+
+
+@pytest.mark.parametrize(
+    ("limit", "most"),
+    [("max_force", 300.0), ("max_displacement", 3e-4), ("max_frequency", 60.0), ("max_velocity", 0.05)],
+)
+def test_no_test_is_beyond_the_rig(known: Knowledge, limit: str, most: float) -> None:
+    found = candidates(known, wanted("predictions", 4.0, **{limit: most}))
+    for test in found:
+        amplitudes, frequencies = motions(test)
+        f, x = (a.ravel() for a in np.meshgrid(frequencies, amplitudes))
+        force = np.abs(known.model.stiffness(test.direction, f, x)) * x
+        reached = {"max_force": force, "max_displacement": x, "max_frequency": f, "max_velocity": 2 * np.pi * f * x}
+        assert reached[limit].max() <= most * (1 + 1e-6)
+    assert {type(test) for test in found} == {SimulatedLoop, SimulatedSweep}
+    assert {*found} != {*candidates(known, wanted("predictions", 4.0))}
+
+
+@pytest.mark.parametrize(
+    ("aim", "hours", "rig", "said"),
+    [
+        ("predictions", 0.1, {}, "no test fits into the hours"),
+        ("predictions", 4.0, {"max_force": 1e-3}, "the rig can make no test"),
+        ("rivals", 4.0, {}, "no rivals"),
+    ],
+)
+def test_what_cannot_be_planned_is_said(
+    known: Knowledge, aim: Aim, hours: float, rig: dict[str, float], said: str
+) -> None:
+    with pytest.raises(ModelError, match=said):
+        plan(known, wanted(aim, hours, **rig))
+
+
+def test_an_amount_that_is_found_is_found_in_nine_of_ten_cases() -> None:
+    """Of normal numbers about FOUND, nine of ten lie beyond what one of twenty about 0 does."""
+    drawn = np.random.default_rng(3).standard_normal(200_000)
+    limit = np.quantile(np.abs(drawn), 0.95)
+    assert np.mean(np.abs(drawn + FOUND) > limit) == pytest.approx(0.9, abs=0.004)
