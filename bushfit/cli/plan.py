@@ -37,7 +37,7 @@ _MOST_VALUES = 6
     "plan",
     epilog=example(
         "bushfit plan configs/arm_bushing.toml --hours 4",
-        "bushfit plan configs/planned.toml --for parameters --check 20",
+        "bushfit plan configs/new_bushing.toml --hours 2.5 --for parameters",
     ),
 )
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=click.Path(path_type=Path))

@@ -167,7 +167,7 @@ def test_no_choice_is_much_better_than_the_one_found(known: Knowledge) -> None:
     weight = np.diag([1.0, 0.0, 0.0, 1.0, 1.0])
     criterion = Criterion([view], weight, np.empty((2, 0), dtype=int), np.zeros(view.told.size.shape[1]), 3.0)
     spent = np.array([minutes(test, RigSettings()) for test in SWEEPS])
-    budget = Budget(spent, np.array([0, 1, 0, 0, 1]), np.arange(5), np.ones(5, dtype=bool), 5.0, 32.0)
+    budget = Budget(spent, np.array([0, 1, 0, 0, 1]), np.arange(5), np.full(5, 9), 5.0, 32.0)
     found = chosen(criterion, budget, np.zeros(5, dtype=int))
     every = (np.array(counts) for counts in product(range(9), repeat=5) if np.dot(counts, spent) <= budget.most)
     values = [criterion.together(counts) for counts in every if budget.spent(counts) <= budget.most]
