@@ -209,7 +209,13 @@ def _checked(options: Options, outcome: Planned, count: int, seed: int) -> Check
     with Progress(console=options.console, transient=True) as progress:
         task = progress.add_task("simulated", total=count)
         found = check(outcome.plan, count, seed, every)
-    table = new_table(f"{len(found.off)} simulated campaigns: standard errors [%]", "of", "predicted", "found", "95 %")
+    table = new_table(
+        f"{len(found.off)} simulated campaigns from seed {found.seed} on: standard errors [%]",
+        "of",
+        "predicted",
+        "found",
+        "95 %",
+    )
     low, high = found.interval
     for name, *sizes in zip(found.names, found.predicted, found.found, low, high, strict=True):
         predicted, scatter, *ends = (number(100.0 * size, 3) for size in sizes)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import SimulateSettings
+from bushfit.campaign.schema import RigSettings, SimulateSettings
 from bushfit.fitting.data_sets import LoopData, loop_data
 from bushfit.model.model import Model
 
@@ -75,3 +76,20 @@ def test_answers_to_the_same_model_are_kept_and_cannot_be_written_over(data_set:
     with pytest.raises(ValueError, match="read-only"):
         slopes[0] = 0.0
     assert not np.array_equal(data_set.jacobian(paper_model, ["m", "mu"]), slopes)
+
+
+def test_a_gain_error_of_the_rig_pulls_no_fit(
+    rig: Callable[..., Campaign], paper_noise: SimulateSettings, paper_model: Model
+) -> None:
+    """The gain that each of eight loops asks for, all of gain 1: noise in the gain's own column would make it small.
+
+    With the force as it was measured in that column, the mean is 6 % below 1 (Peelle's puzzle).
+    """
+    stated, asked = RigSettings(gain_error=5e-3), []
+    for seed in range(8):
+        (loop,) = loop_data(rig(paper_model, replace(paper_noise, force_noise=5e-3), seed).loops, stated)
+        residual, column = loop.residual(paper_model), loop.moved(loop.measured, paper_model)
+        asked.append(-(column @ residual) / (column @ column))
+    print("mean gain asked for, less 1:", np.mean(asked))
+    assert abs(np.mean(asked)) < 1e-3
+    assert np.linalg.norm(column) == pytest.approx(1.0 / 5e-3, rel=0.15)  # no loop tells a gain better than its rig

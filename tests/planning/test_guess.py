@@ -40,13 +40,13 @@ def test_the_papers_bushing_lies_inside() -> None:
     assert np.abs(found).max() < Z95
 
 
-@pytest.mark.parametrize("phr", [40.0, 50.0, 60.0])
-def test_a_measured_coupon_lies_inside(root: Path, phr: float) -> None:
+def test_a_measured_coupon_lies_inside(root: Path) -> None:
     """An EPDM of 70 Shore A whose filler nobody states; its strain sweeps alone, which the five parameters can meet."""
     fitted = fit_joint(Data.of(load_campaign(root / "configs/epdm_70.toml")), directions=["DMA"]).model
-    found = off(guess(BUSHING, Compound(70, phr, "EPDM")), dict(fitted.values))
-    print(f"coupon, taken for {phr:g} phr, in standard errors", found.round(2))
-    assert np.abs(found).max() < Z95
+    for phr in (40.0, 50.0, 60.0):
+        found = off(guess(BUSHING, Compound(70, phr, "EPDM")), dict(fitted.values))
+        print(f"coupon, taken for {phr:g} phr, in standard errors", found.round(2))
+        assert np.abs(found).max() < Z95
 
 
 def test_practice_rubbers_lie_inside(root: Path) -> None:

@@ -111,7 +111,7 @@ def _draw_stiffness(axes: Axes, programmes: dict[str, Programme]) -> None:
         share = 100.0 * (np.arange(values.size) + 0.5) / values.size
         each = max(values.size // _MARKS, 1)
         axes.plot(share, values, color=_COLORS[name], lw=1.3, marker=marker, markevery=each, **style.POINT)
-    style.dress(axes, "share of the points wanted [%]", "standard error of stiffness [%]")
+    style.dress(axes, "share of the points wanted [%]", "error of stiffness [%]")
     axes.set_ylim(bottom=0.0)
     marks = zip(_COLORS.items(), "os^", strict=True)
     handles = [Line2D([], [], color=color, marker=mark, ls="", **style.POINT) for (_, color), mark in marks]
