@@ -378,6 +378,10 @@ def _campaign_toml(simulated: Simulated, form: Form) -> str:
     seed, end = simulated.plan.seed, ending(form)
     lines = [f"# Simulated by bushfit simulate with seed {seed}: no rubber was tested. The model is in truth.json."]
     lines += body_lines(simulated.truth.bushing, simulated.specimens)
+    plan = simulated.plan
+    if plan.level_gain_error or plan.level_phase_error:  # which no repeat shows, so that a fit has to be told
+        errors = {"gain_error": (plan.level_gain_error, "1"), "phase_error": (plan.level_phase_error, "rad")}
+        lines += ["", "[rig]", *(f'{key} = "{size:.6g} {unit}"' for key, (size, unit) in errors.items())]
     for kind, tests in (("loops", simulated.loops), ("sweeps", simulated.sweeps)):
         for each in tests:
             lines += table_lines(kind, f"{each.name}.{end}", each.direction, each.temperature)

@@ -54,7 +54,12 @@ _MOST_VALUES = 6
     show_default=True,
     help="Of the rig, at most.",
 )
-@place_option("directions", multiple=True, help="In which the rig can test; may be given again [axial and radial].")
+@place_option(
+    "directions",
+    multiple=True,
+    help="axial, radial or torsion, or a specimen's name: where the rig can test; may be given again [axial and radial "
+    "of a bushing, else all specimens].",
+)
 @click.option("--parameters", metavar="NAME,...", help="Whose errors count, with --for parameters [all].")
 @click.option(
     "--rivals",

@@ -130,8 +130,8 @@ class _Planner:
             raise ModelError(
                 "there are no rivals to be told apart",
                 found=self.known.source,
-                expected="a diagnosis that is ambiguous",
-                hint="plan for parameters or predictions",
+                expected="tests of a campaign that two effects or more explain alike",
+                hint="plan from the campaign, or for parameters or predictions",
             )
         best = self._with_repeats(self._best())
         if not best.any():

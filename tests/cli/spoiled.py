@@ -148,11 +148,12 @@ FILES = {
     "sweep.csv": "\n".join(sweep()) + "\n",
     "shaker.csv": "\n".join(shaker()) + "\n",
 }
-READING = ("fit-static", "fit-dynamic", "fit", "diagnose", "run")
+READING = ("fit-static", "fit-dynamic", "fit", "diagnose", "run", "plan")
 TAKING_MODELS = (
     ("predict", "model.json"),
     ("compare", "model.json", "campaign.toml"),
     ("simulate", "model.json"),
+    ("plan", "model.json"),
     ("diagnose", "campaign.toml", "--model", "model.json"),
     ("fit-static", "campaign.toml", "--dynamic", "model.json"),
     ("fit-dynamic", "campaign.toml", "--static", "model.json"),

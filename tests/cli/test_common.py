@@ -27,6 +27,7 @@ CAMPAIGN = "configs/cmp_15961.toml"
         ("predict", "model/model.json"),
         ("compare", "model", "model/model.json"),
         ("simulate", "model/model.json"),
+        ("plan", "model/model.json", "--hours", "1.5"),
         ("export", "model/model.json", "--format", "abaqus"),
     ],
     ids=lambda arguments: arguments[0],
@@ -126,7 +127,7 @@ def test_everyday_units_need_no_pint(work: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "command", ["run", "fit-static", "fit-dynamic", "fit", "predict", "compare", "simulate", "export"]
+    "command", ["run", "fit-static", "fit-dynamic", "fit", "predict", "compare", "plan", "simulate", "export"]
 )
 def test_every_command_has_help_that_names_its_files(bushfit: Run, command: str) -> None:
     done = bushfit(command, "--help")

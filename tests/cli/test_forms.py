@@ -33,6 +33,7 @@ ARGUMENTS = {
     **{name: [CASE] for name in ("run", "fit-static", "fit-dynamic", "fit", "diagnose")},
     "simulate": ["model.json"],
     "predict": ["model.json", "--wide"],
+    "plan": ["model.json", "--hours", "1.5"],
     "compare": ["model.json", CASE],
     "export": ["model.json", "--format", "csv"],
     "reduce": ["data/cmp_15961_raw/stepped_sine_axial.csv"],

@@ -60,7 +60,7 @@ def test_roles_are_listed(root: Path, command: str, roles: list[str]) -> None:
     assert set(roles) <= set(words)
 
 
-@pytest.mark.parametrize("command", ["fit", "predict", "compare", "export", "inspect", "init", "reduce"])
+@pytest.mark.parametrize("command", ["fit", "predict", "compare", "plan", "export", "inspect", "init", "reduce"])
 def test_directions_are_listed(root: Path, command: str) -> None:
     told = call(root, command, "-h").stdout.partition("--direction")[2].partition("\n  -")[0]
     assert {"axial", "radial", "torsion"} <= set(re.findall(r"\w+", told))
