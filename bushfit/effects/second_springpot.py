@@ -3,7 +3,19 @@
 from __future__ import annotations
 
 from bushfit.effects import springpot
-from bushfit.effects.contract import Branch, Level, Parameter
+from bushfit.effects.contract import Branch, Level, Parameter, Values
+
+#: Order from which on a springpot is nearly a dashpot, whose order is 1.
+_NEARLY_A_DASHPOT = 0.9
+
+
+def _dashpot(p: Values) -> dict[str, float] | None:
+    """The steeper of the two springpots as a dashpot, m/2 i omega, beside the other: either may be the first."""
+    flat, steep = sorted([(p["alpha"], p["m"]), (p["second_springpot.alpha"], p["second_springpot.m"])])
+    if steep[0] < _NEARLY_A_DASHPOT:
+        return None
+    return {"alpha": flat[0], "m": flat[1], "viscous.eta": steep[1] / 2.0}
+
 
 EFFECT = Branch(
     name="second_springpot",
@@ -15,6 +27,7 @@ EFFECT = Branch(
         Parameter("alpha", "1", (0.02, 1.0), None, 0.6, log=True, meaning="order of this springpot", scale="order"),
     ),
     after="springpot",
+    becomes=("viscous", _dashpot),
     source="two fractional elements: R. L. Bagley, P. J. Torvik, AIAA J. 21 (1983) 741; law as Garcia Tarrago et al. "
     "2007, Eqs. 1-3",
     confirmed_by="sweep to ten times the highest frequency: the rise must go on, where that of a maxwell arm levels "
