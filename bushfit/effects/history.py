@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -24,6 +24,7 @@ class History:
             False where the motion starts from rest before the first sample.
         frequency: of the excitation [Hz]; like the step, it may differ between motions, (..., 1).
         driver: the imposed motion, where something that gives way lies between it and this one.
+        solved: where equations over this motion were solved last, by name: good starts of the next solution, no more.
     """
 
     value: Array
@@ -31,6 +32,7 @@ class History:
     periodic: bool
     frequency: float
     driver: Array | None = None
+    solved: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
     def steady(cls, value: Array, frequency: float, cycles: int = 1) -> History:
@@ -117,28 +119,23 @@ class History:
         inner = np.diff(self.value, n=2, axis=-1) / self.step**2
         return np.concatenate([inner[..., :1], inner, inner[..., -1:]], axis=-1)
 
-    def with_value(self, value: Array) -> History:
-        """Other values at the same times."""
-        return replace(self, value=value)
+    def with_value(self, value: Array, solved: dict[str, Any] | None = None) -> History:
+        """Other values at the same times; with `solved` of values near them, where there were some."""
+        return replace(self, value=value, solved={} if solved is None else solved)
 
     def faster(self, factor: Any) -> History:
         """The same motion so many times as fast, a number or (..., 1)."""
-        return replace(self, step=self.step / factor, frequency=self.frequency * factor)
+        return replace(self, step=self.step / factor, frequency=self.frequency * factor, solved={})
 
     def driven(self) -> History:
         """The same motion, kept as the driver of those that are made from it."""
-        return replace(self, driver=self.value)
+        return replace(self, driver=self.value, solved={})
 
     def scaled(self, factor: float) -> History:
         """All values times a factor, such as strain per displacement; computed once, as a fit asks for it often."""
         if factor not in self._by_factor:
             self._by_factor[factor] = self.with_value(self.value * factor)
         return self._by_factor[factor]
-
-    @cached_property
-    def solved(self) -> dict[str, Any]:
-        """Where equations over this motion were solved last, by name: good starts of the next solution, and no more."""
-        return {}
 
     @cached_property
     def _by_factor(self) -> dict[float, History]:
