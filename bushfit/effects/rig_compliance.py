@@ -64,8 +64,8 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     Notes:
         Solved for the whole history at once. Each round computes what is missing of the motion, x - x_b - c F(x_b), and
         adds it to x_b times 1/(1 + c K), harmonic by harmonic. K is measured once with a pulse: a poor K costs rounds,
-        not accuracy. So K and x_b of the last model that was asked about this motion are where the next one starts. What
-        gives way beneath starts each round from its solution of the round before.
+        not accuracy. So K and x_b of the last model that was asked about this motion are where the next one starts.
+        What gives way beneath starts each round from its solution of the round before.
         Where a round does not bring x_b nearer, the next steps are halved. Dry friction below turns its sense with the
         imposed motion: that it sticks for a moment is neglected.
     """
