@@ -92,7 +92,7 @@ class Mistake(Effect):
             return self.line
         other = other_direction(test.direction) if self.swaps else None
         kind, line = ("loops", self.line) if isinstance(test, Loop) else ("sweeps", self.sweep_line or self.line)
-        return f"[[{kind}]] of {shown(test)}: {line.format(direction=other)}"
+        return f"[[{kind}]] of {shown(test)}: {line.replace('{direction}', str(other))}"
 
 
 def told(mistake: Mistake, test: Loop | Sweep) -> str:

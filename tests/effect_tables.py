@@ -1,15 +1,16 @@
-"""`python -m bushfit.effects`: write the tables in this folder's README.md anew, from the records of the library."""
+"""`python tests/effect_tables.py`: write the tables of the effects' README.md anew, from the library's records."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+import bushfit.effects
 from bushfit.effects import LIBRARY, Effect, effect_named, qualified
 from bushfit.effects.mistakes import MISTAKES
 
 #: The page, and the comments between which its tables stand.
-PAGE = Path(__file__).with_name("README.md")
+PAGE = Path(bushfit.effects.__file__).with_name("README.md")
 BEGIN = "<!-- from the records: begin -->\n"
 END = "<!-- from the records: end -->\n"
 
