@@ -74,11 +74,13 @@ _FILES = (
 )
 
 _MODULES = [import_module(f"{__name__}.{file}") for file in _FILES]
-_EFFECTS: list[Effect] = [module.EFFECT for module in _MODULES]
+#: Every kind of effect that belongs to a place, by name: where a file has one, it is called FAMILY there.
+FAMILIES: dict[str, Family] = {each.FAMILY.record.name: each.FAMILY for each in _MODULES if hasattr(each, "FAMILY")}
+_EFFECTS: list[Effect] = [
+    each.FAMILY.of_place(Direction.RADIAL) if hasattr(each, "FAMILY") else each.EFFECT for each in _MODULES
+]
 #: Every effect by name, in that order; of a kind that belongs to a place, that of the radial direction.
 LIBRARY: dict[str, Effect] = {effect.name: effect for effect in _EFFECTS}
-#: Every kind of effect that belongs to a place, by name: where a file has one, it is called FAMILY there.
-FAMILIES: dict[str, Family] = {module.FAMILY.name: module.FAMILY for module in _MODULES if hasattr(module, "FAMILY")}
 
 #: The paper's model.
 BASE = ("elastic", "springpot", "friction")

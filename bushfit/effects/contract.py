@@ -17,15 +17,16 @@ Notes:
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from bushfit.effects.history import Array as Array
 from bushfit.effects.history import History
-from bushfit.geometry import Bushing, Place
+from bushfit.geometry import Bushing, Direction, Place
 
 if TYPE_CHECKING:
     from bushfit.effects.unnamed import Unnamed
@@ -211,6 +212,10 @@ class Effect:
     after: str | None = None
     never_with: tuple[str, ...] = ()
 
+    def acts_at(self, place: Place) -> bool:
+        """Whether it acts at a place: one that belongs to a place, by its name, acts there alone."""
+        return self.name.partition(".")[2] in ("", str(place))
+
     @property
     def amount(self) -> Parameter:
         """The parameter that the effect is searched by: the first that has a neutral value, where it vanishes."""
@@ -271,24 +276,33 @@ def all_but_the_first(places: Sequence[str]) -> Sequence[str]:
     return places[1:]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Family:
     """A kind of effect of which each place, a direction of the bushing or a specimen, may have its own.
 
     Args:
-        name: of the kind; an effect of it, and its one parameter, is called `<name>.<place>`.
-        of_place: the effect of one place, kept from one call to the next.
+        record: of any place, whose texts have the slot {place}. An effect of the kind, which acts at its place alone,
+            and its one parameter are called `<record.name>.<place>`.
         places: of the places tested, that by which the moduli go first, those that a search gives one.
+        radial: texts that are others for the radial direction.
     """
 
-    name: str
-    of_place: Callable[[str], Effect]
+    record: Effect
     places: Callable[[Sequence[str]], Sequence[str]] = all_but_the_first
+    radial: Mapping[str, Any] = field(default_factory=dict)
 
+    @cached_property
+    def of_place(self) -> Callable[[str], Effect]:
+        """The effect of one place, kept from one call to the next."""
+        return cache(self._of_place)
 
-def only_at(place: str, law: Callable[..., Array], p: Values, below: Callable[..., Array], *motion: Any) -> Array:
-    """A layer's law, of either face, at one place; elsewhere the response below. `motion` ends with the setting."""
-    return law(p, below, *motion) if str(motion[-1].direction) == place else below(*motion[:-1])
+    def _of_place(self, place: str) -> Effect:
+        record = replace(self.record, **(self.radial if place == Direction.RADIAL else {}))
+        named = {each.name: getattr(record, each.name) for each in fields(record)}
+        texts: dict[str, Any] = {key: text.format(place=place) for key, text in named.items() if isinstance(text, str)}
+        parameters = tuple(replace(each, meaning=each.meaning.format(place=place)) for each in record.parameters)
+        twins = tuple(twin.format(place=place) for twin in record.twins)
+        return replace(record, **{**texts, "name": f"{record.name}.{place}"}, parameters=parameters, twins=twins)
 
 
 def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str, Value]:

@@ -3,28 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 
 from bushfit.effects import stiffness_factor
-from bushfit.effects.contract import Effect, Family, Parameter
-from bushfit.geometry import Direction
+from bushfit.effects.contract import Family, Parameter
 
-
-@lru_cache
-def of_place(place: str) -> Effect:
-    """The effect of one place: a direction of the bushing, or a specimen by its name."""
-    return replace(
-        stiffness_factor.of_place(place),
-        name=f"preload_stiffening.{place}",
-        sentence=f"A preload of the {place} tests makes them stiffer (or softer) by one factor than without it.",
+FAMILY = Family(
+    replace(
+        stiffness_factor.FAMILY.record,
+        name="preload_stiffening",
+        sentence="A preload of the {place} tests makes them stiffer (or softer) by one factor than without it.",
         parameters=(
-            Parameter("factor", "1", (0.6, 1.4), 1.0, 0.05, meaning=f"stiffness of {place} under preload over without"),
+            Parameter("factor", "1", (0.6, 1.4), 1.0, 0.05, meaning="stiffness of {place} under preload over without"),
         ),
         source="small motion on a large one: K. N. Morman, J. C. Nagtegaal, Int. J. Numer. Meth. Eng. 19 (1983) 1079",
         confirmed_by="repeat the test at two other preloads: the factor must follow",
         twins=(),
     )
-
-
-FAMILY = Family("preload_stiffening", of_place)
-EFFECT = of_place(Direction.RADIAL.value)
+)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from bushfit.effects import friction
-from bushfit.effects.contract import Branch, Level, Parameter
+from dataclasses import replace
 
-EFFECT = Branch(
+from bushfit.effects import friction
+from bushfit.effects.contract import Parameter
+
+EFFECT = replace(
+    friction.EFFECT,
     name="second_friction",
     sentence="A second filler friction at a smaller strain scale: extra stiffness at the smallest amplitudes.",
     equation="(A + iB)/(2 e0) with sigma_fmax and eps_half of its own",
-    level=Level.MATERIAL,
     parameters=(
         Parameter("sigma_fmax", "Pa", (0.0, 1e8), 0.0, 2e3, meaning="largest stress of this friction"),
         Parameter(
@@ -25,8 +27,4 @@ EFFECT = Branch(
     ),
     source="Garcia Tarrago et al. 2007, Eq. 5, once more; friction elements in parallel as in Iwan 1966",
     confirmed_by="sweep at a fifth and a tenth of the smallest amplitude: stiffness must level off",
-    modulus=friction.modulus,
-    stress=friction.stress,
-    modulus_sensitivities=friction.modulus_sensitivities,
-    stress_sensitivities=friction.stress_sensitivities,
 )
