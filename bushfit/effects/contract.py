@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from bushfit.effects.history import Array as Array
-from bushfit.effects.history import History
+from bushfit.effects.history import History as History
 from bushfit.geometry import Bushing, Direction, Place
 
 if TYPE_CHECKING:
@@ -224,7 +224,7 @@ class Effect:
 
 @dataclass(frozen=True, kw_only=True)
 class Branch(Effect):
-    """A stress in parallel with the others.
+    """A stress in parallel with the others, of the material.
 
     Args:
         modulus: (values, omega [rad/s], strain amplitude) -> complex modulus s~ / (2 e~) of the first harmonic [Pa].
@@ -237,6 +237,7 @@ class Branch(Effect):
             can stand for it. None for all others.
     """
 
+    level: Level = Level.MATERIAL
     modulus: Callable[[Values, Array, Array], Array]
     stress: Callable[[Values, History], Array]
     modulus_sensitivities: Callable[[Values, Array, Array], dict[str, Array]] | None = None
@@ -247,12 +248,13 @@ class Branch(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Modifier(Effect):
-    """Changes values that other effects use, by operating condition.
+    """Changes values that other effects use, by operating condition; of the material unless it says otherwise.
 
     Args:
         adjust: (values, condition) -> the changed values only.
     """
 
+    level: Level = Level.MATERIAL
     adjust: Callable[[Values, Condition], dict[str, Value]]
 
 

@@ -6,17 +6,7 @@ One transducer for all tests would be no effect that tests can show: mu, m and e
 from __future__ import annotations
 
 from bushfit.effects import strain_scale
-from bushfit.effects.contract import (
-    Array,
-    Family,
-    ForceBelow,
-    Layer,
-    Level,
-    Parameter,
-    Setting,
-    StiffnessBelow,
-    Values,
-)
+from bushfit.effects.contract import Array, Family, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Values
 from bushfit.effects.history import History
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, Branch, History, Parameter, Values
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
@@ -32,7 +31,6 @@ EFFECT = Branch(
     name="elastic",
     sentence="The rubber's static stiffness, the same at every frequency and amplitude.",
     equation="mu",
-    level=Level.MATERIAL,
     parameters=(Parameter("mu", "Pa", (1e3, 1e9), 0.0, 1e6, log=True, meaning="elastic shear modulus"),),
     source="Garcia Tarrago et al. 2007, Eq. 1",
     modulus=modulus,

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, Branch, History, Parameter, Values
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
@@ -22,7 +21,6 @@ EFFECT = Branch(
     name="fifth_power_stiffening",
     sentence="The rubber stiffens steeply at large strain: storage stiffness rises with the fourth power of amplitude.",
     equation="5/8 c5 mu e0^4",
-    level=Level.MATERIAL,
     parameters=(Parameter("c5", "1", (0.0, 1e8), 0.0, 2e3, meaning="fifth-power stress coefficient over mu"),),
     source="third term of O. H. Yeoh, Rubber Chem. Technol. 66 (1993) 754, in simple shear",
     confirmed_by="sweep or loop at one and a half times the largest amplitude: the rise must be five times as large, "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bushfit.effects.contract import Condition, Level, Modifier, Parameter, Value, Values, scaled_values
+from bushfit.effects.contract import Condition, Modifier, Parameter, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
@@ -28,7 +28,6 @@ EFFECT = Modifier(
     name="filler_recovery",
     sentence="After a larger amplitude the filler's friction is still low, and recovers while smaller ones are tested.",
     equation="sigma_fmax times 1 - share (1 - (e0/e_l)^2) exp(-t/tau), t since a larger strain amplitude e_l",
-    level=Level.MATERIAL,
     parameters=(
         Parameter("share", "1", (0.0, 0.95), 0.0, 0.2, meaning="share of the friction lost at first"),
         Parameter("tau", "1", (1e-3, 2.0), None, 0.05, log=True, meaning="time of recovery, over that of the session"),

@@ -12,6 +12,7 @@ from bushfit.effects.contract import (
     UNKNOWN,
     Array,
     ForceBelow,
+    History,
     Layer,
     Level,
     Parameter,
@@ -20,7 +21,6 @@ from bushfit.effects.contract import (
     Values,
 )
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
-from bushfit.effects.history import History
 
 #: Amplitude of the force's first harmonic, over the level, below which no waveform of rubber reaches it; chosen.
 _NEAR = 0.5

@@ -14,8 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, Branch, History, Parameter, Values
 
 #: Below this z = 2x/(1 + y), Im h of `harmonic_shape` is taken from a series: the logarithm loses digits there.
 _SERIES_BELOW = 0.05
@@ -217,7 +216,6 @@ EFFECT = Branch(
     name="friction",
     sentence="Friction between filler particles: stiffness falls with amplitude, loss does not depend on rate.",
     equation="(A + iB)/(2 e0), A and B of sigma_fmax and e0/eps_half",
-    level=Level.MATERIAL,
     parameters=(
         Parameter("sigma_fmax", "Pa", (1.0, 1e8), 0.0, 1e4, log=True, meaning="largest friction stress"),
         Parameter("eps_half", "1", (1e-6, 10.0), None, 1e-2, log=True, meaning="strain at half of sigma_fmax"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Values, harmonic_stress
+from bushfit.effects.contract import Array, Branch, Parameter, Values, harmonic_stress
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
@@ -16,7 +16,6 @@ EFFECT = Branch(
     name="hysteretic_loss",
     sentence="A constant loss: the loss stiffness is higher by the same at every frequency and every amplitude.",
     equation="i eta mu",
-    level=Level.MATERIAL,
     parameters=(Parameter("eta", "1", (0.0, 1.0), 0.0, 0.02, meaning="constant loss modulus over mu"),),
     source="structural damping: R. E. D. Bishop, J. R. Aeronaut. Soc. 59 (1955) 738; of no causal law in time: "
     "S. H. Crandall, J. Sound Vib. 11 (1970) 3",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bushfit.effects.contract import Condition, Level, Modifier, Parameter, Value, Values, scaled_values
+from bushfit.effects.contract import Condition, Modifier, Parameter, Value, Values, scaled_values
 
 #: Strain amplitude at which d is what the clock gains [1]: within the range of most tests.
 REFERENCE_STRAIN = 0.01
@@ -21,7 +21,6 @@ EFFECT = Modifier(
     sentence="The rubber's clock runs faster at large strain: rate and amplitude do not separate, the slope over "
     "frequency stays.",
     equation="m (1 + d e0/0.01)^(-alpha)",
-    level=Level.MATERIAL,
     parameters=(Parameter("d", "1", (0.0, 1e3), 0.0, 1.0, meaning="what the clock gains at 1 % strain amplitude"),),
     source="process-dependent viscosity on intrinsic time, steady state: A. Lion, C. Kardelky, Int. J. Plasticity 20 "
     "(2004) 1313; M. Rendek, A. Lion, Int. J. Solids Struct. 47 (2010) 2918",

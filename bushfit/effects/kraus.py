@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Values, harmonic_stress
+from bushfit.effects.contract import Array, Branch, Parameter, Values, harmonic_stress
 
 #: Least strain over e_c at which the powers are taken: less than any test reaches, and more than 0.
 _LEAST = 1e-12
@@ -28,7 +28,6 @@ EFFECT = Branch(
     name="kraus",
     sentence="Contacts of the filler break and form again: over strain G' falls and G'' peaks, each by its own law.",
     equation="delta (1 + 2 i r x^n)/(1 + x^2n), x = e0/e_c",
-    level=Level.MATERIAL,
     parameters=(
         Parameter("delta", "Pa", (0.0, 1e9), 0.0, 5e5, meaning="modulus of the filler network at rest"),
         Parameter("r", "1", (1e-3, 1.0), None, 0.2, log=True, meaning="largest loss modulus over delta"),

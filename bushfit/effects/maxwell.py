@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Value, Values, linear_stress
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, Branch, History, Parameter, Value, Values, linear_stress
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
@@ -40,7 +39,6 @@ EFFECT = Branch(
     name="maxwell",
     sentence="One relaxation of the rubber: stiffness steps up, and loss peaks, around one frequency.",
     equation="mu1 i omega tau/(1 + i omega tau)",
-    level=Level.MATERIAL,
     parameters=(
         Parameter("mu1", "Pa", (0.0, 1e8), 0.0, 5e4, meaning="modulus that relaxes"),
         Parameter("tau", "s", (1e-6, 1e2), None, 2e-3, log=True, meaning="relaxation time", scale="period"),

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, Branch, History, Parameter, Values
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
@@ -28,7 +27,6 @@ EFFECT = Branch(
     name="mullins_softening",
     sentence="The first cycles of a loop are stiffer than the later ones; a settled sweep shows nothing of it.",
     equation="0 once settled",
-    level=Level.MATERIAL,
     parameters=(
         Parameter("share", "1", (0.0, 5.0), 0.0, 0.05, meaning="extra stiffness at the start over mu"),
         Parameter("cycles", "1", (0.1, 100.0), None, 1.0, log=True, meaning="cycles in which it falls to 37 %"),

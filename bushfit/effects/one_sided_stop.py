@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from bushfit.effects import bump_stop
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 from bushfit.effects.dead_zone import first_harmonic
-from bushfit.effects.history import History
 
 _GAP, _STIFFNESS = bump_stop.EFFECT.parameters
 

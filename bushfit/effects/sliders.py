@@ -6,8 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, Branch, History, Parameter, Values
 
 #: Sliders in parallel; chosen: over a decade of slip strains their steps are 0.2 % of the modulus.
 _COUNT = 24
@@ -68,7 +67,6 @@ EFFECT = Branch(
     name="sliders",
     sentence="Springs that slip one after the other: stiffness falls with amplitude in a range with two ends.",
     equation=f"(A + iB)/(2 e0) of {_COUNT} springs with sliders, slip strains from e_s/exp(spread) to e_s exp(spread)",
-    level=Level.MATERIAL,
     parameters=(
         Parameter("sigma", "Pa", (0.0, 1e8), 0.0, 1e4, meaning="stress of all sliders"),
         Parameter("e_s", "1", (1e-6, 10.0), None, 2e-2, log=True, meaning="strain at which the middle one slips"),

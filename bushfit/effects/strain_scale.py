@@ -2,17 +2,7 @@
 
 from __future__ import annotations
 
-from bushfit.effects.contract import (
-    Array,
-    Family,
-    ForceBelow,
-    Layer,
-    Level,
-    Parameter,
-    Setting,
-    StiffnessBelow,
-    Values,
-)
+from bushfit.effects.contract import Array, Family, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Values
 from bushfit.effects.history import History
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bushfit.effects.contract import Condition, Level, Modifier, Parameter, Value, Values, scaled_values
+from bushfit.effects.contract import Condition, Modifier, Parameter, Value, Values, scaled_values
 from bushfit.units import CELSIUS
 
 #: Temperature at which all values are unchanged [K]: that of laboratories, ISO 23529, so that a model stands by itself.
@@ -27,7 +27,6 @@ EFFECT = Modifier(
     name="temperature",
     sentence="Warm rubber is softer and relaxes faster: tests at several temperatures differ, fast ones most.",
     equation="mu, m, sigma_fmax times exp(-softening dT), m also exp(-alpha shift dT), dT = T - 23 degC, within 15 K",
-    level=Level.MATERIAL,
     parameters=(
         Parameter("softening", "1/K", (-0.05, 0.05), 0.0, 3e-3, meaning="share of the moduli lost per kelvin"),
         Parameter("shift", "1/K", (-0.5, 0.5), 0.0, 0.03, meaning="share of its relaxation times lost per kelvin"),
