@@ -52,7 +52,8 @@ def _table(head: tuple[str, ...], rows: Iterable[tuple[object, ...]]) -> str:
 
 
 def _link(effect: Effect) -> str:
-    return f"[`{effect.name}`]({effect.name.partition('.')[0]}.py)"
+    file = f"{effect.name.partition('.')[0]}.py"
+    return f"[`{effect.name}`]({file if PAGE.with_name(file).exists() else 'library.toml'})"
 
 
 def _parameters(effect: Effect) -> str:

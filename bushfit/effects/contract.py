@@ -17,7 +17,7 @@ Notes:
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, Literal
@@ -166,7 +166,7 @@ class Effect:
     """What every effect states about itself.
 
     Args:
-        name: the file's stem; the name in files, reports and options.
+        name: the name in files, reports and options; the file of its law is called so.
         sentence: what it is, for an engineer.
         equation: its first-harmonic form, ASCII.
         source: where the law comes from.
@@ -273,25 +273,25 @@ class Layer(Effect):
     force: Callable[[Values, ForceBelow, History, Setting], Array]
 
 
-def all_but_the_first(places: Sequence[str]) -> Sequence[str]:
-    """The places that have an effect of their own where the first is what the moduli go by."""
-    return places[1:]
-
-
 @dataclass(frozen=True, eq=False)
 class Family:
     """A kind of effect of which each place, a direction of the bushing or a specimen, may have its own.
 
     Args:
-        record: of any place, whose texts have the slot {place}. An effect of the kind, which acts at its place alone,
-            and its one parameter are called `<record.name>.<place>`.
+        record: of any place, in whose texts the place stands for {place}. An effect of the kind, which acts at its
+            place alone, and its one parameter are called `<name>.<place>`.
         places: of the places tested, that by which the moduli go first, those that a search gives one.
         radial: texts that are others for the radial direction.
     """
 
     record: Effect
-    places: Callable[[Sequence[str]], Sequence[str]] = all_but_the_first
-    radial: Mapping[str, Any] = field(default_factory=dict)
+    places: Callable[[Sequence[str]], Sequence[str]]
+    radial: Mapping[str, Any]
+
+    @property
+    def name(self) -> str:
+        """Of the kind."""
+        return self.record.name.partition(".")[0]
 
     @cached_property
     def of_place(self) -> Callable[[str], Effect]:
@@ -304,7 +304,7 @@ class Family:
         texts: dict[str, Any] = {key: text.format(place=place) for key, text in named.items() if isinstance(text, str)}
         parameters = tuple(replace(each, meaning=each.meaning.format(place=place)) for each in record.parameters)
         twins = tuple(twin.format(place=place) for twin in record.twins)
-        return replace(record, **{**texts, "name": f"{record.name}.{place}"}, parameters=parameters, twins=twins)
+        return replace(record, **texts, parameters=parameters, twins=twins)
 
 
 def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str, Value]:

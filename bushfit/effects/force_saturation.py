@@ -13,9 +13,6 @@ from bushfit.effects.contract import (
     Array,
     ForceBelow,
     History,
-    Layer,
-    Level,
-    Parameter,
     Setting,
     StiffnessBelow,
     Values,
@@ -56,24 +53,3 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """F, less a share of what of it lies beyond +-level [N]; the torque cell is another one, so not in torsion."""
     felt = below(history)
     return felt - p["share"] * dead_zone(felt, p["level"]) if setting.kind == "sweep" else felt
-
-
-EFFECT = Layer(
-    name="force_saturation",
-    sentence="The force channel saturates: a sweep's stiffness falls where force is largest, at whatever amplitude.",
-    equation="K (1 - share N(level/(|K| X))), N of the bent waveform, sweeps only",
-    level=Level.INSTRUMENT,
-    parameters=(
-        Parameter(
-            "level", "N", (1e-3, 1e7), None, 1e3, log=True, meaning="force from which on it saturates", scale="force"
-        ),
-        Parameter("share", "1", (0.0, 1.0), 0.0, 0.2, meaning="share lost of the force beyond; 1 where it is clipped"),
-    ),
-    source="A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B",
-    confirmed_by="hang known weights on the load cell up to the largest force; its waveform is cut flat at both ends, "
-    "and the stiffer direction is cut at smaller amplitudes, as no softening of the rubber does",
-    harmonic_error=1e-3,
-    turns=False,
-    stiffness=stiffness,
-    force=force,
-)
