@@ -110,5 +110,5 @@ def cooked(recipe: Recipe, seed: int) -> tuple[Simulated, Sealed]:
     rigged = plain if recipe.rig is None else Rigged(*own, around=recipe.rig(bench))
     clean = replace(undisturbed(rigged, bench.plan, steps_per_cycle=STEPS), truth=plain)
     measured = recipe.file(measure(clean, bench.plan), bench)
-    sealed = Sealed(recipe.truths, "", (), dict(plain.values), bench.size, bench.plan.gain_error > 0.0, seed)
+    sealed = Sealed(recipe.truths, dict(plain.values), bench.size, bench.plan.gain_error > 0.0, seed)
     return measured, sealed
