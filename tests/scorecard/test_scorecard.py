@@ -15,7 +15,7 @@ from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import BASE, LIBRARY
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.scorecard.card import card, confusion
-from bushfit.scorecard.families import DISTURBANCES, tasks
+from bushfit.scorecard.families import DISTURBANCES, RECIPES, tasks
 from bushfit.scorecard.hidden import FIRST, hideable
 from bushfit.scorecard.outcome import Outcome, Task
 from bushfit.scorecard.scorecard import run
@@ -80,7 +80,8 @@ def test_truths_are_sealed_apart_from_the_campaigns(outcomes: list[Outcome], fol
     for outcome in outcomes:
         stem = f"{outcome.task.kind}_{outcome.task.seed}"
         sealed = json.loads((folder / "sealed" / f"{stem}.json").read_text())
-        assert tuple(sealed["hidden"]) == outcome.task.hidden
+        task = outcome.task
+        assert tuple(sealed["hidden"]) == (RECIPES[task.kind][task.outside].truths if task.outside else task.hidden)
         names = {file.name for file in (folder / stem).iterdir()}
         assert {"campaign.toml", "loop_axial_1.csv", "sweep_axial.csv"} <= names
         assert not any("truth" in name or name.endswith(".json") for name in names)
