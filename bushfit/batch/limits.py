@@ -9,8 +9,6 @@ Notes:
     over the limit. Conditional fail: the value is outside, but the interval reaches back. Fail: all of it is outside.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Values of model parameters in a campaign file, by the names that they go by in files."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from typing import Annotated, Any

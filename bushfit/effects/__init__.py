@@ -1,7 +1,5 @@
 """The library of effects: what is said of them in library.toml, their laws one physics a file."""
 
-from __future__ import annotations
-
 import difflib
 import tomllib
 from collections.abc import Callable, Iterable, Sequence

@@ -1,7 +1,5 @@
 """Amplitude roll-off: the rig does not reach the amplitude it was asked for at high frequency."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Value, Values

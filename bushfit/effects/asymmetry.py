@@ -1,7 +1,5 @@
 """Asymmetry: the elastic stress differs between the two senses of motion."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array, History, Values

@@ -1,7 +1,5 @@
 """Bump stop: a spring that is met beyond a gap, both ways."""
 
-from __future__ import annotations
-
 from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
 from bushfit.effects.history import History

@@ -1,7 +1,5 @@
 """Clearance: play between the bushing and what moves it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values

@@ -1,7 +1,5 @@
 """Coupled breakdown: the rate effect shrinks as the filler structure breaks down with amplitude."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Condition, Value, Values, scaled_values

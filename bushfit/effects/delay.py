@@ -1,7 +1,5 @@
 """Delay: the force is recorded later than the displacement, or the displacement later than the force."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values

@@ -3,8 +3,6 @@
 One transducer for all tests would be no effect that tests can show: mu, m and eps_half absorb it exactly.
 """
 
-from __future__ import annotations
-
 from bushfit.effects import strain_scale
 from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
 from bushfit.effects.history import History

@@ -1,7 +1,5 @@
 """Drift: the gain of the force chain moves with time over the session."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Elastic branch: the rubber's static shear modulus."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array, History, Values

@@ -1,7 +1,5 @@
 """Elastic preload: a preload at one place, which other tests do not have, stiffens what is elastic, and no loss."""
 
-from __future__ import annotations
-
 from bushfit.effects.contract import Condition, Value, Values, scaled_values
 
 

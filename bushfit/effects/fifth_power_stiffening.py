@@ -1,7 +1,5 @@
 """Fifth-power stiffening: the elastic stress turns up late and steeply at large strain."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array, History, Values

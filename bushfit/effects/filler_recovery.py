@@ -1,7 +1,5 @@
 """Filler recovery: after a larger amplitude the filler network is still broken, and builds up again with time."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Condition, Value, Values, scaled_values

@@ -1,7 +1,5 @@
 """Fixture resonance: the moving mass sits on a fixture that has a mode of its own."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

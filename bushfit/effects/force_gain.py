@@ -1,7 +1,5 @@
 """Force gain: the loop's force chain and the sweep's do not agree."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Force offset: the load cell does not read zero at zero force."""
 
-from __future__ import annotations
-
 from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
 from bushfit.effects.history import History
 

@@ -3,8 +3,6 @@
 Slow loops have a range of their own, and are cut flat for all to see where that is too small.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.clearance import FIRST, SAMPLES

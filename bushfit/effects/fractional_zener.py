@@ -1,7 +1,5 @@
 """Fractional Zener: a spring in series with the springpot, which levels off at high frequency."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.fft import next_fast_len
 

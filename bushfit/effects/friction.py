@@ -8,8 +8,6 @@ Notes:
     factor. So u is computed from one turning point to the next, with its derivative by eps_half in closed form.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

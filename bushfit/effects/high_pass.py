@@ -3,8 +3,6 @@
 Such a cell serves the sweeps; the loops, as slow as the leak, go by one that holds its force.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Value, Values

@@ -1,7 +1,5 @@
 """Hysteretic loss: a loss that is the same at every rate and every amplitude."""
 
-from __future__ import annotations
-
 from functools import partial
 
 from bushfit.effects.contract import Array, Values, harmonic_stress

@@ -1,7 +1,5 @@
 """Inertia: the mass that moves between the bushing and the load cell."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values

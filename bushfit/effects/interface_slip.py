@@ -1,7 +1,5 @@
 """Interface slip: dry friction at the bonded or pressed face of the bushing, over its play too if there is any."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Value, Values

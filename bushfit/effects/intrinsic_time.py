@@ -1,7 +1,5 @@
 """Intrinsic time: the springpot's clock runs faster the larger the strain."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Condition, Value, Values, scaled_values

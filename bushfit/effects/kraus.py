@@ -1,7 +1,5 @@
 """Kraus: the filler network as contacts that break and form again, in place of the friction branch."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Loop clock: the time of the loops runs at another rate than that of the sweeps."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values

@@ -1,7 +1,5 @@
 """Maxwell branch: a spring and a dashpot in series, one relaxation time."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array, History, Value, Values, linear_stress

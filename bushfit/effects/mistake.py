@@ -1,7 +1,5 @@
 """The record that describes one mistake in what a file says, and the test as it was measured if it was made."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal, TypeVar

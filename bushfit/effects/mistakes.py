@@ -4,8 +4,6 @@ Each is an effect of the level `record` and has no parameter: it either is so or
 user says so.
 """
 
-from __future__ import annotations
-
 import tomllib
 from functools import partial
 from pathlib import Path

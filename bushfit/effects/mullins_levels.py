@@ -1,7 +1,5 @@
 """Mullins over the levels: once strained further, rubber is softer at every smaller strain."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import erf
 

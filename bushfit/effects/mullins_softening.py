@@ -1,7 +1,5 @@
 """Mullins softening: rubber that has rested is stiffer in its first cycles than later on."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array, History, Values

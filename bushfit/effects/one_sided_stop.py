@@ -1,7 +1,5 @@
 """One-sided stop: a spring that is met beyond a gap, one way only."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values

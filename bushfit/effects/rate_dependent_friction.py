@@ -1,7 +1,5 @@
 """Rate-dependent friction: the filler friction grows with the rate of motion."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Condition, Value, Values, scaled_values

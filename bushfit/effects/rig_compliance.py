@@ -1,7 +1,5 @@
 """Rig compliance: the rig gives way in series with the bushing, which is moved less than the rig imposes."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.fft import next_fast_len
 

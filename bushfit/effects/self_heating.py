@@ -1,7 +1,5 @@
 """Self-heating: what the bushing dissipates warms it, and warm rubber is softer."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Condition, Value, Values, scaled_values

@@ -1,7 +1,5 @@
 """Sliders: springs that slip one after the other, in place of the friction branch."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

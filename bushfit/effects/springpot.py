@@ -1,7 +1,5 @@
 """Springpot branch: a fractional derivative, stiffness and loss that grow slowly with frequency."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.fft import next_fast_len
 

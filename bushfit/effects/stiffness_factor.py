@@ -3,8 +3,6 @@
 The law of all that scales the response of one place; `transducer_gain` and `preload_stiffening` have it, too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Strain scale: one direction of the bushing, or one specimen, is strained more or less than its formula says."""
 
-from __future__ import annotations
-
 from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
 from bushfit.effects.history import History
 

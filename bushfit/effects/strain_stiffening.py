@@ -1,7 +1,5 @@
 """Strain stiffening: the elastic stress turns up at large strain."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array, History, Values

@@ -1,7 +1,5 @@
 """Temperature: warm rubber is softer, and answers as cold rubber does to slower motion."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Condition, Value, Values, scaled_values

@@ -1,7 +1,5 @@
 """Viscous branch: a Newtonian dashpot, loss that grows in proportion to frequency."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array, History, Values, linear_stress

@@ -1,7 +1,5 @@
 """What a hysteresis loop or a raw stepped-sine history holds: cycles or steps, sampling, noise, and what is odd."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The grid of a prediction where none is asked for: that of the sweeps, or the paper's as far as it was measured."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Literal

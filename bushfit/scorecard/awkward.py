@@ -1,7 +1,5 @@
 """Clean but awkward campaigns: nothing is hidden, and noise or plan are as real rigs have them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

@@ -5,8 +5,6 @@ Notes:
     workflow that was tuned on the campaigns of its card would be judged by what it had seen.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Literal, get_args
 

@@ -4,8 +4,6 @@ The closed forms that fits use never make these data. Sizes are random, from har
 means what is left of the effect after the plain model has absorbed what it can.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace

@@ -3,8 +3,6 @@
 How a mistake is made is written here, how it is mended in `effects.mistakes`: the one is no use of the other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 

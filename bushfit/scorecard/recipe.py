@@ -4,8 +4,6 @@ A recipe may change the plan of the tests, what the rig does in time around the 
 alone makes the data; the closed forms that fits use never do.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
