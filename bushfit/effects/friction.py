@@ -8,14 +8,12 @@ Notes:
     factor. So u is computed from one turning point to the next, with its derivative by eps_half in closed form.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Values
+from bushfit.effects.contract import Array, Values
 from bushfit.effects.history import History
 
 #: Below this z = 2x/(1 + y), Im h of `harmonic_shape` is taken from a series: the logarithm loses digits there.
@@ -185,20 +183,3 @@ def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
     """d/dsigma_fmax = u and d/deps_half = sigma_fmax du/deps_half."""
     u, slope = _walk(p["eps_half"], history)
     return {"sigma_fmax": u, "eps_half": p["sigma_fmax"] * slope}
-
-
-EFFECT = Branch(
-    name="friction",
-    sentence="Friction between filler particles: stiffness falls with amplitude, loss does not depend on rate.",
-    equation="(A + iB)/(2 e0), A and B of sigma_fmax and e0/eps_half",
-    level=Level.MATERIAL,
-    parameters=(
-        Parameter("sigma_fmax", "Pa", (1.0, 1e8), 0.0, 1e4, log=True, meaning="largest friction stress"),
-        Parameter("eps_half", "1", (1e-6, 10.0), None, 1e-2, log=True, meaning="strain at half of sigma_fmax"),
-    ),
-    source="Garcia Tarrago et al. 2007, Eq. 5; Berg 1998",
-    modulus=modulus,
-    stress=stress,
-    modulus_sensitivities=modulus_sensitivities,
-    stress_sensitivities=stress_sensitivities,
-)

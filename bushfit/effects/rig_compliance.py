@@ -1,11 +1,9 @@
 """Rig compliance: the rig gives way in series with the bushing, which is moved less than the rig imposes."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
+from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Value, Values
 from bushfit.effects.history import History
 from bushfit.errors import ModelError
 
@@ -119,18 +117,3 @@ def _pulse_stiffness(below: ForceBelow, history: History, length: int) -> Array:
     answer = below(history.with_value(pulse).driven())
     measured = np.fft.rfft(answer - answer[..., :1], n=length) / np.fft.rfft(pulse, n=length)
     return np.maximum(measured.real, 0.0) + 1j * measured.imag
-
-
-EFFECT = Layer(
-    name="rig_compliance",
-    sentence="The rig gives way in series: the stiffer the bushing, the softer it seems, most so radially.",
-    equation="1/K' = 1/K + compliance, K at the amplitude that reaches the bushing",
-    level=Level.INSTRUMENT,
-    parameters=(Parameter("compliance", "m/N", (0.0, 1e-5), 0.0, 2e-8, meaning="give of the rig per force"),),
-    source="springs in series; ISO 10846-2:2008",
-    confirmed_by="put a steel dummy in place of the bushing: what still gives way is the rig",
-    harmonic_error=2e-3,
-    turns=False,
-    stiffness=stiffness,
-    force=force,
-)

@@ -1,10 +1,8 @@
 """Sliders: springs that slip one after the other, in place of the friction branch."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Values
+from bushfit.effects.contract import Array, Values
 from bushfit.effects.history import History
 
 #: Sliders in parallel; chosen: over a decade of slip strains their steps are 0.2 % of the modulus.
@@ -48,22 +46,3 @@ def stress(p: Values, history: History) -> Array:
 def in_place_of(p: Values) -> dict[str, float]:
     """Where a fit begins that had friction before: the same stress, and half of it at the same strain."""
     return {"sigma": p["sigma_fmax"], "e_s": 2.0 * p["eps_half"], "spread": 1.5}
-
-
-EFFECT = Branch(
-    name="sliders",
-    sentence="Springs that slip one after the other: stiffness falls with amplitude in a range with two ends.",
-    equation=f"(A + iB)/(2 e0) of {_COUNT} springs with sliders, slip strains from e_s/exp(spread) to e_s exp(spread)",
-    level=Level.MATERIAL,
-    parameters=(
-        Parameter("sigma", "Pa", (0.0, 1e8), 0.0, 1e4, meaning="stress of all sliders"),
-        Parameter("e_s", "1", (1e-6, 10.0), None, 2e-2, log=True, meaning="strain at which the middle one slips"),
-        Parameter("spread", "1", (0.05, 5.0), None, 1.5, log=True, meaning="logarithm of the largest over the middle"),
-    ),
-    source="L. Prandtl 1928, W. D. Iwan 1966; for rubber A. K. Olsson, P.-E. Austrell, Proc. ECCMR 2, 2001",
-    confirmed_by="sweep at a fifth and a tenth of the smallest amplitude: without slip there is no more friction loss",
-    replaces="friction",
-    in_place_of=in_place_of,
-    modulus=modulus,
-    stress=stress,
-)
