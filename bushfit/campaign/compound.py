@@ -1,7 +1,5 @@
 """[compound]: what is known of a rubber before it is tested: its hardness, its polymer, its filler."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal

@@ -1,7 +1,5 @@
 """Data sets of tests that are not made yet, as a model would have them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array

@@ -1,7 +1,5 @@
 """A plan as a campaign that `bushfit simulate` runs: its tests, the errors of the rig, and the model."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace

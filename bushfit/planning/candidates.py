@@ -1,7 +1,5 @@
 """Runs that a rig could make within its limits, what they cost, and the standard programme."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

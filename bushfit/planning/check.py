@@ -5,8 +5,6 @@ Notes:
     levels, start values read off the data. Nothing is told to the fit but the rig's class, which a campaign states too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """How good a choice of tests is: one number for its aim, and what it falls short of the standard programme."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -22,8 +22,6 @@ Notes:
     measured one does, mu falls to nothing in a fit, and no guess of a spring holds it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.campaign.compound import Compound

@@ -1,7 +1,5 @@
 """What is known before tests are planned: from a campaign and its diagnosis, or from a model."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 

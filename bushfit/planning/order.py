@@ -1,7 +1,5 @@
 """In which order tests are made, so that a drift over the session shows and moves no parameter."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

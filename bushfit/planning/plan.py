@@ -1,7 +1,5 @@
 """The plan: tests chosen for an aim, in their order, and the standard programme of as many hours beside them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """What each test of a plan is for: the parameter that would be known least without it."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which tests: the best per minute one after the other, then exchanged for others as long as that helps."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

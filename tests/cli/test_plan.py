@@ -1,7 +1,5 @@
 """bushfit plan: what it writes is what was planned, and the next command takes it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

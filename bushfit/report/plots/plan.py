@@ -1,7 +1,5 @@
 """A plan beside the standard programme: operating points by direction, and the errors that both would leave."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from typing import Any

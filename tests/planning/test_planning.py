@@ -1,7 +1,5 @@
 """A plan against what is worked out another way: full covariances, every choice there is, and fits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import permutations, product
 
