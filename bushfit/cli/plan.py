@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import click
+from rich.markup import escape
 
 from bushfit.cli.common import Options, example, open_model, path_option, place_option, shared_options
 from bushfit.cli.grids import grid_options, parse_grids
@@ -144,9 +145,9 @@ def _tell(options: Options, outcome: Planned) -> None:
     columns = ("before", f"plan, {number(document['hours_planned'], 3)} h", standard)
     table = new_table("standard errors [%]", "of", *columns)
     rows = {**document["parameters"], **{f"stiffness, {place}": row for place, row in document["stiffness"].items()}}
-    rows |= {f"loss factor, {place} [-/100]": row for place, row in document["loss_factor"].items()}
+    rows |= {f"loss factor, {place} [0.01]": row for place, row in document["loss_factor"].items()}
     for name, row in rows.items():
-        table.add_row(name, *(number(100.0 * row[key], 2) for key in ("before", "planned", "standard")))
+        table.add_row(escape(name), *(number(100.0 * row[key], 2) for key in ("before", "planned", "standard")))
     options.console.print(table)
     _tell_effects(options, document)
     if rivals := document["rivals"]:
@@ -171,7 +172,9 @@ def _tell_tests(options: Options, outcome: Planned) -> None:
         unit, factor = test.direction.display.displacement
         sizes, rates = motions(test)
         what = f"loop, {test.cycles} cycles" if isinstance(test, SimulatedLoop) else f"sweep over {test.stepped}"
-        table.add_row(str(test.direction), what, f"{_listed(sizes, factor)} {unit}", _listed(rates, 1.0), str(runs))
+        table.add_row(
+            escape(str(test.direction)), what, f"{_listed(sizes, factor)} {unit}", _listed(rates, 1.0), str(runs)
+        )
     options.console.print(table)
 
 
@@ -195,7 +198,7 @@ def _tell_effects(options: Options, document: PlanFile) -> None:
         sizes = [shown["planned"], shown["standard"]]
         unit, factor = for_people(shown["unit"], 1.0, next(filter(None, sizes), 1.0))
         words = ["none" if size is None else number(size * factor, 3) for size in sizes]
-        table.add_row(name, shown["parameter"], *words, unit)
+        table.add_row(escape(name), escape(shown["parameter"]), *words, unit)
     options.console.print(table)
 
 

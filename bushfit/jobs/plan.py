@@ -43,11 +43,6 @@ class Planned:
     check: Check | None = None
 
     @property
-    def result(self) -> Result:
-        """What is known before."""
-        return Result(self.plan.knowledge.model, specimens=self.plan.knowledge.specimens)
-
-    @property
     def campaign(self) -> bytes:
         """The plan as a campaign file for `bushfit simulate`."""
         return campaign_toml(self.plan).encode()
