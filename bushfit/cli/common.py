@@ -18,6 +18,7 @@ from bushfit.report.contents import Formats, Picture
 from bushfit.report.folder import check_free, to_json, write_files
 
 if TYPE_CHECKING:
+    from bushfit.campaign.campaign import Campaign
     from bushfit.campaign.schema import Loss
     from bushfit.geometry import Direction
     from bushfit.jobs import Found, Job
@@ -294,3 +295,20 @@ def open_model(file: Path) -> Result:
             hint=f"{way} makes one",
         )
     return load_result(file)
+
+
+def open_source(source: Path) -> Campaign | Result:
+    """What a command line names: a campaign, or the result in a model file or in a folder of results."""
+    from bushfit.campaign.campaign import load_campaign
+
+    if source.suffix.lower() == ".toml" and not source.is_dir():
+        return load_campaign(source)
+    file = source / "model.json" if source.is_dir() else source
+    if source.is_dir() and not file.is_file():
+        raise ModelError(
+            "there is no model in this folder",
+            file=source,
+            expected="model.json, as bushfit run, fit and diagnose write it",
+            hint="name a model file itself, or a campaign",
+        )
+    return open_model(file)

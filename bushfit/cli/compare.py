@@ -8,17 +8,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, example, open_model, option_of, place_option, shared_options
+from bushfit.cli.common import Options, example, open_source, option_of, place_option, shared_options
 from bushfit.cli.show import new_table, warn
-from bushfit.errors import ModelError, naming
+from bushfit.errors import naming
 from bushfit.units import for_people, number
 
 if TYPE_CHECKING:
-    from bushfit.campaign.campaign import Campaign
     from bushfit.comparison import ParameterContrast
     from bushfit.diagnosis.families import FittedFamily
     from bushfit.jobs.compare import Compared, Entry
-    from bushfit.model.result import Result
 
 #: Options of the grid, and the SI unit of each.
 _GRIDS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
@@ -102,30 +100,13 @@ def command(
         options.require_free(folder, options.formats.names(job.kinds(families=True)))
         outcome = job.run_families(campaign, str(sources[0]), names)
     else:
-        opened = [(_opened(source), str(source)) for source in sources]
+        opened = [(open_source(source), str(source)) for source in sources]
         folder = options.folder(folder_name(" and ".join(each.name for each, _ in opened)))
         options.require_free(folder, options.formats.names(job.kinds()))
         outcome = job.run([job.entry(*each) for each in opened])
     _tell(options, outcome)
     options.write(folder, options.formats.files(outcome.contents))
     options.tell(outcome.document)
-
-
-def _opened(source: Path) -> Campaign | Result:
-    """What a command line names: a campaign, or the result in a model file or in a folder of results."""
-    from bushfit.campaign.campaign import load_campaign
-
-    if source.suffix.lower() == ".toml" and not source.is_dir():
-        return load_campaign(source)
-    file = source / "model.json" if source.is_dir() else source
-    if source.is_dir() and not file.is_file():
-        raise ModelError(
-            "there is no model in this folder",
-            file=source,
-            expected="model.json, as bushfit run, fit and diagnose write it",
-            hint="name a model file itself, or a campaign",
-        )
-    return open_model(file)
 
 
 def _tell(options: Options, outcome: Compared) -> None:

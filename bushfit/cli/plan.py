@@ -7,14 +7,13 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import click
 from rich.markup import escape
 
-from bushfit.cli.common import Options, example, open_model, path_option, place_option, shared_options
+from bushfit.cli.common import Options, example, open_source, path_option, place_option, shared_options
 from bushfit.cli.grids import grid_options, parse_grids
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import naming
@@ -90,14 +89,15 @@ def command(
     """Choose the tests that would tell most, within the hours and the limits of the rig.
 
     What is known before comes from the tests of CAMPAIGN, from its [compound] (hardness, filler) where there are no
-    tests, or from MODEL.json. The tests are chosen for the errors of parameters, of the stiffness where it is wanted
-    (the grid of predict), or to tell rival effects apart; effects that the model lacks show at least as well as in
-    the standard programme, the paper's tests, of as many hours. [rig] has the limits and the times of the rig.
+    tests, or from MODEL.json or a folder of results. The tests are chosen for the errors of parameters, of the
+    stiffness where it is wanted (the grid of predict), or to tell rival effects apart; effects that the model lacks
+    show at least as well as in the standard programme, the paper's tests, of as many hours. [rig] has the limits and
+    the times of the rig.
 
     Writes plan.csv, a sheet for who runs the rig, plan.png, plan.json, and campaign.toml, which `bushfit simulate`
     takes. --check simulates and fits it many times: are the errors as predicted?
     """
-    from bushfit.campaign.campaign import load_campaign
+    from bushfit.campaign.campaign import Campaign, load_campaign
     from bushfit.campaign.naming import folder_name
     from bushfit.campaign.schema import PredictSettings
     from bushfit.jobs.plan import CAMPAIGN_FILE, PlanTests
@@ -109,20 +109,13 @@ def command(
     chosen = cast("Aim", aim) if aim else ("rivals" if rivals else "parameters" if parameters else "predictions")
     asked = PredictSettings(directions=None, **parse_grids(grids))
     job = PlanTests(chosen, hours, directions, _names(parameters), _names(rivals), asked)
-    if source.suffix.lower() == ".json":
-        result = open_model(source)
-        beside = load_campaign(campaign) if campaign else None
-        folder = options.folder(f"plan {folder_name(result.name)}")
-        work = partial(job.of_result, result, beside)
-    else:
-        if campaign:
-            raise click.UsageError("'--campaign' goes with MODEL.json.")
-        loaded = load_campaign(source)
-        folder = options.folder(f"plan {loaded.slug}")
-        work = partial(job.of_campaign, loaded)
+    opened, beside = open_source(source), load_campaign(campaign) if campaign else None
+    if beside and isinstance(opened, Campaign):
+        raise click.UsageError("'--campaign' goes with MODEL.json.")
+    folder = options.folder(f"plan {folder_name(opened.name)}")
     options.require_free(folder, [*options.formats.names(job.kinds()), CAMPAIGN_FILE])
     with naming(source):
-        outcome = work()
+        outcome = job.run(opened, beside)
     _tell(options, outcome)
     if count:
         outcome = replace(outcome, check=_checked(options, outcome, count, seed))

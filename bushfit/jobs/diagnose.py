@@ -67,7 +67,7 @@ class Diagnose:
                 found="every parameter is held with vary = false",
                 hint="bushfit fit says how well the values given meet the tests; free one to diagnose",
             )
-        found = _with_plan(diagnose(data, self.model, self.settings), data.campaign.path)
+        found = with_plan(diagnose(data, self.model, self.settings), data.campaign.path)
         return Diagnosed(about(data, "diagnose", self._options()), found)
 
     def _options(self) -> tuple[str, ...]:
@@ -79,7 +79,7 @@ class Diagnose:
         return options + (("--tolerance", f"{mine.tolerance:g}") if mine.tolerance != usual.tolerance else ())
 
 
-def _with_plan(found: Diagnosis, path: Path) -> Diagnosis:
+def with_plan(found: Diagnosis, path: Path) -> Diagnosis:
     """The diagnosis with the command that plans tests to tell look-alikes apart, where there are some."""
     sets = [(named.name, *named.alternatives) for named in found.effects if named.alternatives and not named.test]
     if found.verdict != "ambiguous" or not sets or path.suffix != ".toml":

@@ -26,6 +26,7 @@ from bushfit.planning.knowledge import of_campaign, of_result, rig_of
 from bushfit.planning.plan import FOUND, plan
 from bushfit.report.contents import Contents, Kinds
 from bushfit.report.planned import plan_contents
+from bushfit.simulation import model_of
 
 if TYPE_CHECKING:
     from bushfit.effects.contract import Array
@@ -123,33 +124,19 @@ class PlanTests:
         """The names of all that the outcome will hold."""
         return Kinds(("plan",), ("plan",), ("plan",))
 
-    def of_campaign(self, campaign: Campaign) -> Planned:
-        """Of a campaign with tests; or of one without, by its model or else by what its [compound] lets one guess.
+    def run(self, source: Campaign | Result, campaign: Campaign | None = None) -> Planned:
+        """After the tests of a campaign; or without tests by its [compound], or its model; or of a fitted model.
+
+        Args:
+            campaign: of a model, has the rig and what is to be predicted.
 
         Raises:
             CampaignError: nothing is known of the rubber.
             FitError: tests that cannot support a fit.
-            ModelError: see `of_result` and `planning.plan.plan`.
-        """
-        if campaign.loops or campaign.sweeps:
-            known = of_campaign(Data.of(campaign), self.rivals if self.aim == "rivals" else None)
-        elif campaign.bushing and campaign.compound:
-            known = guess(campaign.bushing, campaign.compound)
-        else:
-            from bushfit.simulation import model_of
-
-            known = of_result(Result(model_of(campaign), specimens=campaign.specimens))
-        return self._of(known, campaign)
-
-    def of_result(self, result: Result, campaign: Campaign | None = None) -> Planned:
-        """Of a model; a campaign has its rig and what is to be predicted.
-
-        Raises:
             ModelError: a parameter that is not fitted, a direction without a body, or no tests for this aim.
         """
-        return self._of(of_result(result), campaign)
-
-    def _of(self, known: Knowledge, campaign: Campaign | None) -> Planned:
+        known = self._known(source)
+        campaign = source if isinstance(source, Campaign) else campaign
         for name in self.parameters:
             if name not in known.names:
                 raise ModelError(
@@ -166,6 +153,15 @@ class PlanTests:
         rig = rig_of(campaign.rig if campaign else RigSettings(), known.noise)
         wanted = Wanted(self.aim, self.hours, rig, places, points, self.parameters or known.names)
         return Planned(plan(known, wanted))
+
+    def _known(self, source: Campaign | Result) -> Knowledge:
+        if isinstance(source, Result):
+            return of_result(source)
+        if source.loops or source.sweeps:
+            return of_campaign(Data.of(source), self.rivals if self.aim == "rivals" else None)
+        if source.bushing and source.compound:
+            return guess(source.bushing, source.compound)
+        return of_result(Result(model_of(source), specimens=source.specimens))
 
     def _points(self, result: Result, campaign: Campaign | None, usual: Sequence[Place]) -> Iterator[Points]:
         """Where the stiffness is wanted: as asked, as the campaign's [predict] says, or on the grid of `predict`."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from asking import INERTIA, asked, no_loops, no_repeats, no_sweeps, one_direction, said
@@ -14,6 +15,7 @@ from bushfit.diagnosis.again import Again
 from bushfit.diagnosis.holdout import HoldOut
 from bushfit.diagnosis.next_test import MENU
 from bushfit.effects import BASE
+from bushfit.jobs.diagnose import with_plan
 from bushfit.model.file import to_document
 
 
@@ -28,6 +30,8 @@ def test_look_alikes_are_a_set_and_none_is_added(measured: Measured) -> None:
     assert diagnosis.result.model.effects == BASE
     print(diagnosis.next_test)
     assert diagnosis.next_test in {entry.words for entry in MENU}
+    command = f"bushfit plan my.toml --rivals {','.join((leader.name, *leader.alternatives))} chooses"
+    assert command in with_plan(diagnosis, Path("my.toml")).next_test
     assert all(name in diagnosis.summary for name in (leader.name, *leader.alternatives))
     (entry,) = diagnosis.to_document()["effects"]
     assert entry["parameters"]
