@@ -7,6 +7,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -45,7 +46,7 @@ _MOST_VALUES = 6
     "--for",
     "aim",
     type=click.Choice(["parameters", "predictions", "rivals"]),
-    help="What the tests are to tell best [predictions; with --rivals, rivals].",
+    help="What the tests are to tell best: errors of parameters, of stiffness, or rivals apart [predictions].",
 )
 @click.option(
     "--hours",
@@ -72,7 +73,7 @@ _MOST_VALUES = 6
     "--check", "count", type=click.IntRange(2, 100_000), metavar="N", help="Simulate the plan N times, and fit each."
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of --check.")
-@shared_options
+@partial(shared_options, where="results/plan_<name>")
 def command(
     source: Path,
     aim: str | None,
@@ -88,14 +89,11 @@ def command(
 ) -> None:
     """Choose the tests that would tell most, within the hours and the limits of the rig.
 
-    What is known before comes from the tests of CAMPAIGN, from its [compound] (hardness, filler) where there are no
-    tests, or from MODEL.json or a folder of results. The tests are chosen for the errors of parameters, of the
-    stiffness where it is wanted (the grid of predict), or to tell rival effects apart; effects that the model lacks
-    show at least as well as in the standard programme, the paper's tests, of as many hours. [rig] has the limits and
-    the times of the rig.
+    It starts from the tests of CAMPAIGN, from its [compound] where there are none, or from MODEL.json or a folder of
+    results. Effects that the model lacks show at least as well as in the standard programme, the paper's tests, of as
+    many hours.
 
-    Writes plan.csv, a sheet for who runs the rig, plan.png, plan.json, and campaign.toml, which `bushfit simulate`
-    takes. --check simulates and fits it many times: are the errors as predicted?
+    Writes plan.csv, a sheet for who runs the rig, plan.png, plan.json, and campaign.toml for `bushfit simulate`.
     """
     from bushfit.campaign.campaign import Campaign, load_campaign
     from bushfit.campaign.naming import folder_name
