@@ -73,7 +73,7 @@ _MOST_VALUES = 6
     "--check", "count", type=click.IntRange(2, 100_000), metavar="N", help="Simulate the plan N times, and fit each."
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of --check.")
-@partial(shared_options, where="results/plan_<name>")
+@partial(shared_options, where="results/plan <name>")
 def command(
     source: Path,
     aim: str | None,

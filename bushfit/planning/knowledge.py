@@ -10,7 +10,7 @@ from bushfit.diagnosis.evidence import fit, result_of
 from bushfit.diagnosis.propose import proposals
 from bushfit.diagnosis.refit import refits
 from bushfit.diagnosis.workflow import diagnose
-from bushfit.effects import LIBRARY
+from bushfit.effects import LIBRARY, twins_of
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import parted
@@ -48,13 +48,15 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
     The class of the rig counts as noise, stated or not, as it does in what is planned.
 
     Args:
-        rivals: names of effects; none for those that a diagnosis of these tests cannot tell apart, None for no rivals.
+        rivals: names of effects, of twins any; none for those that a diagnosis of these tests cannot tell apart, None
+            for no rivals.
 
     Raises:
         FitError: data that cannot support the fit.
         ModelError: effects that these tests could not show, or a diagnosis without rivals.
     """
-    names, noise = None if rivals is None else tuple(rivals) or _alike(data), noise_of(data)
+    named = None if rivals is None else tuple(rivals) or _alike(data)
+    names, noise = named and tuple(dict.fromkeys(twins_of(name)[0] for name in named)), noise_of(data)
     data = Data.of(replace(data.campaign, rig=rig_of(data.campaign.rig, noise)))
     data_sets = [*data.loops, *data.sweeps]
     model = Model.started(data.campaign.bushing, data.effects, data.start(data_sets, {}))
@@ -75,7 +77,7 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
             place="--rivals",
             found=", ".join(unknown),
             expected="effects of the library that the model lacks, and the tests could show",
-            hint=did_you_mean(unknown[0], LIBRARY),
+            hint=None if unknown[0] in LIBRARY else did_you_mean(unknown[0], LIBRARY),
         )
     every = [known(result_of(found[name].evidence, data.bounds, ())) for name in names]
     return replace(every[0], rivals=tuple(every), tests=tuple(_tests(data)))

@@ -141,7 +141,7 @@ class _Planner:
             )
         planned = self._programme(ordered(best, self.budget.place, self._drifting(best)))
         before, standard = self._programme([]), self._programme(self.standard_runs)
-        return Plan(self.known, self.wanted, before, planned, standard, tuple(self._notes(planned)))
+        return Plan(self.known, self.wanted, before, planned, standard, tuple(self._notes(planned, best)))
 
     def _best(self) -> Array:
         """So many runs of each test, (tests,), that all effects show as in the standard programme, if that can be."""
@@ -280,13 +280,15 @@ class _Planner:
                 )
         yield Visible("drift", "drift.gain", "1", _found(drifting))
 
-    def _notes(self, planned: Programme) -> Iterator[str]:
+    def _notes(self, planned: Programme, counts: Array) -> Iterator[str]:
         """What a user must know."""
         if planned.hours < self.wanted.hours - float(self.budget.minutes.max() + self.budget.setup) / 60.0:
             yield (
                 f"{number(planned.hours, 2)} of {number(self.wanted.hours, 3)} h are planned: no further run would "
                 "take a quarter per cent off the error"
             )
+        if lacking := self._lacking(counts):
+            yield f"the standard programme shows these effects better: {', '.join(lacking)}"
         tellable = {tuple(pair) for pair in self._tellable.T.tolist()}
         for one, other in self._pairs.T.tolist():
             if (one, other) not in tellable:
