@@ -42,7 +42,7 @@ DESCRIBED = {
     "diagnosis": Described("diagnosis.json; --json of diagnose", "diagnosis.document.DiagnosisFile", "written"),
     "run": Described("--json of run", "jobs.run.RunDocument", "read"),
     "prediction": Described("--json of predict", "jobs.predict.PredictionDocument", "written"),
-    "comparison": Described("compare.json; --json of compare", "jobs.compare_document.ComparisonFile", "written"),
+    "comparison": Described("compare.json; --json of compare", "report.compare_document.ComparisonFile", "written"),
     "batch": Described("batch.json", "batch.document.BatchFile", "written"),
     "summary": Described("--json of batch", "batch.document.BatchSummary", "written"),
     "row": Described("bushings/<name>/row.json of batch", "batch.document.Record", "written"),

@@ -119,7 +119,7 @@ class Predicted:
         return self.contents | measured_contents(self.result, *self._parted)
 
 
-def filled(table: pd.DataFrame) -> dict[str, list[float | None]]:
+def filled(table: pd.DataFrame) -> dict[str, list[Any]]:
     """The columns of a table, None where a cell is empty."""
     return {str(name): [None if x != x else x for x in column.tolist()] for name, column in table.items()}
 

@@ -153,7 +153,7 @@ def to_document(result: Result) -> dict[str, Any]:
                 | ({"conditions": dict(source.conditions)} if source.conditions else {})
                 for source in result.inputs
             ],
-            "packages": dict(_versions()),
+            "packages": dict(versions()),
         },
     }
 
@@ -226,8 +226,8 @@ def _fit(result: Result, quality: Quality, measured: Range) -> dict[str, Any]:
 
 
 @cache
-def _versions() -> dict[str, str]:
-    """Versions of the packages; reading them takes as long as a tenth of a fit."""
+def versions() -> dict[str, str]:
+    """Versions of the packages that the numbers rest on; reading them takes as long as a tenth of a fit."""
     return {name: importlib.metadata.version(name) for name in _PACKAGES}
 
 

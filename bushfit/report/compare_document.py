@@ -8,7 +8,12 @@ from typing_extensions import TypedDict
 
 from bushfit.comparison import ParameterContrast
 from bushfit.diagnosis.holdout import Skipped
+from bushfit.model.document import BushingTable
 from bushfit.model.result import Range
+from bushfit.reading.measurement import Source
+
+#: What "schema" of the document says.
+SchemaName = Literal["bushfit/compare/1"]
 
 
 class ComparedEntry(TypedDict):
@@ -18,19 +23,25 @@ class ComparedEntry(TypedDict):
         label: A, the reference, or B and so on.
         name: of the bushing, or the model family.
         source: file or folder that it was read from.
+        sha256: of the model file or campaign; null where it came from none.
+        bushing: null where specimens of the compound alone are known.
         effects: of its model.
         reduced_chi_square: mean square residual in units of noise; null where it was not fitted.
         nrmse: root mean square difference of model and tests, relative; null where it was not fitted.
         measured: what it was fitted at; null where it was not fitted.
+        inputs: the files of the tests that it was fitted to, with the conditions that the campaign states.
     """
 
     label: str
     name: str
     source: str
+    sha256: str | None
+    bushing: BushingTable | None
     effects: list[str]
     reduced_chi_square: float | None
     nrmse: float | None
     measured: Range | None
+    inputs: tuple[Source, ...]
 
 
 class Joint(TypedDict):
@@ -95,6 +106,7 @@ class Family(TypedDict):
         p: probability by chance of so large a gain or loss, over all families (Holm).
         parts: each part that was held out.
         skipped: each that was not, and why.
+        words: whether it is nearer to what was held out than the first; empty of the first.
     """
 
     label: str
@@ -108,6 +120,7 @@ class Family(TypedDict):
     p: float | None
     parts: list[HeldOutPart]
     skipped: list[Skipped]
+    words: str
 
 
 class ComparisonFile(TypedDict):
@@ -120,11 +133,15 @@ class ComparisonFile(TypedDict):
         families: how each meets the tests; null where none were asked for.
         words: what differs, or how much may differ that is not seen.
         warnings: what a user must know before using the numbers.
+        command: as it was typed; empty where it was made otherwise.
+        versions: of bushfit, and of the packages that the numbers rest on.
     """
 
-    schema: Literal["bushfit/compare/1"]
+    schema: SchemaName
     compared: list[ComparedEntry]
     pairs: list[Pair]
     families: list[Family] | None
     words: list[str]
     warnings: list[str]
+    command: str
+    versions: dict[str, str]

@@ -1,0 +1,202 @@
+"""What the page of a comparison tells: what was compared, what differs, parameters and curves, what is left open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import astuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bushfit.geometry import Bushing
+from bushfit.model.file import read_document
+from bushfit.report.artifacts import comparison_contents
+from bushfit.report.compared import FAMILY_HEADS, Heads, Panel, SideBySide, Sides, chance, parameter_cells, signed
+from bushfit.report.page.chart import DASHES, Rule, Series, chart, colors
+from bushfit.report.page.drawings import FEWEST, LOG_FREQUENCIES, MOST_PLACES, Drawn, span_of
+from bushfit.report.page.gathered import thin
+from bushfit.report.page.story import MOST, conditions, corners, span, tube
+from bushfit.report.tables import numbers
+from bushfit.units import alike, number, split_header
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from bushfit.report.compare_document import ComparedEntry, Pair
+    from bushfit.report.contents import Contents
+
+#: Points of all curves of a page, of which each has a value and a band: with these it stays below 500 kB.
+_MOST_POINTS = 9000
+#: Frequencies and amplitudes of a place whose values are tabled, and rows of all places together.
+_FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 24
+#: Width of an interval, over its value, with whose digits ends of a span are told: three digits.
+_CARRIED = 0.1
+
+
+def read_comparison(folder: Path) -> Contents:
+    """The comparison in a folder, with its page to be written.
+
+    Raises:
+        ModelError: a compare.json that is not as bushfit writes it.
+    """
+    file = folder / "compare.json"
+    document = read_document(file)
+    SideBySide.of(document, file)
+    return comparison_contents(document)
+
+
+def told(found: SideBySide) -> dict[str, Any]:
+    """All that the template of a comparison asks for."""
+    document, names = found.document, found.names
+    (first, named), *others = names.items()
+    families = bool(document["families"])
+    judged = len(others) if families else 0
+    shown = found.sides()[:MOST_PLACES]
+    facts = [_entry(entry, names[entry["label"]]) for entry in document["compared"]]
+    bushing = document["compared"][0]["bushing"]
+    tested = bushing.name if bushing else document["compared"][0]["source"]
+    title = f"{others[0][1]} against {named}" if len(others) == 1 else f"{len(others)} results against {named}"
+    return {
+        "title": f"Model families on {tested}" if families else title,
+        "kicker": "Comparison of model families" if families else "Comparison of rubber bushings and compounds",
+        "families": families,
+        "first": first,
+        "entries": facts,
+        "differ": [name for name in facts[0]["conditions"] if len({_of(fact, name) for fact in facts}) > 1],
+        "sizes": [row for place in found.places[:MOST_PLACES] for row in _sizes(found, place)],
+        "family_heads": FAMILY_HEADS,
+        "family_rows": [*found.family_cells()],
+        "judged": document["words"][:judged],
+        "words": document["words"][judged:][:MOST],
+        "more_words": max(0, len(document["words"]) - judged - MOST),
+        "pairs": [_pair(pair, names) for pair in document["pairs"]],
+        "places": _panels(shown, names),
+        "left_places": max(0, len(found.places) - MOST_PLACES),
+        "tabled": _tabled(found),
+        "warnings": document["warnings"][:MOST],
+        "more_warnings": max(0, len(document["warnings"]) - MOST),
+        "command": document["command"],
+        "versions": document["versions"],
+        "files": _files(document["compared"]),
+    }
+
+
+def _of(fact: dict[str, Any], name: str) -> str:
+    return str(fact["conditions"].get(name, "not stated"))
+
+
+def _entry(entry: ComparedEntry, name: str) -> dict[str, Any]:
+    """What is compared, in a row: its body, its tests and their conditions, and how well its model meets them."""
+    bushing, measured = entry["bushing"], entry["measured"]
+    stated = dict(conditions(source.conditions for source in entry["inputs"]))
+    return {
+        "label": entry["label"],
+        "name": name,
+        "body": tube(Bushing(*astuple(bushing))) if bushing else "rubber compound",
+        "tests": f"{span(measured.frequency, 1.0, 'Hz')}, strain {span(measured.strain, 100.0, '%')}, "
+        + ", ".join(measured.directions)
+        if measured
+        else "given, not fitted",
+        "conditions": stated,
+        "stated": ", ".join(f"{key.lower()} {value}" for key, value in stated.items() if value != "not stated"),
+        "effects": ", ".join(entry["effects"]),
+        "nrmse": "" if entry["nrmse"] is None else f"{number(100.0 * entry['nrmse'], 2)} %",
+        "chi": "" if entry["reduced_chi_square"] is None else number(entry["reduced_chi_square"], 3),
+        "source": entry["source"],
+    }
+
+
+def _sizes(found: SideBySide, place: str) -> Iterator[dict[str, Any]]:
+    """How far each is off the first at a place: least and largest difference, and at how many points it is sure."""
+    for label, table in found.at(place).items():
+        heads = Heads.of(table)
+        row: dict[str, Any] = {"label": label, "place": place, "points": len(table)}
+        for key, header, scale, unit in (("stiffness", heads.relative, 100.0, " %"), ("loss", heads.loss, 1.0, "")):
+            (values,) = scale * numbers(table, header)
+            least, most = float(np.nanmin(values)), float(np.nanmax(values))
+            ends = dict.fromkeys(signed(end, _CARRIED * max(abs(least), abs(most))) for end in (least, most))
+            row[key] = " to ".join(ends) + unit
+            row[f"{key}_sure"] = int((table[f"{header}, sure"] == "yes").sum())
+        yield row
+
+
+def _pair(pair: Pair, names: dict[str, str]) -> dict[str, Any]:
+    """The parameters of one beside those of the first."""
+    return {
+        "heads": ["Parameter", pair["reference"], pair["other"], "Difference", "95 % interval", "p", "Unit"],
+        "caption": f"{pair['other']}: {names[pair['other']]}, against {pair['reference']}: {names[pair['reference']]}",
+        "rows": [parameter_cells(row) for row in pair["parameters"]],
+        "joint": pair["joint"] and (chance(pair["joint"]["p"]), pair["joint"]["parameters"]),
+    }
+
+
+def _panels(shown: Sequence[Sides], names: dict[str, str]) -> list[Drawn]:
+    """Four pictures a place: stiffness and loss factor of all, and below how far they are off the first."""
+    looks = dict(zip(names, colors(len(names)), strict=True))
+    curves = sum(len(panel.lines) for sides in shown for panel in sides.panels)
+    most = max(FEWEST, _MOST_POINTS // max(curves, 1))
+    first = next(iter(names))
+    return [Drawn(s.place, [_picture(s, panel, looks, first, most) for panel in s.panels], []) for s in shown]
+
+
+def _picture(sides: Sides, panel: Panel, looks: dict[str, str], first: str, most: int) -> Any:
+    what, unit = split_header(panel.header)
+    unit = (unit or "").removesuffix("-")
+    series, words = [], []
+    for line in panel.lines:
+        at = thin(line.x.size, most)
+        name = f"{line.label}, {sides.levels[line.level]}"
+        x, value, low, high = (each[at] for each in (line.x, line.value, line.low, line.high))
+        series.append(Series(name, looks[line.label], DASHES[line.level], (x, value), (x, low, high)))
+        words.append(f"{name}: {span_of(line.value)} {unit}".strip())
+    x = panel.lines[0].x
+    log = bool(x.max() > LOG_FREQUENCIES * x.min() > 0.0)
+    rules = [Rule(0.0, f"{first}, the reference")] if panel.least else []
+    alt = f"{what} over {split_header(sides.along)[0]}, {sides.place}; {'; '.join(words)}"
+    labels = sides.along, f"{panel.header}"
+    return chart(f"{sides.place}: {what}", labels, series, alt, log=log, rules=rules, least=panel.least)
+
+
+def _tabled(found: SideBySide) -> list[tuple[Any, ...]]:
+    """Values of the first and of each other at some corners of the grid, with the intervals of their differences."""
+    tables = [(label, place, table) for place in found.places[:MOST_PLACES] for label, table in found.at(place).items()]
+    most = max(_ROWS // max(len(tables), 1), 1)
+    amplitudes = min(most, _AMPLITUDES)
+    rows = (row for each in tables for row in _corners(*each, amplitudes, min(most // amplitudes, _FREQUENCIES)))
+    return list(rows)[: 2 * _ROWS]
+
+
+def _corners(
+    label: str, place: str, table: pd.DataFrame, amplitudes: int, frequencies: int
+) -> Iterator[tuple[Any, ...]]:
+    """Rows of cells: place, label, frequency, amplitude; then of stiffness and loss factor both values, their
+    difference with its interval, and whether it is more than chance at all points at once."""
+    heads = Heads.of(table)
+    ((_, length), (_, unit)) = (split_header(header) for header in heads[:2])
+    kinds = ((heads.stiffness, heads.relative, f" {unit}", 100.0, " %"), ("loss factor [-]", heads.loss, "", 1.0, ""))
+    for row in corners(table, heads.amplitude, amplitudes, frequencies):
+        cells = []
+        for what, difference, of, scale, percent in kinds:
+            value, low, high = (scale * row[f"{difference}{end}"] for end in ("", ", low", ", high"))
+            shown, *ends = (signed(each, high - low) for each in (value, low, high))
+            sides = alike([row[f"{who} {what}"] for who in ("reference", "other")], 4)
+            sure = row[f"{difference}, sure"] == "yes"
+            cells.append((*(side + of for side in sides), shown + percent, " to ".join(ends), sure))
+        yield (
+            place,
+            label,
+            f"{number(row['frequency [Hz]'], 4)} Hz",
+            f"{number(row[heads.amplitude], 3)} {length}",
+            *cells,
+        )
+
+
+def _files(compared: Sequence[ComparedEntry]) -> list[tuple[str, str]]:
+    """Every file behind the comparison with its hash, and what it belongs to: what was compared, and its tests."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for entry in compared:
+        named = [(entry["source"], entry["sha256"] or ""), *((str(s.file), s.sha256) for s in entry["inputs"])]
+        for each in named:
+            found.setdefault(each, []).append(entry["label"])
+    return [(f"{', '.join(labels)}: {file}", sha256) for (file, sha256), labels in found.items() if sha256]
