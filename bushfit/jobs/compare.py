@@ -59,7 +59,7 @@ class Entry:
     sha256: str | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Compared:
     """The outcome: the entries, and each but the first against it; families where these are what is compared."""
 
@@ -68,6 +68,9 @@ class Compared:
     families: Sequence[FittedFamily] = ()
     notes: tuple[str, ...] = ()
     command: str = ""
+
+    def __repr__(self) -> str:
+        return f"Comparison of {', '.join(entry.name for entry in self.entries)}"
 
     @property
     def labels(self) -> list[str]:

@@ -14,7 +14,7 @@ import numpy as np
 from bushfit.errors import ModelError
 from bushfit.report.compare_document import ComparisonFile, Pair
 from bushfit.report.tables import numbers, required
-from bushfit.units import for_people, number, split_header
+from bushfit.units import for_people, number, split_header, told
 from bushfit.validation import check_tables
 
 if TYPE_CHECKING:
@@ -200,8 +200,7 @@ class SideBySide:
             Panel(f"{name} less {first}'s [%]", [*lines(heads.relative, 100.0, off)], LEAST_PERCENT),
             Panel(f"loss factor less {first}'s [-]", [*lines(heads.loss, 1.0, off)], LEAST_LOSS),
         ]
-        held_unit = split_header(held)[1] or ""
-        return Sides(place, along, [f"{number(float(level), 3)} {held_unit}" for level in levels], panels)
+        return Sides(place, along, [told(split_header(held)[1] or "", float(level)) for level in levels], panels)
 
 
 class Heads(NamedTuple):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bushfit.errors import ModelError
-from bushfit.geometry import STRAINING, TRANSLATION
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION
 from bushfit.reading.measurement import loss_factor
 
 if TYPE_CHECKING:
@@ -40,6 +40,8 @@ TEXTS = frozenset(
         *("named effects", "cannot be told from", "on a bound", "warnings"),
     )
 )
+#: Units of amplitudes, by SI, as people read them.
+DISPLAYS = {motion.displacement_unit: motion.display.displacement for motion in (TRANSLATION, ROTATION, STRAINING)}
 #: End of the headers, and name of the line, of what holds where an unresolved effect belongs to the rig.
 IF_RIGS = "if it is the rig's"
 

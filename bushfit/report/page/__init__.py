@@ -41,9 +41,9 @@ def comparison_page(documents: Documents, _: Tables) -> str:
         ModelError: a spoiled document.
     """
     from bushfit.report.compared import SideBySide
-    from bushfit.report.page.comparison import told
+    from bushfit.report.page.comparison import account
 
-    return rendered("compare.html", told(SideBySide.of(documents["compare"])))
+    return rendered("compare.html", account(SideBySide.of(documents["compare"])))
 
 
 def rendered(template: str, context: dict[str, Any]) -> str:

@@ -16,9 +16,9 @@ from bushfit.report.compared import FAMILY_HEADS, Heads, Panel, SideBySide, Side
 from bushfit.report.page.chart import DASHES, Rule, Series, chart, colors
 from bushfit.report.page.drawings import FEWEST, LOG_FREQUENCIES, MOST_PLACES, Drawn, span_of
 from bushfit.report.page.gathered import thin
-from bushfit.report.page.story import MOST, conditions, corners, span, tube
+from bushfit.report.page.story import MOST, conditions, corners, tube
 from bushfit.report.tables import numbers
-from bushfit.units import alike, number, split_header
+from bushfit.units import alike, number, split_header, told
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,7 +46,7 @@ def read_comparison(folder: Path) -> Contents:
     return comparison_contents(document)
 
 
-def told(found: SideBySide) -> dict[str, Any]:
+def account(found: SideBySide) -> dict[str, Any]:
     """All that the template of a comparison asks for."""
     document, names = found.document, found.names
     (first, named), *others = names.items()
@@ -89,15 +89,16 @@ def _of(fact: dict[str, Any], name: str) -> str:
 def _entry(entry: ComparedEntry, name: str) -> dict[str, Any]:
     """What is compared, in a row: its body, its tests and their conditions, and how well its model meets them."""
     bushing, measured = entry["bushing"], entry["measured"]
+    tests = "given, not fitted"
+    if measured:
+        strain = told("%", *(100.0 * end for end in measured.strain))
+        tests = f"{told('Hz', *measured.frequency)}, strain {strain}, {', '.join(measured.directions)}"
     stated = dict(conditions(source.conditions for source in entry["inputs"]))
     return {
         "label": entry["label"],
         "name": name,
         "body": tube(Bushing(*astuple(bushing))) if bushing else "rubber compound",
-        "tests": f"{span(measured.frequency, 1.0, 'Hz')}, strain {span(measured.strain, 100.0, '%')}, "
-        + ", ".join(measured.directions)
-        if measured
-        else "given, not fitted",
+        "tests": tests,
         "conditions": stated,
         "stated": ", ".join(f"{key.lower()} {value}" for key, value in stated.items() if value != "not stated"),
         "effects": ", ".join(entry["effects"]),
@@ -187,7 +188,7 @@ def _corners(
             place,
             label,
             f"{number(row['frequency [Hz]'], 4)} Hz",
-            f"{number(row[heads.amplitude], 3)} {length}",
+            told(length or "", row[heads.amplitude]),
             *cells,
         )
 

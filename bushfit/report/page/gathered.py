@@ -14,7 +14,7 @@ from bushfit.model.result import Result
 from bushfit.report.artifacts import place_names
 from bushfit.report.page.chart import Cells
 from bushfit.report.tables import IF_RIGS, complete, numbers, required, spread, words
-from bushfit.units import number
+from bushfit.units import split_header, told
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -153,7 +153,7 @@ def _by_kind(
 
 def _level(level: float | str, held: str) -> str:
     """A held value as people read it, with the unit of its header; the name of a test as it is."""
-    return level if isinstance(level, str) else f"{number(level, 3)} {held.partition('[')[2].rstrip(']')}"
+    return level if isinstance(level, str) else told(split_header(held)[1] or "", level)
 
 
 def _predicted(
@@ -204,7 +204,7 @@ def cells_at(place: Place, gap: pd.DataFrame, tests: Sequence[TestTable]) -> Ite
     mine = gap[gap["direction"] == str(place)]
     for stepped, along, held, rows in _by_kind(place, mine[mine["kind"] == "sweep"], tests):
         (x,), (name, unit) = numbers(rows, along), along.rstrip("]").split(" [")
-        ends = number(float(x.min()), 3), name, f"{number(float(x.max()), 3)} {unit}"
+        ends = told(unit, float(x.min())), name, told(unit, float(x.max()))
         for part in ("storage", "loss"):
             yield _map(part, rows, held if stepped else "test", x, ends)
     loops = mine[mine["kind"] == "loop"]

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Bushing, Place, Specimen
+from bushfit.geometry import Bushing, Place, Specimen
 from bushfit.model.result import Misfit, Result, Usable
 from bushfit.report.page.drawings import MOST_PLACES, gap_panels, loop_panels, tested_panels
 from bushfit.report.page.gathered import columns_of, places_of
 from bushfit.report.page.schema import Checked
 from bushfit.report.parameters import interval_kind, parameter_rows
-from bushfit.report.tables import complete, spread
-from bushfit.units import alike, for_people, number
+from bushfit.report.tables import DISPLAYS, complete, spread
+from bushfit.units import alike, for_people, number, told
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,8 +43,6 @@ _SAME_LETTERS = 40
 _ROWS = 12
 #: Warnings, regions, and tests that a page lists at most: the documents have all.
 MOST = 12
-#: Units of amplitudes, by SI, as people read them.
-_DISPLAYS = {motion.displacement_unit: motion.display.displacement for motion in (TRANSLATION, ROTATION, STRAINING)}
 
 
 def story(found: Checked, tables: Tables) -> dict[str, Any]:
@@ -129,7 +127,7 @@ def conditions(stated: Iterable[Mapping[str, str | float]]) -> Iterator[tuple[st
 
 def _tested(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str]:
     """A test in a row of a table: its range, and how well the model meets it."""
-    unit, factor = _DISPLAYS[test.unit]
+    unit, factor = DISPLAYS[test.unit]
     met = next((misfit for misfit in misfits if misfit.test == test.test and misfit.held is None), None)
     stated = [
         f"{value if isinstance(value, str) else number(value, 3)}{unit}"
@@ -140,19 +138,14 @@ def _tested(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str]:
         "test": test.test,
         "kind": {"loop": "hysteresis loop", "sweep": "sweep"}.get(test.kind, test.kind),
         "place": test.place,
-        "frequency": span(test.frequency_Hz, 1.0, "Hz"),
-        "amplitude": span(test.amplitude, factor, unit),
+        "frequency": told("Hz", *test.frequency_Hz),
+        "amplitude": told(unit, *(factor * end for end in test.amplitude)),
         "rows": f"{test.rows}",
         "conditions": ", ".join(stated),
         "nrmse": f"{number(100 * met.nrmse, 2)} %" if met else "",
         "chi": number(met.reduced_chi_square, 2) if met else "",
         "fitted": "" if met is None or met.fitted else "not fitted",
     }
-
-
-def span(ends: Iterable[float], factor: float, unit: str) -> str:
-    """Least and largest of a quantity in SI, as people read them."""
-    return " to ".join(dict.fromkeys(number(end * factor, 3) for end in ends)) + f" {unit}"
 
 
 def _usable(place: Usable) -> dict[str, Any]:
@@ -235,7 +228,7 @@ def _corners(table: pd.DataFrame, place: Place, frequencies: int) -> Iterator[tu
     (length, _), _, (unit, _) = place.display
     known = complete(table, "frequency [Hz]", amplitude, *names, *band)
     for row in corners(known, amplitude, _AMPLITUDES, frequencies):
-        cells = [str(place), f"{number(row['frequency [Hz]'], 4)} Hz", f"{number(row[amplitude], 3)} {length}"]
+        cells = [str(place), f"{number(row['frequency [Hz]'], 4)} Hz", told(length, row[amplitude])]
         for name, of in zip(names, (f" {unit}", ""), strict=True):
             value, *ends = alike([row[name], row[f"{name}, low"], row[f"{name}, high"]], 4, least=2)
             measured = row.get(f"measured {name}", np.nan)
