@@ -11,6 +11,7 @@ from bushfit.diagnosis.holdout import Skipped
 from bushfit.model.document import BushingTable
 from bushfit.model.result import Range
 from bushfit.reading.measurement import Source
+from bushfit.validation import Number
 
 #: What "schema" of the document says.
 SchemaName = Literal["bushfit/compare/1"]
@@ -38,8 +39,8 @@ class ComparedEntry(TypedDict):
     sha256: str | None
     bushing: BushingTable | None
     effects: list[str]
-    reduced_chi_square: float | None
-    nrmse: float | None
+    reduced_chi_square: Number | None
+    nrmse: Number | None
     measured: Range | None
     inputs: tuple[Source, ...]
 
@@ -52,7 +53,7 @@ class Joint(TypedDict):
         parameters: how many count.
     """
 
-    p: float
+    p: Number
     parameters: int
 
 
@@ -73,7 +74,7 @@ class Pair(TypedDict):
     shared_inputs: list[str]
     joint: Joint | None
     parameters: list[ParameterContrast]
-    places: dict[str, dict[str, list[float | str | None]]]
+    places: dict[str, dict[str, list[Number | None] | list[Literal["yes", "no"]]]]
 
 
 class HeldOutPart(TypedDict):
@@ -86,8 +87,8 @@ class HeldOutPart(TypedDict):
     """
 
     part: str
-    first: float
-    heldout: float
+    first: Number
+    heldout: Number
 
 
 class Family(TypedDict):
@@ -112,12 +113,12 @@ class Family(TypedDict):
     label: str
     name: str
     parameters: int
-    reduced_chi_square: float
-    bic: float
-    heldout: float | None
-    first_there: float | None
-    gain: tuple[float, float, float] | None
-    p: float | None
+    reduced_chi_square: Number
+    bic: Number
+    heldout: Number | None
+    first_there: Number | None
+    gain: tuple[Number, Number, Number] | None
+    p: Number | None
     parts: list[HeldOutPart]
     skipped: list[Skipped]
     words: str

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,6 +29,8 @@ _DIGITS = 4
 _MOST_DECIMALS = 6
 #: A probability below this is told as being below it.
 _LEAST_CHANCE = 1e-3
+#: Columns that say of a difference whether it is more than chance.
+_SURE = re.compile(", sure$")
 #: Least span of an axis of relative differences [%], and of differences of the loss factor: less would show rounding.
 LEAST_PERCENT = 1.0
 LEAST_LOSS = 0.005
@@ -84,7 +87,18 @@ class SideBySide:
         Raises:
             ModelError: another schema, or a key that is missing or of the wrong kind.
         """
-        return cls(check_tables(document, file, ComparisonFile, kind=ModelError))
+        checked = check_tables(document, file, ComparisonFile, kind=ModelError)
+        first, *others = [entry["label"] for entry in checked["compared"]] or [""]
+        pairs, families = checked["pairs"], checked["families"]
+        asked = [(first, other) for other in dict.fromkeys(others) if other != first]
+        found = [(pair["reference"], pair["other"]) for pair in pairs]
+        places = {tuple(pair["places"]) for pair in pairs}
+        if not asked or len(asked) < len(others) or found != asked or len(places) > 1 or () in places:
+            what = "each result but the first against the first, at the same places"
+            raise ModelError("results that do not go together", file=file, place="pairs", expected=what)
+        if families and [family["label"] for family in families] != [first, *others]:
+            raise ModelError("families that do not go together", file=file, place="families", expected="all compared")
+        return cls(checked)
 
     @cached_property
     def names(self) -> dict[str, str]:
@@ -157,22 +171,20 @@ class SideBySide:
         import pandas as pd
 
         columns = pair["places"].get(place, {})
-        if len({len(column) for column in columns.values()} - {0}) != 1:
+        texts = [name for name, cells in columns.items() if isinstance(next(iter(cells), None), str)]
+        sizes = {len(cells) for cells in columns.values()}
+        if len(sizes) != 1 or 0 in sizes or not all(map(_SURE.search, texts)):
             raise ModelError(
                 "columns that do not go together",
                 place=f"pairs, {pair['other']}, places, {place}",
-                expected="as many numbers in each",
+                expected="as many numbers in each, and yes or no of what is sure",
             )
-        texts = [name for name in columns if name.endswith(", sure")]
         table = pd.DataFrame({name: pd.Series(column, dtype=object) for name, column in columns.items()})
         table = table.astype(dict.fromkeys(table.columns.difference(texts), float))
         return pd.concat([pd.DataFrame({"other": pair["other"], "place": place}, index=table.index), table], axis=1)
 
-    def sides(self) -> list[Sides]:
-        """The lines of each place, over frequency, or over amplitude where there is one frequency."""
-        return [self._sides(place) for place in self.places]
-
-    def _sides(self, place: str) -> Sides:
+    def sides(self, place: str) -> Sides:
+        """The lines of a place, over frequency, or over amplitude where there is one frequency."""
         tables = self.at(place)
         heads = Heads.of(next(iter(tables.values())))
         grid = numbers(next(iter(tables.values())), "frequency [Hz]", heads.amplitude)
@@ -228,7 +240,9 @@ class Heads(NamedTuple):
             f"relative difference of {split_header(stiffness)[0]} [-]",
             "difference of loss factor [-]",
         )
-        required(table, "frequency [Hz]", amplitude, f"reference {stiffness}", *found[2:])
+        sides = [f"{who} {what}" for who in ("reference", "other") for what in (stiffness, "loss factor [-]")]
+        bands = [f"{what}{end}" for what in (*sides, *found[2:]) for end in ("", ", low", ", high")]
+        required(table, "frequency [Hz]", amplitude, *bands, *(f"{what}, sure" for what in found[2:]))
         return found
 
 

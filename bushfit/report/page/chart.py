@@ -118,7 +118,7 @@ def _drawn(series: Series, x: Axis, y: Axis, dot: float) -> Markup:
     parts = []
     if series.band is not None:
         along, low, high = series.band
-        there = np.isfinite(low) & np.isfinite(high)
+        there = np.isfinite(along) & np.isfinite(low) & np.isfinite(high)
         around = (
             x(np.concatenate([along[there], along[there][::-1]])),
             y(np.concatenate([low[there], high[there][::-1]])),

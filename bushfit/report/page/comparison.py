@@ -11,10 +11,10 @@ import numpy as np
 
 from bushfit.geometry import Bushing
 from bushfit.model.file import read_document
-from bushfit.report.artifacts import comparison_contents
 from bushfit.report.compared import FAMILY_HEADS, Heads, Panel, SideBySide, Sides, chance, parameter_cells, signed
+from bushfit.report.contents import Contents
 from bushfit.report.page.chart import DASHES, Rule, Series, chart, colors
-from bushfit.report.page.drawings import FEWEST, LOG_FREQUENCIES, MOST_PLACES, Drawn, span_of
+from bushfit.report.page.drawings import LOG_FREQUENCIES, MOST_PLACES, Drawn, span_of
 from bushfit.report.page.gathered import thin
 from bushfit.report.page.story import MOST, conditions, corners, tube
 from bushfit.report.tables import numbers
@@ -24,10 +24,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from bushfit.report.compare_document import ComparedEntry, Pair
-    from bushfit.report.contents import Contents
 
-#: Points of all curves of a page, of which each has a value and a band: with these it stays below 500 kB.
-_MOST_POINTS = 9000
+#: Curves of a page, and points of all of them, of which each has a value and a band: with these it stays below 500 kB.
+_MOST_CURVES, _MOST_POINTS = 300, 7000
+#: Curves of a place, for each result: four pictures, each at two levels.
+_CURVES = 8
+#: Fewest points of a curve, however many there are: lines are smooth.
+_FEWEST = 12
 #: Frequencies and amplitudes of a place whose values are tabled, and rows of all places together.
 _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 24
 #: Width of an interval, over its value, with whose digits ends of a span are told: three digits.
@@ -43,7 +46,7 @@ def read_comparison(folder: Path) -> Contents:
     file = folder / "compare.json"
     document = read_document(file)
     SideBySide.of(document, file)
-    return comparison_contents(document)
+    return Contents({"compare": document}).paged("compare")
 
 
 def account(found: SideBySide) -> dict[str, Any]:
@@ -52,7 +55,7 @@ def account(found: SideBySide) -> dict[str, Any]:
     (first, named), *others = names.items()
     families = bool(document["families"])
     judged = len(others) if families else 0
-    shown = found.sides()[:MOST_PLACES]
+    places = found.places[: min(MOST_PLACES, _MOST_CURVES // (_CURVES * len(names)))]
     facts = [_entry(entry, names[entry["label"]]) for entry in document["compared"]]
     bushing = document["compared"][0]["bushing"]
     tested = bushing.name if bushing else document["compared"][0]["source"]
@@ -64,16 +67,16 @@ def account(found: SideBySide) -> dict[str, Any]:
         "first": first,
         "entries": facts,
         "differ": [name for name in facts[0]["conditions"] if len({_of(fact, name) for fact in facts}) > 1],
-        "sizes": [row for place in found.places[:MOST_PLACES] for row in _sizes(found, place)],
+        "sizes": [row for place in places for row in _sizes(found, place)],
         "family_heads": FAMILY_HEADS,
         "family_rows": [*found.family_cells()],
         "judged": document["words"][:judged],
         "words": document["words"][judged:][:MOST],
         "more_words": max(0, len(document["words"]) - judged - MOST),
         "pairs": [_pair(pair, names) for pair in document["pairs"]],
-        "places": _panels(shown, names),
-        "left_places": max(0, len(found.places) - MOST_PLACES),
-        "tabled": _tabled(found),
+        "places": _panels([found.sides(place) for place in places], names),
+        "left_places": len(found.places) - len(places),
+        "tabled": _tabled(found, places),
         "warnings": document["warnings"][:MOST],
         "more_warnings": max(0, len(document["warnings"]) - MOST),
         "command": document["command"],
@@ -115,8 +118,8 @@ def _sizes(found: SideBySide, place: str) -> Iterator[dict[str, Any]]:
         row: dict[str, Any] = {"label": label, "place": place, "points": len(table)}
         for key, header, scale, unit in (("stiffness", heads.relative, 100.0, " %"), ("loss", heads.loss, 1.0, "")):
             (values,) = scale * numbers(table, header)
-            least, most = float(np.nanmin(values)), float(np.nanmax(values))
-            ends = dict.fromkeys(signed(end, _CARRIED * max(abs(least), abs(most))) for end in (least, most))
+            known = np.sort(values[np.isfinite(values)])[[0, -1]].tolist() if np.isfinite(values).any() else []
+            ends = dict.fromkeys(signed(end, _CARRIED * max(map(abs, known))) for end in known)
             row[key] = " to ".join(ends) + unit
             row[f"{key}_sure"] = int((table[f"{header}, sure"] == "yes").sum())
         yield row
@@ -136,7 +139,7 @@ def _panels(shown: Sequence[Sides], names: dict[str, str]) -> list[Drawn]:
     """Four pictures a place: stiffness and loss factor of all, and below how far they are off the first."""
     looks = dict(zip(names, colors(len(names)), strict=True))
     curves = sum(len(panel.lines) for sides in shown for panel in sides.panels)
-    most = max(FEWEST, _MOST_POINTS // max(curves, 1))
+    most = max(_FEWEST, _MOST_POINTS // max(curves, 1))
     first = next(iter(names))
     return [Drawn(s.place, [_picture(s, panel, looks, first, most) for panel in s.panels], []) for s in shown]
 
@@ -159,9 +162,9 @@ def _picture(sides: Sides, panel: Panel, looks: dict[str, str], first: str, most
     return chart(f"{sides.place}: {what}", labels, series, alt, log=log, rules=rules, least=panel.least)
 
 
-def _tabled(found: SideBySide) -> list[tuple[Any, ...]]:
+def _tabled(found: SideBySide, places: Sequence[str]) -> list[tuple[Any, ...]]:
     """Values of the first and of each other at some corners of the grid, with the intervals of their differences."""
-    tables = [(label, place, table) for place in found.places[:MOST_PLACES] for label, table in found.at(place).items()]
+    tables = [(label, place, table) for place in places for label, table in found.at(place).items()]
     most = max(_ROWS // max(len(tables), 1), 1)
     amplitudes = min(most, _AMPLITUDES)
     rows = (row for each in tables for row in _corners(*each, amplitudes, min(most // amplitudes, _FREQUENCIES)))

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 #: Points of sweeps, and rows of loops, of a whole page: with these it stays below 500 kB.
 _MOST_POINTS, _MOST_ROWS = 3200, 2400
 #: Fewest points of a curve, however many there are.
-FEWEST = 24
+_FEWEST = 24
 #: Most places that are drawn: a page of more is no page.
 MOST_PLACES = 8
 #: Amplitudes that were stepped over more than this ratio lie on a logarithmic axis; and frequencies over this one.
@@ -57,7 +57,7 @@ def tested_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) ->
     if table is None:
         return []
     found: list[Drawn] = []
-    most = max(FEWEST, _MOST_POINTS // (MOST_LEVELS * min(len(places), MOST_PLACES) or 1))
+    most = max(_FEWEST, _MOST_POINTS // (MOST_LEVELS * min(len(places), MOST_PLACES) or 1))
     for name, place in places.items():
         rows = table[table["direction"] == str(place)]
         if len(rows) and len(found) < MOST_PLACES:
@@ -131,7 +131,7 @@ def loop_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) -> l
         return []
     found: list[Drawn] = []
     drawn = table.groupby("direction")["test"].nunique().clip(upper=MOST_LEVELS).nlargest(MOST_PLACES).sum()
-    most = max(FEWEST, _MOST_ROWS // max(1, int(drawn)))
+    most = max(_FEWEST, _MOST_ROWS // max(1, int(drawn)))
     for place in places_of(result, tables).values():
         rows = table[table["direction"] == str(place)]
         if len(rows) and len(found) < MOST_PLACES:
