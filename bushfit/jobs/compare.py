@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from bushfit import __version__
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
+from bushfit.caveats import caveats
 from bushfit.comparison import Comparison, compare, holm, with_holm
 from bushfit.diagnosis.evidence import result_of
 from bushfit.diagnosis.families import FittedFamily, fit_families, known_families
@@ -24,7 +25,6 @@ from bushfit.jobs.grid import common_grid
 from bushfit.jobs.predict import AMPLITUDES, filled
 from bushfit.model.file import model_document, versions
 from bushfit.model.model import Model
-from bushfit.prediction import caveats
 from bushfit.reading.measurement import Source
 from bushfit.report.artifacts import comparison_contents
 from bushfit.report.compare_document import ComparedEntry, ComparisonFile, Family, Pair

@@ -57,7 +57,8 @@ def prediction_contents(
     """A table and a picture of each prediction, named after its place, the measured points over the model."""
 
     def picture(prediction: Prediction) -> Figure:
-        from bushfit.prediction import caveats, predict, rig_effects
+        from bushfit.caveats import caveats, rig_effects
+        from bushfit.prediction import predict
         from bushfit.report.plots import fine_grid, prediction_figure
 
         grid = fine_grid(prediction)

@@ -15,6 +15,7 @@ from rigged import LEVELS, Fitted, Measured
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings
+from bushfit.caveats import caveats
 from bushfit.diagnosis.correction import Correction, correct
 from bushfit.diagnosis.described import Described, describe
 from bushfit.diagnosis.evidence import Evidence
@@ -25,7 +26,7 @@ from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
-from bushfit.prediction import caveats, predict
+from bushfit.prediction import predict
 
 
 def with_relaxation(campaign: Campaign, size: float = 0.06) -> Campaign:
