@@ -23,6 +23,7 @@ from bushfit.geometry import Direction, Specimen
 from bushfit.jobs.fits import Fit
 from bushfit.jobs.grid import common_grid
 from bushfit.jobs.predict import AMPLITUDES, filled
+from bushfit.model.document import BushingTable
 from bushfit.model.file import model_document, versions
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Source
@@ -161,13 +162,13 @@ def _plain(record: Any) -> Any:
 
 def _entry(label: str, entry: Entry) -> ComparedEntry:
     """What an entry is."""
-    result = entry.result
+    result, bushing = entry.result, model_document(entry.result.model)["bushing"]
     return {
         "label": label,
         "name": entry.name,
         "source": entry.source,
         "sha256": entry.sha256,
-        "bushing": model_document(result.model)["bushing"],
+        "bushing": bushing and _plain(BushingTable(**bushing)),
         "effects": list(result.model.effects),
         "reduced_chi_square": result.quality.reduced_chi_square if result.quality else None,
         "nrmse": result.quality.nrmse if result.quality else None,
