@@ -216,22 +216,13 @@ def picture(outcome: Outcome | Compared, name: str) -> Figure:
 
 def parameters(model: Result | Outcome) -> pd.DataFrame:
     """The parameters in SI: value, standard error, ends of the 95 % interval, unit, and whether each was fitted."""
-    import pandas as pd
+    from bushfit.report.spreadsheets import parameters_table
 
-    result = _result(model)
-    rows = {
-        name: (
-            result.model.values[name],  # noqa: PD011
-            result.covariance.stderr(name),
-            *(result.interval(name) or (None, None)),
-            parameter.unit,
-            name in result.fitted,
-        )
-        for name, parameter in result.model.parameters.items()
-    }
-    columns = ["value", "std error", "low", "high", "unit", "fitted"]
-    numbers = dict.fromkeys(columns[:4], float)
-    return pd.DataFrame.from_dict(rows, orient="index", columns=columns).astype(numbers)
+    ends = {"95 %, low": "low", "95 %, high": "high"}
+    table = parameters_table(_result(model)).set_index("parameter").rename_axis(None).rename(columns=ends)
+    table["fitted"] = table["fitted"] == "yes"
+    columns = ["value", "std error", "low", "high"]
+    return table[[*columns, "unit", "fitted"]].astype(dict.fromkeys(columns, float))
 
 
 def save(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bushfit.cli.common import ALL_FORMS, Options, example, open_model, option_of, place_option, shared_options
+from bushfit.cli.grids import grid_options, parse_grids
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import ModelError, naming, typed
 
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
     from bushfit.jobs.compare import Compared
     from bushfit.model.result import Result
 
-#: Options of the grid, and the SI unit of each.
-_GRIDS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
 #: What --families means without names.
 _ALL = "all"
 #: Warnings that the terminal shows at most without -v.
@@ -47,10 +46,7 @@ _MOST_WARNINGS = 8
     help="axial, radial or torsion, or a specimen's name: where to compare, and which tests of campaigns to fit; may "
     "be given again [all where each was fitted].",
 )
-@click.option("--frequencies", help='Such as "5:155:10 Hz" [as far as all were measured].')
-@click.option("--amplitudes", help='Zero-to-peak, such as "0.1, 0.2, 0.5 mm" [as far as all were measured].')
-@click.option("--torsion-amplitudes", help='Zero-to-peak rotation, such as "0.5, 1, 2 deg".')
-@click.option("--strain-amplitudes", help='Zero-to-peak strain where a modulus is compared, such as "1, 2, 5 %".')
+@partial(grid_options, default="as far as all were measured")
 @partial(shared_options, forms=ALL_FORMS)
 def command(
     sources: tuple[Path, ...],
@@ -74,7 +70,6 @@ def command(
     from bushfit.campaign.campaign import load_campaign
     from bushfit.campaign.naming import folder_name
     from bushfit.campaign.schema import PredictSettings
-    from bushfit.cli.grids import parse_grid
     from bushfit.effects import effect_named
     from bushfit.jobs import about
     from bushfit.jobs.compare import MOST, Compare
@@ -83,7 +78,7 @@ def command(
         raise click.UsageError(f"2 to {MOST} results are compared; one campaign alone with '--families' after it.")
     if families is not None and len(sources) > 1:
         raise click.UsageError("'--families' is of one campaign.")
-    asked = {name: parse_grid(grids[name], option_of(name), unit) for name, unit in _GRIDS.items()}
+    asked = parse_grids(grids)
     words = about.asked(direction=directions, **{option_of(name)[2:]: [text] for name, text in grids.items() if text})
     words = (*map(str, sources), *about.asked(families=[families] if families is not None else []), *words)
     typed_words = ["bushfit", "compare", *(typed(Path(word)) for word in words)]

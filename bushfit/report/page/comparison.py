@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from markupsafe import Markup
 
 from bushfit.geometry import Bushing
 from bushfit.model.file import read_document
@@ -23,7 +24,7 @@ from bushfit.units import alike, number, split_header, told
 if TYPE_CHECKING:
     import pandas as pd
 
-    from bushfit.report.compare_document import ComparedEntry, Pair
+    from bushfit.report.compare_document import ComparedEntry
 
 #: Curves of a page, and points of all of them, of which each has a value and a band: with these it stays below 500 kB.
 _MOST_CURVES, _MOST_POINTS = 300, 7000
@@ -35,6 +36,8 @@ _FEWEST = 12
 _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 24
 #: Width of an interval, over its value, with whose digits ends of a span are told: three digits.
 _CARRIED = 0.1
+#: Conditions of tests that change a rubber.
+_CONDITIONS = ("Temperature", "Preload")
 
 
 def read_comparison(folder: Path) -> Contents:
@@ -52,63 +55,42 @@ def read_comparison(folder: Path) -> Contents:
 def account(found: SideBySide) -> dict[str, Any]:
     """All that the template of a comparison asks for."""
     document, names = found.document, found.names
-    (first, named), *others = names.items()
+    named, *others = names.values()
     families = bool(document["families"])
-    judged = len(others) if families else 0
     places = found.places[: min(MOST_PLACES, _MOST_CURVES // (_CURVES * len(names)))]
-    facts = [_entry(entry, names[entry["label"]]) for entry in document["compared"]]
-    bushing = document["compared"][0]["bushing"]
-    tested = bushing.name if bushing else document["compared"][0]["source"]
-    title = f"{others[0][1]} against {named}" if len(others) == 1 else f"{len(others)} results against {named}"
+    entries = [_entry(entry) for entry in document["compared"]]
+    body = document["compared"][0]["bushing"]
+    title = f"{others[0]} against {named}" if len(others) == 1 else f"{len(others)} results against {named}"
     return {
-        "title": f"Model families on {tested}" if families else title,
-        "kicker": "Comparison of model families" if families else "Comparison of rubber bushings and compounds",
-        "families": families,
-        "first": first,
-        "entries": facts,
-        "differ": [name for name in facts[0]["conditions"] if len({_of(fact, name) for fact in facts}) > 1],
+        "document": document,
+        "names": names,
+        "title": f"Model families on {body.name if body else document['compared'][0]['source']}" if families else title,
+        "entries": entries,
+        "differ": [name for name in _CONDITIONS if len({entry["conditions"].get(name) for entry in entries}) > 1],
         "sizes": [row for place in places for row in _sizes(found, place)],
         "family_heads": FAMILY_HEADS,
         "family_rows": [*found.family_cells()],
-        "judged": document["words"][:judged],
-        "words": document["words"][judged:][:MOST],
-        "more_words": max(0, len(document["words"]) - judged - MOST),
-        "pairs": [_pair(pair, names) for pair in document["pairs"]],
-        "places": _panels([found.sides(place) for place in places], names),
+        "judged": len(others) if families else 0,
+        "most": MOST,
+        "cells": parameter_cells,
+        "chance": chance,
+        "places": _panels([found.sides(place) for place in places], dict(zip(names, colors(len(names)), strict=True))),
         "left_places": len(found.places) - len(places),
         "tabled": _tabled(found, places),
-        "warnings": document["warnings"][:MOST],
-        "more_warnings": max(0, len(document["warnings"]) - MOST),
-        "command": document["command"],
-        "versions": document["versions"],
         "files": _files(document["compared"]),
     }
 
 
-def _of(fact: dict[str, Any], name: str) -> str:
-    return str(fact["conditions"].get(name, "not stated"))
-
-
-def _entry(entry: ComparedEntry, name: str) -> dict[str, Any]:
-    """What is compared, in a row: its body, its tests and their conditions, and how well its model meets them."""
+def _entry(entry: ComparedEntry) -> dict[str, Any]:
+    """What a result is of, in words: its body, its tests and their conditions."""
     bushing, measured = entry["bushing"], entry["measured"]
     tests = "given, not fitted"
     if measured:
         strain = told("%", *(100.0 * end for end in measured.strain))
         tests = f"{told('Hz', *measured.frequency)}, strain {strain}, {', '.join(measured.directions)}"
     stated = dict(conditions(source.conditions for source in entry["inputs"]))
-    return {
-        "label": entry["label"],
-        "name": name,
-        "body": tube(Bushing(*astuple(bushing))) if bushing else "rubber compound",
-        "tests": tests,
-        "conditions": stated,
-        "stated": ", ".join(f"{key.lower()} {value}" for key, value in stated.items() if value != "not stated"),
-        "effects": ", ".join(entry["effects"]),
-        "nrmse": "" if entry["nrmse"] is None else f"{number(100.0 * entry['nrmse'], 2)} %",
-        "chi": "" if entry["reduced_chi_square"] is None else number(entry["reduced_chi_square"], 3),
-        "source": entry["source"],
-    }
+    body = tube(Bushing(*astuple(bushing))) if bushing else "rubber compound"
+    return {"of": entry, "body": body, "tests": tests, "conditions": stated}
 
 
 def _sizes(found: SideBySide, place: str) -> Iterator[dict[str, Any]]:
@@ -125,26 +107,14 @@ def _sizes(found: SideBySide, place: str) -> Iterator[dict[str, Any]]:
         yield row
 
 
-def _pair(pair: Pair, names: dict[str, str]) -> dict[str, Any]:
-    """The parameters of one beside those of the first."""
-    return {
-        "heads": ["Parameter", pair["reference"], pair["other"], "Difference", "95 % interval", "p", "Unit"],
-        "caption": f"{pair['other']}: {names[pair['other']]}, against {pair['reference']}: {names[pair['reference']]}",
-        "rows": [parameter_cells(row) for row in pair["parameters"]],
-        "joint": pair["joint"] and (chance(pair["joint"]["p"]), pair["joint"]["parameters"]),
-    }
-
-
-def _panels(shown: Sequence[Sides], names: dict[str, str]) -> list[Drawn]:
+def _panels(shown: Sequence[Sides], looks: dict[str, str]) -> list[Drawn]:
     """Four pictures a place: stiffness and loss factor of all, and below how far they are off the first."""
-    looks = dict(zip(names, colors(len(names)), strict=True))
     curves = sum(len(panel.lines) for sides in shown for panel in sides.panels)
     most = max(_FEWEST, _MOST_POINTS // max(curves, 1))
-    first = next(iter(names))
-    return [Drawn(s.place, [_picture(s, panel, looks, first, most) for panel in s.panels], []) for s in shown]
+    return [Drawn(s.place, [_picture(s, panel, looks, most) for panel in s.panels], []) for s in shown]
 
 
-def _picture(sides: Sides, panel: Panel, looks: dict[str, str], first: str, most: int) -> Any:
+def _picture(sides: Sides, panel: Panel, looks: dict[str, str], most: int) -> Markup:
     what, unit = split_header(panel.header)
     unit = (unit or "").removesuffix("-")
     series, words = [], []
@@ -156,7 +126,7 @@ def _picture(sides: Sides, panel: Panel, looks: dict[str, str], first: str, most
         words.append(f"{name}: {span_of(line.value)} {unit}".strip())
     x = panel.lines[0].x
     log = bool(x.max() > LOG_FREQUENCIES * x.min() > 0.0)
-    rules = [Rule(0.0, f"{first}, the reference")] if panel.least else []
+    rules = [Rule(0.0, f"{next(iter(looks))}, the reference")] if panel.least else []
     alt = f"{what} over {split_header(sides.along)[0]}, {sides.place}; {'; '.join(words)}"
     labels = sides.along, f"{panel.header}"
     return chart(f"{sides.place}: {what}", labels, series, alt, log=log, rules=rules, least=panel.least)
