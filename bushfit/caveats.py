@@ -1,7 +1,5 @@
 """What a prediction cannot say: sentences on what was not fitted, what is extrapolated, and what a model leaves out."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from bushfit.effects import Level, effect_named

@@ -4,8 +4,6 @@ They are made on demand of the types by which these files are read and written, 
 that none can be out of date.
 """
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import re

@@ -42,10 +42,13 @@ if TYPE_CHECKING:
 
 #: The paper's loop: 1 mm at 0.1 Hz.
 PAPER_LOOPS = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=3),)
-#: The paper's sweeps: 5 to 155 Hz at 0.1, 0.2 and 0.5 mm, in two directions.
+#: Frequencies of the paper's sweeps and tables [Hz].
+PAPER_FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
+#: Amplitudes of the paper's sweeps and tables [m].
+PAPER_AMPLITUDES = (1e-4, 2e-4, 5e-4)
+#: The paper's sweeps, in two directions.
 PAPER_SWEEPS = tuple(
-    SimulatedSweep(direction, (1e-4, 2e-4, 5e-4), tuple(float(f) for f in range(5, 156, 10)))
-    for direction in (Direction.AXIAL, Direction.RADIAL)
+    SimulatedSweep(direction, PAPER_AMPLITUDES, PAPER_FREQUENCIES) for direction in (Direction.AXIAL, Direction.RADIAL)
 )
 #: Rows of a simulated loop in a cycle; chosen: its curve is smooth.
 _ROWS_PER_CYCLE = 1000

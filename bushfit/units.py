@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
 from collections.abc import Sequence
 from functools import lru_cache, partial
 from pathlib import Path
@@ -18,24 +19,10 @@ from bushfit.errors import UnitError
 if TYPE_CHECKING:
     import pint
 
+#: The words of units.toml, by table.
+_WORDS: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
 #: By expected SI unit: what it measures, and a unit that a user would write for it.
-_KINDS = {
-    "m": ("a length", "mm"),
-    "rad": ("an angle", "deg"),
-    "s": ("a time", "s"),
-    "Hz": ("a frequency", "Hz"),
-    "N": ("a force", "N"),
-    "N*m": ("a moment", "N m"),
-    "N/m": ("a stiffness", "N/mm"),
-    "N*m/rad": ("a torsional stiffness", "N m/deg"),
-    "m/s": ("a speed", "mm/min"),
-    "rad/s": ("an angular speed", "deg/min"),
-    "Pa": ("a stress", "MPa"),
-    "kg": ("a mass", "kg"),
-    "m/s^2": ("an acceleration", "m/s^2"),
-    "K": ("a temperature", "degC"),
-    "1": ("a ratio", "%"),
-}
+_KINDS: dict[str, tuple[str, str]] = {unit: tuple(words) for unit, words in _WORDS["kinds"].items()}
 #: By SI unit: the unit in which people write it, and the factor from SI to it; MPa*s^alpha is the paper's.
 _WRITTEN = {
     "m": ("mm", 1e3),
@@ -74,21 +61,11 @@ _FACTOR = r"(?:[^\W\d_]+|[%‰°1])(?:(?:\^|\*\*)-?[1-9]|⁻?[¹²³])?"
 _UNIT = re.compile(rf"{_FACTOR}(?:(?:\s*[*/·⋅]\s*|\s+){_FACTOR})*")
 #: Characters of a unit at most: longer texts are no units, and pint takes its time with them.
 _LONGEST_UNIT = 40
-#: Words of other languages and signs for units, in lower case.
-_SPELLINGS = {
-    word: unit
-    for unit, words in {
-        "s": "sek sekunde sekunden seconde secondes segundo segundos seg 秒",
-        "mm": "millimeter millimetre millimetres milimetro milimetros milímetros 毫米",
-        "µm": "mikrometer 微米",
-        "N": "newton 牛 牛顿",
-        "kN": "kilonewton kilonewtons 千牛",
-        "deg": "º ˚ grados grado degré degrés degre degres 度",
-        "Hz": "hz hertz 赫兹",
-        "%": "prozent pct percent",
-    }.items()
-    for word in words.split()
-}
+#: Of each way to spell a unit the unit: in lower case, with its capitals, and of an acceleration alone.
+_SPELLINGS, _EXACT, _OF_ACCELERATION = (
+    {word: unit for unit, words in _WORDS[table].items() for word in words.split()}
+    for table in ("spellings", "exact", "of_acceleration")
+)
 #: Everyday units, as pint has them: factor to SI, and SI base. A run that meets no other does not load pint, which
 #: takes longer than a fit.
 _EVERYDAY = {
@@ -110,28 +87,6 @@ _EVERYDAY = {
     }.items()
     for unit, scale in scales.items()
 }
-#: What an acceleration is written in that is another quantity elsewhere (a gram, square milliseconds), as pint has it.
-_OF_ACCELERATION = {"g": "gravity", "G": "gravity", "gn": "gravity", "ms2": "m/s^2", "ms-2": "m/s^2", "ms^-2": "m/s^2"}
-#: Units whose capitals matter, by the spelling of users: pint takes Grad for a billion radians.
-_EXACT = {
-    spelling: unit
-    for unit, spellings in {
-        "deg": "Grad GRAD DEG Deg",
-        "mm": "MM",
-        "kN": "KN",
-        "s": "SEC Sec",
-        "rpm": "RPM",
-        "inch": "Inch INCH",
-        "Pa": "pa PA",
-        "kPa": "kpa KPA KPa",
-        "MPa": "Mpa MPA mpa",
-        "GPa": "gpa GPA Gpa",
-        "lbf": "LBF Lbf",
-    }.items()
-    for spelling in spellings.split()
-}
-#: Units that mean one thing to some users and another to others, and what says it clearly.
-_UNCLEAR = {"grad": '"deg" or "gon"', "mil": '"thou" (0.001 inch) or "mrad"', "mils": '"thou" (0.001 inch) or "mrad"'}
 #: The letters of one unit.
 _WORD = re.compile(r"[^\W\d_]+|[º˚]")
 #: Between a unit and a power without its sign: mm2.
@@ -313,8 +268,8 @@ def _by_pint(text: str) -> tuple[float, str]:
     if len(text) > _LONGEST_UNIT or not _UNIT.fullmatch(text):
         raise unknown
     for word in _WORD.findall(text):
-        if word in _UNCLEAR:
-            raise UnitError("a unit that can be read in two ways", found=f'"{text}"', expected=_UNCLEAR[word])
+        if word in _WORDS["unclear"]:
+            raise UnitError("a unit that can be read in two ways", found=f'"{text}"', expected=_WORDS["unclear"][word])
     registry = _registry()
     try:
         unit = registry.parse_units(text.replace("⋅", "*"))

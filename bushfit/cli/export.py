@@ -1,7 +1,5 @@
 """`bushfit export`: model -> files of solvers, multibody codes and spreadsheets."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Literal
 

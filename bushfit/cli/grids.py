@@ -1,7 +1,5 @@
 """Grids on the command line: "5:155:10 Hz" or "0.1, 0.2, 0.5 mm"."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar

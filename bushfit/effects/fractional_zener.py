@@ -1,12 +1,9 @@
 """Fractional Zener: a spring in series with the springpot, which levels off at high frequency."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Values, linear_stress
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, History, Values, linear_stress
 from bushfit.effects.springpot import power_of_rate
 
 #: Frequency at which c compares springpot and spring [Hz]: within the range of most sweeps.
@@ -55,19 +52,3 @@ def stress(p: Values, history: History) -> Array:
     row_by_row = np.vectorize(_from_rest, signature="(),(),(n),()->(n)")
     alpha, scaled, step = (np.atleast_1d(value)[..., 0] for value in (p["alpha"], _scaled(p), history.step))
     return p["m"] * row_by_row(alpha, scaled, history.value, step)
-
-
-EFFECT = Branch(
-    name="fractional_zener",
-    sentence="A spring in series with the springpot: at high frequency stiffness levels off and the loss falls again.",
-    equation="-m/2 w z/(1 + z), w = (i omega)^alpha, z = c (i f/25 Hz)^alpha",
-    level=Level.MATERIAL,
-    parameters=(Parameter("c", "1", (0.0, 10.0), 0.0, 0.1, meaning="springpot over the spring in series, at 25 Hz"),),
-    source="M. Caputo, F. Mainardi, Riv. Nuovo Cimento 1 (1971) 161; R. L. Bagley, P. J. Torvik, AIAA J. 21 (1983) 741",
-    confirmed_by="sweep to twice the highest frequency: the loss factor must fall there",
-    variant_of="springpot",
-    uses=("m", "alpha"),
-    size="m",
-    modulus=modulus,
-    stress=stress,
-)

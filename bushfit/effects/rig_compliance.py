@@ -1,11 +1,9 @@
 """Rig compliance: the rig gives way in series with the bushing, which is moved less than the rig imposes."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
+from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Value, Values
 from bushfit.effects.history import History
 from bushfit.errors import ModelError
 
@@ -24,6 +22,8 @@ _MANY_ROUNDS = 16
 _LARGEST_MOTION = 2.0
 #: The name of its solutions.
 _NAME = "compliance"
+#: The name of the solutions of what gives way beneath it, as a sleeve in a rig.
+_BENEATH = "beneath"
 #: Sample at which the pulse stands that measures a stiffness: a few after the start, for the force before it.
 _PULSE_AT = 4
 
@@ -63,6 +63,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         Solved for the whole history at once. Each round computes what is missing of the motion, x - x_b - c F(x_b), and
         adds it to x_b times 1/(1 + c K), harmonic by harmonic. K is measured once with a pulse: a poor K costs rounds,
         not accuracy. So K and x_b of the last model that was asked about this motion are where the next one starts.
+        What gives way beneath starts each round from its solution of the round before.
         Where a round does not bring x_b nearer, the next steps are halved. Dry friction below turns its sense with the
         imposed motion: that it sticks for a moment is neglected.
     """
@@ -72,25 +73,29 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     imposed, solved, history = history.value, history.solved, history.driven()
     count = imposed.shape[-1]
     length = count if history.periodic else next_fast_len(2 * count, real=True)
-    if _NAME not in solved:
-        solved[_NAME] = _pulse_stiffness(below, history, length), imposed
-    rigid, reached = solved.pop(_NAME)
+    beneath = solved.setdefault(_BENEATH, {})
+    rigid, reached = solved.pop(_NAME, (None, imposed))
+    if rigid is None or reached.shape not in (imposed.shape[-1:], imposed.shape):
+        rigid, reached = _pulse_stiffness(below, history, length), imposed
     yielding = 1.0 / (1.0 + compliance * rigid)
     size = np.max(np.abs(imposed), axis=-1, keepdims=True)
-    felt = below(history.with_value(reached))
+    felt = below(history.with_value(reached, beneath))
     last, pace = np.inf * size, np.ones_like(size)
     for number in range(ROUNDS):
         missing = imposed - reached - compliance * felt
         off = np.max(np.abs(missing), axis=-1, keepdims=True)
         turned = yielding * np.fft.rfft(missing, n=length)
         if np.all(off <= _LAST * size):
-            if imposed.ndim == 1 and number < _MANY_ROUNDS:
-                solved[_NAME] = tuple(each.reshape(-1, each.shape[-1])[-1] for each in (rigid, reached))
+            if number < _MANY_ROUNDS:
+                many = imposed.ndim > 1  # else of many models on one motion the last is kept
+                solved[_NAME] = tuple(
+                    each if many else each.reshape(-1, each.shape[-1])[-1] for each in (rigid, reached)
+                )
             return felt + np.fft.irfft(rigid * turned, n=length)[..., :count]
         pace, last = np.where(off < last, pace, 0.5 * pace), off
         change = np.fft.irfft(turned, n=length)[..., :count]
         reached = np.clip(reached + pace * change, -_LARGEST_MOTION * size, _LARGEST_MOTION * size)
-        felt = below(history.with_value(reached))
+        felt = below(history.with_value(reached, beneath))
     if not history.periodic and np.any(off > _UNSETTLED * size):
         raise ModelError(
             "the rig gives way too much to be followed through time",
@@ -112,18 +117,3 @@ def _pulse_stiffness(below: ForceBelow, history: History, length: int) -> Array:
     answer = below(history.with_value(pulse).driven())
     measured = np.fft.rfft(answer - answer[..., :1], n=length) / np.fft.rfft(pulse, n=length)
     return np.maximum(measured.real, 0.0) + 1j * measured.imag
-
-
-EFFECT = Layer(
-    name="rig_compliance",
-    sentence="The rig gives way in series: the stiffer the bushing, the softer it seems, most so radially.",
-    equation="1/K' = 1/K + compliance, K at the amplitude that reaches the bushing",
-    level=Level.INSTRUMENT,
-    parameters=(Parameter("compliance", "m/N", (0.0, 1e-5), 0.0, 2e-8, meaning="give of the rig per force"),),
-    source="springs in series; ISO 10846-2:2008",
-    confirmed_by="put a steel dummy in place of the bushing: what still gives way is the rig",
-    harmonic_error=2e-3,
-    turns=False,
-    stiffness=stiffness,
-    force=force,
-)

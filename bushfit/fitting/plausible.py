@@ -47,7 +47,7 @@ def apart_in_temperature(model: Model, data_sets: Sequence[DataSet]) -> list[str
         return []
     (low, coldest), (high, warmest) = known[0], known[-1]
     tested = f"{warmest} was tested at {number(high, 3)} degC and {coldest} at {number(low, 3)} degC"
-    if temperature.EFFECT.name in model.effects:
+    if "temperature" in model.effects:
         reference = temperature.REFERENCE - CELSIUS
         beyond = max(high - reference, reference - low) > temperature.REACH
         law = f"the effect of temperature holds within {temperature.REACH:g} K of {number(reference, 3)} degC"

@@ -4,8 +4,6 @@ The tube is bonded to rigid sleeves, its ends are free. `tests/reference/finite_
 coefficients below: of polynomials of Chebyshev's in the two `coordinates` of a shape.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from bushfit import __version__
-from bushfit.effects.stiffness_factor import EFFECT as FACTOR
+from bushfit.effects import LIBRARY
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError, naming
 from bushfit.geometry import Bushing, Specimen
@@ -29,6 +29,8 @@ from bushfit.validation import check_tables
 
 #: The effect that older files have in place of a factor of its own for the radial direction, and its parameter.
 _RADIAL_FACTOR = ("radial_factor", "radial_factor.excess")
+#: That effect as it is called today.
+FACTOR = LIBRARY["stiffness_factor.radial"]
 #: Size of a model file at most [bytes]: a hundred times what a model with every effect of the library takes.
 _LARGEST_BYTES = 10_000_000
 #: Packages that the numbers rest on; a model file records their versions.

@@ -272,10 +272,10 @@ class Model:
 
     def layers(self, setting: Setting) -> tuple[Layer, ...]:
         """The layers that act on a test: a coupon whose modulus is measured has no rig and no sleeves around it."""
-        layers, turning = self._structure.layers, setting.direction.is_rotation
-        if setting.direction.motion is STRAINING:
-            return tuple(layer for layer in layers if layer.corrects)
-        return tuple(layer for layer in layers if layer.turns or not turning)
+        place, layers = setting.direction, self._structure.layers
+        if place.motion is STRAINING:
+            layers = tuple(layer for layer in layers if layer.corrects)
+        return tuple(each for each in layers if each.acts_at(place) and (each.turns or not place.is_rotation))
 
     def values_at(self, place: Place, frequency: float, amplitude: float) -> dict[str, float]:
         """All values as the modifiers leave them at an operating condition [Hz, m or rad]."""
@@ -344,7 +344,8 @@ class Model:
         stiffness = partial(self._branch_stiffness, setting, values, omega, strain)
         condition, base = Condition(setting, omega, amplitude, strain, stiffness), values
         for modifier in self._structure.modifiers:
-            base = {**base, **modifier.adjust(seen_by(modifier, values, base), condition)}
+            if modifier.acts_at(setting.direction):
+                base = {**base, **modifier.adjust(seen_by(modifier, values, base), condition)}
         return base
 
 

@@ -1,7 +1,5 @@
 """What raw histories are reduced to: operating points, stretches that make none, and what is to be said of both."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """What compare writes as JSON, key by key. Its JSON Schema is made of these types; the type checker holds to them."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from typing_extensions import TypedDict

@@ -1,7 +1,5 @@
 """Several results over one grid: stiffness and loss factor with bands, and below how far each is off the first."""
 
-from __future__ import annotations
-
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
