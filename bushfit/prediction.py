@@ -28,6 +28,8 @@ from bushfit.reading.runs import nominal
 from bushfit.reduction.resonance import response
 from bushfit.units import number
 
+#: Relative difference of two stiffnesses that is none.
+_SAME = 1e-6
 #: Strain at which the resonance of a mass is looked for first; chosen: small for any rubber.
 _SMALL_STRAIN = 1e-4
 #: Lowest and highest frequency about a resonance over that of small strain.
@@ -208,8 +210,9 @@ def _left_out(result: Result, found: Prediction) -> Iterator[str]:
         for name in result.unresolved:
             twins = " or ".join(effect_named(name).twins)
             yield f"{name} is taken as the bushing's, but these tests cannot tell it from {twins}"
-        off = percent_off(found.if_rigs.stiffness.value / stiffness)
-        yield f"{place}: stiffness {off} if {' and '.join(result.unresolved)} is the rig's; low and high span both"
+        ratio, if_so = found.if_rigs.stiffness.value / stiffness, f"if {' and '.join(result.unresolved)} is the rig's"
+        off = f"{percent_off(ratio)} {if_so}; low and high span both"
+        yield f"{place}: stiffness {f'the same {if_so}' if np.allclose(ratio, 1.0, atol=_SAME) else off}"
 
 
 def percent_off(ratio: Array) -> str:

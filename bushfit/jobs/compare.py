@@ -28,7 +28,7 @@ from bushfit.model.file import model_document, versions
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Source
 from bushfit.report.artifacts import comparison_contents
-from bushfit.report.compare_document import ComparedEntry, ComparisonFile, Family, Pair
+from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparisonFile, Family, Pair
 from bushfit.report.contents import Contents, Kinds
 from bushfit.report.tables import contrast_table
 from bushfit.validation import plain
@@ -129,7 +129,7 @@ class Compared:
         words = ["", *(family.words for family in self.families[1:])]
         families = [_family(*each) for each in zip(self.labels, self.families, words, strict=False)]
         return {
-            "schema": "bushfit/compare/1",
+            "schema": SCHEMA,
             "compared": compared,
             "pairs": pairs,
             "families": families or None,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import json
-from collections.abc import Set
+from collections.abc import Mapping, Set
 from dataclasses import asdict, astuple
 from functools import cache
 from pathlib import Path
@@ -78,18 +78,28 @@ def from_document(document: object, file: Path | None = None) -> Result:
         raise ModelError(
             "not a model", file=file, found=_KINDS.get(type(document), "null"), expected="a JSON object { ... }"
         )
-    if document.get("schema") not in SCHEMAS:
-        raise ModelError(
-            "not a model this version reads",
-            file=file,
-            place="schema",
-            found=repr(document.get("schema")),
-            expected=" or ".join(SCHEMAS),
-            hint="use a file written by bushfit fit-static, fit-dynamic, fit or diagnose",
-        )
+    hint = "use a file written by bushfit fit-static, fit-dynamic, fit or diagnose"
+    require_schema(document, file, "a model", *SCHEMAS, hint=hint)
     tables = check_tables(_renamed(document), file, ModelFile, kind=ModelError)
     with naming(file):
         return _result(tables)
+
+
+def require_schema(document: Mapping[str, Any], file: Path | None, what: str, *schemas: str, hint: str) -> None:
+    """Refuse a document of another schema.
+
+    Raises:
+        ModelError: it names none of these.
+    """
+    if document.get("schema") not in schemas:
+        raise ModelError(
+            f"not {what} this version reads",
+            file=file,
+            place="schema",
+            found=repr(document.get("schema")),
+            expected=" or ".join(schemas),
+            hint=hint,
+        )
 
 
 def _result(tables: ModelFile) -> Result:

@@ -13,6 +13,7 @@ from bushfit.validation import Number
 
 #: What "schema" of the document says.
 SchemaName = Literal["bushfit/compare/1"]
+SCHEMA: SchemaName = "bushfit/compare/1"
 
 
 class ComparedEntry(TypedDict):

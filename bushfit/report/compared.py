@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from bushfit.errors import ModelError
-from bushfit.report.compare_document import ComparisonFile, Pair
+from bushfit.model.file import require_schema
+from bushfit.report.compare_document import SCHEMA, ComparisonFile, Pair
 from bushfit.report.tables import numbers, required
 from bushfit.units import for_people, number, split_header, told
 from bushfit.validation import check_tables
@@ -87,6 +88,7 @@ class SideBySide:
         Raises:
             ModelError: another schema, or a key that is missing or of the wrong kind.
         """
+        require_schema(document, file, "a comparison", SCHEMA, hint="bushfit compare writes it anew")
         checked = check_tables(document, file, ComparisonFile, kind=ModelError)
         first, *others = [entry["label"] for entry in checked["compared"]] or [""]
         pairs, families = checked["pairs"], checked["families"]

@@ -31,7 +31,7 @@ def comparison_figure(found: SideBySide) -> Figure:
         for axes, panel in zip(grid[2 * i : 2 * i + 2].flat, sides.panels, strict=True):
             for line in panel.lines:
                 _draw(axes, looks[line.label], line)
-            style.dress(axes, sides.along, f"{sides.place} {panel.header}")
+            style.dress(axes, sides.along, panel.header if panel.least else f"{sides.place} {panel.header}")
             style.readable(axes, panel.lines[0].x)
             if panel.least:
                 axes.axhline(0.0, color=looks[first].color, lw=_LINE)
