@@ -58,12 +58,14 @@ def account(found: SideBySide) -> dict[str, Any]:
     named, *others = names.values()
     families = bool(document["families"])
     places = found.places[: min(MOST_PLACES, _MOST_CURVES // (_CURVES * len(names)))]
+    shown = [found.sides(place) for place in places]
     entries = [_entry(entry) for entry in document["compared"]]
     body = document["compared"][0]["bushing"]
     title = f"{others[0]} against {named}" if len(others) == 1 else f"{len(others)} results against {named}"
     return {
         "document": document,
         "names": names,
+        "resisted": "modulus" if all(sides.panels[0].header.startswith("modulus") for sides in shown) else "stiffness",
         "title": f"Model families on {body.name if body else document['compared'][0]['source']}" if families else title,
         "entries": entries,
         "differ": [name for name in _CONDITIONS if len({entry["conditions"].get(name) for entry in entries}) > 1],
@@ -74,7 +76,7 @@ def account(found: SideBySide) -> dict[str, Any]:
         "most": MOST,
         "cells": parameter_cells,
         "chance": chance,
-        "places": _panels([found.sides(place) for place in places], dict(zip(names, colors(len(names)), strict=True))),
+        "places": _panels(shown, dict(zip(names, colors(len(names)), strict=True))),
         "left_places": len(found.places) - len(places),
         "tabled": _tabled(found, places),
         "files": _files(document["compared"]),
@@ -173,4 +175,6 @@ def _files(compared: Sequence[ComparedEntry]) -> list[tuple[str, str]]:
         named = [(entry["source"], entry["sha256"] or ""), *((str(s.file), s.sha256) for s in entry["inputs"])]
         for each in named:
             found.setdefault(each, []).append(entry["label"])
-    return [(f"{', '.join(labels)}: {file}", sha256) for (file, sha256), labels in found.items() if sha256]
+    return [
+        (f"{', '.join(dict.fromkeys(labels))}: {file}", sha256) for (file, sha256), labels in found.items() if sha256
+    ]
