@@ -38,6 +38,8 @@ _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 24
 _CARRIED = 0.1
 #: Conditions of tests that change a rubber.
 _CONDITIONS = ("Temperature", "Preload")
+#: What is said of a difference of two models without uncertainty.
+_NONE = "of unknown error"
 
 
 def read_comparison(folder: Path) -> Contents:
@@ -99,13 +101,18 @@ def _sizes(found: SideBySide, place: str) -> Iterator[dict[str, Any]]:
     """How far each is off the first at a place: least and largest difference, and at how many points it is sure."""
     for label, table in found.at(place).items():
         heads = Heads.of(table)
-        row: dict[str, Any] = {"label": label, "place": place, "points": len(table)}
+        row: dict[str, Any] = {"label": label, "place": place}
         for key, header, scale, unit in (("stiffness", heads.relative, 100.0, " %"), ("loss", heads.loss, 1.0, "")):
             (values,) = scale * numbers(table, header)
             known = np.sort(values[np.isfinite(values)])[[0, -1]].tolist() if np.isfinite(values).any() else []
             ends = dict.fromkeys(signed(end, _CARRIED * max(map(abs, known))) for end in known)
             row[key] = " to ".join(ends) + unit
-            row[f"{key}_sure"] = int((table[f"{header}, sure"] == "yes").sum())
+            sure = int((table[f"{header}, sure"] == "yes").sum())
+            count = "all" if sure == len(table) else f"{sure} of"
+            said = f"sure at {count} {len(table)} points" if sure else "not shown"
+            row[f"{key}_sure"] = (
+                said if np.ptp(numbers(table, f"{header}, low", f"{header}, high"), axis=0).any() else _NONE
+            )
         yield row
 
 
@@ -124,7 +131,8 @@ def _picture(sides: Sides, panel: Panel, looks: dict[str, str], most: int) -> Ma
         at = thin(line.x.size, most)
         name = f"{line.label}, {sides.levels[line.level]}"
         x, value, low, high = (each[at] for each in (line.x, line.value, line.low, line.high))
-        series.append(Series(name, looks[line.label], DASHES[line.level], (x, value), (x, low, high)))
+        alone = (x, value) if x.size == 1 else None
+        series.append(Series(name, looks[line.label], DASHES[line.level], (x, value), (x, low, high), alone))
         words.append(f"{name}: {span_of(line.value)} {unit}".strip())
     x = panel.lines[0].x
     log = bool(x.max() > LOG_FREQUENCIES * x.min() > 0.0)
