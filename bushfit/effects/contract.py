@@ -267,11 +267,13 @@ class Layer(Effect):
 
     Args:
         turns: whether it acts in torsion too; else only on motion along a line.
+        adds: the parameter whose sum stands for neighbours of the same law, such as compliances in series.
         stiffness: (values, response below, omega [rad/s], amplitude [m or rad], setting) -> complex stiffness above.
         force: (values, force below, displacement history, setting) -> force above [N or N m].
     """
 
     turns: bool = True
+    adds: str | None = None
     stiffness: Callable[[Values, StiffnessBelow, Array, Array, Setting], Array]
     force: Callable[[Values, ForceBelow, History, Setting], Array]
 
