@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bushfit.api import (
+        compare,
         diagnose,
         fit,
         fit_dynamic,
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 __all__ = [
+    "compare",
     "diagnose",
     "fit",
     "fit_dynamic",

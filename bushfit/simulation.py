@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.naming import folder_name
@@ -26,6 +27,7 @@ from bushfit.effects.contract import UNKNOWN, Array, Circumstances
 from bushfit.errors import CampaignError, naming, typed
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.model import rig
+from bushfit.model.document import ModelFile
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
 from bushfit.reading.measurement import Loop, Source, Sweep
@@ -56,6 +58,18 @@ _STEPS_PER_ROW = 2
 _MOST_STEPS = 10_000_000
 #: Cycles before a loop is recorded, so that it has settled; none where an effect's settling is what there is to see.
 _RUN_IN_CYCLES = 40
+
+
+class SimulationDocument(TypedDict):
+    """A simulated campaign.
+
+    Args:
+        truth: the model behind it, as in truth.json.
+        files: that were written, by name.
+    """
+
+    truth: ModelFile
+    files: list[str]
 
 
 @dataclass(frozen=True, eq=False)

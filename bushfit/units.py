@@ -41,6 +41,8 @@ _TEMPERATURES = {
 }
 #: Times below this many seconds are written in milliseconds.
 _LEAST_IN_SECONDS = 0.1
+#: Lengths below this many millimeters are written in micrometers.
+_LEAST_IN_MILLIMETERS = 1e-3
 #: Stresses take a prefix from this many of the larger unit on: 0.2 MPa, not 200 kPa.
 _LEAST_STRESS = 0.1
 #: Forces take a prefix from this many of the larger unit on: 9000 N, but 12 kN.
@@ -157,6 +159,8 @@ def for_people(unit: str, factor: float, size: float) -> tuple[str, float]:
     """Unit and factor from SI in which people read numbers of that size in SI: MPa for 1.09e6 Pa, kPa for 1.46e4 Pa."""
     unit, factor = _WRITTEN.get(unit, (unit, factor))
     number = abs(size) * factor
+    if unit == "mm" and 0.0 < number < _LEAST_IN_MILLIMETERS:
+        return "um", 1e3 * factor
     if unit == "s":
         return ("ms", 1e3) if number < _LEAST_IN_SECONDS else (unit, factor)
     least = _LEAST_STRESS if unit.startswith("Pa") else _LEAST_FORCE
@@ -204,10 +208,10 @@ def alike(values: Sequence[float], digits: int, least: int = 0) -> list[str]:
     return [text(value) for value in values]
 
 
-def modulus(value: float, digits: int) -> str:
-    """A modulus [Pa] with at most so many digits, as people read it: 1.09 MPa."""
-    unit, factor = for_people("Pa", 1.0, value)
-    return f"{number(value * factor, digits)} {unit}"
+def told(unit: str, *values: float, digits: int = 3) -> str:
+    """Positive numbers of one unit as people read them, each once: 1.09 MPa, 5 to 155 Hz, 0.0221 um."""
+    unit, factor = for_people(unit, 1.0, math.sqrt(abs(min(values) * max(values))))
+    return f"{' to '.join(dict.fromkeys(number(value * factor, digits) for value in values))} {unit}"
 
 
 def describe(expected: str) -> str:

@@ -18,7 +18,7 @@ from bushfit.units import quantity
 
 if TYPE_CHECKING:
     from bushfit.geometry import Bushing
-    from bushfit.inspection.record import Inspected
+    from bushfit.inspection.record import Inspected, InspectionDocument
 #: Sides of the rubber whose radius or diameter is asked for.
 _SIDES = ("inner", "outer")
 
@@ -72,7 +72,8 @@ def command(
     tell_left_out(options, left_out)
     options.write(folder, {target: text.encode()})
     options.say(f"next: bushfit run {typed(folder / target)}")
-    options.tell({"campaign": text, "files": [one.to_document() for one in seen], "left_out": left_out})
+    found: InspectionDocument = {"campaign": text, "files": [one.to_document() for one in seen], "left_out": left_out}
+    options.tell(found)
 
 
 def _radius(side: str, sizes: Mapping[str, str | None]) -> str:

@@ -18,7 +18,7 @@ from bushfit.errors import BushfitError
 from bushfit.report.contents import Contents, Kinds
 
 if TYPE_CHECKING:
-    from bushfit.inspection.record import Inspected
+    from bushfit.inspection.record import Inspected, InspectionDocument
 
 #: Kinds of test file, in words.
 _KINDS = {"loop": "a hysteresis loop", "sweep": "a sweep", "history": "a raw stepped-sine history"}
@@ -82,7 +82,12 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
         groups = (seen[start : start + _FILES_A_PICTURE] for start in range(0, len(seen), _FILES_A_PICTURE))
         figures = {page: partial(inspection_figure, group) for page, group in zip(pages, groups, strict=True)}
         options.write(folder, options.formats.files(Contents(pictures=figures)))
-    options.tell({"files": [one.to_document() for one in seen], "left_out": list(left_out), "campaign": text})
+    found: InspectionDocument = {
+        "files": [one.to_document() for one in seen],
+        "left_out": list(left_out),
+        "campaign": text,
+    }
+    options.tell(found)
 
 
 def tell(options: Options, seen: Inspected) -> None:

@@ -1,5 +1,7 @@
 """Rig compliance: the rig gives way in series with the bushing, which is moved less than the rig imposes."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.fft import next_fast_len
 
@@ -20,6 +22,10 @@ _UNSETTLED = 1e-3
 _MANY_ROUNDS = 16
 #: Largest motion of the bushing that an iteration may try, relative to the imposed motion.
 _LARGEST_MOTION = 2.0
+#: Rounds before the last two from which the next is foreseen; chosen: three take a third of the rounds, more no less.
+_REMEMBERED = 3
+#: Share of the largest eigenvalue below which two of them teach the same: what rounding leaves.
+_SAME_DIRECTION = 1e-12
 #: The name of its solutions.
 _NAME = "compliance"
 #: The name of the solutions of what gives way beneath it, as a sleeve in a rig.
@@ -64,8 +70,9 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         adds it to x_b times 1/(1 + c K), harmonic by harmonic. K is measured once with a pulse: a poor K costs rounds,
         not accuracy. So K and x_b of the last model that was asked about this motion are where the next one starts.
         What gives way beneath starts each round from its solution of the round before.
-        Where a round does not bring x_b nearer, the next steps are halved. Dry friction below turns its sense with the
-        imposed motion: that it sticks for a moment is neglected.
+        Friction below that turns sharply would make it many rounds: so those before tell the next. Where a round does
+        not bring x_b nearer, the next steps are halved. Dry friction below turns its sense with the imposed motion:
+        that it sticks for a moment is neglected.
     """
     compliance = p["compliance"]
     if not np.any(compliance):
@@ -80,7 +87,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     yielding = 1.0 / (1.0 + compliance * rigid)
     size = np.max(np.abs(imposed), axis=-1, keepdims=True)
     felt = below(history.with_value(reached, beneath))
-    last, pace = np.inf * size, np.ones_like(size)
+    last, pace, past = np.inf * size, np.ones_like(size), list[Sequence[Array]]()
     for number in range(ROUNDS):
         missing = imposed - reached - compliance * felt
         off = np.max(np.abs(missing), axis=-1, keepdims=True)
@@ -94,7 +101,9 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
             return felt + np.fft.irfft(rigid * turned, n=length)[..., :count]
         pace, last = np.where(off < last, pace, 0.5 * pace), off
         change = np.fft.irfft(turned, n=length)[..., :count]
-        reached = np.clip(reached + pace * change, -_LARGEST_MOTION * size, _LARGEST_MOTION * size)
+        past = [*past[-_REMEMBERED:], np.broadcast_arrays(reached, change)]
+        reached = reached + pace * (change - _foreseen(past))
+        reached = np.clip(reached, -_LARGEST_MOTION * size, _LARGEST_MOTION * size)
         felt = below(history.with_value(reached, beneath))
     if not history.periodic and np.any(off > _UNSETTLED * size):
         raise ModelError(
@@ -104,6 +113,16 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
             expected="a rig several times stiffer than the bushing",
         )
     return felt
+
+
+def _foreseen(past: Sequence[Sequence[Array]]) -> Array:
+    """What the last rounds, motions and changes (..., n), teach of the next change (D. G. Anderson, J. ACM 12 (1965)
+    547): the combination of their differences that takes most off it."""
+    motions, changes = (np.stack(each, axis=-2) for each in zip(*past, strict=True))
+    moved, changed = np.diff(motions, axis=-2), np.diff(changes, axis=-2)
+    normal = changed @ np.swapaxes(changed, -1, -2)
+    weights = np.linalg.pinv(normal, rcond=_SAME_DIRECTION, hermitian=True) @ (changed @ changes[..., -1, :, None])
+    return np.squeeze(np.swapaxes(weights, -1, -2) @ (moved + changed), axis=-2)
 
 
 def _pulse_stiffness(below: ForceBelow, history: History, length: int) -> Array:

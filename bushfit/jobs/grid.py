@@ -6,10 +6,10 @@ from typing import Any, Literal
 
 import numpy as np
 
+from bushfit.caveats import MARGIN
 from bushfit.effects.contract import Array
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Place, Specimen
 from bushfit.model.result import Result
-from bushfit.prediction import MARGIN
 from bushfit.reading.measurement import Sweep
 from bushfit.reading.runs import nominal
 from bushfit.simulation import PAPER_AMPLITUDES as PAPER_AMPLITUDES

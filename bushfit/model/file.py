@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import json
-from collections.abc import Set
+from collections.abc import Mapping, Set
 from dataclasses import asdict, astuple
 from functools import cache
 from pathlib import Path
@@ -78,18 +78,28 @@ def from_document(document: object, file: Path | None = None) -> Result:
         raise ModelError(
             "not a model", file=file, found=_KINDS.get(type(document), "null"), expected="a JSON object { ... }"
         )
-    if document.get("schema") not in SCHEMAS:
-        raise ModelError(
-            "not a model this version reads",
-            file=file,
-            place="schema",
-            found=repr(document.get("schema")),
-            expected=" or ".join(SCHEMAS),
-            hint="use a file written by bushfit fit-static, fit-dynamic, fit or diagnose",
-        )
+    hint = "use a file written by bushfit fit-static, fit-dynamic, fit or diagnose"
+    require_schema(document, file, "a model", *SCHEMAS, hint=hint)
     tables = check_tables(_renamed(document), file, ModelFile, kind=ModelError)
     with naming(file):
         return _result(tables)
+
+
+def require_schema(document: Mapping[str, Any], file: Path | None, what: str, *schemas: str, hint: str) -> None:
+    """Refuse a document of another schema.
+
+    Raises:
+        ModelError: it names none of these.
+    """
+    if document.get("schema") not in schemas:
+        raise ModelError(
+            f"not {what} this version reads",
+            file=file,
+            place="schema",
+            found=repr(document.get("schema")),
+            expected=" or ".join(schemas),
+            hint=hint,
+        )
 
 
 def _result(tables: ModelFile) -> Result:
@@ -155,7 +165,7 @@ def to_document(result: Result) -> dict[str, Any]:
                 | ({"conditions": dict(source.conditions)} if source.conditions else {})
                 for source in result.inputs
             ],
-            "packages": dict(_versions()),
+            "packages": dict(versions()),
         },
     }
 
@@ -228,8 +238,8 @@ def _fit(result: Result, quality: Quality, measured: Range) -> dict[str, Any]:
 
 
 @cache
-def _versions() -> dict[str, str]:
-    """Versions of the packages; reading them takes as long as a tenth of a fit."""
+def versions() -> dict[str, str]:
+    """Versions of the packages that the numbers rest on; reading them takes as long as a tenth of a fit."""
     return {name: importlib.metadata.version(name) for name in _PACKAGES}
 
 
