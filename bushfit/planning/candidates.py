@@ -73,6 +73,7 @@ def candidates(known: Knowledge, wanted: Wanted) -> list[Test]:
         ModelError: there is none within the limits of the rig.
     """
     found = [test for test in standard_tests(known, wanted) if test.direction in wanted.places]
+    found += [replace(test, cycles=_LOOP_CYCLES[-1]) for test in found if isinstance(test, SimulatedLoop)]
     for place in wanted.places:
         wished = [points for points in wanted.points if points.place == place]
         usual = [test for test in _of_paper(known, wanted.rig, place) if isinstance(test, SimulatedSweep)]
