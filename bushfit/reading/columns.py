@@ -141,8 +141,15 @@ class Columns:
         values = self._by_library(wanted) or self._row_by_row(wanted)
         found = len(next(iter(values.values())))
         if found < fewest_rows:
-            raise self.error("too few rows", found=f"{found}", expected=f"at least {fewest_rows}")
+            raise self._empty("too few rows", found=f"{found}", expected=f"at least {fewest_rows}")
         return values
+
+    def _empty(self, problem: str, **said: Any) -> MeasurementError:
+        """The error for what should be filled, which may be formulas."""
+        if self.source.lacks_values():
+            problem = "the workbook has formulas whose values were not saved"
+            said["hint"] = "open it in a spreadsheet program and save it again"
+        return self.error(problem, **said)
 
     def check_positive(self, roles: Sequence[str], wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> None:
         """Refuse a value that is not positive in one of some columns, as far as there are such among `values`.
@@ -225,7 +232,7 @@ class Columns:
                 if None in numbers:
                     line, cells = chunk[numbers.index(None)]
                     cell = cells[column.index]
-                    raise self.error(
+                    raise (self._empty if cell == "" else self.error)(
                         "the cell is empty" if cell == "" else "this is no finite number",
                         line=line,
                         column=column,
