@@ -87,5 +87,4 @@ def command(
         for loss in exported.losses:
             options.say(f"{name} leaves out: {loss}")
     warn(options, outcome.predicted.warnings)
-    options.write(folder, outcome.files)
-    options.tell(outcome.document)
+    options.write(folder, outcome.files, outcome.document)

@@ -70,9 +70,9 @@ def command(
     for one in seen:
         _tell(options, one)
     tell_left_out(options, left_out)
-    options.write(folder, {target: text.encode()})
+    document = {"campaign": text, "files": [one.to_document() for one in seen], "left_out": left_out}
+    options.write(folder, {target: text.encode()}, document)
     options.say(f"next: bushfit run {typed(folder / target)}")
-    options.tell({"campaign": text, "files": [one.to_document() for one in seen], "left_out": left_out})
 
 
 def _radius(side: str, sizes: Mapping[str, str | None]) -> str:

@@ -40,7 +40,7 @@ def bound(memory: int, seconds: int) -> None:
 
 
 def answer(data: bytes, order: dict[str, Any]) -> dict[str, Any]:
-    """What is asked of a workbook: the `names` of all sheets, those `shown` (all if none is), and the cells of `sheets`.
+    """What is asked of a workbook: `names` of all sheets, those `shown` (all if none is), and the cells of `sheets`.
 
     Of `order`, `sheets` are the names of those that are wanted, None for those shown, and `cells` is how many they may
     span together; how many are `left` is answered, or with which sheet they are `too_many`. An order with `formulas` in

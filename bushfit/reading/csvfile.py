@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
+from bushfit.errors import printable
 from bushfit.geometry import STRAINING, Display, Place, Unit, stated_strain
 from bushfit.reading.measurement import loss_factor
 
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 #: The start of a text that a spreadsheet takes for a formula, in ASCII or full width, even after blanks.
 _FORMULA = re.compile("[\\s\"']*[=+\\-@\uff1d\uff0b\uff0d\uff20|%]|\\t")
 #: What parts the lines of a text.
-_LINE_ENDS = re.compile("[\\r\\n]+")
+_LINE_ENDS = re.compile("[\\r\\n\\t]+")
 
 
 class Rows:
@@ -69,8 +70,13 @@ def _cell(value: object, point: str) -> str:
 @lru_cache(maxsize=4096)
 def defused(text: str) -> str:
     """A text in one line, after an apostrophe where a spreadsheet would run it as a formula."""
-    line = " ".join(_LINE_ENDS.split(text))
+    line = in_a_line(text)
     return f"'{line}" if _FORMULA.match(line) else line
+
+
+def in_a_line(text: str) -> str:
+    """A text as a cell has it: in one line, control characters as escapes."""
+    return printable(" ".join(_LINE_ENDS.split(text)))
 
 
 def undefused(text: str) -> str:

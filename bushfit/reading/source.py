@@ -9,7 +9,6 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import islice
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bushfit.reading.layout import HEAD_BYTES, MOST_HEAD_LINES, Layout, Line, is_comment, split

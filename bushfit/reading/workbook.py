@@ -108,7 +108,7 @@ def read_sheets(
 
 
 @lru_cache(maxsize=1)
-def _known(data: bytes) -> dict[str, Any]:
+def _known(_: bytes) -> dict[str, Any]:
     """What was read of the last workbook, to be added to: to look at one takes several passes."""
     return {"sheets": {}, "left": _MOST_CELLS}
 
