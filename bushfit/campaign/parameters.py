@@ -10,7 +10,7 @@ from pydantic import WithJsonSchema
 
 from bushfit.effects import is_parameter, parameter_named, parameter_names
 from bushfit.errors import CampaignError, naming
-from bushfit.units import quantity
+from bushfit.units import quantity, sized
 from bushfit.validation import unknown_key
 
 #: Size of a plain number at most: no parameter comes near it, and its square is still finite.
@@ -34,7 +34,7 @@ def parameter_value(place: str, name: str, raw: Any) -> float:
         unit = _S_TO_ALPHA.sub("", parameter_named(name).unit)
         is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
         if is_number and (unit == "1" or "." in name) and abs(raw) <= _LARGEST_NUMBER:
-            return float(raw)
+            return sized(float(raw), unit)
         return quantity(_S_TO_ALPHA.sub("", raw) if name == "m" and isinstance(raw, str) else raw, unit)
 
 

@@ -15,12 +15,13 @@ from bushfit.reading.layout import HEAD_BYTES, MOST_HEAD_LINES, Layout, Line, is
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import Numerals
 from bushfit.reading.parallel import by_chunks
+from bushfit.units import SIZES
 
 if TYPE_CHECKING:
     import pandas as pd
 
-#: [SI] The largest value of a cell: far beyond every rig, and its square is still a number.
-LARGEST_VALUE = 1e100
+#: [SI] The least size of what is above zero or changes, and the largest value of a cell: beyond every rig.
+LEAST_VALUE, LARGEST_VALUE = SIZES
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 #: Signs that part thousands in a number, other than those which may part columns or decimals.
 _SEPARATORS = ("'", "\u2019", "\u00a0", "\u2009", "\u202f")

@@ -14,7 +14,6 @@ from bushfit.errors import ModelError
 from bushfit.model.file import read_document
 from bushfit.reading.csvfile import in_a_line, undefused
 from bushfit.reading.files import read_utf8, view_bytes
-from bushfit.reading.source import LARGEST_VALUE
 from bushfit.reading.workbook import read_sheets
 from bushfit.report.artifacts import place_names
 from bushfit.report.page.schema import MODELS, PLAIN, checked
@@ -29,6 +28,8 @@ if TYPE_CHECKING:
 _DOCUMENTS = (*MODELS, PLAIN, "diagnosis")
 #: Tables of a result beside those of the predictions, which are named after places.
 _TABLES = ("loops", "sweeps", "gap", "candidates")
+#: Largest number of a table, and its inverse the least: their squares are numbers still.
+_LARGEST_NUMBER = 1e100
 #: Size of a table that is read back at most [bytes]: ten times that of a loop as it is written.
 _LARGEST = 500_000_000
 
@@ -111,7 +112,7 @@ def _column(header: str, cells: pd.Series[str]) -> object:
         return [undefused(cell) for cell in cells]
     values = np.array([float(cell.replace(",", ".")) if cell else 0.0 for cell in cells], dtype=float)
     for cell, size in zip(cells, np.abs(values), strict=True):
-        if not (size < LARGEST_VALUE and (size == 0.0 or size > 1.0 / LARGEST_VALUE)):
+        if not (size == 0.0 or 1.0 / _LARGEST_NUMBER < size < _LARGEST_NUMBER):
             raise ValueError(f"{header}: {cell}")
     return np.where(cells == "", np.nan, values)
 
