@@ -47,10 +47,14 @@ _WORDS = {"None": "null", "True": "true", "False": "false"}
 #: Key in the metadata of a field, for a function that gives the keys which stand in the table itself.
 _IN_TABLE = "keys in the table itself"
 
+#: Largest number, with either sign; chosen: its square is a number still, and nothing in SI comes near it.
+_LARGEST_NUMBER = 1e100
+#: Largest whole number, with either sign: beyond, floats leave out some.
+_LARGEST_COUNT = 2**53
 #: A finite number; neither a text nor true is one.
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-_LARGEST_NUMBER, le=_LARGEST_NUMBER)]
 #: A whole number; neither a text, nor true, nor 3.0 is one.
-WholeNumber = Annotated[int, Field(strict=True)]
+WholeNumber = Annotated[int, Field(strict=True, ge=-_LARGEST_COUNT, le=_LARGEST_COUNT)]
 #: True or false; neither a text nor a number is one.
 Flag = Annotated[bool, Field(strict=True)]
 #: A text that is not empty.

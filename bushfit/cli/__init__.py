@@ -7,7 +7,6 @@ import importlib
 import io
 import os
 import sys
-import warnings
 from collections.abc import Callable
 from typing import Any, TextIO
 
@@ -84,8 +83,6 @@ def main() -> None:
     """Entry point: one clear error and exit status 2 for whatever the user can put right."""
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     os.environ["MPLBACKEND"] = _BACKEND
-    if not sys.warnoptions:
-        warnings.simplefilter("ignore")  # they are for programmers, who ask for them: python -W default
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(encoding="utf-8", newline="\n")  # whatever the code page: programs read it
     heard, read = _Stream(sys.stderr, is_needed=False), _Stream(sys.stdout, is_needed=True)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 #: The start of a text that a spreadsheet takes for a formula, in ASCII or full width, even after blanks.
 _FORMULA = re.compile("[\\s\"']*[=+\\-@\uff1d\uff0b\uff0d\uff20|%]|\\t")
 #: What parts the lines of a text.
-_LINE_ENDS = re.compile("[\\r\\n\\t]+")
+_LINE_ENDS = re.compile("[\\r\\n]+")
 
 
 class Rows:
@@ -76,7 +76,7 @@ def defused(text: str) -> str:
 
 def in_a_line(text: str) -> str:
     """A text as a cell has it: in one line, control characters as escapes."""
-    return printable(" ".join(_LINE_ENDS.split(text)))
+    return "\t".join(map(printable, " ".join(_LINE_ENDS.split(text)).split("\t")))
 
 
 def undefused(text: str) -> str:

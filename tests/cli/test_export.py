@@ -26,7 +26,7 @@ def test_every_format_at_once_and_what_it_leaves_out(bushfit: Run, tmp_path: Pat
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
     named = [file for each in document["formats"].values() for file in each["files"]]
-    assert {file.name for file in (tmp_path / "x").iterdir()} == set(named)
+    assert {file.name for file in (tmp_path / "x").glob("[!.]*")} == set(named)
     for name, each in document["formats"].items():
         for line in each["left_out"]:
             assert f"{name} leaves out: {line}" in done.stderr

@@ -34,7 +34,7 @@ def test_the_corpus(name: str) -> None:
 def test_every_seed_has_a_name(name: str) -> None:
     """Words and an ending, as in `key_twice.json`; the fuzzer itself names inputs by their checksum."""
     names = [file.name for file in (CORPUS / name).iterdir()]
-    assert [name for name in names if not re.fullmatch(r"[a-z]\w*\.(csv|toml|json)", name)] == []
+    assert [name for name in names if not re.fullmatch(r"[a-z]\w*\.(csv|toml|json|xml|txt)", name)] == []
 
 
 @each_target

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from reading_html import loads, parsed
 
 from bushfit.campaign.campaign import load_campaign
-from bushfit.errors import BushfitError
+from bushfit.errors import BushfitError, printable
 from bushfit.fitting.data import Data
 from bushfit.jobs.diagnose import Diagnose
 from bushfit.report.contents import Formats, pages_of
