@@ -42,9 +42,9 @@ COUPON = Specimen("DMA", "modulus")
 _LONGEST_ERROR = 5000
 
 
-def readers(folder: Path, data: bytes, name: str = "table.csv") -> None:
+def readers(folder: Path, data: bytes) -> None:
     """A measured table, as a loop, as a sweep, as a resonance test, and as `inspect` takes it: of a coupon, too."""
-    file = folder / name
+    file = folder / "table.csv"
     file.write_bytes(data)
     for read in (read_loop, read_sweep):
         for place in (Direction.AXIAL, COUPON):
@@ -52,6 +52,11 @@ def readers(folder: Path, data: bytes, name: str = "table.csv") -> None:
                 read(file, place)
     with clear_errors():
         read_resonance(Table.open(file, RESONANCE_COLUMNS), Direction.AXIAL, 1.0)
+    look_into(file)
+
+
+def look_into(file: Path) -> None:
+    """A file as `inspect` takes it."""
     with clear_errors():
         for source in gather([file], {})[0]:
             source.inspect()
@@ -75,8 +80,11 @@ def model(folder: Path, data: bytes) -> None:
 
 def workbook(folder: Path, data: bytes) -> None:
     """The rows of a sheet, and those of another after a line of `=`, in a workbook that is whole otherwise."""
-    rows = data.split(b"\n====\n")
-    readers(folder, bombs.workbook(rows, texts=TEXTS), "table.xlsx")
+    file = folder / "table.xlsx"
+    file.write_bytes(bombs.workbook(data.split(b"\n====\n"), texts=TEXTS))
+    with clear_errors():
+        read_sweep(file, Direction.AXIAL)
+    look_into(file)
 
 
 def report(folder: Path, data: bytes) -> None:
