@@ -42,6 +42,8 @@ _SHAPES = {
     "int_type": "a whole number",
     "float_type": "a number",
 }
+#: A number that pydantic writes with all its zeros.
+_ZEROS = re.compile(r"\d{16,}")
 #: Values of Python's as TOML and JSON write them.
 _WORDS = {"None": "null", "True": "true", "False": "false"}
 #: Key in the metadata of a field, for a function that gives the keys which stand in the table itself.
@@ -147,7 +149,8 @@ def _complaint(detail: ErrorDetails, schema: type, kind: type[BushfitError]) -> 
         error = kind("a key is missing", expected=f"{key} = ..." if isinstance(key, str) else "a further value")
     else:
         found = _WORDS.get(str(detail["input"]), str(detail["input"]))
-        expected = _SHAPES.get(detail["type"], re.sub("^(Input|String) should (be|have) ", "", detail["msg"]))
+        said = re.sub("^(Input|String) should (be|have) ", "", detail["msg"])
+        expected = _SHAPES.get(detail["type"], _ZEROS.sub(lambda digits: f"{float(digits[0]):g}", said))
         error = kind("this value is not understood", found=found, expected=expected)
     error.place = place
     return error

@@ -7,8 +7,9 @@ from damage import column, entry, every, row
 
 #: (what is done to the model file, how, what the error says ...)
 IN_MODEL = [
-    *((f"outer radius of {size:g}", entry("bushing", "outer_radius_m", value=size), "model.json, ", "impossible bushing") for size in (1e300, 1e-300, 1e4)),
-    ("length of 1e300", entry("bushing", "length_m", value=1e300), "model.json, length: impossible bushing", "1e-06 to 100 m"),
+    *((f"outer radius of {size:g}", entry("bushing", "outer_radius_m", value=size), "model.json, ", "impossible bushing") for size in (1e50, 1e-300, 1e4)),
+    ("outer radius of 1e300", entry("bushing", "outer_radius_m", value=1e300), "model.json, bushing.outer_radius_m: this value is not understood", "less than or equal to 1e+100"),
+    ("length of 1e30", entry("bushing", "length_m", value=1e30), "model.json, length: impossible bushing", "1e-06 to 100 m"),
     ("a strain that falls", entry("fit", "strain", value=[1, 0]), "model.json, fit.strain: this is no range", "found: 1, 0"),
     ("a strain of zero", entry("fit", "strain", value=[0, 1]), "model.json, fit.strain: this is no range", "least and largest, above zero"),
     ("frequencies that fall", entry("fit", "frequency_Hz", value=[9, 1]), "model.json, fit.frequency_Hz: this is no range"),
