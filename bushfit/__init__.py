@@ -7,6 +7,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from bushfit.api import (
+        compare,
         diagnose,
         fit,
         fit_dynamic,
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 __all__ = [
+    "compare",
     "diagnose",
     "fit",
     "fit_dynamic",

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.campaign import load_campaign as load_campaign
-from bushfit.campaign.schema import PredictSettings, SimulateSettings
+from bushfit.campaign.schema import Loss, PredictSettings, SimulateSettings
 from bushfit.diagnosis.record import Settings
 from bushfit.effects.contract import Array
 from bushfit.errors import BushfitError, did_you_mean
 from bushfit.fitting.data import Data
 from bushfit.jobs import Outcome
+from bushfit.jobs.compare import MOST, Compare, Compared
 from bushfit.jobs.diagnose import Diagnose, Diagnosed
 from bushfit.jobs.fits import Fit, FitDynamic, FitStatic, Fitted
 from bushfit.jobs.predict import Predict, Predicted
@@ -47,7 +48,12 @@ def load_model(path: str | Path) -> Result:
 
 
 def fit(
-    campaign: Campaign, *, directions: Sequence[str] = (), effects: Sequence[str] = (), profile: bool = False
+    campaign: Campaign,
+    *,
+    directions: Sequence[str] = (),
+    effects: Sequence[str] = (),
+    profile: bool = False,
+    loss: Loss | None = None,
 ) -> Fitted:
     """All five parameters from the loops and sweeps of a campaign together: the fit to use.
 
@@ -55,11 +61,12 @@ def fit(
         directions: whose tests to fit, or specimens by name; axial, and all specimens, unless given.
         effects: added to the paper's three, such as "inertia".
         profile: whether to add 95 % intervals by profile likelihood, which takes some seconds.
+        loss: "soft_l1" to let points far off pull less, and outliers not at all; that of the campaign unless given.
 
     Raises:
         BushfitError: tests or settings that cannot support it.
     """
-    return Fit(tuple(directions), tuple(effects), _untold if profile else None).run(Data.of(campaign))
+    return Fit(tuple(directions), tuple(effects), _untold if profile else None).run(_data(campaign, loss))
 
 
 def fit_static(campaign: Campaign, *, dynamic: Result | Outcome | None = None) -> Fitted:
@@ -128,14 +135,44 @@ def predict(
     Raises:
         ModelError: a place, frequency or amplitude that the model cannot have.
     """
-    asked = PredictSettings(
-        frequencies=_values(frequencies),
-        amplitudes=_values(amplitudes),
-        torsion_amplitudes=_values(torsion_amplitudes),
-        strain_amplitudes=_values(strain_amplitudes),
-        directions=None if directions is None else tuple(directions),
-    )
+    asked = _asked(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
     return Predict(asked, temperature=temperature).run(_result(model), campaign)
+
+
+def compare(
+    reference: Result | Outcome | Campaign,
+    *others: Result | Outcome | Campaign,
+    families: Sequence[str] | None = None,
+    directions: Sequence[str] | None = None,
+    frequencies: Numbers | None = None,
+    amplitudes: Numbers | None = None,
+    torsion_amplitudes: Numbers | None = None,
+    strain_amplitudes: Numbers | None = None,
+) -> Compared:
+    """Results beside the first: what differs, by how much, and whether by more than chance; or model families.
+
+    Args:
+        reference, others: results, what fits or diagnoses found, or campaigns, which are fitted as by `fit`.
+        families: with one campaign alone, families to fit to it, such as "sliders" or "kraus+inertia"; () is all.
+        directions: or specimens by name; where all were fitted unless given.
+        frequencies, amplitudes, torsion_amplitudes, strain_amplitudes: as of `predict`; as far as all were measured
+            unless given.
+
+    Raises:
+        BushfitError: too few results or too many, or places and points that one of them cannot be predicted at.
+    """
+    job = Compare(_asked(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes))
+    if families is not None and isinstance(reference, Campaign) and not others:
+        return job.run_families(reference, str(reference.path), families)
+    if families is not None or not 1 <= len(others) < MOST:
+        raise BushfitError(
+            "this cannot be compared",
+            found=f"{1 + len(others)} results{' and families' if families is not None else ''}",
+            expected=f"2 to {MOST} results, or one campaign and families",
+        )
+    opened = [each if isinstance(each, Campaign) else _result(each) for each in (reference, *others)]
+    sources = [str(each.path) if isinstance(each, Campaign) else each.name for each in opened]
+    return job.run([job.entry(*pair) for pair in zip(opened, sources, strict=True)])
 
 
 def simulate(
@@ -163,14 +200,14 @@ def simulate(
     return load_campaign(Path(folder) / "campaign.toml")
 
 
-def table(outcome: Outcome, name: str) -> pd.DataFrame:
+def table(outcome: Outcome | Compared, name: str) -> pd.DataFrame:
     """A table of what was found, by the name of its file: "axial" of a prediction, "sweeps" of a fit."""
     tables = outcome.contents.tables
     _require(name, list(tables), "table")
     return tables[name]()
 
 
-def picture(outcome: Outcome, name: str) -> Figure:
+def picture(outcome: Outcome | Compared, name: str) -> Figure:
     """A picture of what was found, by the name of its file, as a figure of matplotlib."""
     pictures = outcome.contents.pictures
     _require(name, list(pictures), "picture")
@@ -179,26 +216,17 @@ def picture(outcome: Outcome, name: str) -> Figure:
 
 def parameters(model: Result | Outcome) -> pd.DataFrame:
     """The parameters in SI: value, standard error, ends of the 95 % interval, unit, and whether each was fitted."""
-    import pandas as pd
+    from bushfit.report.spreadsheets import parameters_table
 
-    result = _result(model)
-    rows = {
-        name: (
-            result.model.values[name],  # noqa: PD011
-            result.covariance.stderr(name),
-            *(result.interval(name) or (None, None)),
-            parameter.unit,
-            name in result.fitted,
-        )
-        for name, parameter in result.model.parameters.items()
-    }
-    columns = ["value", "std error", "low", "high", "unit", "fitted"]
-    numbers = dict.fromkeys(columns[:4], float)
-    return pd.DataFrame.from_dict(rows, orient="index", columns=columns).astype(numbers)
+    ends = {"95 %, low": "low", "95 %, high": "high"}
+    table = parameters_table(_result(model)).set_index("parameter").rename_axis(None).rename(columns=ends)
+    table["fitted"] = table["fitted"] == "yes"
+    columns = ["value", "std error", "low", "high"]
+    return table[[*columns, "unit", "fitted"]].astype(dict.fromkeys(columns, float))
 
 
 def save(
-    outcome: Outcome, folder: str | Path, *, tables: bool = True, pictures: bool = True, force: bool = False
+    outcome: Outcome | Compared, folder: str | Path, *, tables: bool = True, pictures: bool = True, force: bool = False
 ) -> Path:
     """Write what was found into a folder, all of it or none, as the command would, and return the folder.
 
@@ -214,6 +242,18 @@ def save(
 
 def _untold(name: str, left: int) -> None:
     """Says nothing of a profile that is done."""
+
+
+def _data(campaign: Campaign, loss: Loss | None) -> Data:
+    return Data.of(replace(campaign, fit=replace(campaign.fit, loss=loss)) if loss else campaign)
+
+
+def _asked(directions: Sequence[str] | None, *axes: Numbers | None) -> PredictSettings:
+    """Places, then frequencies and amplitudes of displacements, rotations and strains, as they are asked for."""
+    frequencies, amplitudes, rotations, strains = map(_values, axes)
+    return PredictSettings(
+        frequencies, amplitudes, rotations, None if directions is None else tuple(directions), strains
+    )
 
 
 def _values(axis: Numbers | None) -> tuple[float, ...] | None:

@@ -20,7 +20,7 @@ from bushfit.geometry import Place
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.result import Result
 from bushfit.prediction import Band, Prediction, predict
-from bushfit.units import alike, number
+from bushfit.units import alike, number, told
 
 #: Probability with which chance alone makes a difference somewhere that is said to be one.
 CHANCE = 0.05
@@ -335,4 +335,4 @@ def _told(band: Band, unit: str, at: Contrast) -> str:
 def _point(at: Contrast, i: int) -> str:
     """An operating point in words."""
     unit, factor = at.place.display.displacement
-    return f"{number(at.reference.frequency[i], 3)} Hz, {number(factor * at.reference.amplitude[i], 3)} {unit}"
+    return f"{told('Hz', at.reference.frequency[i])}, {told(unit, factor * at.reference.amplitude[i])}"

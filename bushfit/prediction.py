@@ -14,11 +14,12 @@ from typing import Any
 
 import numpy as np
 
+from bushfit.caveats import MARGIN, circumstances, extrapolations, rig_effects, unfitted
 from bushfit.effects import Level, effect_named
 from bushfit.effects.contract import Array, Circumstances
 from bushfit.errors import ModelError
 from bushfit.fitting.data_sets import SweepData
-from bushfit.geometry import TRANSLATION, Bushing, Direction, Place
+from bushfit.geometry import TRANSLATION, Place
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -27,11 +28,8 @@ from bushfit.reading.runs import nominal
 from bushfit.reduction.resonance import response
 from bushfit.units import number
 
-#: Beyond the fitted range by more than this, relative to its end, a prediction is an extrapolation: rigs miss their
-#: set points by less.
-MARGIN = 0.01
-#: Share by which a finite bulk modulus lowers the radial stiffness, from which that is said: that of the other errors.
-_NOTED_LOWERING = 0.01
+#: Relative difference of two stiffnesses that is none.
+_SAME = 1e-6
 #: Strain at which the resonance of a mass is looked for first; chosen: small for any rubber.
 _SMALL_STRAIN = 1e-4
 #: Lowest and highest frequency about a resonance over that of small strain.
@@ -121,9 +119,9 @@ def predict(
     every = (first, *others)
     bands: dict[str, Any] = {name: _spanned([getattr(each, name) for each in every]) for name in _BANDS}
     told = (
-        *_unfitted(result, direction),
-        *_extrapolations(result, direction, frequency, amplitude),
-        *_circumstances(models[0], temperature),
+        *unfitted(result, direction),
+        *extrapolations(result, direction, frequency, amplitude),
+        *circumstances(models[0], temperature),
     )
     return replace(found, **bands, warnings=(*told, *([] if rig else _left_out(result, found))))
 
@@ -212,8 +210,9 @@ def _left_out(result: Result, found: Prediction) -> Iterator[str]:
         for name in result.unresolved:
             twins = " or ".join(effect_named(name).twins)
             yield f"{name} is taken as the bushing's, but these tests cannot tell it from {twins}"
-        off = percent_off(found.if_rigs.stiffness.value / stiffness)
-        yield f"{place}: stiffness {off} if {' and '.join(result.unresolved)} is the rig's; low and high span both"
+        ratio, if_so = found.if_rigs.stiffness.value / stiffness, f"if {' and '.join(result.unresolved)} is the rig's"
+        off = f"{percent_off(ratio)} {if_so}; low and high span both"
+        yield f"{place}: stiffness {f'the same {if_so}' if np.allclose(ratio, 1.0, atol=_SAME) else off}"
 
 
 def percent_off(ratio: Array) -> str:
@@ -289,122 +288,8 @@ def predict_resonance(
     found, if_rigs = shaken(bushings), shaken(others[-1]) if others else None
     near = np.abs(found.transmissibility) >= min(_NEAR_PEAK, found.peak[1])
     what = f"{place}, resonance of {number(mass, 3)} kg"
-    told = [*_unfitted(result, place), *_extrapolations(result, place, frequency[near], found.amplitude[near], what)]
+    told = [*unfitted(result, place), *extrapolations(result, place, frequency[near], found.amplitude[near], what)]
     if if_rigs:
         there, largest = (number(each, 4) for each in if_rigs.peak)
         told.append(f"{what}: at {there} Hz, |T| {largest}, if {' and '.join(result.unresolved)} is the rig's")
     return replace(found, warnings=tuple(told), if_rigs=if_rigs)
-
-
-def caveats(result: Result) -> list[str]:
-    """Sentences on what holds of a model's prediction in every direction."""
-    lines = []
-    if "springpot" not in result.model.effects:
-        lines.append("the model has no springpot: its stiffness does not depend on frequency")
-    if unnamed := result.model.unnamed:
-        lines.append(
-            "what has no name is corrected as it was measured, by no law: outside the measured range the correction "
-            f"fades, and the band opens by up to {number(100.0 * Z95 * unnamed.beyond, 2)} % either way"
-        )
-        lines.append(
-            "what has no name counts as the bushing's, but these tests cannot tell it from the rig's: if it is the "
-            f"rig's, the car lacks the correction, up to {number(100.0 * unnamed.largest, 2)} % of |K|"
-        )
-    if result.measured is None:
-        lines.append("the model was not fitted here: no uncertainty, and no fitted range to compare with")
-    if rig := rig_effects(result):
-        lines.append(
-            f"left out of the prediction, because they belong to the rig and not to the bushing: {', '.join(rig)}"
-        )
-    return lines
-
-
-def rig_effects(result: Result) -> list[str]:
-    """Effects of a model that belong to the rig."""
-    return [name for name in result.model.effects if effect_named(name).level is Level.INSTRUMENT]
-
-
-def _unfitted(result: Result, direction: Place) -> Iterator[str]:
-    """Warnings where a direction was not fitted: its band lacks the error of the formula that leads there.
-
-    Where the radial direction was fitted by a formula that is off, the parameters carry its error.
-    """
-    fitted = result.measured.directions if result.measured else ()
-    if not fitted:
-        return
-    corrected = {effect.corrects for effect in result.model.without(Level.INSTRUMENT).records}
-    if str(direction) in fitted:
-        shape = result.model.bushing
-        if direction is Direction.RADIAL and shape and shape.shape == "paper" and direction not in corrected:
-            formula = f"the paper's formula, {_radial_error(shape)}"
-            yield f"{direction}: fitted with {formula}; the parameters carry that error"
-            yield from _compressible(result, shape)
-        return
-    of_bushing = direction is Direction.AXIAL and not set(Direction).isdisjoint(fitted)
-    if not (of_bushing or direction in (Direction.RADIAL, Direction.TORSION)):
-        if str(direction) not in corrected:
-            tests = " and ".join(fitted)
-            yield (
-                f"{direction}: not fitted; its band holds the scatter of the {tests} tests, not by how much two bodies "
-                "of one compound differ, nor the error of their dimensions"
-            )
-        return
-    radially = direction is Direction.RADIAL or (Direction.AXIAL not in fitted and Direction.RADIAL in fitted)
-    formula, compared = Direction.TORSION, "which was not compared with finite elements"
-    bushing = result.model.bushing
-    if radially and bushing:
-        formula, compared = Direction.RADIAL, _radial_error(bushing)
-    if formula in corrected:
-        return
-    band = f"its band holds the scatter of the {' and '.join(fitted)} tests, not" if result.fitted else "no band holds"
-    yield f"{direction}: not fitted; {band} the error of the {formula} formula, {compared}"
-    if radially and bushing:
-        yield from _compressible(result, bushing)
-
-
-def _compressible(result: Result, bushing: Bushing) -> Iterator[str]:
-    """A warning where a bulk modulus of 2 GPa would change the radial stiffness."""
-    lowering = bushing.correction.lowering(result.model.values.get("mu", 0.0)) if bushing.correction else 0.0
-    if lowering > _NOTED_LOWERING:
-        lower = f"would lower the radial stiffness of this shape by {number(100.0 * lowering, 2)} %"
-        yield f"{Direction.RADIAL}: the rubber counts as incompressible; a bulk modulus of 2 GPa {lower}"
-
-
-def _radial_error(bushing: Bushing) -> str:
-    """How far the bushing's radial formulas lie off finite elements of its shape."""
-    if bushing.correction is None:
-        return "which no finite elements back for this shape"
-    if bushing.shape == "calibrated":
-        return "up to 1 % in stiffness and 3 % in strain against finite elements"
-    stiffness, strain = (number(100.0 / factor - 100.0, 2, "+") for factor in bushing.correction[:2])
-    off = f"for this shape {stiffness} % in stiffness and {strain} % in strain against finite elements"
-    return f'{off}, by which shape = "calibrated" goes'
-
-
-def _circumstances(model: Model, temperature: float | None) -> Iterator[str]:
-    """What is taken of the circumstances that the model depends on, where they are not asked for."""
-    known = set() if temperature is None else {"temperature"}
-    yield from (effect.taken for effect in model.records if effect.taken and not known & {*effect.under})
-
-
-def _extrapolations(
-    result: Result, direction: Place, frequency: Array, amplitude: Array, what: str | None = None
-) -> Iterator[str]:
-    """A warning for the frequencies and one for the strains of what is predicted where they leave what was fitted."""
-    if result.measured is None:
-        return
-    axes = (
-        ("frequencies", "Hz", frequency, result.measured.frequency),
-        ("strains", "%", amplitude * result.model.unit_strain(direction), result.measured.strain),
-    )
-    for axis, unit, asked, (low, high) in axes:
-        if asked.min() < low * (1 - MARGIN) or asked.max() > high * (1 + MARGIN):
-            here, there = _span(asked.min(), asked.max(), unit), _span(low, high, unit)
-            said = f"predicted at {axis} of {here}, but fitted at {there} only: extrapolated beyond"
-            yield f"{what or direction}: {said}"
-
-
-def _span(low: float, high: float, unit: str) -> str:
-    """A range in words: "5 to 155 Hz", or one number where both ends read alike."""
-    ends = [number(100 * end, 2) if unit == "%" else number(end, 3) for end in (low, high)]
-    return f"{' to '.join(dict.fromkeys(ends))} {unit}"

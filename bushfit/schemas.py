@@ -4,8 +4,6 @@ They are made on demand of the types by which these files are read and written, 
 that none can be out of date.
 """
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import re
@@ -42,13 +40,17 @@ DESCRIBED = {
     "diagnosis": Described("diagnosis.json; --json of diagnose", "diagnosis.document.DiagnosisFile", "written"),
     "run": Described("--json of run", "jobs.run.RunDocument", "read"),
     "prediction": Described("--json of predict", "jobs.predict.PredictionDocument", "written"),
-    "comparison": Described("compare.json; --json of compare", "jobs.compare_document.ComparisonFile", "written"),
+    "comparison": Described("compare.json; --json of compare", "report.compare_document.ComparisonFile", "written"),
     "batch": Described("batch.json", "batch.document.BatchFile", "written"),
     "summary": Described("--json of batch", "batch.document.BatchSummary", "written"),
     "row": Described("bushings/<name>/row.json of batch", "batch.document.Record", "written"),
     "scorecard": Described("scorecard.json; --json of scorecard", "scorecard.document.Scorecard", "written"),
     "outcome": Described("a line of outcomes.jsonl of scorecard", "scorecard.document.Line", "written"),
     "sealed": Described("campaigns/sealed/<campaign>.json of scorecard --keep", "scorecard.hidden.Sealed", "written"),
+    "inspection": Described("--json of inspect and init", "inspection.record.InspectionDocument", "written"),
+    "reduction": Described("--json of reduce", "reduction.result.ReductionDocument", "written"),
+    "simulation": Described("--json of simulate", "simulation.SimulationDocument", "read"),
+    "export": Described("--json of export", "jobs.export.ExportDocument", "written"),
     "campaign": Described("a campaign, in TOML", "campaign.schema.CampaignFile", "toml"),
     "manifest": Described("a list of campaigns for batch, in TOML", "batch.manifest.ManifestFile", "toml"),
     "limits": Described("--limits of batch, in TOML", "batch.limits.Limits", "toml"),

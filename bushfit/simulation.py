@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.naming import folder_name
@@ -26,6 +27,7 @@ from bushfit.effects.contract import UNKNOWN, Array, Circumstances
 from bushfit.errors import CampaignError, naming, typed
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.model import rig
+from bushfit.model.document import ModelFile
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
 from bushfit.reading.measurement import Loop, Source, Sweep
@@ -40,10 +42,13 @@ if TYPE_CHECKING:
 
 #: The paper's loop: 1 mm at 0.1 Hz.
 PAPER_LOOPS = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=3),)
-#: The paper's sweeps: 5 to 155 Hz at 0.1, 0.2 and 0.5 mm, in two directions.
+#: Frequencies of the paper's sweeps and tables [Hz].
+PAPER_FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
+#: Amplitudes of the paper's sweeps and tables [m].
+PAPER_AMPLITUDES = (1e-4, 2e-4, 5e-4)
+#: The paper's sweeps, in two directions.
 PAPER_SWEEPS = tuple(
-    SimulatedSweep(direction, (1e-4, 2e-4, 5e-4), tuple(float(f) for f in range(5, 156, 10)))
-    for direction in (Direction.AXIAL, Direction.RADIAL)
+    SimulatedSweep(direction, PAPER_AMPLITUDES, PAPER_FREQUENCIES) for direction in (Direction.AXIAL, Direction.RADIAL)
 )
 #: Rows of a simulated loop in a cycle; chosen: its curve is smooth.
 _ROWS_PER_CYCLE = 1000
@@ -53,6 +58,18 @@ _STEPS_PER_ROW = 2
 _MOST_STEPS = 10_000_000
 #: Cycles before a loop is recorded, so that it has settled; none where an effect's settling is what there is to see.
 _RUN_IN_CYCLES = 40
+
+
+class SimulationDocument(TypedDict):
+    """A simulated campaign.
+
+    Args:
+        truth: the model behind it, as in truth.json.
+        files: that were written, by name.
+    """
+
+    truth: ModelFile
+    files: list[str]
 
 
 @dataclass(frozen=True, eq=False)

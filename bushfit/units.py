@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
 from collections.abc import Sequence
 from functools import lru_cache, partial
 from pathlib import Path
@@ -18,24 +19,10 @@ from bushfit.errors import UnitError
 if TYPE_CHECKING:
     import pint
 
+#: The words of units.toml, by table.
+_WORDS: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
 #: By expected SI unit: what it measures, and a unit that a user would write for it.
-_KINDS = {
-    "m": ("a length", "mm"),
-    "rad": ("an angle", "deg"),
-    "s": ("a time", "s"),
-    "Hz": ("a frequency", "Hz"),
-    "N": ("a force", "N"),
-    "N*m": ("a moment", "N m"),
-    "N/m": ("a stiffness", "N/mm"),
-    "N*m/rad": ("a torsional stiffness", "N m/deg"),
-    "m/s": ("a speed", "mm/min"),
-    "rad/s": ("an angular speed", "deg/min"),
-    "Pa": ("a stress", "MPa"),
-    "kg": ("a mass", "kg"),
-    "m/s^2": ("an acceleration", "m/s^2"),
-    "K": ("a temperature", "degC"),
-    "1": ("a ratio", "%"),
-}
+_KINDS: dict[str, tuple[str, str]] = {unit: tuple(words) for unit, words in _WORDS["kinds"].items()}
 #: By SI unit: the unit in which people write it, and the factor from SI to it; MPa*s^alpha is the paper's.
 _WRITTEN = {
     "m": ("mm", 1e3),
@@ -58,6 +45,8 @@ _TEMPERATURES = {
 }
 #: Times below this many seconds are written in milliseconds.
 _LEAST_IN_SECONDS = 0.1
+#: Lengths below this many millimeters are written in micrometers.
+_LEAST_IN_MILLIMETERS = 1e-3
 #: Stresses take a prefix from this many of the larger unit on: 0.2 MPa, not 200 kPa.
 _LEAST_STRESS = 0.1
 #: Forces take a prefix from this many of the larger unit on: 9000 N, but 12 kN.
@@ -76,21 +65,11 @@ _FACTOR = r"(?:[^\W\d_]+|[%‰°1])(?:(?:\^|\*\*)-?[1-9]|⁻?[¹²³])?"
 _UNIT = re.compile(rf"{_FACTOR}(?:(?:\s*[*/·⋅]\s*|\s+){_FACTOR})*")
 #: Characters of a unit at most: longer texts are no units, and pint takes its time with them.
 _LONGEST_UNIT = 40
-#: Words of other languages and signs for units, in lower case.
-_SPELLINGS = {
-    word: unit
-    for unit, words in {
-        "s": "sek sekunde sekunden seconde secondes segundo segundos seg 秒",
-        "mm": "millimeter millimetre millimetres milimetro milimetros milímetros 毫米",
-        "µm": "mikrometer 微米",
-        "N": "newton 牛 牛顿",
-        "kN": "kilonewton kilonewtons 千牛",
-        "deg": "º ˚ grados grado degré degrés degre degres 度",
-        "Hz": "hz hertz 赫兹",
-        "%": "prozent pct percent",
-    }.items()
-    for word in words.split()
-}
+#: Of each way to spell a unit the unit: in lower case, with its capitals, and of an acceleration alone.
+_SPELLINGS, _EXACT, _OF_ACCELERATION = (
+    {word: unit for unit, words in _WORDS[table].items() for word in words.split()}
+    for table in ("spellings", "exact", "of_acceleration")
+)
 #: Everyday units, as pint has them: factor to SI, and SI base. A run that meets no other does not load pint, which
 #: takes longer than a fit.
 _EVERYDAY = {
@@ -112,28 +91,6 @@ _EVERYDAY = {
     }.items()
     for unit, scale in scales.items()
 }
-#: What an acceleration is written in that is another quantity elsewhere (a gram, square milliseconds), as pint has it.
-_OF_ACCELERATION = {"g": "gravity", "G": "gravity", "gn": "gravity", "ms2": "m/s^2", "ms-2": "m/s^2", "ms^-2": "m/s^2"}
-#: Units whose capitals matter, by the spelling of users: pint takes Grad for a billion radians.
-_EXACT = {
-    spelling: unit
-    for unit, spellings in {
-        "deg": "Grad GRAD DEG Deg",
-        "mm": "MM",
-        "kN": "KN",
-        "s": "SEC Sec",
-        "rpm": "RPM",
-        "inch": "Inch INCH",
-        "Pa": "pa PA",
-        "kPa": "kpa KPA KPa",
-        "MPa": "Mpa MPA mpa",
-        "GPa": "gpa GPA Gpa",
-        "lbf": "LBF Lbf",
-    }.items()
-    for spelling in spellings.split()
-}
-#: Units that mean one thing to some users and another to others, and what says it clearly.
-_UNCLEAR = {"grad": '"deg" or "gon"', "mil": '"thou" (0.001 inch) or "mrad"', "mils": '"thou" (0.001 inch) or "mrad"'}
 #: The letters of one unit.
 _WORD = re.compile(r"[^\W\d_]+|[º˚]")
 #: Between a unit and a power without its sign: mm2.
@@ -224,6 +181,8 @@ def for_people(unit: str, factor: float, size: float) -> tuple[str, float]:
     """Unit and factor from SI in which people read numbers of that size in SI: MPa for 1.09e6 Pa, kPa for 1.46e4 Pa."""
     unit, factor = _WRITTEN.get(unit, (unit, factor))
     number = abs(size) * factor
+    if unit == "mm" and 0.0 < number < _LEAST_IN_MILLIMETERS:
+        return "um", 1e3 * factor
     if unit == "s":
         return ("ms", 1e3) if number < _LEAST_IN_SECONDS else (unit, factor)
     least = _LEAST_STRESS if unit.startswith("Pa") else _LEAST_FORCE
@@ -271,10 +230,10 @@ def alike(values: Sequence[float], digits: int, least: int = 0) -> list[str]:
     return [text(value) for value in values]
 
 
-def modulus(value: float, digits: int) -> str:
-    """A modulus [Pa] with at most so many digits, as people read it: 1.09 MPa."""
-    unit, factor = for_people("Pa", 1.0, value)
-    return f"{number(value * factor, digits)} {unit}"
+def told(unit: str, *values: float, digits: int = 3) -> str:
+    """Positive numbers of one unit as people read them, each once: 1.09 MPa, 5 to 155 Hz, 0.0221 um."""
+    unit, factor = for_people(unit, 1.0, math.sqrt(abs(min(values) * max(values))))
+    return f"{' to '.join(dict.fromkeys(number(value * factor, digits) for value in values))} {unit}"
 
 
 def describe(expected: str) -> str:
@@ -331,8 +290,8 @@ def _by_pint(text: str) -> tuple[float, str]:
     if len(text) > _LONGEST_UNIT or not _UNIT.fullmatch(text):
         raise unknown
     for word in _WORD.findall(text):
-        if word in _UNCLEAR:
-            raise UnitError("a unit that can be read in two ways", found=f'"{text}"', expected=_UNCLEAR[word])
+        if word in _WORDS["unclear"]:
+            raise UnitError("a unit that can be read in two ways", found=f'"{text}"', expected=_WORDS["unclear"][word])
     registry = _registry()
     try:
         unit = registry.parse_units(text.replace("⋅", "*"))

@@ -18,6 +18,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from effect_tables import PAGE, renewed
 from pydantic import TypeAdapter
 
 from bushfit.batch.limits import Limits
@@ -25,7 +26,6 @@ from bushfit.batch.manifest import ManifestFile
 from bushfit.campaign.campaign import load_campaign
 from bushfit.campaign.schema import CampaignFile
 from bushfit.cli import cli
-from bushfit.effects.__main__ import PAGE, renewed
 from bushfit.geometry import Direction
 from bushfit.reading.loops import read_loop
 from bushfit.reading.sweeps import read_sweep
@@ -39,7 +39,7 @@ def blocks(page: Path, language: str) -> list[str]:
 
 def test_the_tables_of_effects_are_the_library() -> None:
     page = PAGE.read_text(encoding="utf-8")
-    assert renewed(page) == page, "run: python -m bushfit.effects"
+    assert renewed(page) == page, "run: python tests/effect_tables.py"
 
 
 def test_every_command_is_in_the_table_and_has_an_example(root: Path) -> None:

@@ -69,7 +69,15 @@ def written(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Documents:
     run("summary", *batch, *asked, "--limits", "configs/limits.toml", "-o", "batch", status=1)
     card = ("--family", "amplitude_sweeps", "--campaigns", "5", "--jobs", "1", "--keep")
     run("scorecard", "scorecard", *card, "-o", "card")
-    assert call(folder, "simulate", "run/model.json", "-o", "simulated", "-q").returncode == 0
+    run("simulation", "simulate", "run/model.json", "-o", "simulated")
+    run("export", "export", "run/model.json", "--format", "nastran", "--format", "xlsx", "-o", "exported")
+    loop, sweep = ("data/cmp_15961/loop_axial_1.csv", "data/cmp_15961/sweep_axial.csv")
+    run("inspection", "inspect", loop, sweep)
+    run("reduction", "reduce", "data/cmp_15961_raw/stepped_sine_axial.csv", "-o", "reduced")
+    mass = ("--mass", "1.196 kg", "--specimen", "mount")
+    run("reduction", "reduce", "data/measured/epdm_70/shaker_1g_1196g.csv", *mass, "-o", "shaken_mass")
+    sizes = ("--inner-radius", "10 mm", "--outer-radius", "18 mm", "--length", "34 mm")
+    run("inspection", "init", loop, sweep, *sizes, "-o", "begun")
     for names in ("model", "static", "dynamic", "joint", "truth"):
         read("model", f"*/{names}.json")
     read("diagnosis", "*/diagnosis.json")

@@ -3,8 +3,6 @@
 Their JSON Schemas are made of these types, and the type checker holds to them what is written.
 """
 
-from __future__ import annotations
-
 from typing import Literal, NotRequired
 
 from typing_extensions import TypedDict

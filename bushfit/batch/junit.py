@@ -1,7 +1,5 @@
 """A report for continuous integration: a test case a bushing."""
 
-from __future__ import annotations
-
 from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
 
 from bushfit.batch.document import Record

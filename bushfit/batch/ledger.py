@@ -8,8 +8,6 @@ Notes:
     machine leaves torn is found by its hash, so that no write has to wait for the disk.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

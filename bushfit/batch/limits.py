@@ -9,13 +9,12 @@ Notes:
     over the limit. Conditional fail: the value is outside, but the interval reaches back. Fail: all of it is outside.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -26,8 +25,8 @@ from bushfit.batch.document import Record
 from bushfit.batch.manifest import Row
 from bushfit.batch.points import At, Point
 from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, STIFFNESS, Figures, Quantity, at_point, figures
-from bushfit.campaign.parameters import Size, parameter_value
-from bushfit.campaign.quantities import Share, text
+from bushfit.campaign.parameters import Size, with_sizes
+from bushfit.campaign.quantities import Share, table, text
 from bushfit.campaign.toml import read_toml
 from bushfit.diagnosis import document
 from bushfit.effects.contract import Array
@@ -103,16 +102,6 @@ class Bounds:
 _SIZES = ("min", "max", "nominal")
 
 
-def _parameters(raw: object, _: ValidationInfo) -> object:
-    """Tables of limits by parameter with their sizes in SI; what is no table is left to pydantic."""
-    settings = {}
-    for name, table in raw.items() if isinstance(raw, dict) else ():
-        given = [key for key in _SIZES if isinstance(table, dict) and key in table]
-        sizes = {key: parameter_value(f"{name}.{key}", name, table[key]) for key in given}
-        settings[name] = {**table, **sizes} if given else table
-    return settings if isinstance(raw, dict) else raw
-
-
 def _stiffness(raw: object, info: ValidationInfo) -> object:
     point = info.data.get("at")
     return quantity(raw, point.motion.stiffness_unit) if isinstance(point, Point) else 0.0
@@ -172,7 +161,7 @@ class Limits:
 
     __pydantic_config__ = ConfigDict(extra="forbid")
 
-    parameters: Annotated[Mapping[str, Bounds], converted(_parameters)] = field(default_factory=dict)
+    parameters: Annotated[Mapping[str, Bounds], table(partial(with_sizes, keys=_SIZES))] = field(default_factory=dict)
     stiffness: tuple[StiffnessBounds, ...] = ()
     loss_factor: tuple[LossFactorBounds, ...] = ()
     nrmse: Ratio | None = None

@@ -1,7 +1,5 @@
 """Operating points in words: "axial 25 Hz 0.1 mm", or of a specimen "DMA 10 Hz 1 %"."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from typing import Annotated

@@ -1,7 +1,5 @@
 """The whole batch: rows to workers, records to disk, then the table, the verdicts and the picture."""
 
-from __future__ import annotations
-
 import math
 import shutil
 import time

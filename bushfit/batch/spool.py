@@ -1,7 +1,5 @@
 """Records of all rows, on disk: in memory is where each begins, and of each quantity an array over the rows."""
 
-from __future__ import annotations
-
 import json
 from array import array
 from collections import defaultdict

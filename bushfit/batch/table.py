@@ -1,7 +1,5 @@
 """The table of a batch: a row a bushing, in the manifest's order, a unit that people use in every header."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 

@@ -1,7 +1,5 @@
 """A campaign: a bushing, specimens of its compound, their tests and settings, read from a TOML file."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 from collections import Counter

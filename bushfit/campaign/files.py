@@ -1,7 +1,5 @@
 """The tables [[loops]] and [[sweeps]] of a campaign file: a test's file, and what it does not say itself."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal

@@ -1,7 +1,5 @@
 """Names of folders: any text as the name of one folder that every operating system takes."""
 
-from __future__ import annotations
-
 import re
 
 #: Characters that some operating system does not allow in a name, and halves of surrogate pairs.

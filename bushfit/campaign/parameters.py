@@ -1,8 +1,7 @@
 """Values of model parameters in a campaign file, by the names that they go by in files."""
 
-from __future__ import annotations
-
 import re
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -53,17 +52,23 @@ def effect_values(raw: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def with_sizes(raw: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
+    """Tables by parameter with the values of some keys in SI; what is no table is left alone."""
+    return {
+        name: table | {key: parameter_value(f"{name}.{key}", name, table[key]) for key in keys if key in table}
+        if isinstance(table, dict)
+        else table
+        for name, table in raw.items()
+    }
+
+
 def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
     """Tables of value, min, max and vary by parameter, with the first three in SI."""
-    settings = {}
-    for name, table in raw.items():
-        if isinstance(table, dict):
-            given = [key for key in ("min", "value", "max") if key in table]
-            numbers = {key: parameter_value(f"{name}.{key}", name, table[key]) for key in given}
-            ordered = list(numbers.values())
-            if ordered != sorted(ordered) or numbers.get("min", -np.inf) == numbers.get("max", np.inf):
-                expected = "min below max, and value between them"
-                raise CampaignError("these limits hold no value", place=name, found=str(table), expected=expected)
-            table = {**table, **numbers}
-        settings[name] = table
+    keys = ("min", "value", "max")
+    settings = with_sizes(raw, keys)
+    for name, table in settings.items():
+        ordered = [table[key] for key in keys if key in table] if isinstance(table, dict) else []
+        if ordered != sorted(ordered) or (ordered and table.get("min", -np.inf) == table.get("max", np.inf)):
+            expected = "min below max, and value between them"
+            raise CampaignError("these limits hold no value", place=name, found=str(raw[name]), expected=expected)
     return settings

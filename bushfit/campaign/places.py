@@ -1,7 +1,5 @@
 """What a test of a campaign file is made on: a direction of the bushing, or a specimen."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

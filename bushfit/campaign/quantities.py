@@ -1,7 +1,5 @@
 """Kinds of values in a campaign file: pydantic checks them, texts such as "10 mm" become SI."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 

@@ -1,7 +1,5 @@
 """The tables of a campaign file, key by key: pydantic checks them, quantities become SI."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal

@@ -1,7 +1,5 @@
 """The session of a campaign: in which turn each point was measured, at which temperature, and after which strains."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Reads a TOML file that a user wrote, and checks it against a schema."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path

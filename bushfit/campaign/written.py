@@ -1,7 +1,5 @@
 """Tables of a campaign file as text: what was tested, and its tests."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The command line: a file a command; each parses, calls one function and prints."""
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import io

@@ -8,13 +8,14 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from bushfit.cli.common import Options, example, path_option, place_option, shared_options
+from bushfit.cli.common import ALL_FORMS, Options, example, path_option, place_option, shared_options
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import naming
 from bushfit.units import alike, for_people
@@ -64,8 +65,7 @@ _SECONDS_A_LINE = 10.0
 @click.option("--tables", is_flag=True, help="Write loops.csv, sweeps.csv and the like of each too.")
 @click.option("--plots", is_flag=True, help="Write each bushing's plots too.")
 @click.option("--reports", is_flag=True, help="Write report.html of each that is diagnosed too.")
-@click.option("--no-report", is_flag=True, help="Write no index.html.")
-@shared_options
+@partial(shared_options, forms=ALL_FORMS)
 def command(
     manifest: tuple[str, ...],
     at: tuple[str, ...],
@@ -77,7 +77,6 @@ def command(
     tables: bool,
     plots: bool,
     reports: bool,
-    no_report: bool,
     options: Options,
     **asked: tuple[Any, ...],
 ) -> None:
@@ -115,7 +114,7 @@ def command(
     formats = replace(options.formats, tables=tables, pictures=plots and options.formats.pictures, pages=reports)
     output = options.folder(read.stem).absolute()
     orders = Orders(output, tuple(dict.fromkeys(points)), formats, resume)
-    plan = Plan(read.stem, read.rows, orders, judged_by, junit, replace(options.formats, pages=not no_report))
+    plan = Plan(read.stem, read.rows, orders, judged_by, junit, options.formats)
     check_free(plan, force=options.force)
     workers: Pool = DaskPool(scheduler) if scheduler else LocalPool(jobs or os.cpu_count() or 1)
     with _progress(options, len(plan.rows)) as advance:

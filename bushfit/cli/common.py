@@ -167,7 +167,10 @@ _FORMS = {
         show_envvar=True,
         help="png, svg, pdf; may be given again [png].",
     ),
+    "pages": click.option("--no-report", is_flag=True, help="Write no page (HTML)."),
 }
+#: All of them, of a command that writes a page too.
+ALL_FORMS = tuple(_FORMS)
 
 
 def shared_options(
@@ -175,7 +178,7 @@ def shared_options(
 ) -> F:
     """-o, -v, -q, --json, --no-plots, --force, and those of `forms`, gathered into one `options` argument.
 
-    Without -o results go to `where`; `forms` says whether a command writes tables and pictures.
+    Without -o results go to `where`; `forms` says whether a command writes tables, pictures and pages.
     """
     for form in reversed(forms):
         function = _FORMS[form](function)
@@ -191,6 +194,7 @@ def shared_options(
         given = {name: kwargs.pop(name) for name in ("output", "verbose", "quiet", "as_json", "force")}
         formats = Formats(
             pictures=not kwargs.pop("no_plots"),
+            pages=not kwargs.pop("no_report", False),
             table_form=kwargs.pop("table_format", Formats.table_form),
             picture_forms=tuple(dict.fromkeys(kwargs.pop("plot_format", Formats.picture_forms))),
         )
@@ -237,8 +241,12 @@ class Task:
             click.get_current_context().exit(1)
 
 
-def campaign_options(function: F, soft_l1: str = "points far off pull less, outliers not at all") -> F:
-    """CAMPAIGN, --loss, --max-nrmse and the shared options, gathered into one `task` argument.
+def campaign_options(
+    function: F,
+    soft_l1: str = "points far off pull less, outliers not at all",
+    forms: Sequence[str] = ("tables", "pictures"),
+) -> F:
+    """CAMPAIGN, --loss, --max-nrmse and the shared options, those of `forms` too, gathered into one `task` argument.
 
     `soft_l1` says what the robust loss does in this command, for its help.
     """
@@ -255,24 +263,12 @@ def campaign_options(function: F, soft_l1: str = "points far off pull less, outl
         metavar="SHARE",
         help="Exit with status 1 if the NRMSE is above this share (0.02 is 2 %).",
     )
-    @shared_options
+    @partial(shared_options, forms=forms)
     @wraps(function)
     def wrapped(*args: Any, options: Options, **kwargs: Any) -> Any:
         campaign = _only(kwargs.pop("campaigns"))
         task = Task(campaign, kwargs.pop("loss"), kwargs.pop("max_nrmse"), options)
         return function(*args, task=task, **kwargs)
-
-    return wrapped  # type: ignore[return-value]
-
-
-def report_option(function: F) -> F:
-    """--no-report of a command with a `task` that writes a report."""
-
-    @click.option("--no-report", is_flag=True, help="Write no report.html.")
-    @wraps(function)
-    def wrapped(*args: Any, task: Task, no_report: bool, **kwargs: Any) -> Any:
-        options = replace(task.options, formats=replace(task.options.formats, pages=not no_report))
-        return function(*args, task=replace(task, options=options), **kwargs)
 
     return wrapped  # type: ignore[return-value]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
-from bushfit.cli.common import Options, Task, campaign_options, example, open_model, path_option, report_option
+from bushfit.cli.common import ALL_FORMS, Options, Task, campaign_options, example, open_model, path_option
 from bushfit.cli.show import new_table, parameter_table, warn
 from bushfit.errors import BushfitError, naming
 from bushfit.units import alike, for_people, number, quantity
@@ -37,8 +37,7 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 )
 @click.option("--max-effects", type=click.IntRange(0, 5), default=3, show_default=True, help="Effects to add at most.")
 @click.option("--tolerance", default="1 %", show_default=True, help="Gaps below this share of |K| do not count.")
-@partial(campaign_options, soft_l1="the same with outliers left out")
-@report_option
+@partial(campaign_options, soft_l1="the same with outliers left out", forms=ALL_FORMS)
 def command(
     model: Path | None,
     adopt: tuple[str, ...],

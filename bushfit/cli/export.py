@@ -1,8 +1,5 @@
 """`bushfit export`: model -> files of solvers, multibody codes and spreadsheets."""
 
-from __future__ import annotations
-
-from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -40,7 +37,7 @@ _FORMATS = ("fmu", "nastran", "abaqus", "adams", "csv", "xlsx")
 )
 @click.option("--dialect", type=click.Choice(["optistruct"]), help="Of --format nastran: |K| and loss angle.")
 @click.option("--accuracy", default="1 %", help="Largest error of the modulus that an fmu may have [1 %].")
-@partial(shared_options, forms=["tables"])
+@shared_options
 def command(
     model: Path,
     formats: tuple[str, ...],
@@ -55,8 +52,9 @@ def command(
     """MODEL (the model.json of run, fit or diagnose, or dynamic.json) in the files of other programs.
 
     Writes bushing.bdf (nastran), bushing.fem (with --dialect optistruct), bushing.inp (abaqus), bushing_car.bus and
-    bushing_ride.bus (adams), a .fmu (fmu), bushing.xlsx, or a CSV file for each table. Says what each format cannot
-    carry, and what that costs. Effects of the rig are left out. z is the bushing's axis.
+    bushing_ride.bus (adams), a .fmu (fmu) with arms.csv and arms.png, its Maxwell arms and their error, bushing.xlsx,
+    or a CSV file for each table. Says what each format cannot carry, and what that costs. Effects of the rig are left
+    out. z is the bushing's axis.
     """
     from bushfit.campaign.campaign import load_campaign
     from bushfit.campaign.naming import folder_name
@@ -87,4 +85,5 @@ def command(
         for loss in exported.losses:
             options.say(f"{name} leaves out: {loss}")
     warn(options, outcome.predicted.warnings)
-    options.write(folder, outcome.files, outcome.document)
+    files = {**outcome.files, **options.formats.files(outcome.contents)}
+    options.write(folder, files, outcome.document)

@@ -1,7 +1,5 @@
 """`bushfit fit-static`, `fit-dynamic` and `fit`: loops, sweeps, or both together -> parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Grids on the command line: "5:155:10 Hz" or "0.1, 0.2, 0.5 mm"."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
@@ -18,17 +16,17 @@ F = TypeVar("F", bound=Callable[..., Any])
 _MOST_VALUES = 100_000
 #: Options of a grid by their keys: the SI unit and the help of each.
 _GRIDS = {
-    "frequencies": ("Hz", 'Such as "5:155:10 Hz" or "20, 50, 100 Hz" [the campaign\'s].'),
-    "amplitudes": ("m", 'Zero-to-peak, such as "0.1, 0.2, 0.5 mm" [the campaign\'s].'),
+    "frequencies": ("Hz", 'Such as "5:155:10 Hz" or "20, 50, 100 Hz" [{}].'),
+    "amplitudes": ("m", 'Zero-to-peak, such as "0.1, 0.2, 0.5 mm" [{}].'),
     "torsion_amplitudes": ("rad", 'Zero-to-peak rotation, for --direction torsion ["0.5, 1, 2 deg"].'),
     "strain_amplitudes": ("1", 'Zero-to-peak strain, for specimens that give a modulus ["1, 2, 5 %"].'),
 }
 
 
-def grid_options(function: F) -> F:
-    """Decorator of a command that takes a grid: an option for each of its axes."""
+def grid_options(function: F, default: str = "the campaign's") -> F:
+    """Decorator of a command that takes a grid: an option for each of its axes, and in words what holds without."""
     for key, (_, words) in reversed(_GRIDS.items()):
-        function = click.option(option_of(key), help=words)(function)
+        function = click.option(option_of(key), help=words.format(default))(function)
     return function
 
 

@@ -18,7 +18,7 @@ from bushfit.units import quantity
 
 if TYPE_CHECKING:
     from bushfit.geometry import Bushing
-    from bushfit.inspection.record import Inspected
+    from bushfit.inspection.record import Inspected, InspectionDocument
 #: Sides of the rubber whose radius or diameter is asked for.
 _SIDES = ("inner", "outer")
 
@@ -70,7 +70,11 @@ def command(
     for one in seen:
         _tell(options, one)
     tell_left_out(options, left_out)
-    document = {"campaign": text, "files": [one.to_document() for one in seen], "left_out": left_out}
+    document: InspectionDocument = {
+        "campaign": text,
+        "files": [one.to_document() for one in seen],
+        "left_out": left_out,
+    }
     options.write(folder, {target: text.encode()}, document)
     options.say(f"next: bushfit run {typed(folder / target)}")
 

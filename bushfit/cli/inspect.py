@@ -18,7 +18,7 @@ from bushfit.errors import BushfitError
 from bushfit.report.contents import Contents, Kinds
 
 if TYPE_CHECKING:
-    from bushfit.inspection.record import Inspected
+    from bushfit.inspection.record import Inspected, InspectionDocument
 
 #: Kinds of test file, in words.
 _KINDS = {"loop": "a hysteresis loop", "sweep": "a sweep", "history": "a raw stepped-sine history"}
@@ -76,7 +76,11 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
         for other in failed[:-1]:
             click.echo(f"cannot be used: {other}", err=True)
         raise failed[-1]
-    document = {"files": [one.to_document() for one in seen], "left_out": list(left_out), "campaign": text}
+    document: InspectionDocument = {
+        "files": [one.to_document() for one in seen],
+        "left_out": list(left_out),
+        "campaign": text,
+    }
     if options.formats.pictures:
         from bushfit.report.plots import inspection_figure
 

@@ -1,7 +1,5 @@
 """What the commands on test files share: options for what a file does not say itself, and errors that name them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager

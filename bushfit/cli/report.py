@@ -1,7 +1,5 @@
 """`bushfit report`: a folder of results -> one page to show, to print and to mail."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, Task, campaign_options, example, report_option
+from bushfit.cli.common import ALL_FORMS, Options, Task, campaign_options, example
 from bushfit.cli.diagnose import tell_findings, tell_verdict
 from bushfit.cli.predict import tell_predictions
 from bushfit.cli.show import new_table, parameter_table, report, tell_fit, tell_result, tell_sources, warn
@@ -29,8 +30,7 @@ _OPEN = 100.0
 
 
 @click.command("run", epilog=example("bushfit run configs/cmp_15961.toml"))
-@campaign_options
-@report_option
+@partial(campaign_options, forms=ALL_FORMS)
 def command(task: Task) -> None:
     """Fit CAMPAIGN in every way, ask what the model lacks, and predict from the result.
 

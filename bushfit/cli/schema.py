@@ -1,7 +1,5 @@
 """`bushfit schema`: what stands in the files, for other programs and for editors."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from typing import Any

@@ -9,7 +9,7 @@ from rich import box
 from rich.markup import escape
 from rich.table import Table
 
-from bushfit.units import number
+from bushfit.units import number, told
 
 if TYPE_CHECKING:
     from bushfit.cli.common import Options
@@ -76,11 +76,10 @@ def tell_tests(options: Options, tested: Sequence[Misfit], usable: Sequence[Usab
 
 def _held(test: Misfit) -> str:
     """What a run held, as people read it."""
-    from bushfit.geometry import ROTATION, STRAINING, TRANSLATION
+    from bushfit.report.tables import DISPLAYS
 
-    motions = {motion.displacement_unit: motion.display.displacement for motion in (TRANSLATION, ROTATION, STRAINING)}
-    unit, factor = motions.get(test.unit or "", (test.unit, 1.0))
-    return f"{number(factor * (test.value or 0.0), 3)} {unit}"
+    unit, factor = DISPLAYS.get(test.unit or "", (test.unit or "", 1.0))
+    return told(unit, factor * (test.value or 0.0))
 
 
 def tell_sources(options: Options, result: Result) -> None:

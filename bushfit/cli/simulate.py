@@ -53,7 +53,7 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
     Writes campaign.toml, the tables it names, and truth.json, the model behind them.
     """
     from bushfit.campaign.naming import folder_name
-    from bushfit.model.file import model_document
+    from bushfit.model.file import to_document
     from bushfit.simulation import simulate, to_files
 
     truth, plan = _task(source)
@@ -65,7 +65,7 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
     files = to_files(simulated, options.formats.table_form)
     folder = options.folder(f"simulated {folder_name(simulated.result.name)}")
     options.say(truth.equation())
-    options.write(folder, files, {"truth": model_document(truth), "files": sorted(files)})
+    options.write(folder, files, {"truth": to_document(simulated.result), "files": sorted(files)})
 
 
 def _task(source: Path) -> tuple[Model, SimulateSettings]:

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from bushfit.diagnosis.evidence import fit
+from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.holdout import HoldOut, parts
-from bushfit.diagnosis.search import Search, Step
+from bushfit.diagnosis.search import SAME, Search, Step
 from bushfit.errors import FitError, ModelError
 
 
@@ -21,7 +21,8 @@ class Again:
     """What the search makes of the tests without a part.
 
     Args:
-        came_again: whether every effect that was named leads a set, or stands in one.
+        came_again: whether every effect that was named leads a set, or stands in one, or all of them together close
+            what is left of the gap better than what was found in their place.
         others: effects that lead a set in place of one that was named.
     """
 
@@ -30,11 +31,12 @@ class Again:
     others: tuple[str, ...]
 
 
-def searched_again(search: Search, steps: Sequence[Step], held: HoldOut) -> list[Again]:
+def searched_again(search: Search, final: Evidence, steps: Sequence[Step], held: HoldOut) -> list[Again]:
     """The search made anew without each part that was held out, with the same noise, and what comes of it.
 
     It adds as many effects as were named and looks for no more: what a part less brings beside them is not asked. Of
-    several effects another name without one part is enough to take them back, and ends it.
+    several effects another name without one part is enough to take them back, and ends it. The search goes step by
+    step and may miss what fits the rest best: where what was named does, it came again.
     """
     named, told = {step.name for step in steps}, {part.part for part in held.parts}
     known = {name for step in steps for name in (step.name, *(rival.name for rival in step.richer))}
@@ -45,11 +47,12 @@ def searched_again(search: Search, steps: Sequence[Step], held: HoldOut) -> list
         try:
             rest = fit(search.base.model, part.rest(search.base.data_sets), search.held, search.bounds)
             anew = Search.begin(rest, settings, search.start, search.held, search.bounds)
-            again = anew.reconsider(*anew.grow())[1]
+            other, again = anew.reconsider(*anew.grow())
+            sets = [{step.name, *(rival.name for rival in (*step.rivals, *step.richer))} for step in again]
+            every = all(any(name in members for members in sets) for name in named)
+            every = every or fit(final.model, rest.data_sets, search.held, search.bounds).bic < other.bic - SAME
         except (FitError, ModelError):
             continue
-        sets = [{step.name, *(rival.name for rival in (*step.rivals, *step.richer))} for step in again]
-        every = all(any(name in members for members in sets) for name in named)
         others = () if every else tuple(step.name for step, own in zip(again, sets, strict=True) if not own & known)
         found.append(Again(part.name, every, others))
         if others and len(steps) > 1:

@@ -6,6 +6,7 @@ No effect is asked for by name: effects propose themselves with evidence, and ev
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -94,8 +95,11 @@ class Round:
     @property
     def real(self) -> Candidate | None:
         """The best candidate, where it is more than chance and more than its price."""
-        best = self.best
-        return best if best and self.evidence.bic - best.evidence.bic > SAME and best.gain > self.critical else None
+        return self.best if self.best and self.is_real(self.best) else None
+
+    def is_real(self, candidate: Candidate) -> bool:
+        """Whether a candidate is more than chance and more than its price."""
+        return self.evidence.bic - candidate.evidence.bic > SAME and candidate.gain > self.critical
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,8 +161,28 @@ class Search:
             read = self.start if not added and evidence.reduced > _BENT else {}
             starts = {claim.name: self._found_earlier(key, claim.name) or read for claim in best}
             tried = refits(evidence, best, known, starts, self.held, self.bounds)
-            self.rounds[key] = Round(evidence, proposed, tuple(tried))
+            self.rounds[key] = Round(evidence, proposed, tuple(self._with_limit(evidence, tried)))
         return self.rounds[key]
+
+    def _with_limit(self, evidence: Evidence, tried: Sequence[Candidate]) -> Sequence[Candidate]:
+        """With the simpler effect that the best candidate has nearly become, fitted from there.
+
+        Its own score may be next to nothing: a springpot of the model that stands in for a dashpot leaves none.
+        """
+        name, values_at = (tried and effect_named(tried[0].name).becomes) or ("", None)
+        if not values_at or name in self.settings.without or name in evidence.model.effects:
+            return tried
+        values = values_at(tried[0].evidence.model.values)
+        if values is None:
+            return tried
+        beside = {key: value for key, value in tried[0].evidence.model.values.items() if key in evidence.model.values}
+        with suppress(FitError, ModelError):
+            model = evidence.model.with_effect(name).with_values({**beside, **values})
+            end = fit(model, evidence.data_sets, self.held, self.bounds)
+            found = Candidate(name, end, evidence.chi_square - end.chi_square)
+            both = [*(candidate for candidate in tried if candidate.name != name), found]
+            return sorted(both, key=lambda candidate: candidate.evidence.bic)
+        return tried
 
     def _found_earlier(self, added: frozenset[str], name: str) -> Mapping[str, float]:
         """Values at which the earlier search left a candidate beside the same effects; none where it met a bound, as
@@ -206,13 +230,18 @@ class Search:
             may_swap = swaps < _MOST_SWAPS and not any(effect_named(other).after == name for other in others)
             if may_swap and best and best.name != name and best.evidence.bic < current.bic - _LEAST_IMPROVEMENT:
                 names[len(steps)], current = best.name, best.evidence
-            elif may_swap and others and place.evidence.bic - current.bic < SAME:
+            elif may_swap and others and not self._counts(name, current, place):
                 names, current = others, place.evidence
             else:
                 steps.append(self._step(name, current, place))
                 continue
             steps, swaps = [], swaps + 1
         return current, steps
+
+    def _counts(self, name: str, current: Evidence, place: Round) -> bool:
+        """Whether an added effect, beside all that were added since, is still real and large enough to matter."""
+        kept = _added(name, current, place.evidence)
+        return place.is_real(kept) and footprint(place.evidence, current) > self.settings.tolerance
 
     def _step(self, name: str, current: Evidence, place: Round) -> Step:
         """Sort an effect's rivals: those these tests cannot tell from it, and those that contain it.
@@ -233,7 +262,7 @@ class Search:
                 richer.append(rival)
             elif alike:
                 rivals.append(rival)
-        gain = place.evidence.chi_square - current.chi_square
+        gain = _added(name, current, place.evidence).gain
         return Step(name, gain, tuple(rivals), tuple(richer), place.tried)
 
     def _place(self, current: Evidence, name: str, others: Sequence[str]) -> Round:
@@ -245,8 +274,7 @@ class Search:
             model = model.with_effect(other)
         start = {parameter: value for parameter, value in current.model.values.items() if parameter in model.values}
         reduced = fit(model.with_values(start), current.data_sets, self.held, self.bounds)
-        known = Candidate(name, current, reduced.chi_square - current.chi_square)
-        return self._round(reduced, others, [known])
+        return self._round(reduced, others, [_added(name, current, reduced)])
 
     def _distance(self, clean: Sequence[DataSet], rival: Candidate) -> float:
         """Chi-square of the rival, fitted to what the model itself would have measured without noise; no further than
@@ -258,6 +286,11 @@ class Search:
         while descent.chi_square > _CONTAINS and can_reach(descent, APART):
             descent = descent.stepped()
         return descent.chi_square
+
+
+def _added(name: str, current: Evidence, without: Evidence) -> Candidate:
+    """An effect of the current model as a candidate of the model without it."""
+    return Candidate(name, current, without.chi_square - current.chi_square)
 
 
 def critical_gain(evidence: Evidence, proposed: Sequence[Proposal]) -> float:

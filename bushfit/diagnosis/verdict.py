@@ -90,7 +90,7 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
     remainder = find_remainder(search, final, _BESIDE_A_NAME)
     if remainder and not _is_little(search, final, remainder, held):
         return unexplained(search, remainder.words, steps, fault=remainder.fault)
-    again = searched_again(search, steps, held)
+    again = searched_again(search, final, steps, held)
     counted = (sum(each.came_again for each in again), len(again)) if again else None
     others = sorted({other for each in again for other in each.others})
     if sum(bool(each.others) for each in again) >= (_ELSEWHERE if len(steps) == 1 else 1):

@@ -1,11 +1,12 @@
-"""The library of effects: one physics a file, one line here."""
-
-from __future__ import annotations
+"""The library of effects: what is said of them in library.toml, their laws one physics a file."""
 
 import difflib
-from collections.abc import Iterable
+import tomllib
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from importlib import import_module
+from pathlib import Path
+from typing import Any
 
 from bushfit.effects import unnamed
 from bushfit.effects.contract import Branch as Branch
@@ -20,65 +21,57 @@ from bushfit.effects.history import History as History
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction
 
-#: Files of all effects, the paper's three branches first. Within a level this is the order from the rubber outward.
-_FILES = (
-    "elastic",
-    "springpot",
-    "friction",
-    "viscous",
-    "hysteretic_loss",
-    "second_springpot",
-    "maxwell",
-    "second_maxwell",
-    "strain_stiffening",
-    "fifth_power_stiffening",
-    "asymmetry",
-    "second_friction",
-    "mullins_softening",
-    "rate_dependent_friction",
-    "coupled_breakdown",
-    "intrinsic_time",
-    "fractional_zener",
-    "kraus",
-    "sliders",
-    "self_heating",
-    "temperature",
-    "mullins_levels",
-    "filler_recovery",
-    "elastic_preload",
-    "strain_scale",
-    "clearance",
-    "interface_slip",
-    "bump_stop",
-    "one_sided_stop",
-    "stiffness_factor",
-    "preload_stiffening",
-    "sleeve_compliance",
-    "sleeve_compliance_of_direction",
-    "transducer_gain",
-    "rig_compliance",
-    "rig_compliance_of_direction",
-    "fixture_play",
-    "guide_friction",
-    "inertia",
-    "fixture_resonance",
-    "high_pass",
-    "force_saturation",
-    "displacement_gain",
-    "delay",
-    "amplitude_rolloff",
-    "loop_clock",
-    "force_gain",
-    "drift",
-    "force_offset",
+#: Directions along lines.
+_LINES = (Direction.AXIAL, Direction.RADIAL)
+#: Of the places tested, axial first, those that a search gives an effect of a place, by the word in library.toml.
+_SOUGHT: dict[str, Callable[[Sequence[str]], Sequence[str]]] = {
+    "others": lambda places: places[1:],
+    "lines": lambda places: _LINES if set(_LINES) <= set(places) else (),
+}
+_TABLE: dict[str, Any] = tomllib.loads(Path(__file__).with_name("library.toml").read_text(encoding="utf-8"))
+#: What a file may have of the law of an effect: fields of its record.
+_LAW = (
+    *("modulus", "stress", "modulus_sensitivities", "stress_sensitivities", "in_place_of", "becomes"),  # of a branch
+    *("adjust", "stiffness", "force"),  # of a modifier, and of a layer
 )
+#: The kind of an effect, by a part of the law that no other kind has.
+_KINDS: dict[str, type[Effect]] = {"modulus": Branch, "adjust": Modifier, "stiffness": Layer}
 
-_MODULES = [import_module(f"{__name__}.{file}") for file in _FILES]
-_EFFECTS: list[Effect] = [module.EFFECT for module in _MODULES]
-#: Every effect by name, in that order; of a kind that belongs to a place, that of the radial direction.
-LIBRARY: dict[str, Effect] = {effect.name: effect for effect in _EFFECTS}
-#: Every kind of effect that belongs to a place, by name: where a file has one, it is called FAMILY there.
-FAMILIES: dict[str, Family] = {module.FAMILY.name: module.FAMILY for module in _MODULES if hasattr(module, "FAMILY")}
+
+def _entry(name: str) -> dict[str, Any]:
+    """What library.toml says of an effect, itself or by the effect that it is like; "law" is the file of its law."""
+    entry: dict[str, Any] = dict(_TABLE[name])
+    if "like" not in entry:
+        return {"law": name.partition(".")[0], **entry}
+    return {**_entry(entry.pop("like")), "radial": {}, **entry}
+
+
+def _record(name: str) -> Effect | Family:
+    """The effect of a table of library.toml, or the family where each place may have one."""
+    entry = _entry(name)
+    module = import_module(f"{__name__}.{entry.pop('law')}")
+    law = {part: getattr(module, part) for part in _LAW if hasattr(module, part)}
+    kind = next(kind for part, kind in _KINDS.items() if part in law)
+    parameters = [
+        Parameter(own, **{"neutral": None, **each, "bounds": tuple(each["bounds"])})
+        for own, each in entry.pop("parameters").items()
+    ]
+    if "level" in entry:
+        entry["level"] = Level[entry["level"].upper()]
+    radial, places = entry.pop("radial", {}), _SOUGHT[entry.pop("sought", "others")]
+    said: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
+    record = kind(name=name, parameters=tuple(parameters), **said, **law)
+    return Family(record, places, radial) if name.endswith(".{place}") else record
+
+
+_RECORDS = [_record(name) for name in _TABLE]
+#: Every kind of effect that belongs to a place, by name.
+FAMILIES = {each.name: each for each in _RECORDS if isinstance(each, Family)}
+#: Every effect by name, from the rubber outward; of a kind that belongs to a place, that of the radial direction.
+LIBRARY = {
+    effect.name: effect
+    for effect in (each.of_place(Direction.RADIAL) if isinstance(each, Family) else each for each in _RECORDS)
+}
 
 #: The paper's model.
 BASE = ("elastic", "springpot", "friction")

@@ -1,10 +1,8 @@
 """Amplitude roll-off: the rig does not reach the amplitude it was asked for at high frequency."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
+from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Value, Values
 from bushfit.effects.history import History
 
 #: Frequency at which the amplitude has lost the share c [Hz]: the highest of the paper's sweeps.
@@ -28,16 +26,3 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """F of the true motion, scaled as the rig's stiffness is: by the motion asked for over the true one [N]."""
     share = _share(p, history.omega)
     return below(history.with_value(history.value * share)) / share
-
-
-EFFECT = Layer(
-    name="amplitude_rolloff",
-    sentence="The rig falls short of the amplitude asked for at high frequency: stiffness as of a smaller amplitude.",
-    equation="K at X (1 - c (f/155 Hz)^2)",
-    level=Level.INSTRUMENT,
-    parameters=(Parameter("c", "1", (0.0, 0.9), 0.0, 0.05, meaning="share of the amplitude lost at 155 Hz"),),
-    source="second-order low-pass of a servo-hydraulic rig, first term of its series",
-    confirmed_by="log the displacement really reached at every frequency",
-    stiffness=stiffness,
-    force=force,
-)

@@ -1,10 +1,8 @@
 """Clearance: play between the bushing and what moves it."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Values
+from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
 from bushfit.effects.history import History
 
@@ -40,19 +38,3 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
     """The force of the bushing moved by what exceeds +-delta [N]."""
     return below(history.with_value(dead_zone(history.value, p["delta"])))
-
-
-EFFECT = Layer(
-    name="clearance",
-    sentence="Play in the mounting: the bushing is moved less than it seems, most so at the smallest amplitude.",
-    equation="first harmonic of the bushing moved by a dead-zoned sine, about K(X - delta) N(delta/X)",
-    level=Level.COMPONENT,
-    parameters=(Parameter("delta", "m", (0.0, 1e-2), 0.0, 1e-5, meaning="play, each way"),),
-    source="A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B",
-    confirmed_by="log the displacement at the sleeve itself, and put a steel dummy in place of the bushing",
-    harmonic_error=1e-3,
-    twins=("fixture_play",),
-    turns=False,
-    stiffness=stiffness,
-    force=force,
-)

@@ -17,15 +17,16 @@ Notes:
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from bushfit.effects.history import Array as Array
-from bushfit.effects.history import History
-from bushfit.geometry import Bushing, Place
+from bushfit.effects.history import History as History
+from bushfit.geometry import Bushing, Direction, Place
 
 if TYPE_CHECKING:
     from bushfit.effects.unnamed import Unnamed
@@ -165,7 +166,7 @@ class Effect:
     """What every effect states about itself.
 
     Args:
-        name: the file's stem; the name in files, reports and options.
+        name: the name in files, reports and options; the file of its law is called so.
         sentence: what it is, for an engineer.
         equation: its first-harmonic form, ASCII.
         source: where the law comes from.
@@ -188,6 +189,8 @@ class Effect:
         after: the effect without which it is no other: it is looked for beside that one only.
         never_with: effects beside which it is not looked for: the two together are a series that follows any law
             between them, and so no name.
+        becomes: the simpler effect that it is at the end of its range, and by a model's values with this effect those
+            with the simpler one in its place; None away from that end.
     """
 
     name: str
@@ -210,6 +213,11 @@ class Effect:
     in_place_of: Callable[[Values], dict[str, float]] | None = None
     after: str | None = None
     never_with: tuple[str, ...] = ()
+    becomes: tuple[str, Callable[[Values], dict[str, float] | None]] | None = None
+
+    def acts_at(self, place: Place) -> bool:
+        """Whether it acts at a place: one that belongs to a place, by its name, acts there alone."""
+        return self.name.partition(".")[2] in ("", str(place))
 
     @property
     def amount(self) -> Parameter:
@@ -219,7 +227,7 @@ class Effect:
 
 @dataclass(frozen=True, kw_only=True)
 class Branch(Effect):
-    """A stress in parallel with the others.
+    """A stress in parallel with the others, of the material.
 
     Args:
         modulus: (values, omega [rad/s], strain amplitude) -> complex modulus s~ / (2 e~) of the first harmonic [Pa].
@@ -232,6 +240,7 @@ class Branch(Effect):
             can stand for it. None for all others.
     """
 
+    level: Level = Level.MATERIAL
     modulus: Callable[[Values, Array, Array], Array]
     stress: Callable[[Values, History], Array]
     modulus_sensitivities: Callable[[Values, Array, Array], dict[str, Array]] | None = None
@@ -242,12 +251,13 @@ class Branch(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Modifier(Effect):
-    """Changes values that other effects use, by operating condition.
+    """Changes values that other effects use, by operating condition; of the material unless it says otherwise.
 
     Args:
         adjust: (values, condition) -> the changed values only.
     """
 
+    level: Level = Level.MATERIAL
     adjust: Callable[[Values, Condition], dict[str, Value]]
 
 
@@ -257,38 +267,49 @@ class Layer(Effect):
 
     Args:
         turns: whether it acts in torsion too; else only on motion along a line.
+        adds: the parameter whose sum stands for neighbours of the same law, such as compliances in series.
         stiffness: (values, response below, omega [rad/s], amplitude [m or rad], setting) -> complex stiffness above.
         force: (values, force below, displacement history, setting) -> force above [N or N m].
     """
 
     turns: bool = True
+    adds: str | None = None
     stiffness: Callable[[Values, StiffnessBelow, Array, Array, Setting], Array]
     force: Callable[[Values, ForceBelow, History, Setting], Array]
 
 
-def all_but_the_first(places: Sequence[str]) -> Sequence[str]:
-    """The places that have an effect of their own where the first is what the moduli go by."""
-    return places[1:]
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Family:
     """A kind of effect of which each place, a direction of the bushing or a specimen, may have its own.
 
     Args:
-        name: of the kind; an effect of it, and its one parameter, is called `<name>.<place>`.
-        of_place: the effect of one place, kept from one call to the next.
+        record: of any place, in whose texts the place stands for {place}. An effect of the kind, which acts at its
+            place alone, and its one parameter are called `<name>.<place>`.
         places: of the places tested, that by which the moduli go first, those that a search gives one.
+        radial: texts that are others for the radial direction.
     """
 
-    name: str
-    of_place: Callable[[str], Effect]
-    places: Callable[[Sequence[str]], Sequence[str]] = all_but_the_first
+    record: Effect
+    places: Callable[[Sequence[str]], Sequence[str]]
+    radial: Mapping[str, Any]
 
+    @property
+    def name(self) -> str:
+        """Of the kind."""
+        return self.record.name.partition(".")[0]
 
-def only_at(place: str, law: Callable[..., Array], p: Values, below: Callable[..., Array], *motion: Any) -> Array:
-    """A layer's law, of either face, at one place; elsewhere the response below. `motion` ends with the setting."""
-    return law(p, below, *motion) if str(motion[-1].direction) == place else below(*motion[:-1])
+    @cached_property
+    def of_place(self) -> Callable[[str], Effect]:
+        """The effect of one place, kept from one call to the next."""
+        return cache(self._of_place)
+
+    def _of_place(self, place: str) -> Effect:
+        record = replace(self.record, **(self.radial if place == Direction.RADIAL else {}))
+        named = {each.name: getattr(record, each.name) for each in fields(record)}
+        texts: dict[str, Any] = {key: text.format(place=place) for key, text in named.items() if isinstance(text, str)}
+        parameters = tuple(replace(each, meaning=each.meaning.format(place=place)) for each in record.parameters)
+        twins = tuple(twin.format(place=place) for twin in record.twins)
+        return replace(record, **texts, parameters=parameters, twins=twins)
 
 
 def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str, Value]:

@@ -1,10 +1,8 @@
 """Coupled breakdown: the rate effect shrinks as the filler structure breaks down with amplitude."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from bushfit.effects.contract import Condition, Level, Modifier, Parameter, Value, Values, scaled_values
+from bushfit.effects.contract import Condition, Value, Values, scaled_values
 
 #: Strain amplitude at which m is unchanged [1]: within the range of most tests.
 REFERENCE_STRAIN = 0.01
@@ -16,15 +14,3 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
     """m (e0/0.01)^(-q) [Pa s^alpha]."""
     ratio = np.maximum(condition.strain, SMALLEST_STRAIN) / REFERENCE_STRAIN
     return scaled_values(p, ("m",), np.power(ratio, -np.asarray(p["q"], dtype=float)))
-
-
-EFFECT = Modifier(
-    name="coupled_breakdown",
-    sentence="The rate effect shrinks as amplitude breaks the filler down: curves flatten at large amplitude.",
-    equation="m (e0/0.01)^(-q)",
-    level=Level.MATERIAL,
-    parameters=(Parameter("q", "1", (0.0, 1.0), 0.0, 0.1, meaning="power of the strain amplitude"),),
-    source="rate and amplitude dependence coupled, after A. Lion, C. Kardelky, Int. J. Plasticity 20 (2004) 1313",
-    confirmed_by="sweep from 0.05 to 5 Hz at the smallest and the largest amplitude: their slopes must differ",
-    adjust=adjust,
-)

@@ -1,7 +1,5 @@
 """The dead zone, as a function of time and as a describing function: contact beyond a gap, motion within a play."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,10 +1,8 @@
 """Delay: the force is recorded later than the displacement, or the displacement later than the force."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Values
+from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
 from bushfit.effects.history import History
 
 
@@ -28,20 +26,3 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     asked, cycle = place[1:] - np.asarray(p["tau"]) / history.step, 1.0 / (history.frequency * history.step)
     beyond = np.ceil(np.maximum(asked - place[-1], 0.0) / cycle)
     return row_by_row(asked - beyond * cycle, place, from_zero)
-
-
-EFFECT = Layer(
-    name="delay",
-    sentence="Force, or displacement, is recorded late: the loss factor falls, or rises, in proportion to frequency.",
-    equation="K exp(-i omega tau)",
-    level=Level.INSTRUMENT,
-    parameters=(
-        Parameter(
-            "tau", "s", (-1e-2, 1e-2), 0.0, 1e-4, meaning="time by which the force is late; below 0 the displacement is"
-        ),
-    ),
-    source="shift theorem of the Fourier transform",
-    confirmed_by="put a steel dummy in place of the bushing: its loss factor must be zero",
-    stiffness=stiffness,
-    force=force,
-)

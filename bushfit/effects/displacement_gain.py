@@ -1,24 +1,11 @@
-"""Displacement gain: the transducer of one direction, or of one specimen's rig, reads another gain than the others'."""
+"""Displacement gain: the transducer of one direction, or of one specimen's rig, reads another gain than the others'.
 
-from __future__ import annotations
-
-from functools import lru_cache, partial
+One transducer for all tests would be no effect that tests can show: mu, m and eps_half absorb it exactly.
+"""
 
 from bushfit.effects import strain_scale
-from bushfit.effects.contract import (
-    Array,
-    Family,
-    ForceBelow,
-    Layer,
-    Level,
-    Parameter,
-    Setting,
-    StiffnessBelow,
-    Values,
-    only_at,
-)
+from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
 from bushfit.effects.history import History
-from bushfit.geometry import Direction
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
@@ -29,29 +16,3 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
     """F of scale times the motion that was read [N]."""
     return below(history.with_value(p["scale"] * history.value))
-
-
-@lru_cache
-def displacement_gain(place: str) -> Layer:
-    """The effect of one place: a direction of the bushing, or a specimen by its name.
-
-    Notes:
-        One transducer for all tests would be no effect that tests can show: mu, m and eps_half absorb it exactly.
-    """
-    return Layer(
-        name=f"displacement_gain.{place}",
-        sentence=f"The displacement transducer of {place} is off by one factor, and with it amplitude and stiffness; "
-        "off alike in all tests it would not show.",
-        equation=f"scale K(scale X), {place} only",
-        level=Level.INSTRUMENT,
-        parameters=(Parameter("scale", "1", (0.6, 1.4), 1.0, 0.05, meaning=f"true motion of {place} over that read"),),
-        source="sensitivity error of a displacement transducer, ISO 9513:2012",
-        confirmed_by="check the transducer with gauge blocks; a stiffness_factor of the same place shifts the "
-        "stiffness by as much and leaves the amplitude",
-        stiffness=partial(only_at, place, stiffness),
-        force=partial(only_at, place, force),
-    )
-
-
-FAMILY = Family("displacement_gain", displacement_gain)
-EFFECT = displacement_gain(Direction.RADIAL.value)

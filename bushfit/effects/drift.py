@@ -1,13 +1,11 @@
 """Drift: the gain of the force chain moves with time over the session."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Layer, Level, Parameter, Values
+from bushfit.effects.contract import Array, Values
 
 
 def response(p: Values, below: Callable[..., Array], *motion_and_setting: Any) -> Array:
@@ -17,15 +15,4 @@ def response(p: Values, below: Callable[..., Array], *motion_and_setting: Any) -
     return (1.0 if turn is None else 1.0 + p["gain"] * np.asarray(turn)) * below(*motion)
 
 
-EFFECT = Layer(
-    name="drift",
-    sentence="The measured force drifts evenly over the session, in the order in which the tests are listed.",
-    equation="(1 + gain t) K, t from 0 at the first point to 1 at the last",
-    level=Level.INSTRUMENT,
-    parameters=(Parameter("gain", "1", (-0.5, 0.5), 0.0, 0.02, meaning="gain of the last point over the first"),),
-    source="sensitivity drift of a force transducer, ISO 376:2011; of a warming rig or bushing likewise",
-    confirmed_by="repeat the first test last",
-    under=("turn",),
-    stiffness=response,
-    force=response,
-)
+stiffness = force = response

@@ -1,11 +1,8 @@
 """Elastic branch: the rubber's static shear modulus."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, History, Values
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
@@ -26,17 +23,3 @@ def stress(p: Values, history: History) -> Array:
 def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
     """d/dmu = 2 e."""
     return {"mu": 2.0 * history.value}
-
-
-EFFECT = Branch(
-    name="elastic",
-    sentence="The rubber's static stiffness, the same at every frequency and amplitude.",
-    equation="mu",
-    level=Level.MATERIAL,
-    parameters=(Parameter("mu", "Pa", (1e3, 1e9), 0.0, 1e6, log=True, meaning="elastic shear modulus"),),
-    source="Garcia Tarrago et al. 2007, Eq. 1",
-    modulus=modulus,
-    stress=stress,
-    modulus_sensitivities=modulus_sensitivities,
-    stress_sensitivities=stress_sensitivities,
-)

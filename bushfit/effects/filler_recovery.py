@@ -1,10 +1,8 @@
 """Filler recovery: after a larger amplitude the filler network is still broken, and builds up again with time."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from bushfit.effects.contract import Condition, Level, Modifier, Parameter, Value, Values, scaled_values
+from bushfit.effects.contract import Condition, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
@@ -22,21 +20,3 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
     ratio = np.divide(condition.strain, larger, out=np.ones(np.shape(larger)), where=larger > 0.0)
     broken = p["share"] * (1.0 - np.square(ratio)) * np.exp(-np.asarray(rested) / p["tau"])
     return scaled_values(p, ("sigma_fmax",), 1.0 - broken)
-
-
-EFFECT = Modifier(
-    name="filler_recovery",
-    sentence="After a larger amplitude the filler's friction is still low, and recovers while smaller ones are tested.",
-    equation="sigma_fmax times 1 - share (1 - (e0/e_l)^2) exp(-t/tau), t since a larger strain amplitude e_l",
-    level=Level.MATERIAL,
-    parameters=(
-        Parameter("share", "1", (0.0, 0.95), 0.0, 0.2, meaning="share of the friction lost at first"),
-        Parameter("tau", "1", (1e-3, 2.0), None, 0.05, log=True, meaning="time of recovery, over that of the session"),
-    ),
-    source="kinetics lambda' = (lambda_inf - lambda)/tau of the filler structure: A. Lion, J. Mech. Phys. Solids 46 "
-    "(1998) 895; measured recovery: L. Chazeau et al., Polym. Compos. 21 (2000) 202",
-    confirmed_by="repeat the smallest level at once after the largest, and again an hour later: it must have recovered",
-    under=("left", "rested"),
-    taken="predicted as fully recovered from larger strains: right after one friction is lower, see filler_recovery",
-    adjust=adjust,
-)

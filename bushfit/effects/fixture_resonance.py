@@ -1,12 +1,10 @@
 """Fixture resonance: the moving mass sits on a fixture that has a mode of its own."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Values
+from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
 from bushfit.effects.history import History
 
 
@@ -40,23 +38,3 @@ def _mode(omega: float, damping: float, push: Array, step: float) -> Array:
     system = (np.array([omega**2]), np.array([1.0, 2.0 * damping * omega, omega**2]))
     above, under, _ = cont2discrete(system, step, method="foh")
     return np.asarray(lfilter(np.ravel(above), under, push))
-
-
-EFFECT = Layer(
-    name="fixture_resonance",
-    sentence="A mode of the fixture, above or inside the band: inertia that grows towards its resonance.",
-    equation="K - mass omega^2 wr^2/(wr^2 - omega^2 + 2 i damping omega wr), wr = 2 pi frequency",
-    level=Level.INSTRUMENT,
-    parameters=(
-        Parameter("mass", "kg", (0.0, 100.0), 0.0, 0.05, meaning="moving mass of the mode"),
-        Parameter(
-            "frequency", "Hz", (10.0, 1e4), None, 300.0, log=True, meaning="frequency of the mode", scale="frequency"
-        ),
-        Parameter("damping", "1", (1e-3, 1.0), None, 0.03, log=True, meaning="damping ratio of the mode"),
-    ),
-    source="D. J. Ewins, Modal Testing, 2nd ed., 2000, ch. 2 (one mode, driven at its base)",
-    confirmed_by="tap the fixture, or run it empty to three times the highest frequency",
-    turns=False,
-    stiffness=stiffness,
-    force=force,
-)

@@ -1,11 +1,9 @@
 """Force gain: the loop's force chain and the sweep's do not agree."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
-from bushfit.effects.contract import Array, Layer, Level, Parameter, Values
+from bushfit.effects.contract import Array, Values
 
 
 def response(p: Values, below: Callable[..., Array], *motion_and_setting: Any) -> Array:
@@ -14,14 +12,4 @@ def response(p: Values, below: Callable[..., Array], *motion_and_setting: Any) -
     return (1.0 + p["gain"] if setting.kind == "loop" else 1.0) * below(*motion)
 
 
-EFFECT = Layer(
-    name="force_gain",
-    sentence="The loop's load cell reads another gain than the sweep's: the two tests disagree by one factor.",
-    equation="(1 + gain) K in loops",
-    level=Level.INSTRUMENT,
-    parameters=(Parameter("gain", "1", (-0.5, 0.5), 0.0, 0.01, meaning="gain of the loop's chain over the sweep's"),),
-    source="sensitivity error of a force transducer, ISO 376:2011",
-    confirmed_by="hang a known weight on the load cell in both chains",
-    stiffness=response,
-    force=response,
-)
+stiffness = force = response

@@ -3,8 +3,6 @@
 Slow loops have a range of their own, and are cut flat for all to see where that is too small.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.clearance import FIRST, SAMPLES
@@ -12,15 +10,12 @@ from bushfit.effects.contract import (
     UNKNOWN,
     Array,
     ForceBelow,
-    Layer,
-    Level,
-    Parameter,
+    History,
     Setting,
     StiffnessBelow,
     Values,
 )
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
-from bushfit.effects.history import History
 
 #: Amplitude of the force's first harmonic, over the level, below which no waveform of rubber reaches it; chosen.
 _NEAR = 0.5
@@ -56,24 +51,3 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """F, less a share of what of it lies beyond +-level [N]; the torque cell is another one, so not in torsion."""
     felt = below(history)
     return felt - p["share"] * dead_zone(felt, p["level"]) if setting.kind == "sweep" else felt
-
-
-EFFECT = Layer(
-    name="force_saturation",
-    sentence="The force channel saturates: a sweep's stiffness falls where force is largest, at whatever amplitude.",
-    equation="K (1 - share N(level/(|K| X))), N of the bent waveform, sweeps only",
-    level=Level.INSTRUMENT,
-    parameters=(
-        Parameter(
-            "level", "N", (1e-3, 1e7), None, 1e3, log=True, meaning="force from which on it saturates", scale="force"
-        ),
-        Parameter("share", "1", (0.0, 1.0), 0.0, 0.2, meaning="share lost of the force beyond; 1 where it is clipped"),
-    ),
-    source="A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B",
-    confirmed_by="hang known weights on the load cell up to the largest force; its waveform is cut flat at both ends, "
-    "and the stiffer direction is cut at smaller amplitudes, as no softening of the rubber does",
-    harmonic_error=1e-3,
-    turns=False,
-    stiffness=stiffness,
-    force=force,
-)

@@ -1,12 +1,11 @@
 """Fractional Zener: a spring in series with the springpot, which levels off at high frequency."""
 
-from __future__ import annotations
+from functools import lru_cache
 
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Values, linear_stress
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, History, Values, linear_stress
 from bushfit.effects.springpot import power_of_rate
 
 #: Frequency at which c compares springpot and spring [Hz]: within the range of most sweeps.
@@ -27,47 +26,35 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     return -0.5 * p["m"] * rate * turn / (1.0 + turn)
 
 
-def _kernel(alpha: float, scaled: float, count: int, step: float) -> Array:
+@lru_cache(maxsize=64)
+def _circle(length: int) -> tuple[Array, Array]:
+    """ln(1 - z) on half a circle inside that of convergence, (length // 2 + 1,), and the powers of its radius."""
+    radius = _ECHO ** (1.0 / length)
+    turn = np.exp(-2.0j * np.pi * np.arange(length // 2 + 1) / length)
+    return np.log(1.0 - radius * turn), radius ** np.arange(length)
+
+
+def _kernel(alpha: Array, scaled: Array, count: int, step: Array) -> Array:
     """Weights of the strains that went before, as those of Eq. (3): the series of -k v^2/(1 + k v) over step^alpha in
-    powers of z, v = (1 - z)^alpha, k = tau^alpha/step^alpha, (count,).
+    powers of z, v = (1 - z)^alpha, k = tau^alpha/step^alpha; of (..., 1) each, (..., count).
 
     Notes: by its values on a circle inside that of convergence (C. Lubich, Numer. Math. 52 (1988) 129).
     """
-    length = next_fast_len(2 * count)
-    radius = _ECHO ** (1.0 / length)
-    value = (1.0 - radius * np.exp(-2.0j * np.pi * np.arange(length) / length)) ** alpha
-    ratio = scaled / step**alpha
-    series = np.fft.ifft(-ratio * value**2 / (1.0 + ratio * value)).real / step**alpha
-    return series[:count] * radius ** -np.arange(count)
-
-
-def _from_rest(alpha: float, scaled: float, strain: Array, step: float) -> Array:
-    """The kernel's sum over a strain history from rest, (n,)."""
-    length = next_fast_len(2 * strain.size, real=True)
-    kernel = _kernel(alpha, scaled, strain.size, step)
-    return np.fft.irfft(np.fft.rfft(strain, length) * np.fft.rfft(kernel, length), length)[: strain.size]
+    length = next_fast_len(2 * count, real=True)
+    logarithm, powers = _circle(length)
+    value = np.exp(alpha * logarithm)
+    unit = step**alpha
+    turn = scaled / unit * value
+    series = np.fft.irfft(-turn * value / (1.0 + turn), length) / unit
+    return series[..., :count] / powers[:count]
 
 
 def stress(p: Values, history: History) -> Array:
     """s + tau^alpha D^alpha s = m D^alpha e, less the springpot's own m D^alpha e (Eqs. 1, 3) [Pa]."""
     if history.periodic:
         return linear_stress(modulus, p, history)
-    row_by_row = np.vectorize(_from_rest, signature="(),(),(n),()->(n)")
-    alpha, scaled, step = (np.atleast_1d(value)[..., 0] for value in (p["alpha"], _scaled(p), history.step))
-    return p["m"] * row_by_row(alpha, scaled, history.value, step)
-
-
-EFFECT = Branch(
-    name="fractional_zener",
-    sentence="A spring in series with the springpot: at high frequency stiffness levels off and the loss falls again.",
-    equation="-m/2 w z/(1 + z), w = (i omega)^alpha, z = c (i f/25 Hz)^alpha",
-    level=Level.MATERIAL,
-    parameters=(Parameter("c", "1", (0.0, 10.0), 0.0, 0.1, meaning="springpot over the spring in series, at 25 Hz"),),
-    source="M. Caputo, F. Mainardi, Riv. Nuovo Cimento 1 (1971) 161; R. L. Bagley, P. J. Torvik, AIAA J. 21 (1983) 741",
-    confirmed_by="sweep to twice the highest frequency: the loss factor must fall there",
-    variant_of="springpot",
-    uses=("m", "alpha"),
-    size="m",
-    modulus=modulus,
-    stress=stress,
-)
+    count = history.value.shape[-1]
+    alpha, scaled, step = (np.atleast_1d(value) for value in (p["alpha"], _scaled(p), history.step))
+    length = next_fast_len(2 * count, real=True)
+    kernel = np.fft.rfft(_kernel(alpha, scaled, count, step), length)
+    return p["m"] * np.fft.irfft(np.fft.rfft(history.value, length) * kernel, length)[..., :count]

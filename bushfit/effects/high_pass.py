@@ -3,11 +3,9 @@
 Such a cell serves the sweeps; the loops, as slow as the leak, go by one that holds its force.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
+from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Value, Values
 from bushfit.effects.history import History
 from bushfit.effects.maxwell import relax
 
@@ -33,19 +31,3 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         leaked = _leak(p, history.harmonics) * np.fft.rfft(felt)
         return felt + np.fft.irfft(leaked, n=felt.shape[-1])
     return relax(2.0 * np.pi * p["corner"], felt, history.step) if np.any(p["corner"]) else felt
-
-
-EFFECT = Layer(
-    name="high_pass",
-    sentence="The charge amplifier leaks: the slowest of a sweep loses stiffness and gains loss, as 1/frequency.",
-    equation="K i omega T/(1 + i omega T), T = 1/(2 pi corner), sweeps only",
-    level=Level.INSTRUMENT,
-    parameters=(
-        Parameter("corner", "Hz", (0.0, 10.0), 0.0, 0.05, meaning="frequency at which half of the power is lost"),
-    ),
-    source="first-order high-pass of a charge amplifier; G. Gautschi, Piezoelectric Sensorics, 2002, ch. 11",
-    confirmed_by="hang a weight on the load cell: its reading must fall off; a slow maxwell arm "
-    "shows in the loops, too",
-    stiffness=stiffness,
-    force=force,
-)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -24,6 +24,7 @@ class History:
             False where the motion starts from rest before the first sample.
         frequency: of the excitation [Hz]; like the step, it may differ between motions, (..., 1).
         driver: the imposed motion, where something that gives way lies between it and this one.
+        solved: where equations over this motion were solved last, by name: good starts of the next solution, no more.
     """
 
     value: Array
@@ -31,6 +32,7 @@ class History:
     periodic: bool
     frequency: float
     driver: Array | None = None
+    solved: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
     def steady(cls, value: Array, frequency: float, cycles: int = 1) -> History:
@@ -71,24 +73,26 @@ class History:
 
     @cached_property
     def turning(self) -> Turning:
-        """The turning points of each row."""
+        """The pieces of each motion between its turning points, in the order in which friction follows them."""
         count = self.value.shape[-1]
-        rows = self.value.reshape(-1, count)
         if self.periodic:
-            tops = np.argmax(rows, axis=-1)
-            tops = tops[:1] if np.all(tops == tops[0]) else tops
-            order = (tops[:, None] + np.arange(count + 1)) % count
-            path = rows.take(order[0], axis=-1) if tops.size == 1 else np.take_along_axis(rows, order, axis=-1)
-            place = (np.arange(count) - tops[:, None]) % count
+            top = np.argmax(self.value, axis=-1)[..., None]
+            path = np.take_along_axis(self.value, (top + np.arange(count + 1)) % count, axis=-1)
+            place = (np.arange(count) - top) % count
         else:
-            path = np.concatenate([np.zeros((len(rows), 1)), rows], axis=-1)
-            place = np.arange(1, count + 1)[None]
+            path = np.concatenate([np.zeros_like(self.value[..., :1]), self.value], axis=-1)
+            place = np.broadcast_to(np.arange(1, count + 1), self.value.shape)
         turned = reversals(path)
-        if np.all(turned == turned[0]):
-            return Turning(path, place, np.zeros(len(rows), dtype=np.intp), (np.flatnonzero(turned[0]),))
-        packed, label = np.unique(np.packbits(turned, axis=-1), axis=0, return_inverse=True)
-        turns = tuple(np.flatnonzero(np.unpackbits(row, count=count)) for row in packed)
-        return Turning(path, place, label.ravel(), turns)
+        passed = np.cumsum(turned, axis=-1)
+        ends = np.full((*turned.shape[:-1], int(passed[..., -1].max()) + 2), count)
+        ends[..., 0] = 0
+        *rows, samples = np.nonzero(turned)
+        ends[*rows, passed[turned]] = samples
+        levels = np.take_along_axis(path, ends, axis=-1)
+        piece = np.take_along_axis(passed, np.minimum(place, count - 1), axis=-1)
+        travel = self.value - np.take_along_axis(levels, piece, axis=-1)
+        first = piece.reshape(-1, count)[0]
+        return Turning(np.diff(levels), travel, first if np.all(piece == first) else piece)
 
     @cached_property
     def rate(self) -> Array:
@@ -115,28 +119,23 @@ class History:
         inner = np.diff(self.value, n=2, axis=-1) / self.step**2
         return np.concatenate([inner[..., :1], inner, inner[..., -1:]], axis=-1)
 
-    def with_value(self, value: Array) -> History:
-        """Other values at the same times."""
-        return replace(self, value=value)
+    def with_value(self, value: Array, solved: dict[str, Any] | None = None) -> History:
+        """Other values at the same times; with `solved` of values near them, where there were some."""
+        return replace(self, value=value, solved={} if solved is None else solved)
 
     def faster(self, factor: Any) -> History:
         """The same motion so many times as fast, a number or (..., 1)."""
-        return replace(self, step=self.step / factor, frequency=self.frequency * factor)
+        return replace(self, step=self.step / factor, frequency=self.frequency * factor, solved={})
 
     def driven(self) -> History:
         """The same motion, kept as the driver of those that are made from it."""
-        return replace(self, driver=self.value)
+        return replace(self, driver=self.value, solved={})
 
     def scaled(self, factor: float) -> History:
         """All values times a factor, such as strain per displacement; computed once, as a fit asks for it often."""
         if factor not in self._by_factor:
             self._by_factor[factor] = self.with_value(self.value * factor)
         return self._by_factor[factor]
-
-    @cached_property
-    def solved(self) -> dict[str, Any]:
-        """Where equations over this motion were solved last, by name: good starts of the next solution, and no more."""
-        return {}
 
     @cached_property
     def _by_factor(self) -> dict[float, History]:
@@ -146,26 +145,26 @@ class History:
 
 @dataclass(frozen=True, eq=False)
 class Turning:
-    """The turning points of a history's rows.
+    """The pieces of a motion between its turning points.
+
+    A motion from rest begins at 0, before its first sample; a steady cycle at its top, to which it returns.
 
     Args:
-        path: the values of each row in the order in which friction follows them, (rows, n + 1): from the rest before
-            the first sample on, or once around the steady cycle from its top.
-        place: index on the path of each sample, (rows, n), or (1, n) where it is the same for all rows.
-        label: number of the set of turning points that a row has, (rows,).
-        turns: the sets, as indices on the path.
+        strides: change of the value over each piece, (..., k); 0 beyond the last where other motions have more.
+        travel: change of the value from the turning point before each sample to it, (..., n).
+        piece: number of the piece that each sample is on, (..., n), or (n,) where all turn at the same samples.
     """
 
-    path: Array
-    place: Array
-    label: Array
-    turns: tuple[Array, ...]
+    strides: Array
+    travel: Array
+    piece: Array
 
-    def at_samples(self, along: Array, rows: Array) -> Array:
-        """Values along the paths of some rows, (k, n + 1), at the samples of these rows, (k, n)."""
-        if len(self.place) == 1:
-            return along.take(self.place[0], axis=-1)
-        return np.take_along_axis(along, self.place[rows], axis=-1)
+    def at_samples(self, of_pieces: Array) -> Array:
+        """What holds for each piece, (..., k), at the samples on it, (..., n)."""
+        if self.piece.ndim == 1:
+            return of_pieces.take(self.piece, axis=-1)
+        piece = np.broadcast_to(self.piece, (*of_pieces.shape[:-1], self.piece.shape[-1]))
+        return np.take_along_axis(of_pieces, piece, axis=-1)
 
 
 def reversals(value: Array) -> Array:

@@ -1,10 +1,8 @@
 """Interface slip: dry friction at the bonded or pressed face of the bushing, over its play too if there is any."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
+from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Value, Values
 from bushfit.effects.history import History
 
 #: Amplitude below which the slip stiffness grows no more [m or rad]: less than any test reaches, and more than 0.
@@ -25,17 +23,3 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
     """F + Fc sgn(dx/dt) [N]."""
     return below(history) + _force(p, setting) * history.sense
-
-
-EFFECT = Layer(
-    name="interface_slip",
-    sentence="Dry friction at the sleeve's face: extra loss that fades with amplitude, the same at every frequency.",
-    equation="K + i 4 force/(pi X)",
-    level=Level.COMPONENT,
-    parameters=(Parameter("force", "N", (0.0, 1e5), 0.0, 5.0, meaning="Coulomb force"),),
-    source="Coulomb friction; A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B",
-    confirmed_by="run the empty fixture slowly, and a steel dummy: friction that stays is that of the guides",
-    twins=("guide_friction",),
-    stiffness=stiffness,
-    force=force,
-)

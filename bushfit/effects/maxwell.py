@@ -1,11 +1,8 @@
 """Maxwell branch: a spring and a dashpot in series, one relaxation time."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Value, Values, linear_stress
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, History, Value, Values, linear_stress
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
@@ -34,20 +31,3 @@ def stress(p: Values, history: History) -> Array:
     if history.periodic:
         return linear_stress(modulus, p, history)
     return 2.0 * p["mu1"] * relax(1.0 / p["tau"], history.value, history.step)
-
-
-EFFECT = Branch(
-    name="maxwell",
-    sentence="One relaxation of the rubber: stiffness steps up, and loss peaks, around one frequency.",
-    equation="mu1 i omega tau/(1 + i omega tau)",
-    level=Level.MATERIAL,
-    parameters=(
-        Parameter("mu1", "Pa", (0.0, 1e8), 0.0, 5e4, meaning="modulus that relaxes"),
-        Parameter("tau", "s", (1e-6, 1e2), None, 2e-3, log=True, meaning="relaxation time", scale="period"),
-    ),
-    source="Maxwell arm; J. D. Ferry, Viscoelastic Properties of Polymers, 3rd ed., 1980, ch. 3",
-    confirmed_by="sweep a decade below and above the relaxation: the step must level off on both sides",
-    size="mu1",
-    modulus=modulus,
-    stress=stress,
-)

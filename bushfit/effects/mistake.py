@@ -1,7 +1,5 @@
 """The record that describes one mistake in what a file says, and the test as it was measured if it was made."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
@@ -92,7 +90,7 @@ class Mistake(Effect):
             return self.line
         other = other_direction(test.direction) if self.swaps else None
         kind, line = ("loops", self.line) if isinstance(test, Loop) else ("sweeps", self.sweep_line or self.line)
-        return f"[[{kind}]] of {shown(test)}: {line.format(direction=other)}"
+        return f"[[{kind}]] of {shown(test)}: {line.replace('{direction}', str(other))}"
 
 
 def told(mistake: Mistake, test: Loop | Sweep) -> str:

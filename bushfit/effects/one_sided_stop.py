@@ -1,17 +1,9 @@
 """One-sided stop: a spring that is met beyond a gap, one way only."""
 
-from __future__ import annotations
-
-from dataclasses import replace
-
 import numpy as np
 
-from bushfit.effects import bump_stop
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Setting, StiffnessBelow, Values
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 from bushfit.effects.dead_zone import first_harmonic
-from bushfit.effects.history import History
-
-_GAP, _STIFFNESS = bump_stop.EFFECT.parameters
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
@@ -22,18 +14,3 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
     """F + k (x - gap) above the gap [N]: overtones, even ones too, and a mean force."""
     return below(history) + p["stiffness"] * np.maximum(history.value - p["gap"], 0.0)
-
-
-EFFECT = Layer(
-    name="one_sided_stop",
-    sentence="A stop is met beyond a gap in the positive sense only: stiffness jumps up and loops turn lopsided.",
-    equation="K + stiffness N(gap/X)/2",
-    level=Level.COMPONENT,
-    parameters=(replace(_GAP, meaning="travel until the stop is met, in the positive sense"), _STIFFNESS),
-    source="A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B",
-    confirmed_by="loop slowly to the largest amplitude: the force must bend up at one end only, where bump_stop bends "
-    "it at both; sweeps alone cannot part the two",
-    turns=False,
-    stiffness=stiffness,
-    force=force,
-)

@@ -1,11 +1,11 @@
 """Rig compliance: the rig gives way in series with the bushing, which is moved less than the rig imposes."""
 
-from __future__ import annotations
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.effects.contract import Array, ForceBelow, Layer, Level, Parameter, Setting, StiffnessBelow, Value, Values
+from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Value, Values
 from bushfit.effects.history import History
 from bushfit.errors import ModelError
 
@@ -22,8 +22,14 @@ _UNSETTLED = 1e-3
 _MANY_ROUNDS = 16
 #: Largest motion of the bushing that an iteration may try, relative to the imposed motion.
 _LARGEST_MOTION = 2.0
+#: Rounds before the last two from which the next is foreseen; chosen: three take a third of the rounds, more no less.
+_REMEMBERED = 3
+#: Share of the largest eigenvalue below which two of them teach the same: what rounding leaves.
+_SAME_DIRECTION = 1e-12
 #: The name of its solutions.
 _NAME = "compliance"
+#: The name of the solutions of what gives way beneath it, as a sleeve in a rig.
+_BENEATH = "beneath"
 #: Sample at which the pulse stands that measures a stiffness: a few after the start, for the force before it.
 _PULSE_AT = 4
 
@@ -63,8 +69,10 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         Solved for the whole history at once. Each round computes what is missing of the motion, x - x_b - c F(x_b), and
         adds it to x_b times 1/(1 + c K), harmonic by harmonic. K is measured once with a pulse: a poor K costs rounds,
         not accuracy. So K and x_b of the last model that was asked about this motion are where the next one starts.
-        Where a round does not bring x_b nearer, the next steps are halved. Dry friction below turns its sense with the
-        imposed motion: that it sticks for a moment is neglected.
+        What gives way beneath starts each round from its solution of the round before.
+        Friction below that turns sharply would make it many rounds: so those before tell the next. Where a round does
+        not bring x_b nearer, the next steps are halved. Dry friction below turns its sense with the imposed motion:
+        that it sticks for a moment is neglected.
     """
     compliance = p["compliance"]
     if not np.any(compliance):
@@ -72,25 +80,31 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     imposed, solved, history = history.value, history.solved, history.driven()
     count = imposed.shape[-1]
     length = count if history.periodic else next_fast_len(2 * count, real=True)
-    if _NAME not in solved:
-        solved[_NAME] = _pulse_stiffness(below, history, length), imposed
-    rigid, reached = solved.pop(_NAME)
+    beneath = solved.setdefault(_BENEATH, {})
+    rigid, reached = solved.pop(_NAME, (None, imposed))
+    if rigid is None or reached.shape not in (imposed.shape[-1:], imposed.shape):
+        rigid, reached = _pulse_stiffness(below, history, length), imposed
     yielding = 1.0 / (1.0 + compliance * rigid)
     size = np.max(np.abs(imposed), axis=-1, keepdims=True)
-    felt = below(history.with_value(reached))
-    last, pace = np.inf * size, np.ones_like(size)
+    felt = below(history.with_value(reached, beneath))
+    last, pace, past = np.inf * size, np.ones_like(size), list[Sequence[Array]]()
     for number in range(ROUNDS):
         missing = imposed - reached - compliance * felt
         off = np.max(np.abs(missing), axis=-1, keepdims=True)
         turned = yielding * np.fft.rfft(missing, n=length)
         if np.all(off <= _LAST * size):
-            if imposed.ndim == 1 and number < _MANY_ROUNDS:
-                solved[_NAME] = tuple(each.reshape(-1, each.shape[-1])[-1] for each in (rigid, reached))
+            if number < _MANY_ROUNDS:
+                many = imposed.ndim > 1  # else of many models on one motion the last is kept
+                solved[_NAME] = tuple(
+                    each if many else each.reshape(-1, each.shape[-1])[-1] for each in (rigid, reached)
+                )
             return felt + np.fft.irfft(rigid * turned, n=length)[..., :count]
         pace, last = np.where(off < last, pace, 0.5 * pace), off
         change = np.fft.irfft(turned, n=length)[..., :count]
-        reached = np.clip(reached + pace * change, -_LARGEST_MOTION * size, _LARGEST_MOTION * size)
-        felt = below(history.with_value(reached))
+        past = [*past[-_REMEMBERED:], np.broadcast_arrays(reached, change)]
+        reached = reached + pace * (change - _foreseen(past))
+        reached = np.clip(reached, -_LARGEST_MOTION * size, _LARGEST_MOTION * size)
+        felt = below(history.with_value(reached, beneath))
     if not history.periodic and np.any(off > _UNSETTLED * size):
         raise ModelError(
             "the rig gives way too much to be followed through time",
@@ -99,6 +113,16 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
             expected="a rig several times stiffer than the bushing",
         )
     return felt
+
+
+def _foreseen(past: Sequence[Sequence[Array]]) -> Array:
+    """What the last rounds, motions and changes (..., n), teach of the next change (D. G. Anderson, J. ACM 12 (1965)
+    547): the combination of their differences that takes most off it."""
+    motions, changes = (np.stack(each, axis=-2) for each in zip(*past, strict=True))
+    moved, changed = np.diff(motions, axis=-2), np.diff(changes, axis=-2)
+    normal = changed @ np.swapaxes(changed, -1, -2)
+    weights = np.linalg.pinv(normal, rcond=_SAME_DIRECTION, hermitian=True) @ (changed @ changes[..., -1, :, None])
+    return np.squeeze(np.swapaxes(weights, -1, -2) @ (moved + changed), axis=-2)
 
 
 def _pulse_stiffness(below: ForceBelow, history: History, length: int) -> Array:
@@ -112,18 +136,3 @@ def _pulse_stiffness(below: ForceBelow, history: History, length: int) -> Array:
     answer = below(history.with_value(pulse).driven())
     measured = np.fft.rfft(answer - answer[..., :1], n=length) / np.fft.rfft(pulse, n=length)
     return np.maximum(measured.real, 0.0) + 1j * measured.imag
-
-
-EFFECT = Layer(
-    name="rig_compliance",
-    sentence="The rig gives way in series: the stiffer the bushing, the softer it seems, most so radially.",
-    equation="1/K' = 1/K + compliance, K at the amplitude that reaches the bushing",
-    level=Level.INSTRUMENT,
-    parameters=(Parameter("compliance", "m/N", (0.0, 1e-5), 0.0, 2e-8, meaning="give of the rig per force"),),
-    source="springs in series; ISO 10846-2:2008",
-    confirmed_by="put a steel dummy in place of the bushing: what still gives way is the rig",
-    harmonic_error=2e-3,
-    turns=False,
-    stiffness=stiffness,
-    force=force,
-)

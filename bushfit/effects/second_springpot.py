@@ -1,27 +1,21 @@
 """Second springpot: a power of frequency beside that of the first, such as the steep rise towards glass."""
 
-from __future__ import annotations
+from bushfit.effects.contract import Values
+from bushfit.effects.springpot import modulus as modulus
+from bushfit.effects.springpot import modulus_sensitivities as modulus_sensitivities
+from bushfit.effects.springpot import stress as stress
+from bushfit.effects.springpot import stress_sensitivities as stress_sensitivities
 
-from bushfit.effects import springpot
-from bushfit.effects.contract import Branch, Level, Parameter
+#: Order from which on a springpot is nearly a dashpot, whose order is 1.
+_NEARLY_A_DASHPOT = 0.9
 
-EFFECT = Branch(
-    name="second_springpot",
-    sentence="A second, steeper power of frequency: stiffness and loss rise faster at high frequency than below.",
-    equation="m/2 (i omega)^alpha with m and alpha of its own",
-    level=Level.MATERIAL,
-    parameters=(
-        Parameter("m", "Pa*s^alpha", (0.0, 1e8), 0.0, 2e3, meaning="constant of this springpot"),
-        Parameter("alpha", "1", (0.02, 1.0), None, 0.6, log=True, meaning="order of this springpot", scale="order"),
-    ),
-    after="springpot",
-    source="two fractional elements: R. L. Bagley, P. J. Torvik, AIAA J. 21 (1983) 741; law as Garcia Tarrago et al. "
-    "2007, Eqs. 1-3",
-    confirmed_by="sweep to ten times the highest frequency: the rise must go on, where that of a maxwell arm levels "
-    "off; a viscous branch is its limit of order 1, without a rise of stiffness",
-    size="m",
-    modulus=springpot.modulus,
-    stress=springpot.stress,
-    modulus_sensitivities=springpot.modulus_sensitivities,
-    stress_sensitivities=springpot.stress_sensitivities,
-)
+
+def _dashpot(p: Values) -> dict[str, float] | None:
+    """The steeper of the two springpots as a dashpot, m/2 i omega, beside the other: either may be the first."""
+    flat, steep = sorted([(p["alpha"], p["m"]), (p["second_springpot.alpha"], p["second_springpot.m"])])
+    if steep[0] < _NEARLY_A_DASHPOT:
+        return None
+    return {"alpha": flat[0], "m": flat[1], "viscous.eta": steep[1] / 2.0}
+
+
+becomes = ("viscous", _dashpot)

@@ -1,12 +1,8 @@
 """Sliders: springs that slip one after the other, in place of the friction branch."""
 
-from __future__ import annotations
-
-from itertools import pairwise
-
 import numpy as np
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Values
+from bushfit.effects.contract import Array, Values
 from bushfit.effects.history import History
 
 #: Sliders in parallel; chosen: over a decade of slip strains their steps are 0.2 % of the modulus.
@@ -18,7 +14,7 @@ _PLACES = (2.0 * np.arange(_COUNT) + 1.0) / _COUNT - 1.0
 def _slips(p: Values) -> Array:
     """Strains at which the sliders slip, (..., 1, sliders)."""
     spread = np.asarray(p["spread"])[..., None] * _PLACES
-    return np.asarray(p["e_s"])[..., None] * np.exp(spread)
+    return np.atleast_1d(p["e_s"])[..., None] * np.exp(spread)
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
@@ -31,53 +27,22 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     return 0.5 * p["sigma"] * np.mean(shape / slip, axis=-1)
 
 
-def _followed(path: Array, turns: Array, periodic: bool, slip: Array) -> Array:
-    """Mean stress of the sliders over theirs along one path that turns at some samples, (n,); `slip` is (sliders,).
-
-    On a steady cycle the path begins at its top, where every slider has the stress of half the range, or slips.
-    """
-    held = np.minimum(np.ptp(path) / (2.0 * slip), 1.0) if periodic else np.zeros(slip.size)
-    pieces = [held.mean(keepdims=True)]
-    for begin, end in pairwise([0, *turns.tolist(), path.size - 1]):
-        along = np.clip(held + (path[begin + 1 : end + 1, None] - path[begin]) / slip, -1.0, 1.0)
-        pieces.append(along.mean(axis=1))
-        held = along[-1] if len(along) else held
-    return np.concatenate(pieces)
-
-
 def stress(p: Values, history: History) -> Array:
-    """Sum of the sliders' stresses, elastic up to their slip strain and constant beyond, from rest or steady [Pa]."""
-    turning, count = history.turning, history.value.shape[-1]
-    slip = _slips(p)
-    lead = np.broadcast_shapes(history.value.shape[:-1], slip.shape[:-2])
-    rows = np.broadcast_to(np.arange(turning.label.size).reshape(history.value.shape[:-1]), lead).ravel()
-    slips = np.broadcast_to(slip, (*lead, 1, _COUNT)).reshape(-1, _COUNT)
-    mean = np.empty((rows.size, count))
-    for place, (row, own) in enumerate(zip(rows, slips, strict=True)):
-        path = _followed(turning.path[row], turning.turns[turning.label[row]], history.periodic, own)
-        mean[place] = turning.at_samples(path[None], np.array([row]))[0]
-    return p["sigma"] * mean.reshape(*lead, count)
+    """Sum of the sliders' stresses, elastic up to their slip strain and constant beyond, from rest or steady [Pa].
+
+    On a steady cycle the motion begins at its top, where every slider has the stress of half the range, or slips.
+    """
+    turning, slip = history.turning, _slips(p)
+    strides = turning.strides[..., None] / slip
+    top = np.minimum(history.amplitude[..., None] / slip, 1.0) if history.periodic else np.zeros((1, 1))
+    held = np.empty_like(strides)
+    held[..., 0, :] = top[..., 0, :]
+    for piece in range(1, strides.shape[-2]):
+        held[..., piece, :] = np.clip(held[..., piece - 1, :] + strides[..., piece - 1, :], -1.0, 1.0)
+    start = np.moveaxis(turning.at_samples(np.moveaxis(held, -1, 0)), 0, -1)
+    return p["sigma"] * np.clip(start + turning.travel[..., None] / slip, -1.0, 1.0).mean(axis=-1)
 
 
 def in_place_of(p: Values) -> dict[str, float]:
     """Where a fit begins that had friction before: the same stress, and half of it at the same strain."""
     return {"sigma": p["sigma_fmax"], "e_s": 2.0 * p["eps_half"], "spread": 1.5}
-
-
-EFFECT = Branch(
-    name="sliders",
-    sentence="Springs that slip one after the other: stiffness falls with amplitude in a range with two ends.",
-    equation=f"(A + iB)/(2 e0) of {_COUNT} springs with sliders, slip strains from e_s/exp(spread) to e_s exp(spread)",
-    level=Level.MATERIAL,
-    parameters=(
-        Parameter("sigma", "Pa", (0.0, 1e8), 0.0, 1e4, meaning="stress of all sliders"),
-        Parameter("e_s", "1", (1e-6, 10.0), None, 2e-2, log=True, meaning="strain at which the middle one slips"),
-        Parameter("spread", "1", (0.05, 5.0), None, 1.5, log=True, meaning="logarithm of the largest over the middle"),
-    ),
-    source="L. Prandtl 1928, W. D. Iwan 1966; for rubber A. K. Olsson, P.-E. Austrell, Proc. ECCMR 2, 2001",
-    confirmed_by="sweep at a fifth and a tenth of the smallest amplitude: without slip there is no more friction loss",
-    replaces="friction",
-    in_place_of=in_place_of,
-    modulus=modulus,
-    stress=stress,
-)

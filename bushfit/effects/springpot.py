@@ -1,12 +1,9 @@
 """Springpot branch: a fractional derivative, stiffness and loss that grow slowly with frequency."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Value, Values, linear_stress
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, History, Value, Values, linear_stress
 
 #: Step of alpha in differences of the Gruenwald-Letnikov sum [1]: the cube root of rounding, which errs least.
 _ORDER_STEP = 1e-5
@@ -63,21 +60,3 @@ def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
     slopes = modulus_sensitivities(p, history.harmonics, history.amplitude)
     both = history.response(lambda _: 2.0 * np.stack(list(slopes.values())))
     return dict(zip(slopes, both, strict=True))
-
-
-EFFECT = Branch(
-    name="springpot",
-    sentence="The rate dependence of the rubber: stiffness and loss rise with a small power of frequency.",
-    equation="m/2 (i omega)^alpha",
-    level=Level.MATERIAL,
-    parameters=(
-        Parameter("m", "Pa*s^alpha", (1.0, 1e9), 0.0, 2e5, log=True, meaning="springpot constant"),
-        Parameter("alpha", "1", (0.02, 1.0), None, 0.25, meaning="order of the fractional derivative"),
-    ),
-    source="Garcia Tarrago et al. 2007, Eqs. 1-3",
-    size="m",
-    modulus=modulus,
-    stress=stress,
-    modulus_sensitivities=modulus_sensitivities,
-    stress_sensitivities=stress_sensitivities,
-)

@@ -1,11 +1,8 @@
 """Strain stiffening: the elastic stress turns up at large strain."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from bushfit.effects.contract import Array, Branch, Level, Parameter, Values
-from bushfit.effects.history import History
+from bushfit.effects.contract import Array, History, Values
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
@@ -16,17 +13,3 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 def stress(p: Values, history: History) -> Array:
     """s = 2 mu c3 e^3 [Pa]."""
     return 2.0 * p["mu"] * p["c3"] * history.value**3
-
-
-EFFECT = Branch(
-    name="strain_stiffening",
-    sentence="The rubber stiffens at large strain: storage stiffness rises with the square of amplitude.",
-    equation="3/4 c3 mu e0^2",
-    level=Level.MATERIAL,
-    parameters=(Parameter("c3", "1", (0.0, 1e5), 0.0, 20.0, meaning="cubic stress coefficient over mu"),),
-    source="second term of O. H. Yeoh, Rubber Chem. Technol. 66 (1993) 754, in simple shear",
-    confirmed_by="sweep or loop at one and a half times the largest amplitude: the rise must go on with its square",
-    uses=("mu",),
-    modulus=modulus,
-    stress=stress,
-)

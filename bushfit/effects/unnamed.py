@@ -7,8 +7,6 @@ corrects. Standard deviations at the nodes go over from node to node just as smo
 one, their covariance would add little.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

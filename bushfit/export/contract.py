@@ -8,6 +8,7 @@ from typing import Literal
 
 from bushfit.export.systems import UnitSystem
 from bushfit.geometry import Place
+from bushfit.model.arms import Arms
 from bushfit.model.result import Result
 from bushfit.prediction import Prediction
 from bushfit.reading.measurement import Source
@@ -46,7 +47,8 @@ class Order:
 
 @dataclass(frozen=True, eq=False)
 class Exported:
-    """The files of an export by name, what it could not carry, and the error that this costs."""
+    """The files of an export by name, what it could not carry, and the error that this costs; and its Maxwell arms."""
 
     files: Mapping[str, bytes]
     losses: tuple[str, ...] = ()
+    arms: tuple[Arms, ...] = ()

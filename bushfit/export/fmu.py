@@ -70,7 +70,7 @@ def export(order: Order, systems: Collection[str] = tuple(SYSTEMS)) -> Exported:
         **{f"binaries/{path}": library for path, library in libraries(sources, name, systems).items()},
         **{f"sources/{file}": source for file, source in sources.items()},
     }
-    return Exported({f"{name}.fmu": _archive(content)}, found.losses)
+    return Exported({f"{name}.fmu": _archive(content)}, found.losses, found.kinds)
 
 
 def references(found: InTime) -> dict[str, int]:

@@ -73,6 +73,7 @@ class InTime:
         parts: what the moduli of each group of arms go with.
         arms: number of its part, modulus over the size of that, and relaxation time [s] of each.
         losses: what is left out or held, and the error of that.
+        kinds: the same arms by what they stand for, with their error.
     """
 
     places: tuple[Place, ...]
@@ -82,6 +83,7 @@ class InTime:
     parts: tuple[str, ...]
     arms: tuple[tuple[int, float, float], ...]
     losses: tuple[str, ...]
+    kinds: tuple[Arms, ...]
 
 
 def neutral(field: str) -> int:
@@ -119,6 +121,7 @@ def in_time(order: Order) -> InTime:
             for modulus, time in zip(part.modulus, part.time, strict=True)
         ),
         tuple(losses),
+        arms,
     )
 
 

@@ -20,7 +20,7 @@ from bushfit.fitting.information import Information, percent, relative_sizes
 from bushfit.fitting.solve import Coordinates
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model
-from bushfit.units import modulus
+from bushfit.units import told
 
 #: Relative standard error beyond which a direction counts as open, and a parameter as not determined.
 _OPEN = 0.15
@@ -193,5 +193,5 @@ def _combinations(
         error = known.error(combination.weights(values))
         if error < enough:
             at = f" at {slow:.3g} Hz" if "omega" in combination.formula else ""
-            value = modulus(combination.value(values), 4)
+            value = told("Pa", combination.value(values), digits=4)
             yield f"{combination.formula}{at} = {value} to {percent(error)}{combination.remark}"

@@ -11,7 +11,7 @@ from bushfit.fitting.assess import lack_of_fit, quality
 from bushfit.fitting.data_sets import DataSet
 from bushfit.geometry import Bushing, stiffness_per_modulus
 from bushfit.model.model import Model
-from bushfit.units import CELSIUS, modulus, number
+from bushfit.units import CELSIUS, number, told
 
 #: Least shear modulus of a rubber [Pa]: that of the softest gel of a mount, with room.
 _SOFTEST = 5e4
@@ -35,7 +35,7 @@ def implausible(bushing: Bushing | None, data_sets: Sequence[DataSet]) -> list[s
     ratio = moduli[hardest] / moduli[softest]
     if ratio > _MOST_STIFFENING:
         return [f"{hardest} shows {number(ratio, 2)} times the modulus of {softest}, which no rubber does: {_CHECK}"]
-    said = f"a shear modulus of {modulus(moduli[hardest], 3)} is that of no rubber: {_CHECK}"
+    said = f"a shear modulus of {told('Pa', moduli[hardest])} is that of no rubber: {_CHECK}"
     return [] if _SOFTEST < moduli[hardest] < _HARDEST else [said]
 
 
@@ -47,7 +47,7 @@ def apart_in_temperature(model: Model, data_sets: Sequence[DataSet]) -> list[str
         return []
     (low, coldest), (high, warmest) = known[0], known[-1]
     tested = f"{warmest} was tested at {number(high, 3)} degC and {coldest} at {number(low, 3)} degC"
-    if temperature.EFFECT.name in model.effects:
+    if "temperature" in model.effects:
         reference = temperature.REFERENCE - CELSIUS
         beyond = max(high - reference, reference - low) > temperature.REACH
         law = f"the effect of temperature holds within {temperature.REACH:g} K of {number(reference, 3)} degC"

@@ -1,7 +1,5 @@
 """What a test is made on: a bushing in a direction, or a specimen of its compound; equivalent strain and stiffness."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

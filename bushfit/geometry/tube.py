@@ -4,8 +4,6 @@ Source: Garcia Tarrago, Kari, Vinolas, Gil-Negrete, Polymer Testing 26 (2007) 62
 Strains are per unit displacement [1/m] or rotation [1/rad], stiffnesses per unit shear modulus [m] or [m^3/rad].
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Faults that any recorded channel may have: gaps, stuck rows, cut-off tops and outliers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

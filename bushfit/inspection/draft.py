@@ -1,7 +1,5 @@
 """The text of a campaign for files that were inspected."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """What a hysteresis loop or a raw stepped-sine history holds: cycles or steps, sampling, noise, and what is odd."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -19,6 +17,7 @@ from bushfit.inspection.record import Looked, told_frequencies
 from bushfit.reading.measurement import Loop
 from bushfit.reading.names import Said
 from bushfit.reduction.cycles import least_prominence
+from bushfit.reduction.harmonics import cycle_harmonics
 from bushfit.reduction.steps import reduce
 from bushfit.units import alike, for_people, number
 
@@ -172,11 +171,12 @@ def _end_cycles(drive: Drive) -> _EndCycles | None:
     if rows < 4 * order:
         return None
     fitted = [
-        _cycle(phase[part], np.stack((loop.force[part], loop.displacement[part]), axis=1), order) for part in parts
+        cycle_harmonics(phase[part], np.stack((loop.force[part], loop.displacement[part]), axis=1), order)
+        for part in parts
     ]
     mean_force, mean_motion = np.array([mean for mean, *_ in fitted]).T
     amplitude = np.array([abs(first[0]) for _, first, _ in fitted])
-    error = max(drive.noise, *(left for *_, left in fitted)) * np.sqrt(1.0 / rows)
+    error = max(drive.noise, *(left[0] for *_, left in fitted)) * np.sqrt(1.0 / rows)
     return _EndCycles(amplitude, mean_force, mean_motion, error)
 
 
@@ -215,15 +215,3 @@ def _changing(drive: Drive) -> Iterator[str]:
     # a time that was made from the motion turns its noise into drift
     least_drift = 2.0 * _WORTH_TELLING * drive.amplitude if loop.timed else least_prominence(loop.displacement)
     yield from _drifting(cycles.mean_motion, least_drift, motion, units.displacement)
-
-
-def _cycle(phase: Array, values: Array, order: int) -> tuple[Array, Array, float]:
-    """Mean and complex fundamental of each column over one cycle, and the scatter that the fit leaves of the first.
-
-    The phase of the rows is in cycles, (n,), the values (n, columns); `order` is the harmonics that are fitted.
-    """
-    turns = 2.0 * np.pi * np.outer(phase, np.arange(1, order + 1))
-    basis = np.hstack((np.ones((phase.size, 1)), np.cos(turns), -np.sin(turns)))
-    solution = np.linalg.lstsq(basis, values, rcond=None)[0]
-    left = float(np.std(values[:, 0] - basis @ solution[:, 0]))
-    return solution[0], solution[1] + 1j * solution[1 + order], left

@@ -1,7 +1,5 @@
 """The inspection of a test file: it is recognised by its columns, read, and told apart by its content."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import fields

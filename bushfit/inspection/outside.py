@@ -1,7 +1,5 @@
 """What is said of a test outside its columns, by names and the lines above its table: keys of a campaign, and slips."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Which test a table holds, by its columns, and on which body or in which direction."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import fields

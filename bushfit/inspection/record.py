@@ -1,15 +1,16 @@
 """What an inspection of a test file finds."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from typing_extensions import TypedDict
+
 from bushfit.effects.contract import Array
 from bushfit.geometry import Place, Specimen
 from bushfit.reading.measurement import Loop, Sweep
+from bushfit.validation import plain
 
 #: A hysteresis loop, a sweep, or the raw history of a stepped sine.
 Kind = Literal["loop", "sweep", "history"]
@@ -23,9 +24,13 @@ def told_frequencies(frequencies: Sequence[float] | Array) -> str:
 
 @dataclass(frozen=True)
 class ColumnSeen:
-    """A column of a file: its header cell, the role it was taken for, if any, its unit, if it is stated.
+    """A column of a file.
 
-    `low` and `high` are the range of its values in that unit, where they were read.
+    Args:
+        header: its cell.
+        role: that it was taken for; None where it is not needed.
+        unit: of its numbers; None where it is not stated.
+        low, high: the range of its values in that unit; None where they were not read.
     """
 
     header: str
@@ -33,6 +38,46 @@ class ColumnSeen:
     unit: str | None
     low: float | None = None
     high: float | None = None
+
+
+class InspectedFile(TypedDict):
+    """A file, or a sheet of a workbook, and what was found in it.
+
+    Args:
+        file: as it was named.
+        sheet: of a workbook; null where there is one only.
+        kind: a hysteresis loop, a sweep, or the raw history of a stepped sine.
+        direction: of the test, or specimen; null where neither file nor options say it.
+        written: how the file is written, by label: encoding, delimiter, decimal mark and so on.
+        columns: all of them, in order.
+        facts: in words, by label.
+        assumed: what was assumed, with the option or key that says otherwise; null where nothing was.
+        odd: a sentence for each thing that is odd.
+    """
+
+    file: str
+    sheet: str | int | None
+    kind: Kind
+    direction: str | None
+    written: dict[str, str]
+    columns: tuple[ColumnSeen, ...]
+    facts: dict[str, str]
+    assumed: str | None
+    odd: list[str]
+
+
+class InspectionDocument(TypedDict):
+    """What test files hold.
+
+    Args:
+        files: that can be used.
+        left_out: a sentence for each file or sheet that holds no test.
+        campaign: the text for a campaign, or a whole one.
+    """
+
+    files: list[InspectedFile]
+    left_out: list[str]
+    campaign: str
 
 
 @dataclass(frozen=True)
@@ -86,15 +131,15 @@ class Inspected:
             said.append(f"{what} how amplitudes are counted: taken zero-to-peak, else --amplitude peak-to-peak")
         return "; ".join(said) or None
 
-    def to_document(self) -> dict[str, Any]:
+    def to_document(self) -> InspectedFile:
         """All of it but the content, as JSON has it."""
         return {
             "file": str(self.file),
             "sheet": self.entry.get("sheet"),
             "kind": self.kind,
-            "direction": self.direction and str(self.direction),
+            "direction": str(self.direction) if self.direction else None,
             "written": dict(self.written),
-            "columns": [vars(column) for column in self.columns],
+            "columns": plain(self.columns, tuple[ColumnSeen, ...]),
             "facts": dict(self.looked.facts),
             "assumed": self.assumed,
             "odd": list(self.looked.odd),

@@ -1,7 +1,5 @@
 """What a sweep holds: its frequencies, amplitudes, repeats and noise, and what is odd about it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -9,8 +9,10 @@ from itertools import combinations
 from string import ascii_uppercase
 from typing import TYPE_CHECKING, Any
 
+from bushfit import __version__
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
+from bushfit.caveats import caveats
 from bushfit.comparison import Comparison, compare, holm, with_holm
 from bushfit.diagnosis.evidence import result_of
 from bushfit.diagnosis.families import FittedFamily, fit_families, known_families
@@ -18,19 +20,20 @@ from bushfit.errors import ModelError
 from bushfit.fitting.assess import lack_of_fit
 from bushfit.fitting.data import Data
 from bushfit.geometry import Direction, Specimen
-from bushfit.jobs.compare_document import ComparedEntry, ComparisonFile, Family, Pair
 from bushfit.jobs.fits import Fit
 from bushfit.jobs.grid import common_grid
 from bushfit.jobs.predict import AMPLITUDES, filled
+from bushfit.model.document import BushingTable
+from bushfit.model.file import model_document, versions
 from bushfit.model.model import Model
-from bushfit.prediction import caveats
+from bushfit.reading.measurement import Source
 from bushfit.report.artifacts import comparison_contents
+from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparisonFile, Family, Pair
 from bushfit.report.contents import Contents, Kinds
-from bushfit.report.tables import differences_table
+from bushfit.report.tables import contrast_table
+from bushfit.validation import plain
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from bushfit.geometry import Place
     from bushfit.model.result import Result
     from bushfit.reading.measurement import Sweep
@@ -45,7 +48,7 @@ _NO_GAP = "the first family meets these tests within their noise: nothing in the
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """What is compared: a result, what to call it, and the file or folder it came from.
+    """What is compared: a result, what to call it, and the file or folder it came from, with the hash of its content.
 
     `sweeps` are those of its campaign, for the grid.
     """
@@ -54,9 +57,10 @@ class Entry:
     source: str
     result: Result
     sweeps: Sequence[Sweep] = ()
+    sha256: str | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Compared:
     """The outcome: the entries, and each but the first against it; families where these are what is compared."""
 
@@ -64,6 +68,10 @@ class Compared:
     comparisons: Sequence[Comparison]
     families: Sequence[FittedFamily] = ()
     notes: tuple[str, ...] = ()
+    command: str = ""
+
+    def __repr__(self) -> str:
+        return f"Comparison of {', '.join(entry.name for entry in self.entries)}"
 
     @property
     def labels(self) -> list[str]:
@@ -118,14 +126,17 @@ class Compared:
     def document(self) -> ComparisonFile:
         compared = [_entry(*pair) for pair in zip(self.labels, self.entries, strict=True)]
         pairs = [self._pair(*pair) for pair in zip(self.labels[1:], self.comparisons, strict=True)]
-        families = [_family(*pair) for pair in zip(self.labels, self.families, strict=False)]
+        words = ["", *(family.words for family in self.families[1:])]
+        families = [_family(*each) for each in zip(self.labels, self.families, words, strict=False)]
         return {
-            "schema": "bushfit/compare/1",
+            "schema": SCHEMA,
             "compared": compared,
             "pairs": pairs,
             "families": families or None,
             "words": [*self.judged, *self.words],
             "warnings": self.warnings,
+            "command": self.command,
+            "versions": {"bushfit": __version__, **versions()},
         }
 
     def _pair(self, label: str, found: Comparison) -> Pair:
@@ -136,18 +147,12 @@ class Compared:
             "shared_inputs": list(found.shared),
             "joint": {"p": found.joint[0], "parameters": found.joint[1]} if found.joint else None,
             "parameters": [_plain(row) for row in found.parameters],
-            "places": {
-                str(each.place): _columns(differences_table([(label, found, each)]).iloc[:, 2:])
-                for each in found.contrasts
-            },
+            "places": {str(each.place): filled(contrast_table(found, each)) for each in found.contrasts},
         }
 
     @property
     def contents(self) -> Contents:
-        names = [entry.name for entry in self.entries]
-        names = names if len({*names}) == len(names) else [entry.source for entry in self.entries]
-        tables = comparison_contents(self.labels, names, self.comparisons, self.families)
-        return Contents({"compare": self.document}) | tables
+        return comparison_contents(self.document)
 
 
 def _plain(record: Any) -> Any:
@@ -155,26 +160,24 @@ def _plain(record: Any) -> Any:
     return asdict(record)
 
 
-def _columns(table: pd.DataFrame) -> dict[str, list[float | str | None]]:
-    """The columns of a table as JSON has them."""
-    return {name: [*column] for name, column in filled(table).items()}
-
-
 def _entry(label: str, entry: Entry) -> ComparedEntry:
     """What an entry is."""
-    result = entry.result
+    result, bushing = entry.result, model_document(entry.result.model)["bushing"]
     return {
         "label": label,
         "name": entry.name,
         "source": entry.source,
+        "sha256": entry.sha256,
+        "bushing": bushing and _plain(BushingTable(**bushing)),
         "effects": list(result.model.effects),
         "reduced_chi_square": result.quality.reduced_chi_square if result.quality else None,
         "nrmse": result.quality.nrmse if result.quality else None,
         "measured": result.measured and _plain(result.measured),
+        "inputs": plain(result.inputs, tuple[Source, ...]),
     }
 
 
-def _family(label: str, family: FittedFamily) -> Family:
+def _family(label: str, family: FittedFamily, words: str) -> Family:
     """How a family meets the tests, and what was held out of them."""
     evidence, held = family.evidence, family.held
     return {
@@ -189,6 +192,7 @@ def _family(label: str, family: FittedFamily) -> Family:
         "p": family.p,
         "parts": [{"part": part.part, "first": part.before, "heldout": part.after} for part in held.parts],
         "skipped": [_plain(skipped) for skipped in held.skipped],
+        "words": words,
     }
 
 
@@ -197,18 +201,19 @@ class Compare:
     """Every entry against the first: at the places and over the grid asked for, else where all were fitted."""
 
     asked: PredictSettings = field(default_factory=PredictSettings)
+    command: str = ""
 
     def kinds(self, families: bool = False) -> Kinds:
         """The names of all that is written."""
         tables = ("parameters", *(["families"] if families else []), "differences")
-        return Kinds(("compare",), tables, ("compare",))
+        return Kinds(("compare",), tables, ("compare",), ("compare",))
 
-    def entry(self, opened: Campaign | Result, source: str) -> Entry:
+    def entry(self, opened: Campaign | Result, source: str, sha256: str | None = None) -> Entry:
         """A result, or that of a campaign, which is fitted as `bushfit fit` does."""
         if not isinstance(opened, Campaign):
-            return Entry(opened.name, source, opened)
+            return Entry(opened.name, source, opened, sha256=sha256)
         result = Fit(self.asked.directions or ()).run(Data.of(opened)).result
-        return Entry(opened.name, source, result, opened.sweeps)
+        return Entry(opened.name, source, result, opened.sweeps, opened.sha256)
 
     def run(
         self, entries: Sequence[Entry], families: Sequence[FittedFamily] = (), notes: Sequence[str] = ()
@@ -225,7 +230,7 @@ class Compare:
             compare(results[0], result, [(place[0], place[i]) for place in places], grids)
             for i, result in enumerate(results[1:], start=1)
         ]
-        return Compared(entries, with_holm(found), families, tuple(notes))
+        return Compared(entries, with_holm(found), families, tuple(notes), self.command)
 
     def run_families(self, campaign: Campaign, source: str, names: Sequence[str] = ()) -> Compared:
         """Families on one campaign, the model of its [fit] first; all that the library knows unless named.
@@ -247,6 +252,7 @@ class Compare:
                 source,
                 replace(result_of(family.evidence, data.bounds, model.effects), specimens=campaign.specimens),
                 campaign.sweeps,
+                campaign.sha256,
             )
             for family in families
         ]

@@ -42,7 +42,7 @@ class Diagnosed:
     @property
     def contents(self) -> Contents:
         documents = {"diagnosis": self.document, "model": document_of(self.result, self.campaign)}
-        return (Contents(documents) | diagnosis_contents(self.diagnosis, self.campaign["name"])).reported()
+        return (Contents(documents) | diagnosis_contents(self.diagnosis, self.campaign["name"])).paged()
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,18 @@ import importlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from bushfit.errors import ModelError
 from bushfit.export.contract import Dialect, Exported, Order
 from bushfit.jobs.predict import Predict, Predicted
 from bushfit.reading.files import sha256, view_bytes
 from bushfit.reading.measurement import Source
+from bushfit.report.artifacts import arms_contents
+from bushfit.report.contents import Contents
 
 if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
@@ -32,6 +35,30 @@ FORMATS = {
 }
 
 
+class FormatEntry(TypedDict):
+    """One format.
+
+    Args:
+        files: by name.
+        left_out: what it cannot carry, and the error that this costs over the exported grid.
+    """
+
+    files: list[str]
+    left_out: list[str]
+
+
+class ExportDocument(TypedDict):
+    """What was exported.
+
+    Args:
+        formats: by name.
+        warnings: what a user must know before using the numbers.
+    """
+
+    formats: dict[str, FormatEntry]
+    warnings: list[str]
+
+
 @dataclass(frozen=True, eq=False)
 class Written:
     """The outcome of an export: what was predicted, and each format's files and losses by its name."""
@@ -45,12 +72,21 @@ class Written:
         return {name: content for each in self.exported.values() for name, content in each.files.items()}
 
     @property
-    def document(self) -> Mapping[str, Any]:
+    def contents(self) -> Contents:
+        """Table and picture of the Maxwell arms, where a format has them."""
+        arms = tuple(part for each in self.exported.values() for part in each.arms)
+        result, places = self.predicted.result, [found.direction for found in self.predicted.predictions]
+        return arms_contents(result.model, arms, places, result.name)
+
+    @property
+    def document(self) -> ExportDocument:
         """What `--json` prints."""
-        formats = {
-            name: {"files": list(each.files), "left_out": list(each.losses)} for name, each in self.exported.items()
+        return {
+            "formats": {
+                name: {"files": list(each.files), "left_out": list(each.losses)} for name, each in self.exported.items()
+            },
+            "warnings": self.predicted.warnings,
         }
-        return {"formats": formats, "warnings": self.predicted.warnings}
 
 
 @dataclass(frozen=True)

@@ -1,24 +1,20 @@
 """The grid of a prediction where none is asked for: that of the sweeps, or the paper's as far as it was measured."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
 
+from bushfit.caveats import MARGIN
 from bushfit.effects.contract import Array
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Place, Specimen
 from bushfit.model.result import Result
-from bushfit.prediction import MARGIN
 from bushfit.reading.measurement import Sweep
 from bushfit.reading.runs import nominal
+from bushfit.simulation import PAPER_AMPLITUDES as PAPER_AMPLITUDES
+from bushfit.simulation import PAPER_FREQUENCIES as PAPER_FREQUENCIES
 
-#: Frequencies of the paper's tables [Hz].
-PAPER_FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
-#: Amplitudes of the paper's tables [m].
-PAPER_AMPLITUDES = (1e-4, 2e-4, 5e-4)
 #: Amplitudes of each kind of motion where none were measured: those of torsion [rad], which the paper did not measure,
 #: and of the material's strain [1] are chosen so that strains are like the paper's.
 _AMPLITUDES_OF = {

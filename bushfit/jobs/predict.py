@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from bushfit.campaign.schema import PredictSettings
 from bushfit.campaign.session import measured_session
+from bushfit.caveats import caveats
 from bushfit.effects import Level
 from bushfit.errors import ModelError
 from bushfit.fitting.agreement import met_within, misfits
@@ -16,7 +17,7 @@ from bushfit.fitting.data_sets import SweepData, sweep_data
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Specimen, place_named
 from bushfit.jobs.grid import default_grid
 from bushfit.model.arms import Arms, model_arms
-from bushfit.prediction import PredictedResonance, Prediction, caveats, predict, predict_resonance
+from bushfit.prediction import PredictedResonance, Prediction, predict, predict_resonance
 from bushfit.report.artifacts import (
     arms_contents,
     measured_contents,
@@ -119,7 +120,7 @@ class Predicted:
         return self.contents | measured_contents(self.result, *self._parted)
 
 
-def filled(table: pd.DataFrame) -> dict[str, list[float | None]]:
+def filled(table: pd.DataFrame) -> dict[str, list[Any]]:
     """The columns of a table, None where a cell is empty."""
     return {str(name): [None if x != x else x for x in column.tolist()] for name, column in table.items()}
 

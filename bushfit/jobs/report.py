@@ -1,4 +1,4 @@
-"""report: the page of a folder of results, or of a batch."""
+"""report: the page of a folder of results, of a comparison, or of a batch."""
 
 from __future__ import annotations
 
@@ -10,16 +10,22 @@ if TYPE_CHECKING:
 
 
 def report(folder: Path, base: str = "") -> Contents:
-    """What stands in a folder, with its page: `report` of a result, `index` of a batch.
+    """What stands in a folder, with its page: `report` of a result, `compare` of a comparison, `index` of a batch.
 
     Args:
-        folder: as `bushfit run`, `diagnose`, a fit or `batch` wrote it.
+        folder: as `bushfit run`, `diagnose`, a fit, `compare` or `batch` wrote it.
         base: of a batch, what its links begin with, where the page is to stand elsewhere.
 
     Raises:
-        ModelError: a folder of neither, or a file in it that is not as bushfit writes it.
+        ModelError: a folder of none of them, or a file in it that is not as bushfit writes it.
     """
+    from bushfit.report.page.comparison import read_comparison
     from bushfit.report.page.index import is_batch, read_batch
-    from bushfit.report.page.readback import read_results
+    from bushfit.report.page.readback import has_model, read_results
 
-    return read_batch(folder, base) if is_batch(folder) else read_results(folder)
+    if is_batch(folder):
+        return read_batch(folder, base)
+    if not (folder / "compare.json").exists():
+        return read_results(folder)
+    found = read_comparison(folder)
+    return found | read_results(folder) if has_model(folder) else found

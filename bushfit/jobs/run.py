@@ -87,7 +87,7 @@ class Ran:
         campaign, found = self.data.campaign, self.diagnosed
         of_tests = contents_of_tests(self.data, self.result, tests_of(campaign))
         of_gap = diagnosis_contents(found.diagnosis, campaign.name) if found else Contents()
-        return (Contents(self.document) | of_tests | of_gap | self.predicted.contents).reported()
+        return (Contents(self.document) | of_tests | of_gap | self.predicted.contents).paged()
 
 
 @dataclass(frozen=True)

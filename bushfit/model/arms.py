@@ -4,8 +4,6 @@ A springpot remembers its whole past, and most programs cannot. Over a band of f
 in series do the same within a stated error.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -4,8 +4,6 @@ The dataclasses are the keys, for the reader and for the JSON Schema alike: pyda
 other keys alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal, get_args

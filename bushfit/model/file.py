@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import json
-from collections.abc import Set
+from collections.abc import Mapping, Set
 from dataclasses import asdict, astuple
 from functools import cache
 from pathlib import Path
@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from bushfit import __version__
-from bushfit.effects.stiffness_factor import EFFECT as FACTOR
+from bushfit.effects import LIBRARY
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError, naming
 from bushfit.geometry import Bushing, Specimen
@@ -29,6 +29,8 @@ from bushfit.validation import check_tables
 
 #: The effect that older files have in place of a factor of its own for the radial direction, and its parameter.
 _RADIAL_FACTOR = ("radial_factor", "radial_factor.excess")
+#: That effect as it is called today.
+FACTOR = LIBRARY["stiffness_factor.radial"]
 #: Size of a model file at most [bytes]: a hundred times what a model with every effect of the library takes.
 _LARGEST_BYTES = 10_000_000
 #: Packages that the numbers rest on; a model file records their versions.
@@ -76,18 +78,28 @@ def from_document(document: object, file: Path | None = None) -> Result:
         raise ModelError(
             "not a model", file=file, found=_KINDS.get(type(document), "null"), expected="a JSON object { ... }"
         )
-    if document.get("schema") not in SCHEMAS:
-        raise ModelError(
-            "not a model this version reads",
-            file=file,
-            place="schema",
-            found=repr(document.get("schema")),
-            expected=" or ".join(SCHEMAS),
-            hint="use a file written by bushfit fit-static, fit-dynamic, fit or diagnose",
-        )
+    hint = "use a file written by bushfit fit-static, fit-dynamic, fit or diagnose"
+    require_schema(document, file, "a model", *SCHEMAS, hint=hint)
     tables = check_tables(_renamed(document), file, ModelFile, kind=ModelError)
     with naming(file):
         return _result(tables)
+
+
+def require_schema(document: Mapping[str, Any], file: Path | None, what: str, *schemas: str, hint: str) -> None:
+    """Refuse a document of another schema.
+
+    Raises:
+        ModelError: it names none of these.
+    """
+    if document.get("schema") not in schemas:
+        raise ModelError(
+            f"not {what} this version reads",
+            file=file,
+            place="schema",
+            found=repr(document.get("schema")),
+            expected=" or ".join(schemas),
+            hint=hint,
+        )
 
 
 def _result(tables: ModelFile) -> Result:
@@ -153,7 +165,7 @@ def to_document(result: Result) -> dict[str, Any]:
                 | ({"conditions": dict(source.conditions)} if source.conditions else {})
                 for source in result.inputs
             ],
-            "packages": dict(_versions()),
+            "packages": dict(versions()),
         },
     }
 
@@ -226,8 +238,8 @@ def _fit(result: Result, quality: Quality, measured: Range) -> dict[str, Any]:
 
 
 @cache
-def _versions() -> dict[str, str]:
-    """Versions of the packages; reading them takes as long as a tenth of a fit."""
+def versions() -> dict[str, str]:
+    """Versions of the packages that the numbers rest on; reading them takes as long as a tenth of a fit."""
     return {name: importlib.metadata.version(name) for name in _PACKAGES}
 
 

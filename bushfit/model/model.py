@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial, reduce
+from itertools import groupby
 from types import MappingProxyType
 from typing import Any, Literal, cast
 
@@ -272,10 +273,10 @@ class Model:
 
     def layers(self, setting: Setting) -> tuple[Layer, ...]:
         """The layers that act on a test: a coupon whose modulus is measured has no rig and no sleeves around it."""
-        layers, turning = self._structure.layers, setting.direction.is_rotation
-        if setting.direction.motion is STRAINING:
-            return tuple(layer for layer in layers if layer.corrects)
-        return tuple(layer for layer in layers if layer.turns or not turning)
+        place, layers = setting.direction, self._structure.layers
+        if place.motion is STRAINING:
+            layers = tuple(layer for layer in layers if layer.corrects)
+        return tuple(each for each in layers if each.acts_at(place) and (each.turns or not place.is_rotation))
 
     def values_at(self, place: Place, frequency: float, amplitude: float) -> dict[str, float]:
         """All values as the modifiers leave them at an operating condition [Hz, m or rad]."""
@@ -294,6 +295,7 @@ class Model:
         layers = self.layers(setting)
         if not layers:
             return rubber
+        groups = _together(layers)
         per_sample = {
             name: value if np.ndim(value) == 0 else np.asarray(value)[..., None] for name, value in values.items()
         }
@@ -301,18 +303,17 @@ class Model:
         def below(count: int) -> StiffnessBelow:
             def cycle(omega: Array, motion: Array) -> Array:
                 cycles = replace(setting, under=setting.under.at((..., None)))
-                force = self._stack_force(cycles, per_sample, layers[:count])
+                force = self._stack_force(cycles, per_sample, [layer for group in groups[:count] for layer in group])
                 return force(History.steady(motion, cast(float, omega[..., None] / (2.0 * np.pi))))
 
             if count == 0:
                 return StiffnessBelow(rubber, cycle)
-            layer, inner = layers[count - 1], below(count - 1)
-            own = seen_by(layer, values, values)
+            inner, (layer, own) = below(count - 1), _as_one(groups[count - 1], values)
             return StiffnessBelow(
                 lambda omega, amplitude: layer.stiffness(own, inner, omega, amplitude, setting), cycle
             )
 
-        return below(len(layers))
+        return below(len(groups))
 
     def _stack_force(self, setting: Setting, values: Values, layers: Sequence[Layer]) -> ForceBelow:
         """The force outside these layers, as a function of the displacement history."""
@@ -326,11 +327,11 @@ class Model:
             stresses = (branch.stress(seen_by(branch, values, base), strain) for branch in self._structure.branches)
             return factor * sum(stresses, start=np.zeros(1))
 
-        def wrap(below: ForceBelow, layer: Layer) -> ForceBelow:
-            own = seen_by(layer, values, values)
+        def wrap(below: ForceBelow, group: Sequence[Layer]) -> ForceBelow:
+            layer, own = _as_one(group, values)
             return lambda displacement: layer.force(own, below, displacement, setting)
 
-        return reduce(wrap, layers, cast(ForceBelow, rubber))
+        return reduce(wrap, _together(layers), cast(ForceBelow, rubber))
 
     def _branch_stiffness(self, setting: Setting, values: Values, omega: Array, strain: Array, base: Values) -> Array:
         """Complex stiffness of the rubber, with the paper's parameters as in `base`."""
@@ -344,7 +345,8 @@ class Model:
         stiffness = partial(self._branch_stiffness, setting, values, omega, strain)
         condition, base = Condition(setting, omega, amplitude, strain, stiffness), values
         for modifier in self._structure.modifiers:
-            base = {**base, **modifier.adjust(seen_by(modifier, values, base), condition)}
+            if modifier.acts_at(setting.direction):
+                base = {**base, **modifier.adjust(seen_by(modifier, values, base), condition)}
         return base
 
 
@@ -361,6 +363,17 @@ def _check(name: str, value: float, parameter: Parameter) -> None:
             found=f"{value:g}{unit}",
             expected=f"{low:g} to {high:g}{unit} ({parameter.meaning})",
         )
+
+
+def _together(layers: Sequence[Layer]) -> list[list[Layer]]:
+    """Layers that act one after the other; neighbours of one law whose amounts add, in a group."""
+    return [list(group) for _, group in groupby(layers, key=lambda layer: layer.force if layer.adds else layer.name)]
+
+
+def _as_one(group: Sequence[Layer], values: Values) -> tuple[Layer, Values]:
+    """A group of layers as the first of them, with the values that it reads."""
+    first, own = group[0], [seen_by(layer, values, values) for layer in group]
+    return first, {**own[0], **({first.adds: sum(each[first.adds] for each in own)} if first.adds else {})}
 
 
 def seen_by(effect: Effect, values: Values, base: Values) -> Values:

@@ -1,7 +1,5 @@
 """What a fit found: a model, how uncertain its values are, and how well it meets the tests."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal

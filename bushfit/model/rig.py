@@ -5,8 +5,6 @@ friction, and evaluates force and displacement by lock-in. It shares no formula 
 state, so each checks the other.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 

@@ -6,8 +6,6 @@ parameters in one call, with the values along a leading axis. The differences ar
 ones, and good to a millionth, which is more than the steps and errors of a fit need.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import cast

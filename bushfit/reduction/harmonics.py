@@ -143,6 +143,22 @@ class HarmonicFit:
         return np.sqrt(overtones / power[:, 0])
 
 
+def cycle_harmonics(phase: Floats, values: Floats, order: int, drift: int = 0) -> tuple[Floats, Complex, Floats]:
+    """Mean, complex fundamental and scatter of what is left of each column, (k,) each, by least squares over rows.
+
+    Args:
+        phase: of each row [cycles], (n,).
+        values: (n, k).
+        order: harmonics that are fitted.
+        drift: power of the phase up to which a drift is fitted with them.
+    """
+    turn = np.exp(2j * np.pi * np.outer(phase, np.arange(1, order + 1)))
+    basis = np.column_stack((np.vander(phase, 1 + drift, increasing=True), turn.real, -turn.imag))
+    solution = np.linalg.lstsq(basis, values, rcond=None)[0]
+    fundamental = solution[1 + drift] + 1j * solution[1 + drift + order]
+    return solution[0], fundamental, np.std(values - basis @ solution, axis=0)
+
+
 def _bases(time: Floats, frequency: float, size: int) -> Iterator[tuple[slice, Floats]]:
     """Rows of each chunk, and there the drift, then cosine and negative sine of each harmonic, (size, m)."""
     half = max(float(np.abs(time[[0, -1]]).max()), 1e-300)

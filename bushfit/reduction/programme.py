@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from bushfit.errors import MeasurementError
 from bushfit.reading.measurement import Floats, Loop, Part, rebuild_time
 from bushfit.reduction.cycles import SAME_PHASE, least_prominence, lone_outliers, middle_crossings, turning_points
+from bushfit.reduction.harmonics import cycle_harmonics
 
 #: Rows that are enough to find the parts.
 _ENOUGH_ROWS = 200_000
@@ -280,10 +281,6 @@ def _stiffness(loop: Loop, begin: float, period: float) -> tuple[complex, float]
     phase = (clock[rows] - begin) / period
     if phase.size <= _UNKNOWNS:
         return 1.0, np.inf
-    turn = np.exp(2j * np.pi * np.outer(phase, np.arange(1, _HARMONICS + 1)))
-    columns = np.column_stack((np.ones_like(phase), phase, turn.real, -turn.imag))
     values = np.column_stack((loop.displacement[rows], loop.force[rows]))
-    solution = np.linalg.lstsq(columns, values, rcond=None)[0]
-    x, force = solution[2] + 1j * solution[2 + _HARMONICS]
-    scatter = float(np.std(values[:, 1] - columns @ solution[:, 1]))
+    _, (x, force), (_, scatter) = cycle_harmonics(phase, values, _HARMONICS, drift=1)
     return complex(force / x), scatter * np.sqrt(2.0 / (phase.size - _UNKNOWNS)) / float(abs(force))

@@ -5,8 +5,6 @@ K = M omega^2 T/(T - 1), and its deformation |T - 1| times the base's displaceme
 dK/K = dT/(T (T - 1)): K is known well where |T - 1| is large, from somewhat below the resonance on, and badly below.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any

@@ -1,13 +1,13 @@
 """What raw histories are reduced to: operating points, stretches that make none, and what is to be said of both."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Required
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import TypedDict
 
 from bushfit.geometry import Place
 from bushfit.units import for_people, number
@@ -22,6 +22,29 @@ _DISTORTED = 0.02
 _PRELOADED = 0.5
 #: Stretches without a point that are told one by one; chosen: about as many lines as a screen has room for.
 _MOST_TOLD = 5
+
+
+class ReductionDocument(TypedDict, total=False):
+    """A sweep that histories or a resonance test were reduced to.
+
+    Args:
+        direction, specimen: what was tested: one of the two.
+        points: the columns of sweep.csv, by header.
+        warnings: what a user must know before using the numbers.
+        campaign: the text for a campaign.
+        mass_kg: that stood on the mount [kg]; of a resonance test, as the next two.
+        resonance_Hz: frequency of the largest transmissibility [Hz].
+        transmissibility_at_resonance: the largest.
+    """
+
+    direction: str
+    specimen: str
+    points: Required[dict[str, list[float | str | None]]]
+    warnings: Required[list[str]]
+    campaign: Required[str]
+    mass_kg: float
+    resonance_Hz: float
+    transmissibility_at_resonance: float
 
 
 @dataclass(frozen=True, eq=False)

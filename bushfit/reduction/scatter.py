@@ -1,7 +1,5 @@
 """Median and standard deviation of values, neither of which a few outliers move by much."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.reading.measurement import Floats

@@ -4,8 +4,6 @@ A history is cut into cycles at the upward crossings of its displacement. Cycles
 evaluated by one least-squares fit to all of its steady cycles.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

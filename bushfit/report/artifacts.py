@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,14 +12,13 @@ from bushfit.campaign.naming import folder_name
 from bushfit.effects import Level
 from bushfit.geometry import Direction
 from bushfit.report import tables
+from bushfit.report.compared import SideBySide
 from bushfit.report.contents import Contents
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from bushfit.comparison import Comparison
-    from bushfit.diagnosis.families import FittedFamily
     from bushfit.diagnosis.record import Diagnosis
     from bushfit.fitting.data_sets import LoopData, SweepData
     from bushfit.geometry import Place
@@ -58,7 +57,8 @@ def prediction_contents(
     """A table and a picture of each prediction, named after its place, the measured points over the model."""
 
     def picture(prediction: Prediction) -> Figure:
-        from bushfit.prediction import caveats, predict, rig_effects
+        from bushfit.caveats import caveats, rig_effects
+        from bushfit.prediction import predict
         from bushfit.report.plots import fine_grid, prediction_figure
 
         grid = fine_grid(prediction)
@@ -132,21 +132,20 @@ def diagnosis_contents(diagnosis: Diagnosis, title: str) -> Contents:
     return Contents({}, found, {"gap": picture})
 
 
-def comparison_contents(
-    labels: Sequence[str], names: Sequence[str], comparisons: Sequence[Comparison], families: Sequence[FittedFamily]
-) -> Contents:
-    """`parameters`, `differences` and, of families, `families`, tables; and one picture, `compare`."""
+def comparison_contents(document: Mapping[str, Any]) -> Contents:
+    """`compare`, document, picture and page; and `parameters`, `differences` and, of families, `families`, tables."""
 
     def picture() -> Figure:
         from bushfit.report.plots import comparison_figure
 
-        return comparison_figure(labels, names, comparisons)
+        return comparison_figure(SideBySide.of(document))
 
-    pairs = zip(labels[1:], comparisons, strict=True)
-    contrasts = [(label, found, each) for label, found in pairs for each in found.contrasts]
-    found = {"parameters": partial(tables.parameters_table, labels, comparisons)}
-    found |= {"families": partial(tables.families_table, labels, families)} if families else {}
-    return Contents({}, found | {"differences": partial(tables.differences_table, contrasts)}, {"compare": picture})
+    def table(name: str) -> pd.DataFrame:
+        return SideBySide.of(document).tables()[name]
+
+    names = ("parameters", *(["families"] if document["families"] else []), "differences")
+    made = {name: partial(table, name) for name in names}
+    return Contents({"compare": document}, made, {"compare": picture}).paged("compare")
 
 
 def place_names(places: Sequence[Place]) -> list[str]:

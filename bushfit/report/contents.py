@@ -59,9 +59,15 @@ class Contents:
     def __or__(self, other: Contents) -> Contents:
         return Contents(*({**getattr(self, each.name), **getattr(other, each.name)} for each in fields(Contents)))
 
-    def reported(self) -> Contents:
-        """The same with `report`, the page of all that it holds."""
-        return replace(self, pages={**self.pages, "report": _report})
+    def paged(self, name: Literal["report", "compare"] = "report") -> Contents:
+        """The same with a page of what it holds: the report of a result, or the page of a comparison."""
+
+        def page(documents: Documents, tables: Tables) -> str:
+            from bushfit.report.page import comparison_page, report_page
+
+            return {"report": report_page, "compare": comparison_page}[name](documents, tables)
+
+        return replace(self, pages={**self.pages, name: page})
 
     @property
     def kinds(self) -> Kinds:
@@ -117,12 +123,6 @@ def pages_of(contents: Contents) -> dict[str, bytes]:
     tables = {name: make() for name, make in contents.tables.items()} if contents.pages else {}
     made = {name: page(contents.documents, tables) for name, page in contents.pages.items()}
     return {f"{name}.html": text.encode() for name, text in made.items()}
-
-
-def _report(documents: Documents, tables: Tables) -> str:
-    from bushfit.report.page import report_page
-
-    return report_page(documents, tables)
 
 
 def _picture(figure: Figure, form: str) -> bytes:

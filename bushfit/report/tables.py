@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bushfit.geometry import STRAINING, TRANSLATION
+from bushfit.errors import ModelError
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION
 from bushfit.reading.measurement import loss_factor
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from bushfit.comparison import Comparison, Contrast
-    from bushfit.diagnosis.families import FittedFamily
     from bushfit.diagnosis.record import Diagnosis
     from bushfit.effects.contract import Array
     from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
@@ -40,6 +40,8 @@ TEXTS = frozenset(
         *("named effects", "cannot be told from", "on a bound", "warnings"),
     )
 )
+#: Units of amplitudes, by SI, as people read them.
+DISPLAYS = {motion.displacement_unit: motion.display.displacement for motion in (TRANSLATION, ROTATION, STRAINING)}
 #: End of the headers, and name of the line, of what holds where an unresolved effect belongs to the rig.
 IF_RIGS = "if it is the rig's"
 
@@ -245,96 +247,40 @@ def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def parameters_table(labels: Sequence[str], comparisons: Sequence[Comparison]) -> pd.DataFrame:
-    """Every parameter that results have in common, in SI: a row a parameter and result beside the first."""
-    import pandas as pd
-
-    first, *others = labels
-    rows = [
-        {
-            "parameter": row.name,
-            "unit": row.unit,
-            "reference": first,
-            "other": label,
-            "reference value": row.reference,
-            "other value": row.other,
-            "difference": row.difference,
-            "difference, low": row.interval and row.interval[0],
-            "difference, high": row.interval and row.interval[1],
-            "difference is": "relative" if row.relative else "absolute",
-            "p": row.p,
-            "p by Holm": row.holm,
-            "not tested": row.note,
-        }
-        for label, found in zip(others, comparisons, strict=True)
-        for row in found.parameters
-    ]
-    return pd.DataFrame(rows)
-
-
-def differences_table(contrasts: Sequence[tuple[str, Comparison, Contrast]]) -> pd.DataFrame:
-    """Stiffness and loss factor of results, by label, beside the first over operating points, with 95 % bands.
+def contrast_table(found: Comparison, each: Contrast) -> pd.DataFrame:
+    """Stiffness and loss factor of two results over operating points of a place, with 95 % bands, and how far the other
+    is off the reference.
 
     Stiffness in the units of its place; `sure` is what differs where the bands of all points hold at once.
     """
     import pandas as pd
 
-    def rows(label: str, found: Comparison, each: Contrast) -> pd.DataFrame:
-        (length, length_factor), _, (unit, factor) = each.place.display
-        moved, _, resisted = words(each.place)
-        values: dict[str, Any] = {
-            "other": label,
-            "place": str(each.place),
-            "frequency [Hz]": each.reference.frequency,
-            f"{moved} [{length}]": each.reference.amplitude * length_factor,
-        }
-        name = f"{resisted} [{unit}]"
-        for who, side in (("reference", each.reference), ("other", each.other)):
-            for what, band, scale in ((name, side.stiffness, factor), ("loss factor [-]", side.loss_factor, 1.0)):
-                for end, of in _ends(band).items():
-                    values[f"{who} {what}{end}"] = of * scale
-        differences = (
-            (f"relative difference of {resisted} [-]", each.stiffness, np.expm1),
-            ("difference of loss factor [-]", each.loss_factor, np.asarray),
-        )
-        for what, band, shown in differences:
-            wide = found.widened(band)
-            sure = bool(len(band.root)) & ((wide.low > 0.0) | (wide.high < 0.0))
-            values |= {f"{what}{end}": shown(of) for end, of in _ends(band).items()}
-            values[f"{what}, sure"] = np.where(sure, "yes", "no")
-        return pd.DataFrame(values)
-
-    return pd.concat([rows(*each) for each in contrasts], ignore_index=True)
+    (length, length_factor), _, (unit, factor) = each.place.display
+    moved, _, resisted = words(each.place)
+    values: dict[str, Any] = {
+        "frequency [Hz]": each.reference.frequency,
+        f"{moved} [{length}]": each.reference.amplitude * length_factor,
+    }
+    name = f"{resisted} [{unit}]"
+    for who, side in (("reference", each.reference), ("other", each.other)):
+        for what, band, scale in ((name, side.stiffness, factor), ("loss factor [-]", side.loss_factor, 1.0)):
+            for end, of in _ends(band).items():
+                values[f"{who} {what}{end}"] = of * scale
+    differences = (
+        (f"relative difference of {resisted} [-]", each.stiffness, np.expm1),
+        ("difference of loss factor [-]", each.loss_factor, np.asarray),
+    )
+    for what, band, shown in differences:
+        wide = found.widened(band)
+        sure = bool(len(band.root)) & ((wide.low > 0.0) | (wide.high < 0.0))
+        values |= {f"{what}{end}": shown(of) for end, of in _ends(band).items()}
+        values[f"{what}, sure"] = np.where(sure, "yes", "no")
+    return pd.DataFrame(values)
 
 
 def _ends(band: Any) -> dict[str, Array]:
     """A band by the end of its columns' names."""
     return {"": band.value, ", low": band.low, ", high": band.high}
-
-
-def families_table(labels: Sequence[str], families: Sequence[FittedFamily]) -> pd.DataFrame:
-    """How model families meet the same tests, and what was held out of them."""
-    import pandas as pd
-
-    rows = [
-        {
-            "label": label,
-            "family": family.name,
-            "parameters": family.evidence.parameters,
-            "reduced chi-square": family.evidence.reduced,
-            "BIC less the first's": family.evidence.bic - families[0].evidence.bic,
-            "held out [noise]": family.held.after,
-            "the first there [noise]": family.held.before,
-            "parts held out": len(family.held.parts),
-            "fall of the mean square": family.gain and family.gain[0],
-            "fall of the mean square, low": family.gain and family.gain[1],
-            "fall of the mean square, high": family.gain and family.gain[2],
-            "p by Holm": family.p,
-            "words": family.words if family is not families[0] else "",
-        }
-        for label, family in zip(labels, families, strict=True)
-    ]
-    return pd.DataFrame(rows)
 
 
 #: Columns of a reduced sweep that tell how each point came about, and what each is of a step.
@@ -395,3 +341,30 @@ def resonance_table(found: Resonance) -> pd.DataFrame:
 def spread(count: int, most: int) -> Array:
     """Places of at most so many of `count` things, evenly from the first to the last, (min(count, most),)."""
     return np.linspace(0, count - 1, min(most, count)).round().astype(int)
+
+
+def numbers(rows: pd.DataFrame, *headers: str) -> Array:
+    """Columns of a table, (k, n).
+
+    Raises:
+        ModelError: one of them is not there.
+    """
+    return required(rows, *headers)[list(headers)].to_numpy(dtype=float).T
+
+
+def required(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
+    """A table that has these columns.
+
+    Raises:
+        ModelError: one of them is not there.
+    """
+    for header in headers:
+        if header not in rows:
+            hint = "write the results anew, or take the table away: the page then goes without it"
+            raise ModelError("a column of a table is missing", expected=header, hint=hint)
+    return rows
+
+
+def complete(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
+    """The rows of a table in which all these numbers are known."""
+    return rows.iloc[np.flatnonzero(np.isfinite(numbers(rows, *headers)).all(axis=0))]

@@ -1,7 +1,5 @@
 """Clean but awkward campaigns: nothing is hidden, and noise or plan are as real rigs have them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -16,8 +14,14 @@ from bushfit.scorecard.hidden import FORCE_NOISE, NOISE
 from bushfit.scorecard.recipe import Bench, Recipe
 from bushfit.simulation import Simulated
 
-#: Amplitudes of a strain sweep, relative to the largest.
-_AMPLITUDES = np.geomspace(0.03, 1.0, 12)
+#: Amplitudes of a strain sweep.
+_STEPS = 12
+#: The least of them, relative to the largest.
+_LEAST_STRAIN = 0.03
+#: The same where sweeps begin at any strain.
+_SMALLEST_STRAIN = 0.01
+#: Least and largest of the lowest, and of the highest frequency [Hz] of three.
+_FREQUENCIES = ((1.0, 10.0), (50.0, 150.0))
 #: Frequencies of a strain sweep, and of a sweep with three of them only [Hz].
 _THREE = (5.0, 35.0, 155.0)
 #: Frequencies of a dense sweep [Hz].
@@ -46,13 +50,25 @@ def _sweeps(**changes: object) -> Callable[[Bench], SimulateSettings]:
     )
 
 
-def _strain_sweeps(bench: Bench) -> SimulateSettings:
+def _strain_sweeps(bench: Bench, least: float = _LEAST_STRAIN, reached: float = _REACHED) -> SimulateSettings:
+    """Amplitudes from a share of the largest on, stepped at three frequencies, one to three repeats."""
+
     def turned(test: SimulatedSweep) -> SimulatedSweep:
-        amplitudes = tuple((_AMPLITUDES * max(test.amplitudes)).tolist())
-        return replace(test, amplitudes=amplitudes, frequencies=_THREE, stepped="amplitude", reached=_REACHED)
+        amplitudes = tuple((np.geomspace(least, 1.0, _STEPS) * max(test.amplitudes)).tolist())
+        return replace(test, amplitudes=amplitudes, frequencies=_THREE, stepped="amplitude", reached=reached)
 
     sweeps = tuple(turned(test) for test in bench.plan.sweeps)
     return replace(bench.plan, sweeps=sweeps, repeats=int(bench.random.integers(1, 4)))
+
+
+def _any_strain_sweeps(bench: Bench) -> SimulateSettings:
+    """The same at any three frequencies, in one direction or two, with a loop or without."""
+    random = bench.random
+    plan = _strain_sweeps(bench, _SMALLEST_STRAIN, random.uniform(0.0, 1.5 * _REACHED))
+    low, high = (bench.between(*ends) for ends in _FREQUENCIES)
+    frequencies = tuple(np.round(np.geomspace(low, high, 3), 1).tolist())
+    sweeps = tuple(replace(test, frequencies=frequencies) for test in plan.sweeps[: 1 + (random.random() < 0.7)])
+    return replace(plan, sweeps=sweeps, loops=plan.loops[: int(random.random() < 0.5)])
 
 
 def _level_missing(bench: Bench) -> SimulateSettings:
@@ -177,4 +193,8 @@ AWKWARD: dict[str, Recipe] = {
     "long": Recipe("loops of 25 cycles", plan=_long),
     "one_direction": Recipe("axial tests alone", plan=_one_direction),
     "three_frequencies": Recipe("three frequencies", plan=_sweeps(frequencies=_THREE)),
+}
+#: Clean amplitude sweeps of any plan.
+SWEPT: dict[str, Recipe] = {
+    "strain_sweeps": Recipe("the amplitude stepped at any frequencies", plan=_any_strain_sweeps)
 }

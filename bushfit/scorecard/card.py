@@ -1,7 +1,5 @@
 """The rows of a score card: every target, measured, with the exact 95 % interval of each rate."""
 
-from __future__ import annotations
-
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -5,22 +5,19 @@ Notes:
     workflow that was tuned on the campaigns of its card would be judged by what it had seen.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Literal, get_args
 
 import numpy as np
 
 from bushfit.effects.mistakes import MISTAKES
-from bushfit.scorecard.awkward import AWKWARD
+from bushfit.scorecard.awkward import AWKWARD, SWEPT
 from bushfit.scorecard.faults import FAULTS
-from bushfit.scorecard.hidden import FIRST, OUTSIDE, Sealed, hidden_campaign, hideable
+from bushfit.scorecard.hidden import FIRST, Sealed, hidden_campaign, hideable
 from bushfit.scorecard.mistaken import mistaken_campaign
 from bushfit.scorecard.outcome import Task
 from bushfit.scorecard.outside import OUTSIDE_LAWS
 from bushfit.scorecard.recipe import Recipe, cooked
-from bushfit.scorecard.swept import swept_campaign
 from bushfit.simulation import Simulated
 
 #: What is hidden in the campaigns of a card.
@@ -39,8 +36,16 @@ KINDS: dict[Family, dict[str, float]] = {
     "outside": {"law": 0.9, "three": 0.1},
     "library": {"alone": 0.5, "two": 0.5},
 }
+#: Of the faults of rigs and of the laws outside the library, those of the family `effects`.
+DISTURBANCES = ("narrow_resonance", "mislabelled_level", "velocity_weakening_slip")
 #: Recipes of the kinds that are made by one.
-RECIPES: dict[str, Mapping[str, Recipe]] = {"awkward": AWKWARD, "fault": FAULTS, "law": OUTSIDE_LAWS}
+RECIPES: dict[str, Mapping[str, Recipe]] = {
+    "awkward": AWKWARD,
+    "swept": SWEPT,
+    "fault": FAULTS,
+    "law": OUTSIDE_LAWS,
+    "outside": {name: (FAULTS | OUTSIDE_LAWS)[name] for name in DISTURBANCES},
+}
 #: Effects that are hidden at once, of the kinds that hide several.
 _AT_ONCE = {"pair": 2, "two": 2, "three": 3}
 #: Least and largest size of what stays visible in the family `library`: from a fifth of what counts as visible to ten
@@ -61,7 +66,7 @@ def tasks(count: int, seed: int, family: Family = "effects") -> list[Task]:
             hidden: tuple[str, ...] = ()
             if kind in _AT_ONCE:
                 hidden = tuple(random.choice(names, _AT_ONCE[kind], replace=False).tolist())
-            elif kind in ("outside", *RECIPES):
+            elif kind in RECIPES:
                 outside = name
             elif name:
                 hidden = (name,)
@@ -75,8 +80,7 @@ def _names(kind: str) -> list[str]:
         return list(RECIPES[kind])
     if kind in ("alone", "two"):
         return hideable()
-    first = list(FIRST)
-    return {"mistake": list(MISTAKES), "outside": list(OUTSIDE), "clean": [], "swept": []}.get(kind, first)
+    return {"mistake": list(MISTAKES), "clean": []}.get(kind, list(FIRST))
 
 
 def campaign_of(task: Task) -> tuple[Simulated, Sealed]:
@@ -85,8 +89,6 @@ def campaign_of(task: Task) -> tuple[Simulated, Sealed]:
         return cooked(RECIPES[task.kind][task.outside], task.seed)
     if task.kind == "mistake":
         return mistaken_campaign(task.seed, task.hidden[0])
-    if task.kind == "swept":
-        return swept_campaign(task.seed)
     if task.kind in ("alone", "two"):
         return hidden_campaign(task.seed, task.hidden, visible=_FROM_INVISIBLE)
-    return hidden_campaign(task.seed, task.hidden, task.outside)
+    return hidden_campaign(task.seed, task.hidden)

@@ -1,7 +1,5 @@
 """Rig faults as they come: each in turn, hardly seen to plain. What may be said of them stands beside each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ The closed forms that fits use never make these data. Sizes are random, from har
 means what is left of the effect after the plain model has absorbed what it can.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -23,13 +21,10 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet
 from bushfit.geometry import Bushing, Direction
-from bushfit.model import rig
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.simulation import Simulated, Undisturbed, measure, undisturbed
+from bushfit.simulation import PAPER_FREQUENCIES, Simulated, measure, undisturbed
 
-#: Disturbances that the library does not have.
-OUTSIDE = ("spot_disturbance", "mislabelled_level", "velocity_weakening_slip")
 #: Effects of the family `effects`, in turn: those of its first card, so that a seed makes the same card ever after.
 FIRST = (
     "viscous",
@@ -65,8 +60,6 @@ _DISPLACEMENT_NOISE = 2e-4
 _SHARED_GAIN = 0.004
 #: Phase error that it then shares [rad].
 _SHARED_PHASE = float(np.radians(0.2))
-#: Frequencies of every sweep [Hz], the paper's.
-_FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
 #: Least and largest temperature of a test where an effect of it is hidden [K]: within 12 K of the laboratory's.
 _TEMPERATURES = (285.0, 308.0)
 #: Levels of a sweep, relative to the largest, as in the paper.
@@ -83,8 +76,6 @@ _MOST_LOSS = 1.0
 _SIZING_STEPS = 4
 #: Logarithm of the ratio to the wanted size at which it is near enough: 15 %.
 _NEAR = 0.15
-#: Size of a disturbance from outside the library, least and largest, relative to |K|.
-_OUTSIDE_SIZE = (0.03, 0.12)
 
 
 @dataclass(frozen=True)
@@ -93,8 +84,6 @@ class Sealed:
 
     Args:
         hidden: effects, or the mistake and its tests.
-        outside: what the library does not have, or "".
-        without: effects that the library is made to lack.
         values: of the parameters that are asked for [SI].
         seed: of everything random.
         visible: largest misfit of the plain model without noise, relative; of a recipe the size it was asked for.
@@ -102,8 +91,6 @@ class Sealed:
     """
 
     hidden: tuple[str, ...]
-    outside: str
-    without: tuple[str, ...]
     values: Mapping[str, float]
     visible: float
     shared: bool
@@ -117,7 +104,6 @@ class _OutOfReachError(Exception):
 def hidden_campaign(
     seed: int,
     hidden: Sequence[str],
-    outside: str = "",
     directions: Sequence[Direction] = (Direction.AXIAL, Direction.RADIAL),
     visible: tuple[float, float] = _VISIBLE,
 ) -> tuple[Simulated, Sealed]:
@@ -125,7 +111,7 @@ def hidden_campaign(
 
     Args:
         seed: of everything random.
-        hidden, outside: effects of the library to hide, none for a clean campaign; one of OUTSIDE, or "".
+        hidden: effects of the library to hide, none for a clean campaign.
         directions: of the two sweeps.
         visible: least and largest size of what stays visible of each effect, relative.
     """
@@ -141,9 +127,7 @@ def hidden_campaign(
     else:
         raise RuntimeError(f"no visible size of {', '.join(hidden)} was found for seed {seed}")
     clean = undisturbed(model, plan, steps_per_cycle=STEPS)
-    if outside:
-        clean = _disturbed(clean, outside, random)
-    sealed = Sealed(tuple(hidden), outside, (), dict(model.values), least, plan.gain_error > 0.0, seed)
+    sealed = Sealed(tuple(hidden), dict(model.values), least, plan.gain_error > 0.0, seed)
     return measure(clean, plan), sealed
 
 
@@ -185,7 +169,7 @@ def plan_of(
         phase_error=_SHARED_PHASE if shared else 0.0,
         loops=tuple(SimulatedLoop(Direction.AXIAL, factor * axial, 0.1, cycles=3) for factor in (1.0, 2.0)),
         sweeps=tuple(
-            SimulatedSweep(direction, tuple((_LEVELS * largest).tolist()), _FREQUENCIES)
+            SimulatedSweep(direction, tuple((_LEVELS * largest).tolist()), PAPER_FREQUENCIES)
             for direction, largest in zip(directions, (axial, second), strict=True)
         ),
     )
@@ -300,63 +284,6 @@ def _noise_free_data(model: Model, plan: SimulateSettings) -> list[DataSet]:
     data = Data.of(campaign)
     silent = [loop.noise_free(model).with_noise(3e-3) for loop in data.loops]
     return [*silent, *(sweep.noise_free(model) for sweep in data.sweeps)]
-
-
-def _disturbed(clean: Undisturbed, outside: str, random: Generator) -> Undisturbed:
-    """What the library does not have, put on the clean measurements."""
-    size = float(np.exp(random.uniform(*np.log(_OUTSIDE_SIZE))))
-    if outside == "spot_disturbance":
-        centre, width = random.uniform(25.0, 135.0), random.uniform(3.0, 6.0)
-        sweeps = [(test, k * _resonance(np.array(test.frequencies), centre, width, size)) for test, k in clean.sweeps]
-        return replace(clean, sweeps=tuple(sweeps))
-    if outside == "mislabelled_level":
-        return replace(clean, sweeps=_mislabelled(clean, random))
-    return _weakening_slip(clean, size, random)
-
-
-def _resonance(frequency: Array, centre: float, width: float, size: float) -> Array:
-    """1 + a narrow mode of the rig."""
-    return 1.0 + size / (1.0 + 1j * (frequency - centre) / width)
-
-
-def _mislabelled(clean: Undisturbed, random: Generator) -> tuple[tuple[SimulatedSweep, Array], ...]:
-    """One level of one sweep was run at another amplitude than its label says."""
-    which, level = int(random.integers(len(clean.sweeps))), int(random.integers(3))
-    test, stiffness = clean.sweeps[which]
-    factor = float(random.choice([0.5, 0.6, 1.6, 2.0]))
-    wrong = stiffness.copy()
-    wrong[level] = rig.dynamic_stiffness(
-        clean.truth,
-        test.direction,
-        np.array(test.frequencies),
-        np.full(len(test.frequencies), factor * test.amplitudes[level]),
-        steps_per_cycle=STEPS,
-    )
-    return tuple((t, wrong if i == which else k) for i, (t, k) in enumerate(clean.sweeps))
-
-
-def _weakening_slip(clean: Undisturbed, size: float, random: Generator) -> Undisturbed:
-    """A slip whose force falls with speed: F = Fc sgn(v) / (1 + |v|/v0), in every test."""
-    test, stiffness = clean.sweeps[0]
-    middle = test.amplitudes[1]
-    force = size * float(np.abs(stiffness[1]).mean()) * middle
-    speed = 2.0 * np.pi * float(np.exp(random.uniform(np.log(10.0), np.log(60.0)))) * middle
-    angle = 2.0 * np.pi * (np.arange(512) + 0.5) / 512
-
-    def slip(velocity: Array) -> Array:
-        return force * np.sign(velocity) / (1.0 + np.abs(velocity) / speed)
-
-    sweeps = []
-    for swept, k in clean.sweeps:
-        x, omega = np.meshgrid(swept.amplitudes, 2.0 * np.pi * np.array(swept.frequencies), indexing="ij")
-        velocity = (x * omega)[..., None] * np.cos(angle)
-        quadrature = 2.0 * np.mean(slip(velocity) * np.cos(angle), axis=-1)
-        sweeps.append((swept, k + 1j * quadrature / x))
-    loops = tuple(
-        (looped, replace(rec, force=rec.force + slip(np.gradient(rec.displacement, rec.time))))
-        for looped, rec in clean.loops
-    )
-    return replace(clean, sweeps=tuple(sweeps), loops=loops)
 
 
 def hideable() -> list[str]:

@@ -1,7 +1,5 @@
 """The outcomes of a card on disk, a line each as they come, so that a run that is stopped goes on where it was."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager

@@ -3,17 +3,15 @@
 How a mistake is made is written here, how it is mended in `effects.mistakes`: the one is no use of the other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.random import Generator
 
-from bushfit.effects.mistake import Mistake
+from bushfit.effects.mistake import Mistake, other_direction
 from bushfit.effects.mistakes import MISTAKES, labelled
-from bushfit.geometry import ROTATION, Direction
+from bushfit.geometry import ROTATION, Direction, Place
 from bushfit.reading.measurement import Complex, Floats, Loop, Sweep
 from bushfit.scorecard.hidden import Sealed, hidden_campaign
 from bushfit.simulation import Simulated
@@ -93,9 +91,6 @@ def _stated_sweep(mistake: Mistake, sweep: Sweep) -> Sweep:
     )
 
 
-def _stated_direction(mistake: Mistake, test: Loop | Sweep) -> Direction:
+def _stated_direction(mistake: Mistake, test: Loop | Sweep) -> Place:
     """The direction that the campaign states."""
-    assert isinstance(test.direction, Direction)  # hidden campaigns have no specimens
-    if not mistake.swaps:
-        return test.direction
-    return Direction.AXIAL if test.direction is Direction.RADIAL else Direction.RADIAL
+    return (other_direction(test.direction) if mistake.swaps else None) or test.direction

@@ -1,7 +1,5 @@
 """What a task of the score card is, and what the workflow said of it beside the truth."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from bushfit.scorecard.hidden import Sealed

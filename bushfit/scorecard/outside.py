@@ -5,8 +5,6 @@ said of what nobody thought of. Each is a stress over the history of the strain,
 the size that a campaign asks for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise

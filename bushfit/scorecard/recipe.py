@@ -4,8 +4,6 @@ A recipe may change the plan of the tests, what the rig does in time around the 
 alone makes the data; the closed forms that fits use never do.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -110,5 +108,5 @@ def cooked(recipe: Recipe, seed: int) -> tuple[Simulated, Sealed]:
     rigged = plain if recipe.rig is None else Rigged(*own, around=recipe.rig(bench))
     clean = replace(undisturbed(rigged, bench.plan, steps_per_cycle=STEPS), truth=plain)
     measured = recipe.file(measure(clean, bench.plan), bench)
-    sealed = Sealed(recipe.truths, "", (), dict(plain.values), bench.size, bench.plan.gain_error > 0.0, seed)
+    sealed = Sealed(recipe.truths, dict(plain.values), bench.size, bench.plan.gain_error > 0.0, seed)
     return measured, sealed

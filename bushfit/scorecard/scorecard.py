@@ -4,8 +4,6 @@ Campaigns are written to disk as files; the workflow reads the campaign, never t
 afterwards. The same seed makes the same card.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext

@@ -11,7 +11,7 @@ from commandline import Done
 
 Run = Callable[..., Done]
 CAMPAIGN = "configs/cmp_15961.toml"
-FILES = ["compare.json", "parameters.csv", "differences.csv", "compare.png"]
+FILES = ["compare.json", "parameters.csv", "differences.csv", "compare.png", "compare.html"]
 
 
 def test_a_folder_a_model_and_a_campaign_of_the_same_tests_differ_in_nothing(bushfit: Run, tmp_path: Path) -> None:

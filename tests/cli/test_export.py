@@ -42,6 +42,15 @@ def test_every_format_at_once_and_what_it_leaves_out(bushfit: Run, tmp_path: Pat
     assert any(line.startswith("radial: not fitted") for line in told)
 
 
+def test_the_arms_of_an_fmu_stand_beside_it_as_table_and_picture(bushfit: Run, tmp_path: Path) -> None:
+    done = bushfit("export", "model/model.json", "--format", "fmu", "-o", str(tmp_path), "--json")
+    assert done.returncode == 0, done.stderr
+    (fmu,) = json.loads(done.stdout)["formats"]["fmu"]["files"]
+    assert {file.name for file in tmp_path.iterdir()} == {fmu, "arms.csv", "arms.png"}
+    arms = pd.read_csv(tmp_path / "arms.csv")["relaxation time [s]"]
+    assert f"{arms.notna().sum()} Maxwell arms in place of the springpot" in done.stderr
+
+
 def test_the_tables_are_those_of_predict(bushfit: Run, tmp_path: Path) -> None:
     grid = (
         "--campaign",

@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 from asking import asked
 from rigged import LEVELS, Fitted, Measured
+from test_schemas import complaints
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings
+from bushfit.caveats import caveats
 from bushfit.diagnosis.correction import Correction, correct
 from bushfit.diagnosis.described import Described, describe
 from bushfit.diagnosis.evidence import Evidence
@@ -25,7 +27,8 @@ from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
-from bushfit.prediction import caveats, predict
+from bushfit.prediction import predict
+from bushfit.report.folder import to_json
 
 
 def with_relaxation(campaign: Campaign, size: float = 0.06) -> Campaign:
@@ -191,7 +194,9 @@ def test_what_the_diagnosis_says(measured: Measured) -> None:
     assert found.description is None
     words = found.summary.partition(";")[0]
     assert "% of |K|" in words, "the size comes first"
-    assert any("intervals are invalid" in line for line in found.to_document()["warnings"])
+    document = found.to_document()
+    assert any("intervals are invalid" in line for line in document["warnings"])
+    assert complaints("diagnosis", json.loads(to_json(document)), whole=True) == []
     inside = predict(found.result, Direction.AXIAL, [45.0, 95.0], [LEVELS[1]]).stiffness
     assert np.all(inside.high - inside.value < 0.01 * inside.value)
     assert found.result.covariance.stderr("m") > 1.5 * plain_error(found, "m")  # type: ignore[operator]

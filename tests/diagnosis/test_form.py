@@ -5,15 +5,18 @@ The data are the virtual rig's; made-up laws are added to their stiffness in the
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import pytest
 from asking import asked
 from rigged import LEVELS, Effects, Fitted, Measured
 from scipy.stats import binomtest
+from test_schemas import complaints
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.diagnosis.form import other_form
+from bushfit.report.folder import to_json
 
 CHANCE = 0.998
 #: Campaigns with a true effect.
@@ -48,6 +51,7 @@ def test_it_is_described_and_not_named(measured: Measured) -> None:
     assert "to be trusted between these tests alone (axial 5 to 150 Hz, 0.62 to 3.1 %" in found.effects[0].evidence
     assert [effect["level"] for effect in document["effects"]] == ["unresolved"]
     assert document["usable"]["held_out"] is False
+    assert complaints("diagnosis", json.loads(to_json(document)), whole=True) == []
 
 
 @pytest.mark.slow

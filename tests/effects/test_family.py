@@ -131,8 +131,9 @@ def effect(request: pytest.FixtureRequest) -> Effect:
     return LIBRARY[request.param]
 
 
-def test_file_stem_is_the_name(effect: Effect) -> None:
-    __import__(f"bushfit.effects.{effect.name.partition('.')[0]}")
+def test_its_law_stands_in_the_file_of_an_effect(effect: Effect) -> None:
+    law = next(getattr(effect, part) for part in ("modulus", "stiffness", "adjust") if hasattr(effect, part))
+    assert law.__module__.rpartition(".")[2] in {name.partition(".")[0] for name in LIBRARY}
 
 
 def test_record_is_complete(effect: Effect) -> None:

@@ -38,16 +38,17 @@ def test_a_sine_turns_at_its_top_and_bottom_wherever_it_begins() -> None:
     for shift in (0, 100, 700):
         history = History.steady(np.roll(np.sin(PHASE), shift), FREQUENCY)
         turning = history.turning
-        (turns,) = turning.turns
-        assert np.array_equal(np.sort(turning.path[0, turns])[:1], [-1.0])
-        assert turning.path[0, 0] == turning.path[0, -1] == 1.0
-        np.testing.assert_array_equal(turning.at_samples(turning.path, np.array([0]))[0], history.value)
+        assert turning.strides.tolist() == [-2.0, 2.0]
+        begins = turning.at_samples(np.array([1.0, -1.0]))
+        np.testing.assert_allclose(begins + turning.travel, history.value, atol=1e-15)
 
 
 def test_a_motion_from_rest_begins_at_zero() -> None:
-    history = History(np.array([[1.0, 2.0, 1.0, 3.0]]), 0.1, periodic=False, frequency=1.0)
-    assert history.turning.path.tolist() == [[0.0, 1.0, 2.0, 1.0, 3.0]]
-    assert [turns.tolist() for turns in history.turning.turns] == [[2, 3]]
+    history = History(np.array([[1.0, 2.0, 1.0, 3.0], [1.0, 2.0, 2.5, 3.0]]), 0.1, periodic=False, frequency=1.0)
+    turning = history.turning
+    assert turning.strides.tolist() == [[2.0, -1.0, 2.0], [3.0, 0.0, 0.0]]
+    assert turning.piece.tolist() == [[0, 1, 2, 2], [0, 0, 0, 0]]
+    assert turning.travel.tolist() == [[1.0, 0.0, 0.0, 2.0], [1.0, 2.0, 2.5, 3.0]]
 
 
 @pytest.mark.parametrize(

@@ -95,6 +95,14 @@ def test_a_compliant_rig_over_a_spring_is_two_springs_in_series() -> None:
         )
 
 
+def test_compliances_in_series_add() -> None:
+    both = PLAIN.with_effect("sleeve_compliance", {"sleeve_compliance.compliance": 2e-8})
+    both = both.with_effect("sleeve_compliance.axial", {"sleeve_compliance.axial": 3e-8})
+    one = PLAIN.with_effect("sleeve_compliance", {"sleeve_compliance.compliance": 5e-8})
+    np.testing.assert_array_equal(both.stiffness("axial", 20.0, 1e-4), one.stiffness("axial", 20.0, 1e-4))
+    np.testing.assert_allclose(both.force("axial", LOOP), one.force("axial", LOOP), rtol=1e-10)
+
+
 @pytest.mark.parametrize("history", [LOOP, STARTED], ids=["steady", "from rest"])
 @pytest.mark.parametrize("inside", ["strain_stiffening", "viscous", "bump_stop", "clearance", "self_heating"])
 def test_rig_and_bushing_share_the_motion(inside: str, history: History) -> None:

@@ -242,8 +242,8 @@ def _main() -> None:
                 f"strain of equal energy {found.energy_strain:.6g}, for friction {found.friction_strain:.6g}"
             )
     tubes = shapes(9, 17)
-    for name, table in zip(("STIFFNESS", "STRAIN", "SOFTENING"), fitted(tubes, corrections(tubes)), strict=True):
-        print(f"_{name} = np.array({table.round(4).tolist()})")
+    for name, table in zip(("stiffness", "strain", "softening"), fitted(tubes, corrections(tubes)), strict=True):
+        print(f"{name} = {table.round(4).tolist()}")
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ def said(
     verdict: str, *sets: tuple[str, ...], truths: tuple[str, ...] = (), kind: str = "fault", **more: Any
 ) -> Outcome:
     hidden = truths if kind in ("alone", "two") else ()
-    sealed = Sealed(truths, "", (), {}, more.pop("visible", 0.05), False, 1)
+    sealed = Sealed(truths, {}, more.pop("visible", 0.05), False, 1)
     return Outcome(Task(kind, 1, hidden), sealed, verdict, tuple(names[0] for names in sets), sets, **more)
 
 

@@ -15,8 +15,8 @@ from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import BASE, LIBRARY
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.scorecard.card import card, confusion
-from bushfit.scorecard.families import tasks
-from bushfit.scorecard.hidden import FIRST, OUTSIDE, hideable
+from bushfit.scorecard.families import DISTURBANCES, RECIPES, tasks
+from bushfit.scorecard.hidden import FIRST, hideable
 from bushfit.scorecard.outcome import Outcome, Task
 from bushfit.scorecard.scorecard import run
 
@@ -47,7 +47,7 @@ def test_a_card_has_every_kind_and_the_same_seed_the_same(capsys: pytest.Capture
     print(kinds)
     assert kinds == {"single": 150, "clean": 60, "pair": 30, "outside": 30, "lacking": 30}
     assert {task.hidden[0] for task in large if task.kind == "single"} == set(FIRST) <= set(LIBRARY) - set(BASE)
-    assert {task.outside for task in large if task.kind == "outside"} == set(OUTSIDE)
+    assert {task.outside for task in large if task.kind == "outside"} == set(DISTURBANCES)
     assert all(task.without == task.hidden for task in large if task.kind == "lacking")
     assert len({(task.kind, task.seed) for task in large}) == len(large)
     assert large == tasks(300, 1) != tasks(300, 2)
@@ -80,7 +80,8 @@ def test_truths_are_sealed_apart_from_the_campaigns(outcomes: list[Outcome], fol
     for outcome in outcomes:
         stem = f"{outcome.task.kind}_{outcome.task.seed}"
         sealed = json.loads((folder / "sealed" / f"{stem}.json").read_text())
-        assert tuple(sealed["hidden"]) == outcome.task.hidden
+        task = outcome.task
+        assert tuple(sealed["hidden"]) == (RECIPES[task.kind][task.outside].truths if task.outside else task.hidden)
         names = {file.name for file in (folder / stem).iterdir()}
         assert {"campaign.toml", "loop_axial_1.csv", "sweep_axial.csv"} <= names
         assert not any("truth" in name or name.endswith(".json") for name in names)

@@ -1,4 +1,5 @@
-"""The page of a result, `report.html`, and that of a batch, `index.html`: one file each, complete without a network."""
+"""The pages of a result, `report.html`, of a comparison, `compare.html`, and of a batch, `index.html`: one file each,
+complete without a network."""
 
 from __future__ import annotations
 
@@ -33,6 +34,18 @@ def report_page(documents: Documents, tables: Tables) -> str:
 
     same = {name: canonical(table) for name, table in tables.items()}
     return rendered("report.html", story(checked(documents), same))
+
+
+def comparison_page(documents: Documents, _: Tables) -> str:
+    """The page of a comparison as HTML, made of its document alone.
+
+    Raises:
+        ModelError: a spoiled document.
+    """
+    from bushfit.report.compared import SideBySide
+    from bushfit.report.page.comparison import account
+
+    return rendered("compare.html", account(SideBySide.of(documents["compare"])))
 
 
 def rendered(template: str, context: dict[str, Any]) -> str:

@@ -88,14 +88,15 @@ def chart(
     log: bool = False,
     rules: Sequence[Rule] = (),
     dot: float = 4.6,
+    least: float = 0.0,
 ) -> Markup:
-    """Lines, bands and points over x, which is logarithmic on request, under a legend."""
+    """Lines, bands and points over x, which is logarithmic on request, under a legend; y spans `least` or more."""
     legend, lines = _legend(series, rules)
     top = _LINE * (1 + lines) + 12.0
     levels = np.array([rule.value for rule in rules])
     x = Axis.over(labels[0], (values for each in series for values in each.values(0)), _LEFT, WIDTH - _RIGHT, log=log)
     ys = [*(values for each in series for values in each.values(1)), levels]
-    y = Axis.over(labels[1], ys, top + _PANEL, top)
+    y = Axis.over(labels[1], ys, top + _PANEL, top, least=least)
     drawn = [_drawn(each, x, y, dot) for each in series]
     across = np.array([x.first, x.last])
     drawn += [
@@ -117,7 +118,7 @@ def _drawn(series: Series, x: Axis, y: Axis, dot: float) -> Markup:
     parts = []
     if series.band is not None:
         along, low, high = series.band
-        there = np.isfinite(low) & np.isfinite(high)
+        there = np.isfinite(along) & np.isfinite(low) & np.isfinite(high)
         around = (
             x(np.concatenate([along[there], along[there][::-1]])),
             y(np.concatenate([low[there], high[there][::-1]])),

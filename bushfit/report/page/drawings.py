@@ -39,11 +39,11 @@ _FEWEST = 24
 #: Most places that are drawn: a page of more is no page.
 MOST_PLACES = 8
 #: Amplitudes that were stepped over more than this ratio lie on a logarithmic axis; and frequencies over this one.
-_DECADES, _LOG_FREQUENCIES = 3.0, 40.0
+_DECADES, LOG_FREQUENCIES = 3.0, 40.0
 
 
 @dataclass(frozen=True, eq=False)
-class Panel:
+class Drawn:
     """What is drawn of a place: its pictures, and what must be said of them."""
 
     place: str
@@ -51,19 +51,19 @@ class Panel:
     notes: Sequence[str]
 
 
-def tested_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) -> list[Panel]:
+def tested_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) -> list[Drawn]:
     """Stiffness and loss factor of each place, measured and predicted."""
     table, places = tests_of(tables, "sweep"), places_of(result, tables)
     if table is None:
         return []
-    found: list[Panel] = []
+    found: list[Drawn] = []
     most = max(_FEWEST, _MOST_POINTS // (MOST_LEVELS * min(len(places), MOST_PLACES) or 1))
     for name, place in places.items():
         rows = table[table["direction"] == str(place)]
         if len(rows) and len(found) < MOST_PLACES:
             kinds = [sweeps for sweeps in sweeps_at(place, rows, tests, tables.get(name), most) if sweeps.curves]
             pictures = [picture for sweeps in kinds for picture in _sweeps(sweeps)]
-            found += [Panel(str(place), pictures, _notes(kinds, most))] if kinds else []
+            found += [Drawn(str(place), pictures, _notes(kinds, most))] if kinds else []
     return found
 
 
@@ -87,7 +87,7 @@ def _notes(kinds: Sequence[Sweeps], most: int) -> list[str]:
 def _sweeps(sweeps: Sweeps) -> Iterator[Markup]:
     """|K| and loss factor of sweeps over what they step through."""
     x = np.concatenate([curve.measured[0] for curve in sweeps.curves])
-    log = bool(x.max() > (_DECADES if sweeps.stepped == "amplitude" else _LOG_FREQUENCIES) * x.min() > 0.0)
+    log = bool(x.max() > (_DECADES if sweeps.stepped == "amplitude" else LOG_FREQUENCIES) * x.min() > 0.0)
     stiffness = columns_of(sweeps.place)[1]
     for row, label in enumerate((stiffness, "loss factor [-]"), start=1):
         what = label.partition(" [")[0]
@@ -113,22 +113,23 @@ def _described(sweeps: Sweeps, row: int, what: str, label: str) -> str:
     over = sweeps.x_label.partition(" [")[0]
     parts = [f"{what} over {over}, {sweeps.place}, measured and model"]
     for curve in sweeps.curves:
-        spans = (f"{_span(values[row])} {unit}".strip() for values in (curve.measured, curve.model))
+        spans = (f"{span_of(values[row])} {unit}".strip() for values in (curve.measured, curve.model))
         parts.append("{}: measured {}, model {}".format(curve.name, *spans))
     return "; ".join(parts)
 
 
-def _span(values: Array) -> str:
+def span_of(values: Array) -> str:
+    """Least and largest of the values that are known, in words."""
     known = values[np.isfinite(values)]
     return f"{number(float(known.min()), 3)} to {number(float(known.max()), 3)}" if known.size else "nothing"
 
 
-def loop_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) -> list[Panel]:
+def loop_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) -> list[Drawn]:
     """Force over displacement of each place, measured and modelled."""
     table = tests_of(tables, "loop")
     if table is None:
         return []
-    found: list[Panel] = []
+    found: list[Drawn] = []
     drawn = table.groupby("direction")["test"].nunique().clip(upper=MOST_LEVELS).nlargest(MOST_PLACES).sum()
     most = max(_FEWEST, _MOST_ROWS // max(1, int(drawn)))
     for place in places_of(result, tables).values():
@@ -145,7 +146,7 @@ def loop_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) -> l
             ]
             if left := rows["test"].nunique() - len(loops):
                 notes.append(f"{left} further loops are left out of the picture; loops.csv has all.")
-            found.append(Panel(str(place), _loops(place, loops), notes))
+            found.append(Drawn(str(place), _loops(place, loops), notes))
     return found
 
 
@@ -159,10 +160,12 @@ def _loops(place: Place, loops: Sequence[LoopCurve]) -> list[Markup]:
     ]
     left = [Series(loop.name, color, points=(loop.rows[0], loop.rows[1] - loop.rows[2])) for loop, color in looks]
     spans = "; ".join(
-        f"{loop.name}: measured {_span(loop.rows[1])} {place.display.force.name}, model {_span(loop.rows[2])}"
+        f"{loop.name}: measured {span_of(loop.rows[1])} {place.display.force.name}, model {span_of(loop.rows[2])}"
         for loop in loops
     )
-    off = "; ".join(f"{each.name}: {_span(each.points[1])} {place.display.force.name}" for each in left if each.points)
+    off = "; ".join(
+        f"{each.name}: {span_of(each.points[1])} {place.display.force.name}" for each in left if each.points
+    )
     return [
         chart(
             f"{place}: hysteresis",
@@ -182,12 +185,12 @@ def _loops(place: Place, loops: Sequence[LoopCurve]) -> list[Markup]:
     ]
 
 
-def gap_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) -> list[Panel]:
+def gap_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) -> list[Drawn]:
     """What is left of each place before and after, measured less model in %."""
     gap = gap_of(tables)
     if gap is None or not any(str(name).endswith("before [%]") for name in gap):
         return []
-    found: list[Panel] = []
+    found: list[Drawn] = []
     for place in list(places_of(result, tables).values())[:MOST_PLACES]:
         shown = list(cells_at(place, gap, tests))
         if shown:
@@ -196,7 +199,7 @@ def gap_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) -> li
                 Cells(each.name, each.rows, each.along, (*each.sides, *each.sides)[: len(heads)]) for each in shown
             ]
             title = f"{place}: measured less model, %"
-            found.append(Panel(str(place), [maps(title, heads, shown, _mapped(place, heads, shown))], []))
+            found.append(Drawn(str(place), [maps(title, heads, shown, _mapped(place, heads, shown))], []))
     return found
 
 

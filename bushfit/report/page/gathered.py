@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.errors import ModelError
 from bushfit.geometry import Direction, Place
 from bushfit.model.result import Result
 from bushfit.report.artifacts import place_names
 from bushfit.report.page.chart import Cells
-from bushfit.report.tables import IF_RIGS, spread, words
-from bushfit.units import number
+from bushfit.report.tables import IF_RIGS, complete, numbers, required, spread, words
+from bushfit.units import split_header, told
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -112,33 +111,6 @@ def columns_of(place: Place) -> tuple[str, str, str]:
     return f"{moved} [{length}]", f"{resisted} [{stiffness}]", f"{resisting} [{force}]"
 
 
-def numbers(rows: pd.DataFrame, *headers: str) -> Array:
-    """Columns of a table, (k, n).
-
-    Raises:
-        ModelError: one of them is not there.
-    """
-    return required(rows, *headers)[list(headers)].to_numpy(dtype=float).T
-
-
-def required(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
-    """A table that has these columns.
-
-    Raises:
-        ModelError: one of them is not there.
-    """
-    for header in headers:
-        if header not in rows:
-            hint = "write the results anew, or take the table away: the page then goes without it"
-            raise ModelError("a column of a table is missing", expected=header, hint=hint)
-    return rows
-
-
-def complete(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
-    """The rows of a table in which all these numbers are known."""
-    return rows.iloc[np.flatnonzero(np.isfinite(numbers(rows, *headers)).all(axis=0))]
-
-
 def sweeps_at(
     place: Place, rows: pd.DataFrame, tests: Sequence[TestTable], predicted: pd.DataFrame | None, most: int
 ) -> Iterator[Sweeps]:
@@ -154,7 +126,7 @@ def sweeps_at(
             there = mine[mine[held] == level].sort_values(along)
             if stepped:
                 there = there.groupby(along, as_index=False)[headers[1:]].mean()
-            points = numbers(there, *headers)[:, _thin(len(there), most)]
+            points = numbers(there, *headers)[:, thin(len(there), most)]
             line = _predicted(predicted, along, held, level, names) if stepped else None
             model, band, rigs = (points[[0, 3, 4]], None, None) if line is None else line
             curves.append(Curve(_level(level, held), points[:3], model, band, rigs))
@@ -181,7 +153,7 @@ def _by_kind(
 
 def _level(level: float | str, held: str) -> str:
     """A held value as people read it, with the unit of its header; the name of a test as it is."""
-    return level if isinstance(level, str) else f"{number(level, 3)} {held.partition('[')[2].rstrip(']')}"
+    return level if isinstance(level, str) else told(split_header(held)[1] or "", level)
 
 
 def _predicted(
@@ -222,7 +194,7 @@ def _moved(place: Place) -> str:
     return f"{place.motion.words[0]} [{place.display.displacement.name}]"
 
 
-def _thin(count: int, most: int) -> slice:
+def thin(count: int, most: int) -> slice:
     """Every so many-th of some rows, at most so many."""
     return slice(None, None, max(1, -(-count // most)))
 
@@ -232,7 +204,7 @@ def cells_at(place: Place, gap: pd.DataFrame, tests: Sequence[TestTable]) -> Ite
     mine = gap[gap["direction"] == str(place)]
     for stepped, along, held, rows in _by_kind(place, mine[mine["kind"] == "sweep"], tests):
         (x,), (name, unit) = numbers(rows, along), along.rstrip("]").split(" [")
-        ends = number(float(x.min()), 3), name, f"{number(float(x.max()), 3)} {unit}"
+        ends = told(unit, float(x.min())), name, told(unit, float(x.max()))
         for part in ("storage", "loss"):
             yield _map(part, rows, held if stepped else "test", x, ends)
     loops = mine[mine["kind"] == "loop"]

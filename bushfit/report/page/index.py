@@ -15,7 +15,7 @@ from markupsafe import Markup
 
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
-from bushfit.model.file import read_document
+from bushfit.model.file import read_document, require_schema
 from bushfit.report.contents import Contents
 from bushfit.report.page import rendered
 from bushfit.report.page.chart import LIMIT, Rule, Series, chart
@@ -82,14 +82,7 @@ def read_batch(folder: Path, base: str = "") -> Contents:
     """
     file = folder / "batch.json"
     document = read_document(file)
-    if document.get("schema") != SCHEMA:
-        raise ModelError(
-            "not a batch this version reads",
-            file=file,
-            place="schema",
-            found=repr(document.get("schema")),
-            expected=SCHEMA,
-        )
+    require_schema(document, file, "a batch", SCHEMA, hint="run the batch again with --resume")
     check_tables(document, file, Batch, kind=ModelError)
     table = read_table(folder, "batch")
     if table is None or not {"name", "status", "folder"} <= set(table):

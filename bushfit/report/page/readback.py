@@ -34,6 +34,11 @@ _LARGEST_NUMBER = 1e100
 _LARGEST = 500_000_000
 
 
+def has_model(folder: Path) -> bool:
+    """Whether a folder holds a model, and so perhaps more of a result."""
+    return any((folder / f"{name}.json").exists() for name in MODELS)
+
+
 def read_results(folder: Path) -> Contents:
     """What stands in a folder of results, with its page to be written.
 
@@ -47,7 +52,7 @@ def read_results(folder: Path) -> Contents:
         found = "a file" if folder.exists() else "nothing"
         raise ModelError("a folder of results is needed", file=folder, found=found, expected="as bushfit run writes it")
     files = {name: folder / f"{name}.json" for name in _DOCUMENTS if (folder / f"{name}.json").exists()}
-    if not set(files) & set(MODELS):
+    if not has_model(folder):
         standing = sorted(path.name for path in folder.iterdir())[:8]
         raise ModelError(
             "there is no model in this folder",
@@ -60,7 +65,7 @@ def read_results(folder: Path) -> Contents:
     result = checked(documents, files).result
     names = (*_TABLES, *place_names([*Direction, *result.specimens]))
     tables = {name: table for name in names if (table := read_table(folder, name)) is not None}
-    return Contents(documents, {name: _given(table) for name, table in tables.items()}).reported()
+    return Contents(documents, {name: _given(table) for name, table in tables.items()}).paged()
 
 
 def canonical(table: pd.DataFrame) -> pd.DataFrame:

@@ -10,7 +10,7 @@ from typing import Any
 from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.errors import ModelError
 from bushfit.model.document import CampaignTable
-from bushfit.model.file import from_document
+from bushfit.model.file import from_document, require_schema
 from bushfit.model.result import Result
 from bushfit.validation import check_tables
 
@@ -50,15 +50,9 @@ def checked(documents: Mapping[str, Mapping[str, Any]], files: Mapping[str, Path
         raise ModelError("there is no model among the results", expected=" or ".join(f"{name}.json" for name in MODELS))
     model, plain, diagnosis = documents[name], documents.get(PLAIN), documents.get("diagnosis")
     result = from_document(model, at.get(name))
-    if diagnosis is not None and diagnosis.get("schema") != DIAGNOSIS:
-        raise ModelError(
-            "not a diagnosis this version reads",
-            file=at.get("diagnosis"),
-            place="schema",
-            found=repr(diagnosis.get("schema")),
-            expected=DIAGNOSIS,
-            hint="bushfit diagnose writes it anew",
-        )
+    if diagnosis is not None:
+        hint = "bushfit diagnose writes it anew"
+        require_schema(diagnosis, at.get("diagnosis"), "a diagnosis", DIAGNOSIS, hint=hint)
     provenance = model.get("provenance", {})
     return Checked(
         result,

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Bushing, Place, Specimen
+from bushfit.geometry import Bushing, Place, Specimen
 from bushfit.model.result import Misfit, Result, Usable
 from bushfit.report.page.drawings import MOST_PLACES, gap_panels, loop_panels, tested_panels
-from bushfit.report.page.gathered import columns_of, complete, places_of
+from bushfit.report.page.gathered import columns_of, places_of
 from bushfit.report.page.schema import Checked
 from bushfit.report.parameters import interval_kind, parameter_rows
-from bushfit.report.tables import spread
-from bushfit.units import alike, for_people, number
+from bushfit.report.tables import DISPLAYS, complete, spread
+from bushfit.units import alike, for_people, number, told
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,9 +42,7 @@ _SAME_LETTERS = 40
 #: Rows of predicted values of all places together.
 _ROWS = 12
 #: Warnings, regions, and tests that a page lists at most: the documents have all.
-_MOST = 12
-#: Units of amplitudes, by SI, as people read them.
-_DISPLAYS = {motion.displacement_unit: motion.display.displacement for motion in (TRANSLATION, ROTATION, STRAINING)}
+MOST = 12
 
 
 def story(found: Checked, tables: Tables) -> dict[str, Any]:
@@ -56,10 +54,10 @@ def story(found: Checked, tables: Tables) -> dict[str, Any]:
     return {
         "name": about.name if about else result.name,
         "subject": "rubber bushing" if result.model.bushing else "rubber compound",
-        "facts": [*_bodies(result), *_conditions(tests)],
-        "tests": [_tested(test, result.tests) for test in tests[:_MOST]],
+        "facts": [*_bodies(result), *conditions(test.conditions for test in tests)],
+        "tests": [_tested(test, result.tests) for test in tests[:MOST]],
         "conditioned": any(test.conditions for test in tests),
-        "more_tests": max(0, len(tests) - _MOST),
+        "more_tests": max(0, len(tests) - MOST),
         "diagnosis": diagnosis,
         "tone": _TONES.get(diagnosis["verdict"], "fair") if diagnosis else "fair",
         "effects": [_effect(effect) for effect in diagnosis["effects"]] if diagnosis else [],
@@ -78,8 +76,8 @@ def story(found: Checked, tables: Tables) -> dict[str, Any]:
         "gap": gap_panels(result, tables, tests),
         "gaps": (gaps := _gaps(found)),
         "added": any(before != after for _, before, after in gaps if after),
-        "warnings": warnings[:_MOST],
-        "more_warnings": max(0, len(warnings) - _MOST),
+        "warnings": warnings[:MOST],
+        "more_warnings": max(0, len(warnings) - MOST),
         "unresolved": result.unresolved,
         "outliers": len(result.outliers),
         "about": about,
@@ -91,12 +89,12 @@ def story(found: Checked, tables: Tables) -> dict[str, Any]:
 def _bodies(result: Result) -> Iterator[tuple[str, str]]:
     """What was tested, and its sizes."""
     if bushing := result.model.bushing:
-        yield "Bushing", _tube(bushing)
+        yield "Bushing", tube(bushing)
     for specimen in result.specimens:
         yield f"Specimen {specimen}", _specimen(specimen)
 
 
-def _tube(bushing: Bushing) -> str:
+def tube(bushing: Bushing) -> str:
     inner, outer, length = (
         number(1e3 * size, 4) for size in (2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length)
     )
@@ -113,10 +111,11 @@ def _specimen(specimen: Specimen) -> str:
     )
 
 
-def _conditions(tests: Sequence[TestTable]) -> Iterator[tuple[str, str]]:
+def conditions(stated: Iterable[Mapping[str, str | float]]) -> Iterator[tuple[str, str]]:
     """Conditions of all tests: each value once; of three that every report has, too, that they are not stated."""
+    tests = list(stated)
     for key, name in _CONDITIONS.items():
-        values = list(dict.fromkeys(test.conditions[key] for test in tests if key in test.conditions))
+        values = list(dict.fromkeys(test[key] for test in tests if key in test))
         if degrees := sorted(value for value in values if not isinstance(value, str)):
             unit = " °C" if key == "temperature_degC" else ""
             yield name, " to ".join(dict.fromkeys(f"{number(end, 3)}{unit}" for end in (degrees[0], degrees[-1])))
@@ -128,7 +127,7 @@ def _conditions(tests: Sequence[TestTable]) -> Iterator[tuple[str, str]]:
 
 def _tested(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str]:
     """A test in a row of a table: its range, and how well the model meets it."""
-    unit, factor = _DISPLAYS[test.unit]
+    unit, factor = DISPLAYS[test.unit]
     met = next((misfit for misfit in misfits if misfit.test == test.test and misfit.held is None), None)
     stated = [
         f"{value if isinstance(value, str) else number(value, 3)}{unit}"
@@ -139,18 +138,14 @@ def _tested(test: TestTable, misfits: Sequence[Misfit]) -> dict[str, str]:
         "test": test.test,
         "kind": {"loop": "hysteresis loop", "sweep": "sweep"}.get(test.kind, test.kind),
         "place": test.place,
-        "frequency": _ends(test.frequency_Hz, 1.0, "Hz"),
-        "amplitude": _ends(test.amplitude, factor, unit),
+        "frequency": told("Hz", *test.frequency_Hz),
+        "amplitude": told(unit, *(factor * end for end in test.amplitude)),
         "rows": f"{test.rows}",
         "conditions": ", ".join(stated),
         "nrmse": f"{number(100 * met.nrmse, 2)} %" if met else "",
         "chi": number(met.reduced_chi_square, 2) if met else "",
         "fitted": "" if met is None or met.fitted else "not fitted",
     }
-
-
-def _ends(ends: tuple[float, float], factor: float, unit: str) -> str:
-    return " to ".join(dict.fromkeys(number(end * factor, 3) for end in ends)) + f" {unit}"
 
 
 def _usable(place: Usable) -> dict[str, Any]:
@@ -230,16 +225,20 @@ def _corners(table: pd.DataFrame, place: Place, frequencies: int) -> Iterator[tu
     amplitude, stiffness, _ = columns_of(place)
     names = (stiffness, "loss factor [-]")
     band = [f"{name}, {end}" for name in names for end in ("low", "high")]
-    table = complete(table, "frequency [Hz]", amplitude, *names, *band)
     (length, _), _, (unit, _) = place.display
+    known = complete(table, "frequency [Hz]", amplitude, *names, *band)
+    for row in corners(known, amplitude, _AMPLITUDES, frequencies):
+        cells = [str(place), f"{number(row['frequency [Hz]'], 4)} Hz", told(length, row[amplitude])]
+        for name, of in zip(names, (f" {unit}", ""), strict=True):
+            value, *ends = alike([row[name], row[f"{name}, low"], row[f"{name}, high"]], 4, least=2)
+            measured = row.get(f"measured {name}", np.nan)
+            cells += [value + of, " to ".join(ends), "" if np.isnan(measured) else alike([measured], 4)[0]]
+        yield tuple(cells)
+
+
+def corners(table: pd.DataFrame, amplitude: str, amplitudes: int, frequencies: int) -> Iterator[dict[str, Any]]:
+    """At most so many rows of a table of operating points, evenly over its amplitudes and frequencies."""
     levels = np.unique(table[amplitude])
-    for level in levels[spread(levels.size, _AMPLITUDES)]:
+    for level in levels[spread(levels.size, amplitudes)]:
         mine = table[table[amplitude] == level].sort_values("frequency [Hz]").to_dict("records")
-        for at in spread(len(mine), frequencies):
-            row = mine[at]
-            cells = [str(place), f"{number(row['frequency [Hz]'], 4)} Hz", f"{number(float(level), 3)} {length}"]
-            for name, of in zip(names, (f" {unit}", ""), strict=True):
-                value, *ends = alike([row[name], row[f"{name}, low"], row[f"{name}, high"]], 4, least=2)
-                measured = row.get(f"measured {name}", np.nan)
-                cells += [value + of, " to ".join(ends), "" if np.isnan(measured) else alike([measured], 4)[0]]
-            yield tuple(cells)
+        yield from ({str(key): cell for key, cell in mine[at].items()} for at in spread(len(mine), frequencies))

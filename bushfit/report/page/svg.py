@@ -91,15 +91,17 @@ class Axis:
     log: bool = False
 
     @classmethod
-    def over(cls, label: str, values: Iterable[Array], first: float, last: float, *, log: bool = False) -> Axis:
-        """An axis that holds all these values, with a margin."""
+    def over(
+        cls, label: str, values: Iterable[Array], first: float, last: float, *, log: bool = False, least: float = 0.0
+    ) -> Axis:
+        """An axis that holds all these values, with a margin; a linear one spans `least` or more."""
         known = np.concatenate([np.empty(0), *(np.ravel(each) for each in values)])
         known = known[np.isfinite(known) & ((known > 0.0) | (not log))]
         low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
         if log and high > low:
             margin = (high / low) ** (_MARGIN / 2.0)
             return cls(label, low / margin, high * margin, first, last, log=True)
-        margin = _MARGIN * (high - low) or 0.1 * abs(high) or 1.0
+        margin = max(_MARGIN * (high - low), (least - high + low) / 2.0) or 0.1 * abs(high) or 1.0
         return cls(label, low - margin, high + margin, first, last)
 
     def __call__(self, values: Array | float) -> Array:

@@ -30,7 +30,7 @@ from bushfit.report.plots.points import (
     turn,
 )
 from bushfit.report.plots.prediction import FINE, draw, draw_as_it_came, points_note
-from bushfit.units import for_people
+from bushfit.units import for_people, told
 
 #: Height of a panel of residuals [inch].
 _STRIP = 2.6 / style.CM
@@ -170,7 +170,9 @@ def loops_legend(axes: Axes, data_sets: Sequence[LoopData], **words: Any) -> Non
 def loop_labels(data_sets: Sequence[LoopData]) -> list[str]:
     """Each loop of a direction by amplitude and frequency, and by file on a second line where that leaves twins."""
     unit, length = data_sets[0].direction.display.displacement
-    labels = [f"{length * data_set.amplitude[0]:.3g} {unit}, {data_set.frequency[0]:.3g} Hz" for data_set in data_sets]
+    labels = [
+        f"{told(unit, length * data_set.amplitude[0])}, {told('Hz', data_set.frequency[0])}" for data_set in data_sets
+    ]
     if len(set(labels)) == len(labels):
         return labels
     return [

@@ -25,6 +25,7 @@ from bushfit.report.plots.fits import loop_labels, loops_legend
 from bushfit.report.plots.misfit import Curve, Map, Side, columns, has_holes, side_of
 from bushfit.report.plots.points import SECTORS, Kind, by_direction, by_kind
 from bushfit.report.plots.prediction import axis_label
+from bushfit.units import told
 
 #: Height of a row of a map [inch].
 _LEVEL = 0.6 / style.CM
@@ -210,7 +211,7 @@ def _cells(along: Array, *, logarithmic: bool) -> tuple[Array, Array]:
 
 def _label_maps(row: Sequence[Axes], kind: Kind, part: str, drawn: Map, sweeps: Sequence[SweepData]) -> None:
     unit, factor = ("Hz", 1.0) if kind.axis == "amplitude" else kind.place.display.displacement
-    names = [f"{factor * level:.3g} {unit}" for level in np.unique(drawn.points.held)]
+    names = [told(unit, factor * level) for level in np.unique(drawn.points.held)]
     if kind.stepped is None and drawn.merged == 1:
         names = [style.file_name(sweep.name) for sweep in sweeps]
     for axes in row:

@@ -14,7 +14,7 @@ from bushfit.reading.measurement import Loop, Sweep
 from bushfit.report.plots import style
 from bushfit.report.plots.points import BINS, Kind, Repeats, held_beside, ranges
 from bushfit.report.plots.prediction import axis_label
-from bushfit.units import for_people
+from bushfit.units import for_people, told
 
 #: Colour of a history.
 _COLOR = "#3b528b"
@@ -100,7 +100,7 @@ def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
             axes.plot(x[at], values[at], look.marker, color=look.color, alpha=0.75, **style.POINT)
         style.dress(axes, axis_label(sweep.direction, axis), label)
         style.readable(axes, x)
-    labels = [f"{length * level:.3g} {unit}" for level in levels]
+    labels = [told(unit, length * level) for level in levels]
     if sweep.stepped:
         style.name_levels(pair[-1], labels, held, [True] * levels.size)
     return pair[0]

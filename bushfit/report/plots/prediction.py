@@ -19,7 +19,7 @@ from bushfit.reading.runs import nominal
 from bushfit.report.plots import style
 from bushfit.report.plots.points import Axis, Points, held_beside, means
 from bushfit.report.tables import IF_RIGS, spread, words
-from bushfit.units import for_people
+from bushfit.units import for_people, told
 
 #: Points of a model's line: chosen, no corner is seen at the size of a panel.
 FINE = 60
@@ -174,7 +174,7 @@ def draw(
         double = tuple(Line2D([], [], color=color, lw=lw) for color, lw in ((style.INK, _DOUBLE), ("white", _CORE)))
         besides |= {"bushing": bushing, IF_RIGS: double}
     unit, scale = scales[held]
-    called = [f"{scale * level:.3g} {unit}" for level in levels]
+    called = [told(unit, scale * level) for level in levels]
     style.name_levels(pair[-1], called, held, [bool(spots.any()) for spots in marked], besides)
     return laid
 

@@ -14,6 +14,7 @@ from bushfit.reduction.result import Reduction
 from bushfit.report.plots import style
 from bushfit.report.plots.points import ranges
 from bushfit.report.plots.prediction import pair_labels
+from bushfit.units import told
 
 #: Height of a history [inch].
 _STRIP = 2.7 / style.CM
@@ -93,7 +94,7 @@ def _draw_points(
         axes.tick_params(labelbottom=False)
         style.readable(axes, steps["frequency"].to_numpy())
     handles = [look.handle(True) for look in looks.values()]
-    style.legend(pair[-1], handles, [f"{length * level:.4g} {unit}" for level in looks], "amplitude")
+    style.legend(pair[-1], handles, [told(unit, length * level, digits=4) for level in looks], "amplitude")
 
 
 def _draw_quality(pair: Sequence[Axes], steps: pd.DataFrame, looks: dict[float, style.Style]) -> None:

@@ -1,4 +1,4 @@
-"""The results of two campaigns, of a batch, and their pages."""
+"""The results of two campaigns, of comparisons, of a batch, and their pages."""
 
 from __future__ import annotations
 
@@ -37,6 +37,17 @@ def measured(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         done = call(root, *command, "--no-plots", "-q")
         assert done.returncode == 0, done.stderr
     return folder
+
+
+@pytest.fixture(scope="session")
+def compared(root: Path, results: Callable[[str], Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with two comparisons: `two` bushings in both directions, and model `families` on one campaign."""
+    home = tmp_path_factory.mktemp("compared")
+    two = (results("cmp_15961"), results("mystery_mount"), "--direction", "axial", "--direction", "radial")
+    for name, what in (("two", two), ("families", ("configs/cmp_15961.toml", "--families", "sliders,kraus"))):
+        done = call(root, "compare", *what, "-o", home / name, "--no-plots", "-q")
+        assert done.returncode == 0, done.stderr
+    return home
 
 
 @pytest.fixture(scope="session")

@@ -2,15 +2,41 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections import Counter
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
+from pathlib import Path
 
+import numpy as np
+from hypothesis import strategies as st
+
+from bushfit.errors import printable
+
+#: A page at most [bytes].
+LARGEST = 500_000
 #: Elements that have no end.
 VOID = {"meta", "link", "br", "hr", "img", "input"}
 #: What makes a browser load something.
 LOADING = {"src", "srcset", "data", "poster", "background", "action", "formaction", "xlink:href"}
+
+#: Names that would do harm where they are not escaped.
+HARMFUL = [
+    '"><script>alert(1)</script>',
+    "a'b\"c",
+    "</style><b>",
+    "{{ 7*7 }}",
+    "=1+1",
+    "&lt;",
+    "<!--",
+    "']]>",
+    "\u202eabc",
+]
+#: Such names, and any others without white space.
+NASTY = st.one_of(
+    st.sampled_from(HARMFUL), st.text(st.characters(exclude_categories=["C", "Z"]), min_size=1, max_size=40)
+)
 
 
 @dataclass
@@ -75,3 +101,36 @@ def loads(page: str) -> list[str]:
     handlers = [name for _, name, _ in found.attributes if name.startswith("on")]
     addresses = set(re.findall(r"https?://[^\s\"'<]*", page)) - {"http://www.w3.org/2000/svg"}
     return [*asked, *styles, *handlers, *addresses]
+
+
+def assert_harmless(page: str, plain: Parsed, name: str) -> None:
+    """Whatever stands in a text, the page has the same elements and attributes as a plain one, and says it to the
+    letter."""
+    found = parsed(page)
+    same = ("script", "style", "svg", "section", "table", "h2", "b", "a", "meta", "body", "button")
+    assert {tag: found.counts[tag] for tag in same} == {tag: plain.counts[tag] for tag in same}
+    assert {key for _, key, _ in found.attributes} == {key for _, key, _ in plain.attributes}
+    assert " ".join(printable(name).split()) in found.text
+    assert loads(page) == [] or "//" in name
+
+
+def drawn(page: str, title: str) -> dict[str, dict[str, np.ndarray]]:
+    """The points of a chart by its title, series and kind, back from pixels by the axes that it states, (2, n)."""
+    (svg,) = re.findall(rf"<svg(?:(?!</svg>).)*?>{re.escape(title)}</text>.*?</svg>", page, re.DOTALL)
+    x, y = (re.search(rf'data-{axis}="([^"]*)"', svg)[1].split() for axis in "xy")  # type: ignore[index]
+
+    def back(axis: list[str], pixels: np.ndarray) -> np.ndarray:
+        low, high, first, last = map(float, axis[:4])
+        share = (pixels - first) / (last - first)
+        return low * (high / low) ** share if axis[4] == "log" else low + (high - low) * share
+
+    found: dict[str, dict[str, np.ndarray]] = {}
+    for name, inside in re.findall(r'<g data-series="([^"]*)">(.*?)</g>', svg):
+        for d, of in re.findall(r'd="([^"]*)"[^>]*data-of="(\w+)"', inside):
+            pairs = np.array([pair.split() for pair in re.findall(r"-?[\d.]+ -?[\d.]+", d)], dtype=float).T
+            found.setdefault(name, {})[of] = np.stack((back(x, pairs[0]), back(y, pairs[1])))
+    return found
+
+
+def change(file: Path, **keys: object) -> None:
+    file.write_text(json.dumps(json.loads(file.read_text(encoding="utf-8")) | keys), encoding="utf-8")

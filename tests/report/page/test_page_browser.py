@@ -17,7 +17,7 @@ pytestmark = pytest.mark.skipif(
     chromium.found() is None, reason=f"none of {', '.join(chromium.NAMES)} is installed here"
 )
 Pages = Callable[[str], Path]
-NAMES = ("cmp_15961", "mystery_mount", "measured", "batch")
+NAMES = ("cmp_15961", "mystery_mount", "measured", "two", "families", "batch")
 
 
 @pytest.fixture(scope="module")
@@ -29,11 +29,12 @@ def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
 @pytest.fixture
 def pages(results: Pages, request: pytest.FixtureRequest) -> Pages:
     def page(name: str) -> Path:
-        if name == "measured":
-            return Path(request.getfixturevalue("measured")) / "report.html"
-        return (
-            Path(request.getfixturevalue("batch")) / "index.html" if name == "batch" else results(name) / "report.html"
-        )
+        if name in ("two", "families"):
+            return Path(request.getfixturevalue("compared")) / name / "compare.html"
+        if name in ("measured", "batch"):
+            file = {"measured": "report.html", "batch": "index.html"}[name]
+            return Path(request.getfixturevalue(name)) / file
+        return results(name) / "report.html"
 
     return page
 
@@ -56,7 +57,7 @@ def test_nothing_is_asked_for_and_all_can_read_it(tab: Tab, pages: Pages, name: 
     assert found["passes"] > 15
 
 
-@pytest.mark.parametrize("name", NAMES[:3])
+@pytest.mark.parametrize("name", NAMES[:-1])
 def test_a_report_is_two_sheets_of_paper(tab: Tab, pages: Pages, name: str) -> None:
     tab.open(pages(name), 1280)
     assert tab.sheets() == 2

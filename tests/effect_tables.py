@@ -1,15 +1,16 @@
-"""`python -m bushfit.effects`: write the tables in this folder's README.md anew, from the records of the library."""
+"""`python tests/effect_tables.py`: write the tables of the effects' README.md anew, from the library's records."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+import bushfit.effects
 from bushfit.effects import LIBRARY, Effect, effect_named, qualified
 from bushfit.effects.mistakes import MISTAKES
 
 #: The page, and the comments between which its tables stand.
-PAGE = Path(__file__).with_name("README.md")
+PAGE = Path(bushfit.effects.__file__).with_name("README.md")
 BEGIN = "<!-- from the records: begin -->\n"
 END = "<!-- from the records: end -->\n"
 
@@ -51,7 +52,8 @@ def _table(head: tuple[str, ...], rows: Iterable[tuple[object, ...]]) -> str:
 
 
 def _link(effect: Effect) -> str:
-    return f"[`{effect.name}`]({effect.name.partition('.')[0]}.py)"
+    file = f"{effect.name.partition('.')[0]}.py"
+    return f"[`{effect.name}`]({file if PAGE.with_name(file).exists() else 'library.toml'})"
 
 
 def _parameters(effect: Effect) -> str:

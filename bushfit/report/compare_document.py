@@ -1,14 +1,19 @@
 """What compare writes as JSON, key by key. Its JSON Schema is made of these types; the type checker holds to them."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from typing_extensions import TypedDict
 
 from bushfit.comparison import ParameterContrast
 from bushfit.diagnosis.holdout import Skipped
+from bushfit.model.document import BushingTable
 from bushfit.model.result import Range
+from bushfit.reading.measurement import Source
+from bushfit.validation import Number
+
+#: What "schema" of the document says.
+SchemaName = Literal["bushfit/compare/1"]
+SCHEMA: SchemaName = "bushfit/compare/1"
 
 
 class ComparedEntry(TypedDict):
@@ -18,19 +23,25 @@ class ComparedEntry(TypedDict):
         label: A, the reference, or B and so on.
         name: of the bushing, or the model family.
         source: file or folder that it was read from.
+        sha256: of the model file or campaign; null where it came from none.
+        bushing: null where specimens of the compound alone are known.
         effects: of its model.
         reduced_chi_square: mean square residual in units of noise; null where it was not fitted.
         nrmse: root mean square difference of model and tests, relative; null where it was not fitted.
         measured: what it was fitted at; null where it was not fitted.
+        inputs: the files of the tests that it was fitted to, with the conditions that the campaign states.
     """
 
     label: str
     name: str
     source: str
+    sha256: str | None
+    bushing: BushingTable | None
     effects: list[str]
-    reduced_chi_square: float | None
-    nrmse: float | None
+    reduced_chi_square: Number | None
+    nrmse: Number | None
     measured: Range | None
+    inputs: tuple[Source, ...]
 
 
 class Joint(TypedDict):
@@ -41,7 +52,7 @@ class Joint(TypedDict):
         parameters: how many count.
     """
 
-    p: float
+    p: Number
     parameters: int
 
 
@@ -62,7 +73,7 @@ class Pair(TypedDict):
     shared_inputs: list[str]
     joint: Joint | None
     parameters: list[ParameterContrast]
-    places: dict[str, dict[str, list[float | str | None]]]
+    places: dict[str, dict[str, list[Number | None] | list[Literal["yes", "no"]]]]
 
 
 class HeldOutPart(TypedDict):
@@ -75,8 +86,8 @@ class HeldOutPart(TypedDict):
     """
 
     part: str
-    first: float
-    heldout: float
+    first: Number
+    heldout: Number
 
 
 class Family(TypedDict):
@@ -95,19 +106,21 @@ class Family(TypedDict):
         p: probability by chance of so large a gain or loss, over all families (Holm).
         parts: each part that was held out.
         skipped: each that was not, and why.
+        words: whether it is nearer to what was held out than the first; empty of the first.
     """
 
     label: str
     name: str
     parameters: int
-    reduced_chi_square: float
-    bic: float
-    heldout: float | None
-    first_there: float | None
-    gain: tuple[float, float, float] | None
-    p: float | None
+    reduced_chi_square: Number
+    bic: Number
+    heldout: Number | None
+    first_there: Number | None
+    gain: tuple[Number, Number, Number] | None
+    p: Number | None
     parts: list[HeldOutPart]
     skipped: list[Skipped]
+    words: str
 
 
 class ComparisonFile(TypedDict):
@@ -120,11 +133,15 @@ class ComparisonFile(TypedDict):
         families: how each meets the tests; null where none were asked for.
         words: what differs, or how much may differ that is not seen.
         warnings: what a user must know before using the numbers.
+        command: as it was typed; empty where it was made otherwise.
+        versions: of bushfit, and of the packages that the numbers rest on.
     """
 
-    schema: Literal["bushfit/compare/1"]
+    schema: SchemaName
     compared: list[ComparedEntry]
     pairs: list[Pair]
     families: list[Family] | None
     words: list[str]
     warnings: list[str]
+    command: str
+    versions: dict[str, str]

@@ -1,0 +1,188 @@
+"""What the page of a comparison tells: what was compared, what differs, parameters and curves, what is left open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import astuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from markupsafe import Markup
+
+from bushfit.geometry import Bushing
+from bushfit.model.file import read_document
+from bushfit.report.compared import FAMILY_HEADS, Heads, Panel, SideBySide, Sides, chance, parameter_cells, signed
+from bushfit.report.contents import Contents
+from bushfit.report.page.chart import DASHES, Rule, Series, chart, colors
+from bushfit.report.page.drawings import LOG_FREQUENCIES, MOST_PLACES, Drawn, span_of
+from bushfit.report.page.gathered import thin
+from bushfit.report.page.story import MOST, conditions, corners, tube
+from bushfit.report.tables import numbers
+from bushfit.units import alike, number, split_header, told
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from bushfit.report.compare_document import ComparedEntry
+
+#: Curves of a page, and points of all of them, of which each has a value and a band: with these it stays below 500 kB.
+_MOST_CURVES, _MOST_POINTS = 300, 7000
+#: Curves of a place, for each result: four pictures, each at two levels.
+_CURVES = 8
+#: Fewest points of a curve, however many there are: lines are smooth.
+_FEWEST = 12
+#: Frequencies and amplitudes of a place whose values are tabled, and rows of all places together.
+_FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 24
+#: Width of an interval, over its value, with whose digits ends of a span are told: three digits.
+_CARRIED = 0.1
+#: Conditions of tests that change a rubber.
+_CONDITIONS = ("Temperature", "Preload")
+#: What is said of a difference of two models without uncertainty.
+_NONE = "of unknown error"
+
+
+def read_comparison(folder: Path) -> Contents:
+    """The comparison in a folder, with its page to be written.
+
+    Raises:
+        ModelError: a compare.json that is not as bushfit writes it.
+    """
+    file = folder / "compare.json"
+    document = read_document(file)
+    SideBySide.of(document, file)
+    return Contents({"compare": document}).paged("compare")
+
+
+def account(found: SideBySide) -> dict[str, Any]:
+    """All that the template of a comparison asks for."""
+    document, names = found.document, found.names
+    named, *others = names.values()
+    families = bool(document["families"])
+    places = found.places[: min(MOST_PLACES, _MOST_CURVES // (_CURVES * len(names)))]
+    shown = [found.sides(place) for place in places]
+    entries = [_entry(entry) for entry in document["compared"]]
+    body = document["compared"][0]["bushing"]
+    title = f"{others[0]} against {named}" if len(others) == 1 else f"{len(others)} results against {named}"
+    return {
+        "document": document,
+        "names": names,
+        "resisted": "modulus" if all(sides.panels[0].header.startswith("modulus") for sides in shown) else "stiffness",
+        "title": f"Model families on {body.name if body else document['compared'][0]['source']}" if families else title,
+        "entries": entries,
+        "differ": [name for name in _CONDITIONS if len({entry["conditions"].get(name) for entry in entries}) > 1],
+        "sizes": [row for place in places for row in _sizes(found, place)],
+        "family_heads": FAMILY_HEADS,
+        "family_rows": [*found.family_cells()],
+        "judged": len(others) if families else 0,
+        "most": MOST,
+        "cells": parameter_cells,
+        "chance": chance,
+        "places": _panels(shown, dict(zip(names, colors(len(names)), strict=True))),
+        "left_places": len(found.places) - len(places),
+        "tabled": _tabled(found, places),
+        "files": _files(document["compared"]),
+    }
+
+
+def _entry(entry: ComparedEntry) -> dict[str, Any]:
+    """What a result is of, in words: its body, its tests and their conditions."""
+    bushing, measured = entry["bushing"], entry["measured"]
+    tests = "given, not fitted"
+    if measured:
+        strain = told("%", *(100.0 * end for end in measured.strain))
+        tests = f"{told('Hz', *measured.frequency)}, strain {strain}, {', '.join(measured.directions)}"
+    stated = dict(conditions(source.conditions for source in entry["inputs"]))
+    body = tube(Bushing(*astuple(bushing))) if bushing else "rubber compound"
+    return {"of": entry, "body": body, "tests": tests, "conditions": stated}
+
+
+def _sizes(found: SideBySide, place: str) -> Iterator[dict[str, Any]]:
+    """How far each is off the first at a place: least and largest difference, and at how many points it is sure."""
+    for label, table in found.at(place).items():
+        heads = Heads.of(table)
+        row: dict[str, Any] = {"label": label, "place": place}
+        for key, header, scale, unit in (("stiffness", heads.relative, 100.0, " %"), ("loss", heads.loss, 1.0, "")):
+            (values,) = scale * numbers(table, header)
+            known = np.sort(values[np.isfinite(values)])[[0, -1]].tolist() if np.isfinite(values).any() else []
+            ends = dict.fromkeys(signed(end, _CARRIED * max(map(abs, known))) for end in known)
+            row[key] = " to ".join(ends) + unit
+            sure = int((table[f"{header}, sure"] == "yes").sum())
+            count = "all" if sure == len(table) else f"{sure} of"
+            said = f"sure at {count} {len(table)} points" if sure else "not shown"
+            row[f"{key}_sure"] = (
+                said if np.ptp(numbers(table, f"{header}, low", f"{header}, high"), axis=0).any() else _NONE
+            )
+        yield row
+
+
+def _panels(shown: Sequence[Sides], looks: dict[str, str]) -> list[Drawn]:
+    """Four pictures a place: stiffness and loss factor of all, and below how far they are off the first."""
+    curves = sum(len(panel.lines) for sides in shown for panel in sides.panels)
+    most = max(_FEWEST, _MOST_POINTS // max(curves, 1))
+    return [Drawn(s.place, [_picture(s, panel, looks, most) for panel in s.panels], []) for s in shown]
+
+
+def _picture(sides: Sides, panel: Panel, looks: dict[str, str], most: int) -> Markup:
+    what, unit = split_header(panel.header)
+    unit = (unit or "").removesuffix("-")
+    series, words = [], []
+    for line in panel.lines:
+        at = thin(line.x.size, most)
+        name = f"{line.label}, {sides.levels[line.level]}"
+        x, value, low, high = (each[at] for each in (line.x, line.value, line.low, line.high))
+        alone = (x, value) if x.size == 1 else None
+        series.append(Series(name, looks[line.label], DASHES[line.level], (x, value), (x, low, high), alone))
+        words.append(f"{name}: {span_of(line.value)} {unit}".strip())
+    x = panel.lines[0].x
+    log = bool(x.max() > LOG_FREQUENCIES * x.min() > 0.0)
+    rules = [Rule(0.0, f"{next(iter(looks))}, the reference")] if panel.least else []
+    alt = f"{what} over {split_header(sides.along)[0]}, {sides.place}; {'; '.join(words)}"
+    labels = sides.along, f"{panel.header}"
+    return chart(f"{sides.place}: {what}", labels, series, alt, log=log, rules=rules, least=panel.least)
+
+
+def _tabled(found: SideBySide, places: Sequence[str]) -> list[tuple[Any, ...]]:
+    """Values of the first and of each other at some corners of the grid, with the intervals of their differences."""
+    tables = [(label, place, table) for place in places for label, table in found.at(place).items()]
+    most = max(_ROWS // max(len(tables), 1), 1)
+    amplitudes = min(most, _AMPLITUDES)
+    rows = (row for each in tables for row in _corners(*each, amplitudes, min(most // amplitudes, _FREQUENCIES)))
+    return list(rows)[: 2 * _ROWS]
+
+
+def _corners(
+    label: str, place: str, table: pd.DataFrame, amplitudes: int, frequencies: int
+) -> Iterator[tuple[Any, ...]]:
+    """Rows of cells: place, label, frequency, amplitude; then of stiffness and loss factor both values, their
+    difference with its interval, and whether it is more than chance at all points at once."""
+    heads = Heads.of(table)
+    ((_, length), (_, unit)) = (split_header(header) for header in heads[:2])
+    kinds = ((heads.stiffness, heads.relative, f" {unit}", 100.0, " %"), ("loss factor [-]", heads.loss, "", 1.0, ""))
+    for row in corners(table, heads.amplitude, amplitudes, frequencies):
+        cells = []
+        for what, difference, of, scale, percent in kinds:
+            value, low, high = (scale * row[f"{difference}{end}"] for end in ("", ", low", ", high"))
+            shown, *ends = (signed(each, high - low) for each in (value, low, high))
+            sides = alike([row[f"{who} {what}"] for who in ("reference", "other")], 4)
+            sure = row[f"{difference}, sure"] == "yes"
+            cells.append((*(side + of for side in sides), shown + percent, " to ".join(ends), sure))
+        yield (
+            place,
+            label,
+            f"{number(row['frequency [Hz]'], 4)} Hz",
+            told(length or "", row[heads.amplitude]),
+            *cells,
+        )
+
+
+def _files(compared: Sequence[ComparedEntry]) -> list[tuple[str, str]]:
+    """Every file behind the comparison with its hash, and what it belongs to: what was compared, and its tests."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for entry in compared:
+        named = [(entry["source"], entry["sha256"] or ""), *((str(s.file), s.sha256) for s in entry["inputs"])]
+        for each in named:
+            found.setdefault(each, []).append(entry["label"])
+    return [
+        (f"{', '.join(dict.fromkeys(labels))}: {file}", sha256) for (file, sha256), labels in found.items() if sha256
+    ]
