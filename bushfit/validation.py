@@ -50,11 +50,11 @@ _WORDS = {"None": "null", "True": "true", "False": "false"}
 _IN_TABLE = "keys in the table itself"
 
 #: Largest number, with either sign; chosen: its square is a number still, and nothing in SI comes near it.
-_LARGEST_NUMBER = 1e100
+LARGEST_NUMBER = 1e100
 #: Largest whole number, with either sign: beyond, floats leave out some.
 _LARGEST_COUNT = 2**53
 #: A finite number; neither a text nor true is one.
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-_LARGEST_NUMBER, le=_LARGEST_NUMBER)]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]
 #: A whole number; neither a text, nor true, nor 3.0 is one.
 WholeNumber = Annotated[int, Field(strict=True, ge=-_LARGEST_COUNT, le=_LARGEST_COUNT)]
 #: True or false; neither a text nor a number is one.

@@ -88,5 +88,6 @@ def _not_computed(data: bytes) -> bool:
 
 if __name__ == "__main__":
     given = json.loads(sys.argv[1])
+    sys.path.append(given.pop("packages"))
     bound(given.pop("memory"), given.pop("seconds"))
     marshal.dump(answer(sys.stdin.buffer.read(), given), sys.stdout.buffer)

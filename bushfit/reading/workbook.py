@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -124,8 +125,10 @@ def _asked(data: bytes, file: Path, kind: type[BushfitError], **order: object) -
     Raises:
         kind: the workbook is broken, or takes more memory or time than a workbook may.
     """
-    bounds = {"memory": _MOST_MEMORY, "seconds": _MOST_SECONDS}
-    command = [sys.executable, "-I", aside.__file__, json.dumps(order | bounds)]
+    found = find_spec("python_calamine")
+    packages = str(Path(found.origin).parents[1]) if found and found.origin else ""
+    order |= {"memory": _MOST_MEMORY, "seconds": _MOST_SECONDS, "packages": packages}
+    command = [sys.executable, "-I", "-S", aside.__file__, json.dumps(order)]
     try:
         done = subprocess.run(command, input=data, capture_output=True, check=False, timeout=_PATIENCE * _MOST_SECONDS)
         status, answer = done.returncode, marshal.loads(done.stdout) if done.returncode == 0 else {}
@@ -136,11 +139,11 @@ def _asked(data: bytes, file: Path, kind: type[BushfitError], **order: object) -
         raise kind("the workbook cannot be read", file=file, found=answer["error"], hint=hint)
     if status or "too_many" in answer:
         slow = status == -getattr(signal, "SIGXCPU", 0)
-        found = f"more than {_MOST_SECONDS} s of work" if slow else f"more than {_MOST_MEMORY >> 30} GiB of memory"
+        taken = f"more than {_MOST_SECONDS} s of work" if slow else f"more than {_MOST_MEMORY >> 30} GiB of memory"
         raise kind(
             "the workbook is too large",
             file=file,
-            found=f'more, with sheet "{answer["too_many"]}"' if answer else found,
+            found=f'more, with sheet "{answer["too_many"]}"' if answer else taken,
             expected=f"at most {_MOST_CELLS} cells in the sheets that are read, empty ones between others counted",
             hint="save the sheet as CSV",
         )

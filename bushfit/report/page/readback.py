@@ -18,6 +18,7 @@ from bushfit.reading.workbook import read_sheets
 from bushfit.report.artifacts import place_names
 from bushfit.report.page.schema import MODELS, PLAIN, checked
 from bushfit.report.tables import TEXTS
+from bushfit.validation import LARGEST_NUMBER
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 _DOCUMENTS = (*MODELS, PLAIN, "diagnosis")
 #: Tables of a result beside those of the predictions, which are named after places.
 _TABLES = ("loops", "sweeps", "gap", "candidates")
-#: Largest number of a table, and its inverse the least: their squares are numbers still.
-_LARGEST_NUMBER = 1e100
 #: Size of a table that is read back at most [bytes]: ten times that of a loop as it is written.
 _LARGEST = 500_000_000
 
@@ -117,7 +116,7 @@ def _column(header: str, cells: pd.Series[str]) -> object:
         return [undefused(cell) for cell in cells]
     values = np.array([float(cell.replace(",", ".")) if cell else 0.0 for cell in cells], dtype=float)
     for cell, size in zip(cells, np.abs(values), strict=True):
-        if not (size == 0.0 or 1.0 / _LARGEST_NUMBER < size < _LARGEST_NUMBER):
+        if not (size == 0.0 or 1.0 / LARGEST_NUMBER < size < LARGEST_NUMBER):
             raise ValueError(f"{header}: {cell}")
     return np.where(cells == "", np.nan, values)
 
