@@ -88,7 +88,7 @@ def written(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Documents:
     lines = (folder / "card/outcomes.jsonl").read_text(encoding="utf-8").splitlines()
     found["outcome"] = [json.loads(line) for line in lines]
     known = {"model", "static", "dynamic", "joint", "truth", "diagnosis", "row", "scorecard", "compare", "batch"}
-    strange = [file for file in folder.glob("*/**/*.json") if file.stem not in known and "sealed" not in file.parts]
+    strange = [file for file in folder.glob("*/**/[!.]*.json") if file.stem not in known and "sealed" not in file.parts]
     assert [file for file in strange if "data" not in file.parts] == [], "a file that no schema describes"
     return found
 

@@ -61,7 +61,8 @@ def answer(data: bytes, order: dict[str, Any]) -> dict[str, Any]:
             left -= (last_row + 1) * (last_column + 1)
             if left < 0:
                 return {"too_many": name}
-            sheets[name] = [[_cell(cell) for cell in row] for row in sheet.to_python(skip_empty_area=False)]
+            rows = ([_cell(cell) for cell in row] for row in sheet.to_python(skip_empty_area=False))
+            sheets[name] = [row if any(cell != "" for cell in row) else [] for row in rows]
     except (calamine.CalamineError, zipfile.BadZipFile, zlib.error, OSError, ValueError, NotImplementedError) as error:
         return {"error": str(error)}
     return {"names": names, "shown": shown, "sheets": sheets, "left": left}

@@ -138,4 +138,4 @@ def _workbook(file: Path) -> pd.DataFrame:
 
     first, *_ = read_sheets(view_bytes(file, ModelError, largest=_LARGEST), file, kind=ModelError)[1]
     header, *rows = first.content
-    return pd.DataFrame([[str(cell) for cell in row] for row in rows], columns=[str(cell) for cell in header])
+    return pd.DataFrame([[str(cell) for cell in row] for row in rows if row], columns=[str(cell) for cell in header])
