@@ -52,6 +52,7 @@ class Step:
 
     Args:
         gain: chi-square that it takes off, all others refitted without it.
+        critical: the gain that noise alone would make in its place.
         rivals: candidates in its place that these tests cannot tell from it.
         richer: candidates that contain it as a limit.
         tried: best refit of every candidate in its place.
@@ -59,6 +60,7 @@ class Step:
 
     name: str
     gain: float
+    critical: float
     rivals: tuple[Candidate, ...]
     richer: tuple[Candidate, ...]
     tried: tuple[Candidate, ...]
@@ -263,7 +265,7 @@ class Search:
             elif alike:
                 rivals.append(rival)
         gain = _added(name, current, place.evidence).gain
-        return Step(name, gain, tuple(rivals), tuple(richer), place.tried)
+        return Step(name, gain, place.critical, tuple(rivals), tuple(richer), place.tried)
 
     def _place(self, current: Evidence, name: str, others: Sequence[str]) -> Round:
         """The model without an added effect, refitted, and its candidates, of which that effect is one; each once."""
