@@ -46,7 +46,7 @@ def test_the_arms_of_an_fmu_stand_beside_it_as_table_and_picture(bushfit: Run, t
     done = bushfit("export", "model/model.json", "--format", "fmu", "-o", str(tmp_path), "--json")
     assert done.returncode == 0, done.stderr
     (fmu,) = json.loads(done.stdout)["formats"]["fmu"]["files"]
-    assert {file.name for file in tmp_path.iterdir()} == {fmu, "arms.csv", "arms.png"}
+    assert {file.name for file in tmp_path.glob("[!.]*")} == {fmu, "arms.csv", "arms.png"}
     arms = pd.read_csv(tmp_path / "arms.csv")["relaxation time [s]"]
     assert f"{arms.notna().sum()} Maxwell arms in place of the springpot" in done.stderr
 
