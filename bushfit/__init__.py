@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
+TYPE_CHECKING = False  # as type checkers take it for true; to import typing takes as long as all the rest
 if TYPE_CHECKING:
+    from typing import Any
+
     from bushfit.api import (
         compare,
         diagnose,

@@ -11,8 +11,9 @@ from pathlib import Path
 
 #: Characters of a quoted value at most: four lines of a terminal.
 _LONGEST_QUOTE = 300
-#: Characters that could steer a terminal or break a line, and halves of surrogate pairs.
-_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
+#: Characters that could steer a terminal or break a line, marks that turn the order of what follows around, and halves
+#: of surrogate pairs.
+CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 #: Characters of a path for which a shell wants quotes.
 _TAKEN_APART = re.compile(r"[^\w./\\:~+,@%=-]")
 
@@ -51,7 +52,7 @@ class BushfitError(Exception):
         where = ", ".join(part for part in (str(self.file) if self.file else None, self.place) if part)
         head = f"{where}: {self.problem}" if where else self.problem
         lines = (("", head), ("  found: ", self.found), ("  expected: ", self.expected), ("  try: ", self.hint))
-        return "\n".join(label + _printable(text) for label, text in lines if text)
+        return "\n".join(label + printable(text) for label, text in lines if text)
 
     def __reduce__(self) -> tuple[object, ...]:
         """The error from its parts, for pickle: errors travel between the processes of a batch."""
@@ -75,9 +76,15 @@ def did_you_mean(name: str, known: Collection[str], *, likeness: float = 0.6) ->
     return f'did you mean "{near[0]}"?' if near else None
 
 
-def _printable(text: str) -> str:
-    """A text with its control characters written as escapes, so that no file can steer the terminal that shows it."""
-    return _CONTROL.sub(lambda character: character[0].encode("unicode_escape").decode(), text)
+def printable(text: str, *, lines: bool = False) -> str:
+    """A text in one line, or in its `lines`, with control characters written as escapes.
+
+    All that stands in files of others goes through this on its way to people, so that no file can steer the terminal
+    that shows it, or make a table, a picture or a page show what it does not say.
+    """
+    if lines:
+        return "\n".join(map(printable, text.split("\n")))
+    return CONTROL.sub(lambda character: character[0].encode("unicode_escape").decode(), text)
 
 
 class UnitError(BushfitError):

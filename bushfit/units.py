@@ -31,6 +31,10 @@ _WRITTEN = {
     "1": ("-", 1.0),
     "Pa*s^alpha": ("MPa*s^alpha", 1e-6),
 }
+#: By SI unit: the least and the largest size that a quantity of a bushing, of its tests or of its rig may have.
+_SIZES = {"m": (1e-10, 100.0), "rad": (1e-10, 1e3), "s": (1e-9, 1e9), "Hz": (1e-9, 1e9), "1": (1e-12, 1e9)}
+#: The same of every other unit; chosen: far beyond all of them, and powers of it are numbers still.
+SIZES = (1e-15, 1e15)
 #: Zero of the Celsius scale [K].
 CELSIUS = 273.15
 #: By the unit of a temperature: kelvin per unit, and kelvin at zero of the unit.
@@ -152,7 +156,25 @@ def quantity(value: object, *expected: str) -> float:
     number, unit = _split_quantity(value, expected[0])
     fitting = next((choice for choice in expected if agrees(unit, choice)), expected[0])
     # to 15 digits: 18 mm are 0.018 m, and not 0.018000000000000002 m
-    return float(f"{number * factor(unit, fitting):.{_MOST_DIGITS}g}")
+    return sized(float(f"{number * factor(unit, fitting):.{_MOST_DIGITS}g}"), fitting)
+
+
+def sized(value: float, unit: str) -> float:
+    """A value in SI, if it is zero or of a size that a bushing, its tests or its rig may have.
+
+    Raises:
+        UnitError: it is smaller or larger than any.
+    """
+    least, largest = _SIZES.get(unit, SIZES)
+    if value == 0.0 or least <= abs(value) <= largest:
+        return value
+    written = "" if unit == "1" else f" {unit}"
+    raise UnitError(
+        "no bushing has this",
+        found=f"{value:g}{written}",
+        expected=f"{_kind(unit)[0]} from {least:g} to {largest:g}{written}",
+        hint="check the number and its unit",
+    )
 
 
 def for_people(unit: str, factor: float, size: float) -> tuple[str, float]:

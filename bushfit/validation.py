@@ -42,15 +42,21 @@ _SHAPES = {
     "int_type": "a whole number",
     "float_type": "a number",
 }
+#: A number that pydantic writes with all its zeros.
+_ZEROS = re.compile(r"\d{16,}")
 #: Values of Python's as TOML and JSON write them.
 _WORDS = {"None": "null", "True": "true", "False": "false"}
 #: Key in the metadata of a field, for a function that gives the keys which stand in the table itself.
 _IN_TABLE = "keys in the table itself"
 
+#: Largest number, with either sign; chosen: its square is a number still, and nothing in SI comes near it.
+LARGEST_NUMBER = 1e100
+#: Largest whole number, with either sign: beyond, floats leave out some.
+_LARGEST_COUNT = 2**53
 #: A finite number; neither a text nor true is one.
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]
 #: A whole number; neither a text, nor true, nor 3.0 is one.
-WholeNumber = Annotated[int, Field(strict=True)]
+WholeNumber = Annotated[int, Field(strict=True, ge=-_LARGEST_COUNT, le=_LARGEST_COUNT)]
 #: True or false; neither a text nor a number is one.
 Flag = Annotated[bool, Field(strict=True)]
 #: A text that is not empty.
@@ -143,7 +149,8 @@ def _complaint(detail: ErrorDetails, schema: type, kind: type[BushfitError]) -> 
         error = kind("a key is missing", expected=f"{key} = ..." if isinstance(key, str) else "a further value")
     else:
         found = _WORDS.get(str(detail["input"]), str(detail["input"]))
-        expected = _SHAPES.get(detail["type"], re.sub("^(Input|String) should (be|have) ", "", detail["msg"]))
+        said = re.sub("^(Input|String) should (be|have) ", "", detail["msg"])
+        expected = _SHAPES.get(detail["type"], _ZEROS.sub(lambda digits: f"{float(digits[0]):g}", said))
         error = kind("this value is not understood", found=found, expected=expected)
     error.place = place
     return error

@@ -103,7 +103,7 @@ def written(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Documents:
         "batch",
         "plan",
     }
-    strange = [file for file in folder.glob("*/**/*.json") if file.stem not in known and "sealed" not in file.parts]
+    strange = [file for file in folder.glob("*/**/[!.]*.json") if file.stem not in known and "sealed" not in file.parts]
     assert [file for file in strange if "data" not in file.parts] == [], "a file that no schema describes"
     return found
 
@@ -250,7 +250,7 @@ def test_printed_and_written_are_the_same(root: Path, tmp_path: Path) -> None:
     assert (printed.returncode, printed.stderr) == (0, "")
     assert json.loads(printed.stdout) == schema("diagnosis")
     assert call(tmp_path, "schema", "-o", "all").returncode == 0
-    files = {file.name.removesuffix(".schema.json"): file for file in (tmp_path / "all").iterdir()}
+    files = {file.name.removesuffix(".schema.json"): file for file in (tmp_path / "all").glob("[!.]*")}
     assert set(files) == set(DESCRIBED)
     assert files["diagnosis"].read_text(encoding="utf-8") == printed.stdout
     listed = call(tmp_path, "schema", "--json", "-q")

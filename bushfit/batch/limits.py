@@ -67,7 +67,7 @@ class Bounds:
     max: Size | None = None
     nominal: Size | None = None
     tolerance: Share | None = None
-    sigma: Annotated[float, Field(gt=0)] | None = None
+    sigma: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     at_least: Annotated[int, Field(ge=3)] = 10
 
     def __post_init__(self) -> None:
@@ -111,8 +111,11 @@ def _ratio(raw: object, _: ValidationInfo) -> object:
     return raw if isinstance(raw, int | float) and not isinstance(raw, bool) else quantity(raw, "1")
 
 
-Ratio = Annotated[float, converted(_ratio, text("a share, or a number") | {"type": ["string", "number"]})]
-Stiffness = Annotated[float, converted(_stiffness, text("a number with a unit of N/m, N*m/rad or Pa, by the point"))]
+_LIMIT = Field(ge=0, allow_inf_nan=False)
+Ratio = Annotated[float, converted(_ratio, text("a share, or a number") | {"type": ["string", "number"]}), _LIMIT]
+Stiffness = Annotated[
+    float, converted(_stiffness, text("a number with a unit of N/m, N*m/rad or Pa, by the point")), _LIMIT
+]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,11 +9,9 @@ from pydantic import WithJsonSchema
 
 from bushfit.effects import is_parameter, parameter_named, parameter_names
 from bushfit.errors import CampaignError, naming
-from bushfit.units import quantity
-from bushfit.validation import unknown_key
+from bushfit.units import quantity, sized
+from bushfit.validation import LARGEST_NUMBER, unknown_key
 
-#: Size of a plain number at most: no parameter comes near it, and its square is still finite.
-_LARGEST_NUMBER = 1e100
 #: The second to the power of alpha, at the end of the unit of m.
 _S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
 #: A value of a parameter: a number here, a text or a number in the file.
@@ -33,8 +31,8 @@ def parameter_value(place: str, name: str, raw: Any) -> float:
         stated = parameter_named(name).unit
         unit = _S_TO_ALPHA.sub("", stated)
         is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
-        if is_number and (unit == "1" or "." in name) and abs(raw) <= _LARGEST_NUMBER:
-            return float(raw)
+        if is_number and (unit == "1" or "." in name) and abs(raw) <= LARGEST_NUMBER:
+            return sized(float(raw), unit)
         return quantity(_S_TO_ALPHA.sub("", raw) if unit != stated and isinstance(raw, str) else raw, unit)
 
 

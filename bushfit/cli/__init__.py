@@ -1,14 +1,17 @@
 """The command line: a file a command; each parses, calls one function and prints."""
 
+import contextlib
 import importlib
+import io
 import os
 import sys
-from typing import NoReturn
+from collections.abc import Callable
+from typing import Any, TextIO
 
 import click
 
 from bushfit import __version__
-from bushfit.errors import BushfitError
+from bushfit.errors import BushfitError, OutputError, printable
 
 #: Command, its module (and its name there, if not "command") and the line that `bushfit --help` shows: no module is
 #: loaded before it is needed.
@@ -79,28 +82,73 @@ def main() -> None:
     """Entry point: one clear error and exit status 2 for whatever the user can put right."""
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     os.environ["MPLBACKEND"] = _BACKEND
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(encoding="utf-8", newline="\n")  # whatever the code page: programs read it
+    heard, read = _Stream(sys.stderr, is_needed=False), _Stream(sys.stdout, is_needed=True)
+    with contextlib.redirect_stderr(heard), contextlib.redirect_stdout(read):
+        sys.exit(_status())
+
+
+def _status() -> int:
+    """Exit status of the command that is typed; what went wrong is said."""
     try:
-        sys.exit(cli.main(standalone_mode=False))
-    except click.exceptions.Abort:
-        _fail("aborted")
+        status = cli.main(standalone_mode=False)
+        sys.stdout.flush()
+        return status or 0
+    except (click.exceptions.Abort, KeyboardInterrupt):
+        message = "aborted"
     except click.ClickException as error:
-        error.show()
-        sys.exit(2)
+        shown = io.StringIO()
+        error.show(shown)
+        sys.stderr.write(printable(shown.getvalue(), lines=True))
+        return 2
     except BushfitError as error:
-        _fail(f"error: {error}")
-    except BrokenPipeError:
-        sys.exit(2)
+        message = f"error: {error}"
     except MemoryError:
-        _fail("error: out of memory")
+        message = "error: out of memory"
     except Exception as error:  # a fault of bushfit, not of its user
         if os.environ.get("BUSHFIT_TRACEBACK"):
             raise
-        _fail(
-            f"a fault in bushfit itself: {type(error).__name__}: {error}\n"
+        message = (
+            f"a fault in bushfit itself: {type(error).__name__}: {printable(str(error))}\n"
             "  try: set BUSHFIT_TRACEBACK=1, run again, and report what it prints"
         )
+    sys.stderr.write(f"bushfit: {message}\n")
+    return 2
 
 
-def _fail(message: str) -> NoReturn:
-    click.echo(f"bushfit: {message}", err=True)
-    sys.exit(2)
+class _Stream:
+    """A standard stream that nobody may read any more, because it is closed or its disk is full.
+
+    Where what is written `is_needed`, as a result is, that is an error; what people are told besides is not, and the
+    work goes on without.
+    """
+
+    def __init__(self, stream: TextIO | None, *, is_needed: bool) -> None:
+        self._stream, self._is_needed = stream, is_needed
+        self._fault = None if stream else "it is closed"
+
+    def write(self, text: str) -> int:
+        """Write a text, as a stream does."""
+        return self._tried(lambda stream: stream.write(text))
+
+    def flush(self) -> None:
+        """Write what is held back, as a stream does."""
+        if self._stream:
+            self._tried(lambda stream: stream.flush())
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def _tried(self, work: Callable[[TextIO], int | None]) -> int:
+        if self._stream and not self._fault:
+            try:
+                return work(self._stream) or 0
+            except OSError as error:
+                self._fault = error.strerror or str(error)
+                nowhere = os.open(os.devnull, os.O_WRONLY)
+                os.dup2(nowhere, self._stream.fileno())  # or Python tries again in the end
+                os.close(nowhere)
+        if self._is_needed:
+            raise OutputError(f"standard output cannot be written: {self._fault}")
+        return 0

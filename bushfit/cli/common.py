@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args
 
 import click
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
 
-from bushfit.errors import ModelError, typed
+from bushfit.errors import ModelError, printable, typed
 from bushfit.reading.tablefile import Form
 from bushfit.report.contents import Formats, Picture
 from bushfit.report.folder import check_free, to_json, write_files
@@ -82,6 +84,14 @@ def option_of(key: str) -> str:
     return "--" + key.replace("_", "-")
 
 
+class _Console(Console):
+    """A console to which no text that it is given can speak by itself: only its own colours and bars are commands."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else segment._replace(text=printable(segment.text, lines=True))
+
+
 @dataclass(frozen=True)
 class Options:
     """Options that every command takes."""
@@ -100,16 +110,25 @@ class Options:
     @property
     def console(self) -> Console:
         """People read standard error; nothing at all with --quiet."""
-        console = Console(stderr=True, quiet=self.quiet, highlight=False, soft_wrap=True)
-        return console if console.is_terminal else Console(stderr=True, quiet=self.quiet, soft_wrap=True, width=_WIDTH)
+        console = _Console(stderr=True, quiet=self.quiet, highlight=False, soft_wrap=True)
+        return console if console.is_terminal else _Console(stderr=True, quiet=self.quiet, soft_wrap=True, width=_WIDTH)
 
     def say(self, text: str) -> None:
         """A line as it is, its brackets no markup."""
         self.console.print(text, markup=False)
 
-    def write(self, folder: Path, files: Mapping[str, bytes]) -> None:
-        """Write the results, all or none, and say where."""
-        write_files(folder, files, force=self.force)
+    def write(self, folder: Path, files: Mapping[str, bytes], document: Mapping[str, Any] | None = None) -> None:
+        """Write the results, all or none, and say where; --json prints the document once they are safe on the disk.
+
+        With --force, what the same command wrote there before and does not write now is removed.
+        """
+        write_files(
+            folder,
+            files,
+            force=self.force,
+            by=click.get_current_context().info_name,
+            before=lambda: self.tell(document) if document is not None else None,
+        )
         self.say(f"wrote {', '.join(files)} to {folder}")
 
     def require_free(self, folder: Path, names: Sequence[str]) -> None:
@@ -119,7 +138,8 @@ class Options:
     def tell(self, document: Mapping[str, Any]) -> None:
         """The result on standard output, where --json asks for it."""
         if self.as_json:
-            click.echo(to_json(document).decode(), nl=False)
+            sys.stdout.write(to_json(document).decode())
+            sys.stdout.flush()
 
 
 def example(*commands: str) -> str:
@@ -213,10 +233,9 @@ class Task:
         options.require_free(folder, options.formats.names(job.kinds(loaded)))
         outcome = job.run(Data.of(loaded))
         tell(options, loaded.name, outcome)
-        options.write(folder, options.formats.files(outcome.contents))
+        options.write(folder, options.formats.files(outcome.contents), outcome.document)
         if last_line:
             options.say(last_line(folder, outcome))
-        options.tell(outcome.document)
         quality = outcome.result.quality
         if self.max_nrmse is not None and quality and quality.nrmse > self.max_nrmse:
             click.echo(f"bushfit: NRMSE {quality.nrmse:.4g} is above --max-nrmse {self.max_nrmse:g}", err=True)

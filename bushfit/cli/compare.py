@@ -98,8 +98,7 @@ def command(
         options.require_free(folder, options.formats.names(job.kinds()))
         outcome = job.run([job.entry(*each) for each in opened])
     _tell(options, outcome)
-    options.write(folder, options.formats.files(outcome.contents))
-    options.tell(outcome.document)
+    options.write(folder, options.formats.files(outcome.contents), outcome.document)
 
 
 def _opened(source: Path) -> tuple[Campaign | Result, str, str | None]:

@@ -85,5 +85,5 @@ def command(
         for loss in exported.losses:
             options.say(f"{name} leaves out: {loss}")
     warn(options, outcome.predicted.warnings)
-    options.write(folder, {**outcome.files, **options.formats.files(outcome.contents)})
-    options.tell(outcome.document)
+    files = {**outcome.files, **options.formats.files(outcome.contents)}
+    options.write(folder, files, outcome.document)

@@ -70,10 +70,13 @@ def command(
     for one in seen:
         _tell(options, one)
     tell_left_out(options, left_out)
-    options.write(folder, {target: text.encode()})
+    document: InspectionDocument = {
+        "campaign": text,
+        "files": [one.to_document() for one in seen],
+        "left_out": left_out,
+    }
+    options.write(folder, {target: text.encode()}, document)
     options.say(f"next: bushfit run {typed(folder / target)}")
-    found: InspectionDocument = {"campaign": text, "files": [one.to_document() for one in seen], "left_out": left_out}
-    options.tell(found)
 
 
 def _radius(side: str, sizes: Mapping[str, str | None]) -> str:

@@ -76,18 +76,19 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
         for other in failed[:-1]:
             click.echo(f"cannot be used: {other}", err=True)
         raise failed[-1]
+    document: InspectionDocument = {
+        "files": [one.to_document() for one in seen],
+        "left_out": list(left_out),
+        "campaign": text,
+    }
     if options.formats.pictures:
         from bushfit.report.plots import inspection_figure
 
         groups = (seen[start : start + _FILES_A_PICTURE] for start in range(0, len(seen), _FILES_A_PICTURE))
         figures = {page: partial(inspection_figure, group) for page, group in zip(pages, groups, strict=True)}
-        options.write(folder, options.formats.files(Contents(pictures=figures)))
-    found: InspectionDocument = {
-        "files": [one.to_document() for one in seen],
-        "left_out": list(left_out),
-        "campaign": text,
-    }
-    options.tell(found)
+        options.write(folder, options.formats.files(Contents(pictures=figures)), document)
+    else:
+        options.tell(document)
 
 
 def tell(options: Options, seen: Inspected) -> None:

@@ -119,8 +119,7 @@ def command(
         options.say(part.sentence)
     tell_tests(options, outcome.tests, outcome.usable)
     warn(options, of_fit)
-    options.write(folder, options.formats.files(outcome.contents_beside))
-    options.tell(outcome.document)
+    options.write(folder, options.formats.files(outcome.contents_beside), outcome.document)
 
 
 def tell_predictions(options: Options, outcome: Predicted) -> None:

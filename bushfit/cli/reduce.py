@@ -81,12 +81,12 @@ def command(
     )
     found.tell(options)
     contents = Contents(tables={"sweep": lambda: found.points}, pictures={"reduce": found.figure})
-    options.write(folder, formats.files(contents))
     file = formats.table("sweep")
     snippet = f'[[sweeps]]\nfile = "{file}"\n{found.body} = {json.dumps(found.name, ensure_ascii=False)}\n'
-    options.say(f"for a campaign in {folder} (elsewhere, with the way there):\n\n{snippet}")
     document = {found.body: found.name, "points": found.points.to_dict(orient="list"), **found.document}
-    options.tell({**document, "warnings": list(found.warnings), "campaign": snippet})
+    document |= {"warnings": list(found.warnings), "campaign": snippet}
+    options.write(folder, formats.files(contents), document)
+    options.say(f"for a campaign in {folder} (elsewhere, with the way there):\n\n{snippet}")
 
 
 @dataclass(frozen=True)

@@ -29,5 +29,4 @@ def command(folder: Path, options: Options) -> None:
     contents = report(folder, base)
     options.require_free(target, [f"{name}.html" for name in contents.pages])
     pages = pages_of(contents)
-    options.write(target, pages)
-    options.tell({"pages": {str(target / name): len(page) for name, page in pages.items()}})
+    options.write(target, pages, {"pages": {str(target / name): len(page) for name, page in pages.items()}})

@@ -1,6 +1,8 @@
 """`bushfit schema`: what stands in the files, for other programs and for editors."""
 
+from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import click
 
@@ -25,8 +27,12 @@ def command(name: str | None, options: Options) -> None:
 
     with naming(place="NAME"):
         made = {each: schema(each) for each in ([name] if name else DESCRIBED if options.output else ())}
+    document: dict[str, Any] = (
+        made[name] if name else {**made} or {each: described.files for each, described in DESCRIBED.items()}
+    )
     if options.output:
-        options.write(options.output, {f"{each}.schema.json": to_json(found) for each, found in made.items()})
+        files = {f"{each}.schema.json": to_json(found) for each, found in made.items()}
+        options.write(options.output, files, document)
     elif name:
         options.say(f"{name} describes: {DESCRIBED[name].files}")
     else:
@@ -34,6 +40,5 @@ def command(name: str | None, options: Options) -> None:
         for each, described in DESCRIBED.items():
             table.add_row(each, described.files)
         options.console.print(table)
-    listed = {each: described.files for each, described in DESCRIBED.items()}
-    if options.as_json or (name and not options.output):
-        click.echo(to_json(made[name] if name else made or listed).decode(), nl=False)
+    if not options.output:
+        replace(options, as_json=options.as_json or name is not None).tell(document)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -56,7 +57,7 @@ def command(campaigns: int, seed: int, jobs: int, family: str, keep: bool, optio
     same command goes on where it was stopped, and ends with scorecard.json. Seeds from 77000 on are kept for cards that
     are shown; try and tune with others.
     """
-    from bushfit.report.folder import to_json, write_files
+    from bushfit.report.folder import to_json
     from bushfit.scorecard.card import card, confusion
     from bushfit.scorecard.document import Scorecard
     from bushfit.scorecard.families import CARD_SEEDS, FAMILIES, tasks
@@ -98,9 +99,9 @@ def command(campaigns: int, seed: int, jobs: int, family: str, keep: bool, optio
     }
     document = plain(whole, Scorecard)
     if folder:
-        write_files(folder, {"scorecard.json": to_json(document)}, force=True)
-        options.say(f"wrote scorecard.json to {folder}")
-    options.tell(document)
+        replace(options, force=True).write(folder, {"scorecard.json": to_json(document)}, document)
+    else:
+        options.tell(document)
 
 
 def _made(

@@ -65,8 +65,7 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
     files = to_files(simulated, options.formats.table_form)
     folder = options.folder(f"simulated {folder_name(simulated.result.name)}")
     options.say(truth.equation())
-    options.write(folder, files)
-    options.tell({"truth": to_document(simulated.result), "files": sorted(files)})
+    options.write(folder, files, {"truth": to_document(simulated.result), "files": sorted(files)})
 
 
 def _task(source: Path) -> tuple[Model, SimulateSettings]:

@@ -346,11 +346,12 @@ def _about_smooth_curve(log_step: Array, log_stiffness: Array) -> _Line:
     usual = np.median(np.sort(residual, axis=0)[degree + 1 :], axis=0)  # the curve goes through degree + 1 points
     inliers = np.all(residual <= np.maximum(_OUTLIER * MEDIAN_TO_SIGMA * usual, FLOOR), axis=1)
     inliers |= np.count_nonzero(inliers) < degree + 2  # too few would leave nothing free
-    scatter = _complement(basis[inliers]).T @ values[inliers]
-    free = _complement(basis)
-    falls = np.square(free @ (free.T @ values)).sum(axis=1) / np.maximum(np.square(free).sum(axis=1), FLOOR**2)
+    scatter = _freed(basis[inliers], values[inliers])
+    curve = np.linalg.qr(basis)[0]
+    off, free = values - curve @ (curve.T @ values), 1.0 - np.square(curve).sum(axis=1)
+    falls = np.square(off).sum(axis=1) / np.maximum(free, FLOOR**2)
     worst = int(np.argmax(falls))  # the point without which the sum of squares about the curve falls most
-    calmer = _complement(np.delete(basis, worst, axis=0)).T @ np.delete(values, worst, axis=0)
+    calmer = _freed(np.delete(basis, worst, axis=0), np.delete(values, worst, axis=0))
     return _Line(scatter, len(scatter), np.empty((0, 2)), calmer=calmer)
 
 
@@ -359,9 +360,15 @@ def unit(values: Array) -> Array:
     return 2.0 * (values - values.min()) / max(float(np.ptp(values)), np.finfo(float).tiny) - 1.0
 
 
-def _complement(basis: Array) -> Array:
-    """Orthonormal basis of what a curve, (n, k), leaves free, (n, n - k): coordinates in it scatter independently."""
-    return np.linalg.qr(basis, mode="complete")[0][:, basis.shape[1] :]
+def _freed(basis: Array, values: Array) -> Array:
+    """What a curve, (n, k), leaves of values, (n, m) -> (n - k, m), in orthonormal coordinates: they scatter
+    independently. Householder's reflections are applied one by one, and no matrix of n by n is made."""
+    reflections, factors = np.linalg.qr(basis, mode="raw")
+    turned = values.astype(float)
+    for place, (column, factor) in enumerate(zip(reflections, factors, strict=True)):
+        mirror = np.append(1.0, column[place + 1 :])
+        turned[place:] -= np.outer(factor * mirror, mirror @ turned[place:])
+    return turned[basis.shape[1] :]
 
 
 def _least_absolute(basis: Array, values: Array) -> Array:

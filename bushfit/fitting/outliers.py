@@ -173,10 +173,18 @@ def _from_repeats(values: Array, place: Array) -> tuple[Array, Array]:
 
     Points of one `place`, (n,), are repeats.
     """
-    repeats, distance = np.zeros(values.size, dtype=int), np.zeros_like(values)
-    for row, same in enumerate(place == place[:, None]):
-        same[row] = False
-        repeats[row] = np.count_nonzero(same)
-        if repeats[row]:
-            distance[row] = values[row] - np.median(values[same].real) - 1j * np.median(values[same].imag)
-    return repeats, distance
+    counts = np.bincount(place)
+    repeats = counts[place] - 1
+    real, imag = (part - _median_of_others(part, place, counts) for part in (values.real, values.imag))
+    return repeats, np.where(repeats > 0, real + 1j * imag, 0.0)
+
+
+def _median_of_others(values: Array, place: Array, counts: Array) -> Array:
+    """The median of the other values at the place of each, (n,); its own where there are none. `counts` by place."""
+    order = np.lexsort((values, place))
+    ordered, size, start = values[order], counts[place[order]], (np.cumsum(counts) - counts)[place[order]]
+    rank = np.arange(order.size) - start
+    middle = [np.minimum(half + (half >= rank), size - 1) for half in ((size - 2) // 2, (size - 1) // 2)]
+    medians = np.empty_like(ordered)
+    medians[order] = (ordered[start + np.maximum(middle[0], 0)] + ordered[start + middle[1]]) / 2.0
+    return medians

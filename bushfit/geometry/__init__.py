@@ -19,6 +19,11 @@ SpecimenKind = Literal["modulus", "shear"]
 StatedStrain = Literal["engineering", "tensor", "tension"]
 
 
+#: Shortest and longest side of a body of rubber [m]; chosen: far from all that is tested.
+_SHORTEST = 1e-6
+_LONGEST = 100.0
+
+
 class Unit(NamedTuple):
     """A unit in which people read a quantity, and the factor from SI to it."""
 
@@ -116,8 +121,13 @@ class Bushing:
     def __post_init__(self) -> None:
         for key in ("inner_radius", "outer_radius", "length"):
             value = getattr(self, key)
-            if not (math.isfinite(value) and value > 0):
-                raise ModelError("impossible bushing", place=key, found=f"{value:g} m", expected="a positive length")
+            if not _SHORTEST <= value <= _LONGEST:
+                raise ModelError(
+                    "impossible bushing",
+                    place=key,
+                    found=f"{value:g} m",
+                    expected=f"a positive length, {_SHORTEST:g} to {_LONGEST:g} m",
+                )
         if self.inner_radius >= self.outer_radius:
             raise ModelError(
                 "impossible bushing",
@@ -192,7 +202,7 @@ class Specimen:
     def __post_init__(self) -> None:
         for key in ("area", "thickness"):
             size = getattr(self, key)
-            if (self.kind == "shear") != (size is not None) or not (size is None or (math.isfinite(size) and size > 0)):
+            if (self.kind == "shear") != (size is not None) or not (size is None or _SHORTEST**2 <= size <= _LONGEST):
                 raise ModelError(
                     "impossible specimen",
                     place=f"{self.name}, {key}",

@@ -6,13 +6,17 @@ other keys alone.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
+
+import numpy as np
+from pydantic import ConfigDict, Field
 
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import Shape, SpecimenKind, StatedStrain
 from bushfit.model.result import End, Misfit, Outlier, Quality, Range, Usable
 from bushfit.reading.measurement import Source, Stepped
+from bushfit.units import SIZES
 from bushfit.validation import Flag, Name, Number, WholeNumber
 
 #: What the key "schema" of a model file has to say: of one with a bushing alone, and of one with specimens too.
@@ -20,6 +24,11 @@ SchemaName = Literal["bushfit/model/1", "bushfit/model/2"]
 SCHEMAS: tuple[SchemaName, ...] = get_args(SchemaName)
 
 Matrix = tuple[tuple[Number, ...], ...]
+#: Share of a variance by which rounding in a file may take the least eigenvalue below zero.
+_ROUNDING = 1e-6
+#: Characters of a text, and warnings, at most: what people read, and a table shows in no time.
+_LONGEST_TEXT = 10_000
+_MOST_WARNINGS = 10_000
 
 
 @dataclass(frozen=True)
@@ -108,6 +117,35 @@ class CovarianceTable:
                 raise ValueError(ModelError("no covariance of its names", found=found, expected=f"{size} x {size}"))
         if any(self.matrix[i][i] < 0.0 for i in range(size)):
             raise ValueError(ModelError("a variance below zero", place="matrix", expected="squares on the diagonal"))
+        if len(set(self.names)) < size:
+            raise ValueError(ModelError("a parameter twice", place="names", expected="each name once"))
+        if size:
+            self._check_values()
+
+    def _check_values(self) -> None:
+        """Refuse matrices that no variances and covariances of real quantities make."""
+        matrix = np.array(self.matrix)
+        spread = np.array([*self.spread, np.zeros_like(matrix)])
+        sigma = np.sqrt(np.diag(matrix))
+        with np.errstate(over="ignore"):
+            correlation = (matrix / np.outer(sigma, sigma).clip(np.finfo(float).tiny)).clip(-2.0, 2.0)
+        for place, bad, problem, expected in (
+            ("matrix", not np.allclose(correlation, correlation.T), "a covariance that is not symmetric", "C = C^T"),
+            (
+                "matrix",
+                not np.linalg.eigvalsh(correlation).min() > -_ROUNDING * len(self.names),
+                "a covariance that no quantities have",
+                "a positive semidefinite matrix",
+            ),
+            (
+                "spread",
+                (np.diagonal(spread, axis1=1, axis2=2) < -_ROUNDING * np.diag(matrix)).any(),
+                "a spread that no variance has",
+                "zero or more on the diagonals",
+            ),
+        ):
+            if bad:
+                raise ValueError(ModelError(problem, place=place, expected=expected))
 
 
 @dataclass(frozen=True)
@@ -131,6 +169,17 @@ class FitTable(Quality):
     def __post_init__(self) -> None:
         if self.strain and not self.frequency_Hz:
             raise ValueError(ModelError("a key is missing", place="frequency_Hz", expected="frequency_Hz = ..."))
+        for key in ("frequency_Hz", "strain"):
+            low, high = getattr(self, key) or (1.0, 1.0)
+            if not SIZES[0] <= low <= high <= SIZES[1]:
+                expected = "least and largest, above zero"
+                raise ValueError(
+                    ModelError("this is no range", place=key, found=f"{low:g}, {high:g}", expected=expected)
+                )
+        for key in ("nrmse", "reduced_chi_square", "points", "noise"):
+            if getattr(self, key) < 0.0:
+                found = f"{getattr(self, key):g}"
+                raise ValueError(ModelError("no fit has this", place=key, found=found, expected="zero or more"))
 
     @property
     def quality(self) -> Quality:
@@ -233,13 +282,15 @@ class ModelFile:
         campaign: that the model was fitted to; null where it is known of none.
     """
 
+    __pydantic_config__ = ConfigDict(str_max_length=_LONGEST_TEXT)
+
     schema: SchemaName
     bushing: BushingTable | None
     effects: tuple[str, ...]
     parameters: Mapping[str, ParameterTable]
     covariance: CovarianceTable | None = None
     fit: FitTable | None = None
-    warnings: tuple[str, ...] = ()
+    warnings: Annotated[tuple[str, ...], Field(max_length=_MOST_WARNINGS)] = ()
     outliers: tuple[Outlier, ...] = ()
     provenance: ProvenanceTable = field(default_factory=ProvenanceTable)
     specimens: tuple[SpecimenTable, ...] = ()

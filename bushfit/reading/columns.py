@@ -18,7 +18,7 @@ from bushfit.reading.headers import Column
 from bushfit.reading.layout import FileFormat, Layout, fits
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, weigh
-from bushfit.reading.source import LARGEST_VALUE, RowSource, rows
+from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, RowSource, rows
 
 #: Rows that are taken apart at a time where a library cannot; chosen: their texts fill some MiB.
 _CHUNK_ROWS = 1 << 16
@@ -141,8 +141,15 @@ class Columns:
         values = self._by_library(wanted) or self._row_by_row(wanted)
         found = len(next(iter(values.values())))
         if found < fewest_rows:
-            raise self.error("too few rows", found=f"{found}", expected=f"at least {fewest_rows}")
+            raise self._empty("too few rows", found=f"{found}", expected=f"at least {fewest_rows}")
         return values
+
+    def _empty(self, problem: str, **said: Any) -> MeasurementError:
+        """The error for what should be filled, which may be formulas."""
+        if self.source.lacks_values():
+            problem = "the workbook has formulas whose values were not saved"
+            said["hint"] = "open it in a spreadsheet program and save it again"
+        return self.error(problem, **said)
 
     def check_positive(self, roles: Sequence[str], wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> None:
         """Refuse a value that is not positive in one of some columns, as far as there are such among `values`.
@@ -154,6 +161,8 @@ class Columns:
             if role in values:
                 problem = f"the {role.replace('_', ' ')} is not positive"
                 self.refuse(values[role] <= 0.0, wanted[role], problem, "a number above zero")
+                least = f"{LEAST_VALUE / abs(wanted[role].scale):.3g} or more"
+                self.refuse(values[role] < LEAST_VALUE, wanted[role], "no rig records so little", least)
 
     def refuse(
         self, bad: NDArray[np.bool_], column: Column, problem: str, expected: str, hint: str | None = None
@@ -225,8 +234,8 @@ class Columns:
                 if None in numbers:
                     line, cells = chunk[numbers.index(None)]
                     cell = cells[column.index]
-                    raise self.error(
-                        "the cell is empty" if cell == "" else "this is no finite number",
+                    raise (self._empty if cell == "" else self.error)(
+                        "the cell is empty" if cell == "" else "this is no finite number, or one beyond every rig",
                         line=line,
                         column=column,
                         found=f'"{cell}"',
@@ -236,6 +245,6 @@ class Columns:
         return {role: np.concatenate(chunks) for role, chunks in parts.items()}
 
     def _number(self, cell: str | float, column: Column) -> float | None:
-        """The number in a cell in SI; None where it holds none, or one beyond LARGEST_VALUE."""
+        """The number in a cell in SI; None where it holds none, or one beyond LARGEST_VALUE, as no rig records."""
         number = self.numerals.value(cell) if isinstance(cell, str) else cell
         return None if number is None or not abs(number * column.scale) <= LARGEST_VALUE else number * column.scale

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
+from bushfit.errors import printable
 from bushfit.geometry import STRAINING, Display, Place, Unit, stated_strain
 from bushfit.reading.measurement import loss_factor
 
@@ -69,8 +70,13 @@ def _cell(value: object, point: str) -> str:
 @lru_cache(maxsize=4096)
 def defused(text: str) -> str:
     """A text in one line, after an apostrophe where a spreadsheet would run it as a formula."""
-    line = " ".join(_LINE_ENDS.split(text))
+    line = in_a_line(text)
     return f"'{line}" if _FORMULA.match(line) else line
+
+
+def in_a_line(text: str) -> str:
+    """A text as a cell has it: in one line, control characters as escapes."""
+    return "\t".join(map(printable, " ".join(_LINE_ENDS.split(text)).split("\t")))
 
 
 def undefused(text: str) -> str:

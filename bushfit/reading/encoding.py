@@ -10,6 +10,7 @@ Notes:
 from __future__ import annotations
 
 import codecs
+import io
 import re
 from contextlib import suppress
 from pathlib import Path
@@ -17,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from bushfit.errors import MeasurementError
-from bushfit.reading.files import CHUNK_BYTES, HEAD_BYTES, Bytes, line_of, not_utf8
+from bushfit.reading.files import CHUNK_BYTES, HEAD_BYTES, line_of, not_utf8
 from bushfit.reading.parallel import by_chunks
 
 #: Byte order marks, and Python's name of the encoding that each tells. UTF-32's begins with UTF-16's.
@@ -37,7 +38,7 @@ _HIGH_RUN = re.compile(rb"[\x80-\xff]+")
 _COMMON_CHINESE = re.compile(rb"(?:[\xa1-\xa3\xb0-\xd7][\xa1-\xfe])+")
 
 
-def to_utf8(data: Bytes, file: Path, stated: str | None = None) -> tuple[Bytes, str]:
+def to_utf8(data: bytes, file: Path, stated: str | None = None) -> tuple[bytes, str]:
     """A text as UTF-8 without byte order mark, and the encoding it had; errors name `file`.
 
     Raises:
@@ -46,17 +47,18 @@ def to_utf8(data: Bytes, file: Path, stated: str | None = None) -> tuple[Bytes, 
     codes = np.frombuffer(data, dtype=np.int8)
     if stated is None and all(by_chunks(lambda part: bool(codes[part].min() > 0), codes.size, CHUNK_BYTES)):
         return data, "utf-8"  # ASCII: all bytes are from 1 to 127
-    data = data[:]
     encoding = stated or detect(data)
     if encoding in ("utf-8", "utf-8-sig"):
         without_mark = data.removeprefix(codecs.BOM_UTF8)
         if (bad := not_utf8(without_mark)) is None:
             return without_mark, "utf-8"
         raise _undecodable(data, file, bad, "utf-8")
+    raw = io.BytesIO(data)
     try:
-        text = data.decode(encoding)
+        text = io.TextIOWrapper(raw, encoding, newline="")  # decoded in one piece, it would take four times its bytes
+        parts = [part.encode("utf-8", "replace") for part in iter(lambda: text.read(CHUNK_BYTES), "")]
     except UnicodeDecodeError as error:
-        raise _undecodable(data, file, error.start, encoding) from None
+        raise _undecodable(data, file, raw.tell() - len(error.object) + error.start, encoding) from None
     except LookupError:
         raise MeasurementError(
             "unknown encoding",
@@ -64,7 +66,7 @@ def to_utf8(data: Bytes, file: Path, stated: str | None = None) -> tuple[Bytes, 
             found=f'"{stated}"',
             expected='a name such as "utf-8", "utf-16", "cp1252", "latin-1" or "gb18030"',
         ) from None
-    return text.removeprefix("\ufeff").encode(), encoding
+    return b"".join(parts).removeprefix(codecs.BOM_UTF8), encoding
 
 
 def detect(data: bytes) -> str:
@@ -72,7 +74,8 @@ def detect(data: bytes) -> str:
     for mark, encoding in _MARKS:
         if data.startswith(mark):
             return encoding
-    if 0 in (head := data[:HEAD_BYTES]):
+    if 0 in data:
+        head = data[:HEAD_BYTES]
         even, odd = head[::2].count(0), head[1::2].count(0)
         if max(even, odd) > _LEAST_ZERO_SHARE * len(head) / 2 and min(even, odd) == 0:
             return "utf-16-le" if odd else "utf-16-be"

@@ -4,29 +4,23 @@ from __future__ import annotations
 
 import codecs
 import hashlib
-import mmap
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 from bushfit.errors import BushfitError, did_you_mean
 
-#: Bytes of the largest file that is read: ten times a loop of 10 million rows.
-_LARGEST_BYTES = 4 << 30
-#: Bytes from which a file is mapped and not copied; chosen: a smaller one takes milliseconds.
-_MAPPED_BYTES = 1 << 22
+#: Bytes of the largest file that is read: three times a loop of 10 million rows.
+_LARGEST_BYTES = 1 << 30
 #: Bytes at the start of a file that are looked at first; chosen: they hold the header and many rows.
 HEAD_BYTES = 1 << 16
 #: Bytes that are checked at a time; chosen: few enough to be held beside the file, enough to be fast.
 CHUNK_BYTES = 1 << 22
 
-#: The bytes of a file: copied, or where the system keeps those of a large one.
-Bytes = bytes | mmap.mmap
-
 
 def view_bytes(
     file: Path, kind: type[BushfitError], *, largest: int = _LARGEST_BYTES, hint: str = "thin it out"
-) -> Bytes:
-    """The bytes of a file; a large one is mapped and not copied.
+) -> bytes:
+    """The bytes of a file: read and not mapped, because a mapped file that becomes shorter ends the process.
 
     Raises:
         kind: the file is missing, no regular file, not readable, empty, or has more than `largest` bytes (with `hint`).
@@ -41,10 +35,10 @@ def view_bytes(
             limit = f"at most {largest} bytes"
             raise kind("the file is too large", file=file, found=f"{size} bytes", expected=limit, hint=hint)
         with file.open("rb") as stream:
-            data = stream.read() if size < _MAPPED_BYTES else mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
+            data = stream.read(largest)
     except OSError as error:
         raise kind("the file cannot be read", file=file, found=error.strerror or str(error)) from error
-    if (data[:HEAD_BYTES].isspace() and data[:].isspace()) or not data:
+    if data.isspace() or not data:
         raise kind("the file is empty", file=file, expected="text", hint="export it again")
     return data
 
@@ -57,7 +51,7 @@ def read_utf8(
     Raises:
         kind: as `view_bytes`, or the file is not UTF-8 text.
     """
-    data = view_bytes(file, kind, largest=largest, hint=hint)[:]
+    data = view_bytes(file, kind, largest=largest, hint=hint)
     if (bad := not_utf8(data)) is not None:
         raise kind(
             "the file is not UTF-8 text",
@@ -100,7 +94,7 @@ def line_of(data: bytes, index: int) -> str:
     return f"line {number}"
 
 
-def sha256(data: Bytes) -> Future[str]:
+def sha256(data: bytes) -> Future[str]:
     """SHA-256 of a file's bytes as hexadecimal digits, made meanwhile in a thread."""
     thread = ThreadPoolExecutor(1)
     digest = thread.submit(lambda: hashlib.sha256(data).hexdigest())

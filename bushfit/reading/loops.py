@@ -14,6 +14,7 @@ from bushfit.reading.headers import Column
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Floats, Loop, Waveform, rebuild_time, source_of
 from bushfit.reading.parallel import by_chunks
+from bushfit.reading.source import LEAST_VALUE
 from bushfit.reading.table import Table
 from bushfit.reading.words import LOOP_COLUMNS
 
@@ -65,7 +66,7 @@ def read_loop(
     values = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
     displacement, force, time = values["displacement"], values["force"], values.get("time")
     for role in ("displacement", "force"):
-        if np.ptp(values[role][:_FEWEST_LOOP_ROWS]) == 0.0 == np.ptp(values[role]):
+        if np.ptp(values[role][:_FEWEST_LOOP_ROWS]) < LEAST_VALUE and np.ptp(values[role]) < LEAST_VALUE:
             raise table.error(f"the {role} never changes", column=wanted[role], expected="a loop")
     _check_sense(table, wanted["force"], displacement, force, force_sign)
     if time is None:
@@ -131,3 +132,5 @@ def _check_increases(table: Table, column: Column, time: Floats) -> None:
     after, before = time[1:], time[:-1]
     if any(by_chunks(lambda rows: bool((after[rows] <= before[rows]).any()), after.size)):
         table.refuse(np.append(False, after <= before), column, "time does not increase", "a later time on every row")
+    if time[-1] - time[0] < LEAST_VALUE:
+        raise table.error("the record takes no time", column=column, expected=f"{LEAST_VALUE:g} s or more")

@@ -81,12 +81,15 @@ def nominal(amplitude: Floats) -> Floats:
     Amplitudes that no gaps part into narrow levels of several points keep their own values.
     """
     distinct, place = np.unique(amplitude, return_inverse=True)
-    gaps = np.diff(np.log(distinct))
-    for gap in np.unique(gaps[gaps <= _WIDEST_LEVEL])[::-1]:
+    logs = np.log(distinct)
+    gaps = np.diff(logs)
+    within = np.unique(gaps)
+    between = np.append(within[1:], np.inf)
+    parting = (within <= _WIDEST_LEVEL) & (between >= _LEAST_GAP * within)  # a level spans its widest gap or more
+    for gap, next_gap in zip(within[parting][::-1], between[parting][::-1], strict=True):
         group = np.append(0, np.cumsum(gaps > gap))
-        span = max(float(np.ptp(np.log(distinct[group == one]))) for one in np.unique(group))
-        between = float(np.min(gaps, where=gaps > gap, initial=np.inf))
-        if span <= _WIDEST_LEVEL and between >= _LEAST_GAP * span and np.median(np.bincount(group)) > 1:
+        span = float(_spans(logs, group).max())
+        if span <= _WIDEST_LEVEL and next_gap >= _LEAST_GAP * span and np.median(np.bincount(group)) > 1:
             return _middle(amplitude, group[place])
     return amplitude
 
@@ -98,8 +101,7 @@ def _by_frequency(frequency: Floats, amplitude: Floats) -> Floats:
     """
     rank = np.empty(amplitude.size, dtype=np.intp)
     shapes = set()
-    for one in np.unique(frequency):
-        rows = np.flatnonzero(frequency == one)
+    for rows in _members(np.unique(frequency, return_inverse=True)[1]):
         levels, rank[rows], counts = np.unique(nominal(amplitude[rows]), return_inverse=True, return_counts=True)
         shapes.add((levels.size, counts.min(), counts.max()))
         if len(shapes) > 1 or counts.min() != counts.max() or counts.max() < 2 or levels.size < _FEWEST_POINTS:
@@ -131,13 +133,27 @@ def _where_apart(amplitude: Floats, rank: NDArray[np.intp]) -> Floats:
 
 def _of_passes(amplitude: Floats, passes: NDArray[np.intp]) -> Floats | None:
     """The level of each amplitude where every pass over the frequencies nearly keeps to one, (n,); else None."""
-    spans = [float(np.ptp(np.log(amplitude[passes == one]))) for one in np.unique(passes)]
-    return nominal(_middle(amplitude, passes)) if max(spans) < _WIDEST_PASS else None
+    widest = _spans(np.log(amplitude), passes).max()
+    return nominal(_middle(amplitude, passes)) if widest < _WIDEST_PASS else None
+
+
+def _members(group: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    """The indices of the members of each group, in order, where groups count from 0 and none is empty."""
+    order = np.argsort(group, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(group))[:-1])
+
+
+def _spans(values: Floats, group: NDArray[np.intp]) -> Floats:
+    """From the least to the largest value of each group, (groups,)."""
+    ordered, ends = values[np.lexsort((values, group))], np.cumsum(np.bincount(group))
+    return ordered[ends - 1] - ordered[np.append(0, ends[:-1])]
 
 
 def _middle(values: Floats, group: NDArray[np.intp]) -> Floats:
     """The median of the group of each value, (n,)."""
-    medians = np.array([np.median(values[group == one]) for one in range(group.max() + 1)])
+    ordered, counts = values[np.lexsort((values, group))], np.bincount(group)
+    starts = np.cumsum(counts) - counts
+    medians = (ordered[starts + (counts - 1) // 2] + ordered[starts + counts // 2]) / 2.0
     return medians[group]
 
 

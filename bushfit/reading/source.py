@@ -4,26 +4,24 @@ from __future__ import annotations
 
 import csv
 import io
-import mmap
 import re
 import warnings
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import islice
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bushfit.reading.files import Bytes
 from bushfit.reading.layout import HEAD_BYTES, MOST_HEAD_LINES, Layout, Line, is_comment, split
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import Numerals
 from bushfit.reading.parallel import by_chunks
+from bushfit.units import SIZES
 
 if TYPE_CHECKING:
     import pandas as pd
 
-#: [SI] The largest value of a cell: far beyond every rig, and its square is still a number.
-LARGEST_VALUE = 1e100
+#: [SI] The least size of what is above zero or changes, and the largest value of a cell: beyond every rig.
+LEAST_VALUE, LARGEST_VALUE = SIZES
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 #: Signs that part thousands in a number, other than those which may part columns or decimals.
 _SEPARATORS = ("'", "\u2019", "\u00a0", "\u2009", "\u202f")
@@ -33,10 +31,9 @@ _GROUP_BY_BLANK = re.compile(rb"\d \d{3}(?!\d)")
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """A text as rows of cells, with the line, from 1, that each stands on; `data`, in UTF-8, may be the mapped file."""
+    """A text as rows of cells, with the line, from 1, that each stands on; `data` is UTF-8."""
 
-    file: Path
-    data: Bytes
+    data: bytes
     encoding: str | None
     sheet: None = None
 
@@ -46,9 +43,13 @@ class Text:
 
     def lines(self, after: int) -> Iterator[Line]:
         """All filled lines after a line."""
-        stream = self.file.open("rb") if isinstance(self.data, mmap.mmap) else io.BytesIO(self.data)
+        stream = io.BytesIO(self.data)
         stream.seek(self._offset(after))
         return _lines(stream, after)
+
+    def lacks_values(self) -> bool:
+        """Whether it has formulas without values, as a sheet may."""
+        return False
 
     def may_have_comma(self, layout: Layout) -> bool:
         """Whether cells below the header may have a comma in them."""
@@ -93,20 +94,18 @@ class Text:
     def _frame(self, layout: Layout, width: int, numbers: Set[int], numerals: Numerals) -> pd.DataFrame | None:
         """The rows as pandas reads them, the columns `numbers` as floats; None where it does not read them.
 
-        pandas rounds correctly from 3.1 on, and reads a large file on all cores if it is given the path of plain UTF-8.
+        pandas rounds correctly from 3.1 on.
         """
         import pandas as pd
 
         before = self._offset(layout.lines_before_data)
-        from_path = isinstance(self.data, mmap.mmap) and b'"' not in self.data[:before]
-        rest = io.BytesIO(b"" if from_path else self.data)
+        rest = io.BytesIO(self.data)
         rest.seek(before)
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error", pd.errors.ParserWarning)
                 frame = pd.read_csv(
-                    self.file if from_path else rest,
-                    skiprows=layout.lines_before_data if from_path else None,
+                    rest,
                     sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
                     header=None,
                     names=list(range(width)),
@@ -133,7 +132,7 @@ class Text:
         return 0 if after == 0 else ends[-1] if len(ends) == after else len(self.data)
 
 
-def _lines(data: io.BytesIO | io.BufferedReader, after: int) -> Iterator[Line]:
+def _lines(data: io.BytesIO, after: int) -> Iterator[Line]:
     """The filled lines of a stream that begins after a line of the file; the stream is closed."""
     with io.TextIOWrapper(data, encoding="utf-8", errors="replace") as text:
         for number, line in enumerate(text, start=after + 1):
@@ -143,10 +142,14 @@ def _lines(data: io.BytesIO | io.BufferedReader, after: int) -> Iterator[Line]:
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """A sheet of a workbook as rows of texts and numbers, "" where a cell is empty; it answers what a `Text` does."""
+    """A sheet of a workbook as rows of texts and numbers, "" where a cell is empty; it answers what a `Text` does.
+
+    `lacks_values` tells whether the workbook has formulas whose values were not saved, which are empty cells, too.
+    """
 
     sheet: str
     content: Sequence[Sequence[str | float]]
+    lacks_values: Callable[[], bool] = bool
     encoding: None = None
 
     def head(self) -> list[Line]:

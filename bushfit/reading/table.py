@@ -15,7 +15,7 @@ from bushfit.errors import MeasurementError, NoColumnError, UnitError, naming
 from bushfit.geometry import STRAINING, TRANSLATION, Motion
 from bushfit.reading.columns import Columns
 from bushfit.reading.encoding import to_utf8
-from bushfit.reading.files import Bytes, sha256, view_bytes
+from bushfit.reading.files import sha256, view_bytes
 from bushfit.reading.headers import Column, Heading, Vocabulary, is_angular, plain, split_convention
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.numerals import is_like_number
@@ -241,13 +241,13 @@ class Table(Columns):
         )
 
 
-def _source(data: Bytes, file: Path, stated: FileFormat, is_usable: Callable[[RowSource], bool]) -> RowSource:
+def _source(data: bytes, file: Path, stated: FileFormat, is_usable: Callable[[RowSource], bool]) -> RowSource:
     """The rows of a file: of a text, or of the sheet of a workbook that is stated or usable."""
     if is_workbook(data):
-        return open_sheet(data[:], file, stated.sheet, is_usable)
+        return open_sheet(data, file, stated.sheet, is_usable)
     if stated.sheet:
         raise MeasurementError("this is no workbook", file=file, found=f'sheet = "{stated.sheet}"', expected="xlsx")
-    return Text(file, *to_utf8(data, file, stated.encoding))
+    return Text(*to_utf8(data, file, stated.encoding))
 
 
 def _is_k(header: str) -> bool:

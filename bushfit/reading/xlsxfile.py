@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
-from bushfit.errors import OutputError
+from bushfit.errors import OutputError, printable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -115,7 +115,7 @@ def _book(stream: IO[bytes], **options: object) -> Iterator[Workbook]:
 
 def _text(text: str) -> str:
     """A text as a cell holds it."""
-    return text.encode("utf-8", "replace").decode()[:_LONGEST_TEXT]
+    return printable(text, lines=True)[:_LONGEST_TEXT]
 
 
 def _cut(text: str, most: int) -> str:

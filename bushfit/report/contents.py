@@ -122,7 +122,7 @@ def pages_of(contents: Contents) -> dict[str, bytes]:
     """The bytes of the pages of a result alone, by the names of their files."""
     tables = {name: make() for name, make in contents.tables.items()} if contents.pages else {}
     made = {name: page(contents.documents, tables) for name, page in contents.pages.items()}
-    return {f"{name}.html": text.encode("utf-8", "replace") for name, text in made.items()}
+    return {f"{name}.html": text.encode() for name, text in made.items()}
 
 
 def _picture(figure: Figure, form: str) -> bytes:

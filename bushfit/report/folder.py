@@ -13,31 +13,46 @@ How `write_files` does it:
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from bushfit.errors import OutputError
+from bushfit.errors import CONTROL, OutputError
 from bushfit.report import disk
 
 #: Start of the name of a stage, the hidden folder in which a set of files is written.
 _STAGE = ".bushfit-"
 #: Name of a set of files that is complete and waits to be moved into the folder around it.
 _DECIDED = ".bushfit-decided"
+#: Name of the record, in a folder of results, of the files that each command wrote there: as JSON their SHA-256 by
+#: command and name, and the names that the last one took away.
+_RECORD = ".bushfit.json"
 #: Most files of a folder that is exchanged [files]; one that holds more is no folder of results, and linking its files
 #: would take longer than moving the new ones in.
 _MOST_LINKED = 2000
 
 
+@dataclass(frozen=True)
+class _Record:
+    """SHA-256 of the files in a folder by command and name, and the names of those that the last one took away."""
+
+    written: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    removed: tuple[str, ...] = ()
+
+
 def to_json(document: Mapping[str, Any]) -> bytes:
-    """A document as the bytes of its file."""
-    return (json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
+    """A document as the bytes of its file, in which no character steers a terminal."""
+    text = json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False)
+    safe = "\n".join(CONTROL.sub(lambda sign: f"\\u{ord(sign[0]):04x}", line) for line in text.split("\n"))
+    return f"{safe}\n".encode()
 
 
 def check_free(folder: Path, names: list[str], *, force: bool) -> None:
@@ -82,11 +97,21 @@ def _check_writable(folder: Path) -> None:
         raise PermissionError(errno.EACCES, "no right to write there", str(nearest))
 
 
-def write_files(folder: Path, files: Mapping[str, bytes], *, force: bool) -> None:
+def write_files(
+    folder: Path,
+    files: Mapping[str, bytes],
+    *,
+    force: bool,
+    by: str | None = None,
+    before: Callable[[], None] = lambda: None,
+) -> None:
     """Write a set of files into a folder: all of them or none, even if this run is killed or another writes there.
 
     The steps stand at the top of this module. Runs that write into one folder take turns, and the last one's files
-    stay. What a killed run left behind is removed by the next. With `force` files of these names are replaced.
+    stay. What a killed run left behind is removed by the next. With `force` files of these names are replaced, and
+    those that the same command, `by`, wrote there before and does not write now are removed, unless somebody has
+    changed them since. `before` is called when all is on the disk and only stands elsewhere; if it raises, nothing is
+    written.
 
     Raises:
         OutputError: the folder cannot be written, or holds results and `force` is False.
@@ -99,6 +124,8 @@ def write_files(folder: Path, files: Mapping[str, bytes], *, force: bool) -> Non
             with _staged(place if inside else place.parent, files) as ready, disk.locked(place.parent):
                 _end_decided(place)
                 check_free(folder, list(files), force=force)
+                _record(place, ready, files, by, force=force)
+                before()
                 if not place.exists():
                     ready.rename(place)
                 elif inside or not _exchanged(ready, place):
@@ -106,6 +133,43 @@ def write_files(folder: Path, files: Mapping[str, bytes], *, force: bool) -> Non
                     _end_decided(place)
     except OSError as error:
         raise _unwritable(folder, error) from error
+
+
+def _record(place: Path, ready: Path, files: Mapping[str, bytes], by: str | None, *, force: bool) -> None:
+    """Put the record of a folder's files beside new ones, where a command writes several there or has done so.
+
+    It names what is to be removed, too: files as the command wrote them before, and does not write now.
+    """
+    known = _recorded(place)
+    if by is None or not (known.written or len(files) > 1):
+        return
+    before = known.written.get(by, {})
+    left = {name: digest for name, digest in before.items() if name not in files and _digest(place / name) == digest}
+    written = {
+        command: {name: digest for name, digest in names.items() if name not in files and not (force and name in left)}
+        for command, names in known.written.items()
+    }
+    written[by] = written.get(by, {}) | {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
+    record = _Record(written, tuple(left) if force else ())
+    (ready / _RECORD).write_bytes(to_json(asdict(record)))
+
+
+def _recorded(folder: Path) -> _Record:
+    """The record in a folder; an empty one, by which nothing is removed, where there is none that can be read."""
+    from pydantic import TypeAdapter
+
+    try:
+        data = (folder / _RECORD).read_bytes()
+        record = TypeAdapter(_Record).validate_json(data)
+    except (OSError, ValueError):
+        return _Record()
+    names = {*record.removed, *(name for names in record.written.values() for name in names)}
+    return record if all(Path(name).name == name for name in names) else _Record()
+
+
+def _digest(file: Path) -> str | None:
+    """SHA-256 of a file; None where there is none."""
+    return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else None
 
 
 @contextmanager
@@ -165,7 +229,7 @@ def _exchangeable(place: Path) -> bool:
 
 def _exchanged(ready: Path, place: Path) -> bool:
     """Exchange a folder for one that holds the new files and its own other ones; False where that cannot be done."""
-    whole, home, count = ready.with_name("whole"), ready.stat(), 0
+    whole, home, count, removed = ready.with_name("whole"), ready.stat(), 0, _recorded(ready).removed
 
     def passed_over(folder: str, names: list[str]) -> list[str]:
         """What of a folder is not linked: stages, and files that are written anew."""
@@ -173,7 +237,7 @@ def _exchanged(ready: Path, place: Path) -> bool:
         count, owned = count + len(names), Path(folder).stat()
         if count > _MOST_LINKED or (owned.st_uid, owned.st_gid) != (home.st_uid, home.st_gid):
             raise OSError("too many files, or folders that a copy would give another owner")
-        anew = [name for name in names if (ready / name).exists()] if Path(folder) == place else []
+        anew = [name for name in names if (ready / name).exists() or name in removed] if Path(folder) == place else []
         return [*anew, *(name for name in names if name.startswith(_STAGE))]
 
     try:
@@ -189,7 +253,9 @@ def _end_decided(place: Path) -> None:
     """Move the files of a decided set into the folder: those of this run, or of one that was killed before it could."""
     decided = place / _DECIDED
     if decided.is_dir():
-        for file in decided.iterdir():
+        for name in _recorded(decided).removed:
+            (place / name).unlink(missing_ok=True)
+        for file in sorted(decided.iterdir(), key=lambda file: file.name == _RECORD):
             file.replace(place / file.name)
         decided.rmdir()
 

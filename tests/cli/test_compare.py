@@ -18,7 +18,7 @@ def test_a_folder_a_model_and_a_campaign_of_the_same_tests_differ_in_nothing(bus
     folder = tmp_path / "x"
     done = bushfit("compare", "model", "model/model.json", CAMPAIGN, "-o", folder, "--json")
     assert done.returncode == 0, done.stderr
-    assert sorted(path.name for path in folder.iterdir()) == sorted(FILES)
+    assert sorted(path.name for path in folder.glob("[!.]*")) == sorted(FILES)
     found = json.loads(done.stdout)
     assert done.stdout == (folder / "compare.json").read_text(encoding="utf-8")
     assert found["schema"] == "bushfit/compare/1"
@@ -68,7 +68,7 @@ def test_families_of_one_campaign_are_fitted_and_held_out(bushfit: Run, tmp_path
     folder = tmp_path / "x"
     done = bushfit("compare", CAMPAIGN, "-o", folder, "--json", "--families", "kraus, intrinsic_time")
     assert done.returncode == 0, done.stderr
-    assert sorted(path.name for path in folder.iterdir()) == sorted([*FILES, "families.csv"])
+    assert sorted(path.name for path in folder.glob("[!.]*")) == sorted([*FILES, "families.csv"])
     families = json.loads(done.stdout)["families"]
     assert [family["name"] for family in families] == ["paper", "kraus", "intrinsic_time"]
     assert [family["parameters"] for family in families] == [5, 7, 6]
@@ -86,4 +86,4 @@ def test_results_that_stand_are_not_replaced_and_nothing_is_fitted_before_that_i
     done = bushfit("compare", CAMPAIGN, "model", "-o", tmp_path)
     assert done.returncode == 2
     assert "--force" in done.stderr
-    assert [path.name for path in tmp_path.iterdir()] == ["differences.csv"]
+    assert [path.name for path in tmp_path.glob("[!.]*")] == ["differences.csv"]

@@ -48,7 +48,7 @@ def found(work: Path, done: Done) -> Path:
 
 
 def test_files_and_streams(done: Done, found: Path) -> None:
-    assert {file.name for file in found.iterdir()} == TABLES
+    assert {file.name for file in found.glob("[!.]*")} == TABLES
     assert done.stdout == (found / "diagnosis.json").read_text(encoding="utf-8")
     for words in ("case 001: named", "inertia", "95 %", "data fitted", "held out", "where", "next test:", "wrote "):
         assert words in done.stderr
@@ -183,7 +183,7 @@ def test_statuses(bushfit: Run, tmp_path: Path) -> None:
     missed = bushfit("diagnose", CAMPAIGN, "-o", str(tmp_path / "x"), "--no-plots", "--max-nrmse", "1e-4")
     assert missed.returncode == 1
     assert "is above --max-nrmse" in missed.stderr
-    assert {file.name for file in (tmp_path / "x").iterdir()} == TABLES
+    assert {file.name for file in (tmp_path / "x").glob("[!.]*")} == TABLES
     refused = bushfit("diagnose", CAMPAIGN, "-o", str(tmp_path / "x"), "--no-plots")
     assert refused.returncode == 2
     assert "--force" in refused.stderr
@@ -199,7 +199,7 @@ def test_a_small_score_card(bushfit: Run, tmp_path: Path) -> None:
     assert {"card", "confusion", "seed"} <= document.keys()
     assert "score card:" in run.stderr
     assert "false alarm on clean campaigns" in run.stderr
-    assert {file.name for file in (tmp_path / "x").iterdir()} == {"outcomes.jsonl", "scorecard.json"}
+    assert {file.name for file in (tmp_path / "x").glob("[!.]*")} == {"outcomes.jsonl", "scorecard.json"}
     lines = (tmp_path / "x" / "outcomes.jsonl").read_bytes().splitlines(keepends=True)
     (tmp_path / "x" / "outcomes.jsonl").write_bytes(b"".join(lines[:-1]) + lines[-1][:30])
     again = bushfit("scorecard", "--campaigns", "5", "--jobs", "1", "-o", str(tmp_path / "x"), "--json", "-q")
@@ -223,7 +223,7 @@ def test_wrong_usage_of_the_score_card(bushfit: Run, options: tuple[str, ...]) -
 def test_the_gap_in_a_picture(bushfit: Run, tmp_path: Path) -> None:
     run = bushfit("diagnose", CAMPAIGN, "-o", str(tmp_path / "x"))
     assert run.returncode == 0, run.stderr
-    assert {file.name for file in (tmp_path / "x").iterdir()} == TABLES | {"gap.png"}
+    assert {file.name for file in (tmp_path / "x").glob("[!.]*")} == TABLES | {"gap.png"}
     picture = (tmp_path / "x" / "gap.png").read_bytes()
     assert picture.startswith(b"\x89PNG")
     assert len(picture) > 20_000

@@ -26,7 +26,7 @@ def test_every_format_at_once_and_what_it_leaves_out(bushfit: Run, tmp_path: Pat
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
     named = [file for each in document["formats"].values() for file in each["files"]]
-    assert {file.name for file in (tmp_path / "x").iterdir()} == set(named)
+    assert {file.name for file in (tmp_path / "x").glob("[!.]*")} == set(named)
     for name, each in document["formats"].items():
         for line in each["left_out"]:
             assert f"{name} leaves out: {line}" in done.stderr
@@ -46,7 +46,7 @@ def test_the_arms_of_an_fmu_stand_beside_it_as_table_and_picture(bushfit: Run, t
     done = bushfit("export", "model/model.json", "--format", "fmu", "-o", str(tmp_path), "--json")
     assert done.returncode == 0, done.stderr
     (fmu,) = json.loads(done.stdout)["formats"]["fmu"]["files"]
-    assert {file.name for file in tmp_path.iterdir()} == {fmu, "arms.csv", "arms.png"}
+    assert {file.name for file in tmp_path.glob("[!.]*")} == {fmu, "arms.csv", "arms.png"}
     arms = pd.read_csv(tmp_path / "arms.csv")["relaxation time [s]"]
     assert f"{arms.notna().sum()} Maxwell arms in place of the springpot" in done.stderr
 

@@ -68,7 +68,7 @@ def written(place: Path, name: str, *options: str) -> set[Path]:
     done = call(place, name, *ARGUMENTS[name], *options)
     assert done.returncode == 0, done.stderr
     folder = place / options[1]
-    return {file.relative_to(folder) for file in folder.rglob("*") if file.is_file()}
+    return {file.relative_to(folder) for file in folder.rglob("[!.]*") if file.is_file()}
 
 
 @pytest.mark.parametrize("name", having("table_format"))

@@ -20,7 +20,7 @@ RECORD = "data/cmp_15961_raw/stepped_sine_axial.csv"
 def test_files_are_told_and_the_campaign_s_text_can_be_pasted(typed: Callable, root: Path, tmp_path: Path) -> None:
     done = typed("inspect", *(root / file for file in (*CLEAN, RECORD)), "-o", "x")
     assert done.returncode == 0, done.stderr
-    assert [file.name for file in (tmp_path / "x").iterdir()] == ["inspect.png"]
+    assert [file.name for file in (tmp_path / "x").glob("[!.]*")] == ["inspect.png"]
     campaign = tomllib.loads(done.stdout)
     assert [(kind, test["direction"]) for kind, (test,) in campaign.items()] == [
         ("loops", "axial"), ("sweeps", "radial"),
@@ -76,7 +76,7 @@ def test_results_are_not_replaced_unasked(typed: Callable, root: Path) -> None:
 def test_many_files_make_several_pictures(typed: Callable, root: Path, tmp_path: Path) -> None:
     done = typed("inspect", *[root / CLEAN[1]] * 6, "-o", "x", "-q")
     assert done.returncode == 0, done.stderr
-    assert {file.name for file in (tmp_path / "x").iterdir()} == {"inspect.png", "inspect_2.png"}
+    assert {file.name for file in (tmp_path / "x").glob("[!.]*")} == {"inspect.png", "inspect_2.png"}
 
 
 def test_a_sheet_of_a_workbook(typed: Callable, root: Path, tmp_path: Path) -> None:

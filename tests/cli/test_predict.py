@@ -20,7 +20,7 @@ def test_predict_lays_measurements_over_and_takes_grids(bushfit: Run, tmp_path: 
         "--frequencies", "10:30:10 Hz", "--amplitudes", "0.1, 0.3 mm",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert {file.name for file in (tmp_path / "x").iterdir()} == {
+    assert {file.name for file in (tmp_path / "x").glob("[!.]*")} == {
         *(f"{d}.{end}" for d in ("axial", "radial") for end in ("csv", "png")), "measured.csv",
     }  # fmt: skip
     measured = pd.read_csv(tmp_path / "x" / "measured.csv")

@@ -35,7 +35,7 @@ def test_a_raw_record_becomes_a_sweep_that_fits(
     done = typed("reduce", root / RECORD, "-o", "x")
     assert done.returncode == 0, done.stderr
     assert done.stdout == ""
-    assert {file.name for file in (tmp_path / "x").iterdir()} == {"sweep.csv", "reduce.png"}
+    assert {file.name for file in (tmp_path / "x").glob("[!.]*")} == {"sweep.csv", "reduce.png"}
     assert "15 points found" in done.stderr
 
     sweep = read_sweep(tmp_path / "x/sweep.csv", Direction.AXIAL)

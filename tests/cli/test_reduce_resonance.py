@@ -18,7 +18,7 @@ def test_a_measured_test_becomes_a_sweep(typed: Callable, root: Path, tmp_path: 
     done = typed("reduce", root / MEASURED, *STATED, "-o", "x")
     assert done.returncode == 0, done.stderr
     assert done.stdout == ""
-    assert {file.name for file in (tmp_path / "x").iterdir()} == {"sweep.csv", "reduce.png"}
+    assert {file.name for file in (tmp_path / "x").glob("[!.]*")} == {"sweep.csv", "reduce.png"}
     assert "100 points of 2000 rows; resonance at 230.5 Hz, |T| 8.03" in done.stderr
     table = pd.read_csv(tmp_path / "x/sweep.csv")
     assert list(table)[:5] == [

@@ -23,7 +23,7 @@ def test_simulate_writes_a_campaign_that_run_takes(bushfit: Run, tmp_path: Path)
     one = bushfit("simulate", "model/model.json", "--seed", "7", "--noise", "0.5 %", "-o", at)
     assert one.returncode == 0, one.stderr
     assert {"campaign.toml", "truth.json", "loop_axial_1.csv", "sweep_axial.csv", "sweep_radial.csv"} == {
-        file.name for file in Path(at).iterdir()
+        file.name for file in Path(at).glob("[!.]*")
     }
     bushfit("simulate", "model/model.json", "--seed", "7", "--noise", "0.5 %", "-o", f"{at}2")
     bushfit("simulate", "model/model.json", "--seed", "8", "--noise", "0.5 %", "-o", f"{at}3")

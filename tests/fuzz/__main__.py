@@ -1,4 +1,4 @@
-"""Coverage-guided fuzzing: `python -m tests.fuzz --seconds 60 [--target readers|campaign|model] [--keep]`.
+"""Coverage-guided fuzzing: `python -m tests.fuzz --seconds 60 [--target readers|campaign|model|...] [--keep]`.
 
 Needs the dependency group `fuzz`. Starts from the corpus beside this file; what crashes, hangs for ten seconds or takes
 more than 2 GiB is left in the working folder as crash-*, timeout-* or oom-*, and the exit status is 1. With --keep the
@@ -14,7 +14,7 @@ import tempfile
 from pathlib import Path
 
 HERE = Path(__file__).parent
-TARGETS = ("readers", "campaign", "model")
+TARGETS = ("readers", "campaign", "model", "workbook", "report")
 LIMITS = ("-max_len=4096", "-timeout=10", "-rss_limit_mb=2048")
 
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import shlex
 import sys
+from pathlib import Path
 
 import atheris
 
+sys.path.insert(0, str(Path(__file__).parents[1]))  # what the tests share
 with atheris.instrument_imports(include=["bushfit", "tomllib"]):
     from targets import ready
 

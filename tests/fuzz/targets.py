@@ -9,24 +9,57 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
+import bombs
+
 from bushfit.campaign.campaign import load_campaign
 from bushfit.errors import BushfitError
-from bushfit.geometry import Direction
+from bushfit.geometry import Direction, Specimen
+from bushfit.inspection.gathering import gather
+from bushfit.jobs.compare import Compare
+from bushfit.jobs.predict import Predict
 from bushfit.model.file import load_result, to_document
 from bushfit.reading.loops import read_loop
+from bushfit.reading.resonance import read_resonance
 from bushfit.reading.sweeps import read_sweep
+from bushfit.reading.table import Table
+from bushfit.reading.words import RESONANCE_COLUMNS
+from bushfit.report.contents import pages_of
+from bushfit.report.folder import to_json
+from bushfit.report.page.readback import read_results
 
 CORPUS = Path(__file__).with_name("corpus")
+#: The files of a folder of results, by their names.
+RESULTS = {
+    file.name.encode(): file
+    for file in (Path(__file__).parents[2] / "data/reports/mystery_mount").iterdir()
+    if file.suffix in (".json", ".csv")
+}
+#: Texts that cells of a workbook may name.
+TEXTS = (
+    b"<sst><si><t>time [s]</t></si><si><t>displacement [mm]</t></si><si><t>force [N]</t></si><si><t>1,5</t></si></sst>"
+)
+COUPON = Specimen("DMA", "modulus")
 _LONGEST_ERROR = 5000
 
 
 def readers(folder: Path, data: bytes) -> None:
-    """A measured table, as a loop and as a sweep."""
+    """A measured table, as a loop, as a sweep, as a resonance test, and as `inspect` takes it: of a coupon, too."""
     file = folder / "table.csv"
     file.write_bytes(data)
     for read in (read_loop, read_sweep):
-        with clear_errors():
-            read(file, Direction.AXIAL)
+        for place in (Direction.AXIAL, COUPON):
+            with clear_errors():
+                read(file, place)
+    with clear_errors():
+        read_resonance(Table.open(file, RESONANCE_COLUMNS), Direction.AXIAL, 1.0)
+    look_into(file)
+
+
+def look_into(file: Path) -> None:
+    """A file as `inspect` takes it."""
+    with clear_errors():
+        for source in gather([file], {})[0]:
+            source.inspect()
 
 
 def campaign(folder: Path, data: bytes) -> None:
@@ -40,7 +73,35 @@ def model(folder: Path, data: bytes) -> None:
     file = folder / "model.json"
     file.write_bytes(data)
     with clear_errors():
-        to_document(load_result(file))
+        result = load_result(file)
+        to_json(to_document(result))
+        Predict().run(result, None)
+
+
+def workbook(folder: Path, data: bytes) -> None:
+    """The rows of a sheet, and those of another after a line of `=`, in a workbook that is whole otherwise."""
+    file = folder / "table.xlsx"
+    file.write_bytes(bombs.workbook(data.split(b"\n====\n"), texts=TEXTS))
+    with clear_errors():
+        read_sweep(file, Direction.AXIAL)
+    look_into(file)
+
+
+def report(folder: Path, data: bytes) -> None:
+    """A folder of results of which one file, named on the first line, is the rest; its page, and it beside another."""
+    name, _, content = data.partition(b"\n")
+    file = folder / (name.decode("ascii", "ignore") if name in RESULTS else "model.json")
+    kept = file.read_bytes()
+    file.write_bytes(content)
+    try:
+        with clear_errors():
+            pages_of(read_results(folder))
+        if file.suffix == ".json":
+            with clear_errors():
+                job = Compare()
+                job.run([job.entry(load_result(folder / "model.json"), name) for name in ("one", "other")])
+    finally:
+        file.write_bytes(kept)
 
 
 @contextmanager
@@ -52,12 +113,18 @@ def clear_errors() -> Iterator[None]:
             raise ValueError("an error that nobody reads to its end") from error
 
 
-TARGETS: dict[str, Callable[[Path, bytes], None]] = {"readers": readers, "campaign": campaign, "model": model}
+TARGETS: dict[str, Callable[[Path, bytes], None]] = {
+    "readers": readers,
+    "campaign": campaign,
+    "model": model,
+    "workbook": workbook,
+    "report": report,
+}
 
 
 def ready(name: str) -> Callable[[bytes], None]:
     """A target in a folder of its own, with the tables that the campaigns of the corpus name."""
     folder = Path(tempfile.mkdtemp(prefix="fuzz-"))
-    for table in ("loop.csv", "sweep.csv"):
-        shutil.copy(CORPUS / "readers" / table, folder)
+    for file in (*(CORPUS / "readers" / table for table in ("loop.csv", "sweep.csv")), *RESULTS.values()):
+        shutil.copy(file, folder)
     return partial(TARGETS[name], folder)

@@ -17,7 +17,7 @@ SEMICOLONS = Layout(";", ("time", "force"), 1, ("", ""), None)
 
 
 def text(content: str) -> Text:
-    return Text(FILE, content.encode(), "utf-8")
+    return Text(content.encode(), "utf-8")
 
 
 SOURCES = [

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import io
+import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import bombs
 import numpy as np
 import openpyxl
 import pytest
@@ -138,3 +140,43 @@ def test_hostile_workbooks_are_refused(case: str, tmp_path: Path) -> None:
     with pytest.raises(MeasurementError, match="workbook") as caught:
         forces(file)
     print(caught.value)
+
+
+def test_a_sheet_that_is_not_asked_for_is_not_read(tmp_path: Path) -> None:
+    """Beside one that would fill the memory stands one that is used."""
+    rows = "".join(
+        "<row>" + "".join(f'<c t="str"><v>{cell}</v></c>' for cell in row) + "</row>"
+        for row in [["t [s]", "Weg [mm]", "Kraft [N]"], *NUMBERS["loop"]]
+    )
+    (tmp_path / "test.xlsx").write_bytes(bombs.workbook([bombs.far_apart(), rows]))
+    assert np.array_equal(forces(tmp_path / "test.xlsx", sheet="S2"), FORCE)
+    with pytest.raises(MeasurementError, match="the workbook is too large"):
+        forces(tmp_path / "test.xlsx")
+
+
+def test_cells_of_all_sheets_count_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Which are asked for one after the other, too."""
+    file = workbook({"A": table("loop"), "B": table("loop")}, tmp_path)
+    monkeypatch.setattr("bushfit.reading.workbook._MOST_CELLS", 300)
+    with pytest.raises(MeasurementError, match='more, with sheet "B"'):
+        forces(file)
+    assert np.array_equal(forces(file, sheet="A"), FORCE)
+    with pytest.raises(MeasurementError, match="at most 300 cells"):
+        forces(file, sheet="B")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows bounds no process")
+def test_a_workbook_takes_so_much_time_and_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "test.xlsx").write_bytes(bombs.workbook([bombs.EMPTY * 5]))
+    monkeypatch.setattr("bushfit.reading.workbook._MOST_SECONDS", 1)
+    with pytest.raises(MeasurementError, match="more than 1 s of work"):
+        forces(tmp_path / "test.xlsx")
+
+
+@pytest.mark.parametrize("cells", [lambda row: f"=1*{row}", lambda row: float(row)], ids=["all", "one column"])
+def test_formulas_whose_values_were_not_saved_are_said(cells: Callable[[str], object], tmp_path: Path) -> None:
+    """As programs write them that do not compute, openpyxl among them."""
+    rows = [table("loop")[0], *([f"=2*{t}", cells(x), cells(force)] for t, x, force in NUMBERS["loop"])]
+    with pytest.raises(MeasurementError, match="formulas whose values were not saved") as caught:
+        forces(workbook({"Loop": rows}, tmp_path))
+    assert "open it in a spreadsheet program and save it again" in str(caught.value)

@@ -1,4 +1,6 @@
-"""Runs `bushfit` again and again, each run killed at a random time: `kill.py TIMES FOLDER ARGUMENT...`.
+"""Runs `bushfit` again and again, each run killed at a random time: `kill.py TIMES FOLDER OTHERWISE ARGUMENT...`.
+
+OTHERWISE are the options, parted by |, with which results are replaced.
 
 Each run is a process of its own, forked after the imports. Every other one replaces the results of an earlier run with
 --force; half of them are killed at any time, half after they have begun to write. Prints as JSON how often the folder
@@ -52,16 +54,16 @@ def digest(folder: Path) -> str:
     """Which set of results a folder holds."""
     if not folder.exists():
         return "absent"
-    files = {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+    files = {path.name: path.read_bytes() for path in sorted(folder.glob("[!.]*"))}
     assert files.pop("notes.txt", b"mine") == b"mine"
     return hashlib.sha256(repr(files).encode()).hexdigest()
 
 
-def run(times: int, folder: Path, arguments: list[str]) -> None:
+def run(times: int, folder: Path, otherwise: list[str], arguments: list[str]) -> None:
     call([*arguments, "-o", str(folder)])  # imports what it needs
     shutil.rmtree(folder)
     known, lasts = {"absent": "absent"}, []
-    for name, more in (("first", []), ("first", []), ("second", ["--frequencies", "10:20:5 Hz"])):
+    for name, more in (("first", []), ("first", []), ("second", otherwise)):
         begun = time.perf_counter()
         status = os.waitstatus_to_exitcode(os.waitpid(start([*arguments, *more, "-o", str(folder)]), 0)[1])
         lasts.append(time.perf_counter() - begun)
@@ -77,7 +79,7 @@ def run(times: int, folder: Path, arguments: list[str]) -> None:
         if number % 2:
             assert os.waitpid(start([*arguments, "-o", str(folder)]), 0)[1] == 0
             (folder / "notes.txt").write_bytes(b"mine")
-            more = ["--frequencies", "10:20:5 Hz", "--force"]
+            more = [*otherwise, "--force"]
         before = set(folder.parent.iterdir())
         child = start([*arguments, *more, "-o", str(folder)])
         if number % 4 < 2:
@@ -89,11 +91,12 @@ def run(times: int, folder: Path, arguments: list[str]) -> None:
         ended = "ended" if os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0 else "killed"
         what = "replacing" if number % 2 else "new"
         seen[f"{what}, {ended}: {known.get(digest(folder), 'mixed')}"] += 1
-    assert os.waitpid(start([*arguments, "-o", str(folder), "--force"]), 0)[1] == 0
+    shutil.rmtree(folder, ignore_errors=True)
+    assert os.waitpid(start([*arguments, "-o", str(folder)]), 0)[1] == 0
     hidden = [path.name for path in folder.parent.iterdir() if path.name.startswith(".")]
     assert not hidden, f"left behind: {hidden}"
     print(json.dumps(seen))
 
 
 if __name__ == "__main__":
-    run(int(sys.argv[1]), Path(sys.argv[2]), sys.argv[3:])
+    run(int(sys.argv[1]), Path(sys.argv[2]), sys.argv[3].split("|"), sys.argv[4:])

@@ -72,3 +72,47 @@ def test_a_folder_in_the_way(tmp_path: Path) -> None:
 def test_check_free_says_nothing_where_nothing_stands(tmp_path: Path) -> None:
     check_free(tmp_path / "absent", ["a.csv"], force=False)
     check_free(tmp_path, ["a.csv"], force=False)
+
+
+def test_force_takes_away_what_the_same_command_wrote_before(tmp_path: Path) -> None:
+    """Not what another wrote, what somebody has changed since, or what stands there besides."""
+    folder = tmp_path / "x"
+    write_files(folder, {"a.csv": b"1", "b.csv": b"1", "c.csv": b"1"}, force=False, by="one")
+    write_files(folder, {"d.csv": b"1", "e.csv": b"1"}, force=False, by="other")
+    write_files(folder, {"f.csv": b"1", "g.csv": b"1"}, force=False, by="one")
+    assert {file.name for file in folder.glob("[!.]*")} == {f"{letter}.csv" for letter in "abcdefg"}
+    (folder / "b.csv").write_bytes(b"mine")
+    (folder / "notes.txt").write_bytes(b"mine")
+    write_files(folder, {"c.csv": b"2", "d.csv": b"2"}, force=True, by="one")
+    assert {file.name: file.read_bytes() for file in folder.glob("[!.]*")} == {
+        "b.csv": b"mine",
+        "c.csv": b"2",
+        "d.csv": b"2",
+        "e.csv": b"1",
+        "notes.txt": b"mine",
+    }
+    write_files(folder, {"h.csv": b"1"}, force=True, by="one")
+    assert {file.name for file in folder.glob("[!.]*")} == {"b.csv", "e.csv", "h.csv", "notes.txt"}
+
+
+@pytest.mark.parametrize(
+    "record",
+    [b"", b"[]", b"\xff", b'{"written": {"one": {"../mine.txt": 3}}, "removed": ["../mine.txt"]}', b"[" * 100_000],
+)
+def test_a_record_that_is_spoiled_removes_nothing(record: bytes, tmp_path: Path) -> None:
+    folder = tmp_path / "x"
+    (tmp_path / "mine.txt").write_bytes(b"mine")
+    write_files(folder, {"a.csv": b"1", "b.csv": b"1"}, force=False, by="one")
+    (folder / ".bushfit.json").write_bytes(record)
+    write_files(folder, {"b.csv": b"2"}, force=True, by="one")
+    assert {file.name for file in folder.glob("[!.]*")} == {"a.csv", "b.csv"}
+    assert (tmp_path / "mine.txt").read_bytes() == b"mine"
+
+
+def test_nothing_stands_where_the_last_word_fails(tmp_path: Path) -> None:
+    def closed() -> None:
+        raise OutputError("standard output cannot be written")
+
+    with pytest.raises(OutputError, match="standard output"):
+        write_files(tmp_path / "x", {"a.csv": b"1"}, force=False, before=closed)
+    assert list(tmp_path.iterdir()) == []

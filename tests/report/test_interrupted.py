@@ -63,11 +63,23 @@ def test_stopped_at_every_system_call(where: str, how: str, tmp_path: Path) -> N
     assert len(states) >= 2
 
 
-def test_killed_at_50_random_times(root: Path, tmp_path: Path) -> None:
-    arguments = ("predict", str(root / "data/arm_bushing/truth.json"), "--no-plots")
-    seen = script("kill.py", "50", str(tmp_path / "x"), *arguments)
-    assert sum(seen.values()) == 50
-    assert sum(count for what, count in seen.items() if "killed" in what) >= 10
+@pytest.mark.parametrize(
+    ("times", "otherwise", "arguments"),
+    [
+        (50, "--frequencies|10:20:5 Hz", ("predict", "data/arm_bushing/truth.json", "--no-plots")),
+        (8, "--no-report", ("run", "configs/cmp_15961.toml", "--no-plots")),
+        (12, "--format|csv", ("export", "data/arm_bushing/truth.json", "--format", "nastran")),
+    ],
+    ids=lambda given: given[0] if isinstance(given, tuple) else "",
+)
+def test_killed_at_random_times(
+    root: Path, tmp_path: Path, times: int, otherwise: str, arguments: tuple[str, ...]
+) -> None:
+    """With 50 in place of so few, `python tests/report/kill.py` takes minutes for `run`."""
+    command, source, *options = arguments
+    seen = script("kill.py", str(times), str(tmp_path / "x"), otherwise, command, str(root / source), *options)
+    assert sum(seen.values()) == times
+    assert sum(count for what, count in seen.items() if "killed" in what) >= times // 5
     assert not [what for what in seen if what.endswith("mixed")]
 
 

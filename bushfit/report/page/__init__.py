@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
+from bushfit.errors import printable
+
 if TYPE_CHECKING:
     import jinja2
 
@@ -53,7 +55,7 @@ def rendered(template: str, context: dict[str, Any]) -> str:
         f"default-src 'none'; style-src {_hash(style)}; script-src {_hash(script)}; base-uri 'none'; form-action 'none'"
     )
     page = _environment().get_template(template).render(style=style, script=script, allowed=allowed, **context)
-    return page + "\n"
+    return printable(page, lines=True) + "\n"
 
 
 def _hash(text: str) -> str:

@@ -12,12 +12,13 @@ import numpy as np
 
 from bushfit.errors import ModelError
 from bushfit.model.file import read_document
-from bushfit.reading.csvfile import undefused
+from bushfit.reading.csvfile import in_a_line, undefused
 from bushfit.reading.files import read_utf8, view_bytes
-from bushfit.reading.source import LARGEST_VALUE
+from bushfit.reading.workbook import read_sheets
 from bushfit.report.artifacts import place_names
 from bushfit.report.page.schema import MODELS, PLAIN, checked
 from bushfit.report.tables import TEXTS
+from bushfit.validation import LARGEST_NUMBER
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,7 +74,7 @@ def canonical(table: pd.DataFrame) -> pd.DataFrame:
     def column(name: str) -> object:
         values = table[name]
         if name in TEXTS:
-            return [" ".join(str(value).split("\n")) for value in values]
+            return [in_a_line(str(value)) for value in values]
         numbers = values.to_numpy(dtype=float, na_value=np.nan)
         return [float(f"{value:.7g}") for value in numbers.tolist()]
 
@@ -115,7 +116,7 @@ def _column(header: str, cells: pd.Series[str]) -> object:
         return [undefused(cell) for cell in cells]
     values = np.array([float(cell.replace(",", ".")) if cell else 0.0 for cell in cells], dtype=float)
     for cell, size in zip(cells, np.abs(values), strict=True):
-        if not (size < LARGEST_VALUE and (size == 0.0 or size > 1.0 / LARGEST_VALUE)):
+        if not (size == 0.0 or 1.0 / LARGEST_NUMBER < size < LARGEST_NUMBER):
             raise ValueError(f"{header}: {cell}")
     return np.where(cells == "", np.nan, values)
 
@@ -134,11 +135,7 @@ def _csv(file: Path) -> pd.DataFrame:
 def _workbook(file: Path) -> pd.DataFrame:
     """Cells of the first sheet of a workbook as texts."""
     import pandas as pd
-    from python_calamine import CalamineError, CalamineWorkbook
 
-    try:
-        workbook = CalamineWorkbook.from_filelike(io.BytesIO(view_bytes(file, ModelError, largest=_LARGEST)[:]))
-        header, *rows = workbook.get_sheet_by_index(0).to_python()
-    except CalamineError as error:
-        raise ValueError(str(error)) from error
-    return pd.DataFrame([[str(cell) for cell in row] for row in rows], columns=[str(cell) for cell in header])
+    first, *_ = read_sheets(view_bytes(file, ModelError, largest=_LARGEST), file, kind=ModelError)[1]
+    header, *rows = first.content
+    return pd.DataFrame([[str(cell) for cell in row] for row in rows if row], columns=[str(cell) for cell in header])

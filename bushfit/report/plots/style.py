@@ -18,9 +18,11 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, ScalarFormatter
 
 from bushfit.effects.contract import Array
+from bushfit.errors import CONTROL, printable
 from bushfit.model.covariance import Z95
 from bushfit.report.tables import spread
 
@@ -237,6 +239,9 @@ def to_image(figure: Figure, form: str = "png") -> bytes:
 
     Texts of an SVG are outlines, which look the same wherever they are shown; those of a PDF can be found and copied.
     """
+    for text in figure.findobj(Text):
+        if CONTROL.search(text.get_text()):
+            text.set_text(printable(text.get_text(), lines=True))
     buffer = io.BytesIO()
     settings = rc_context({"svg.hashsalt": "bushfit", "svg.fonttype": "path", "pdf.fonttype": 42})
     with warnings.catch_warnings(), settings:

@@ -1,0 +1,24 @@
+"""The command `bushfit`, and `python -m bushfit`: nothing slow is imported before an early Ctrl-C is taken care of.
+
+Warnings of Python and its packages are shown to nobody who did not ask for them.
+"""
+
+import sys
+import warnings
+
+
+def main() -> None:
+    """Entry point of the command line; stopped by Ctrl-C, it says so in a line."""
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")  # they are for programmers, who ask for them: python -W default -m bushfit
+    try:
+        from bushfit.cli import main as command
+
+        command()
+    except KeyboardInterrupt:
+        sys.stderr.write("bushfit: aborted\n")
+        sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()
