@@ -25,7 +25,7 @@ def planned(root: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path,
 def test_sheet_document_and_screen_tell_the_same_plan(planned: tuple[Path, dict, str]) -> None:
     folder, document, said = planned
     sheet = pd.read_csv(folder / "plan.csv")
-    assert {file.name for file in folder.iterdir()} == {"plan.json", "plan.csv", "plan.png", "campaign.toml"}
+    assert {file.name for file in folder.glob("[!.]*")} == {"plan.json", "plan.csv", "plan.png", "campaign.toml"}
     assert json.loads((folder / "plan.json").read_text(encoding="utf-8")) == document
     assert sheet["direction"].tolist() == [run["place"] for run in document["tests"]]
     assert f"{len(sheet)} runs" in said
