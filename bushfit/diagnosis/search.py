@@ -172,11 +172,11 @@ class Search:
         Its own score may be next to nothing: a springpot of the model that stands in for a dashpot leaves none.
         """
         name, values_at = (tried and effect_named(tried[0].name).becomes) or ("", None)
-        if not values_at or name in self.settings.without or name in evidence.model.effects:
+        values = values_at(tried[0].evidence.model.values) if values_at else None
+        if values is None or name in evidence.model.effects:
             return tried
-        values = values_at(tried[0].evidence.model.values)
-        if values is None:
-            return tried
+        if name in self.settings.without:
+            return tried[1:]  # it is that effect under another name
         beside = {key: value for key, value in tried[0].evidence.model.values.items() if key in evidence.model.values}
         with suppress(FitError, ModelError):
             model = evidence.model.with_effect(name).with_values({**beside, **values})
