@@ -41,8 +41,6 @@ _ELSEWHERE = 2
 #: Share of the parts without which a name has to come out again, more than this: of 64 simulated campaigns right ones
 #: did in four of seven or more, a wrong one in three of six.
 _STANDS = 0.5
-#: Gain over that which noise alone makes, below which a name is taken back that nothing held out has tested: chosen.
-_UNTESTED = 2.0
 #: What is said where there is no gap.
 _NOTHING = "nothing is missing beyond noise and tolerance"
 #: What is said of a gap without a name.
@@ -103,7 +101,7 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
         words = f"without a part of the tests {' and '.join(step.name for step in steps)} seldom comes out again"
         return unexplained(search, words, steps, again=counted)
     untested = _untested(held, steps)
-    if untested and any(step.gain < _UNTESTED * step.critical for step in steps):
+    if untested and any(step.gain < step.critical + SAME for step in steps):
         return unexplained(search, f"{_closing(names)} the gap by little{untested}", steps, again=counted)
     words = f"{_closing(names)} {'part of the gap; ' + remainder.words if remainder else 'the gap'}{untested}"
     verdict: Verdict = "partly" if remainder else "named"

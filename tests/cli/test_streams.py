@@ -77,7 +77,9 @@ def test_json_is_utf8_in_any_code_page_and_no_text_steers_the_terminal(folder: P
 def test_an_early_ctrl_c(after: float, folder: Path) -> None:
     """From the first line of bushfit on, which here says that it has begun."""
     code = (
-        "import sys; print(flush=True); sys.argv = ['bushfit', 'run', 'campaign.toml']\n"
+        "import signal, sys; sys.argv = ['bushfit', 'run', 'campaign.toml']\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # what runs in the background ignores it
+        "print(flush=True)\n"
         "from bushfit.__main__ import main; main()"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as run:
