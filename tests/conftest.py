@@ -14,9 +14,13 @@ from pathlib import Path
 import pytest
 from commandline import Done, call
 
+from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.effects import BASE
+from bushfit.fitting.data import Data
+from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing
 from bushfit.model.model import Model
+from bushfit.model.result import Result
 
 ROOT = Path(__file__).parents[1]
 TABLE_1 = {"mu": 1.09e6, "m": 2.0e5, "alpha": 0.24, "sigma_fmax": 1.46e4, "eps_half": 1.3e-2}
@@ -45,6 +49,18 @@ def table_1() -> dict[str, float]:
 def paper_model() -> Model:
     """The paper's bushing with the parameters of Table 1."""
     return Model(CMP_15961, BASE, TABLE_1)
+
+
+@pytest.fixture(scope="session")
+def campaign() -> Campaign:
+    """The paper's bushing as an independent rig simulation measured it."""
+    return load_campaign(ROOT / "configs/cmp_15961.toml")
+
+
+@pytest.fixture(scope="session")
+def result(campaign: Campaign) -> Result:
+    """The joint fit to its axial tests."""
+    return fit_joint(Data.of(campaign))
 
 
 @pytest.fixture(scope="session")

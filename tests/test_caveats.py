@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.campaign.campaign import Campaign
 from bushfit.caveats import caveats
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
@@ -16,16 +15,6 @@ from bushfit.geometry import Bushing, Direction, Shape
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
 from bushfit.prediction import predict, predict_resonance
-
-
-@pytest.fixture(scope="module")
-def campaign(root: Path) -> Campaign:
-    return load_campaign(root / "configs/cmp_15961.toml")
-
-
-@pytest.fixture(scope="module")
-def result(campaign: Campaign) -> Result:
-    return fit_joint(Data.of(campaign))
 
 
 def test_extrapolation_is_said(result: Result) -> None:

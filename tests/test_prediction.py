@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.schema import SimulatedSweep, SimulateSettings
 from bushfit.caveats import caveats
 from bushfit.errors import ModelError
@@ -30,16 +28,6 @@ from bushfit.units import CELSIUS
 FREQUENCIES = np.array([155.0, 5.0, 55.0])
 AMPLITUDES = np.array([5e-4, 1e-4])
 FOUR = ("stiffness [N/mm]", "loss factor [-]", "storage stiffness [N/mm]", "loss stiffness [N/mm]")
-
-
-@pytest.fixture(scope="module")
-def campaign(root: Path) -> Campaign:
-    return load_campaign(root / "configs/cmp_15961.toml")
-
-
-@pytest.fixture(scope="module")
-def result(campaign: Campaign) -> Result:
-    return fit_joint(Data.of(campaign))
 
 
 def test_table_is_that_of_the_interface(result: Result) -> None:
