@@ -18,6 +18,7 @@ from bushfit.diagnosis.record import Settings
 from bushfit.diagnosis.refit import EXCLUDED, Candidate, can_reach, refits
 from bushfit.diagnosis.score_test import SENSITIVITY_LEFT, ScoreTest
 from bushfit.effects import effect_named, qualified
+from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.solve import Bounds
@@ -300,9 +301,13 @@ def critical_gain(evidence: Evidence, proposed: Sequence[Proposal]) -> float:
     if not proposed:
         return float("inf")
     columns = np.concatenate([proposal.columns for proposal in proposed])
-    groups = np.split(np.arange(len(columns)), np.cumsum([len(proposal.columns) for proposal in proposed])[:-1])
-    test = ScoreTest(evidence, columns, groups, SENSITIVITY_LEFT)
-    return test.largest_by_chance(CHANCE_LEVEL, [proposal.sense for proposal in proposed])
+    places = np.split(np.arange(len(columns)), np.cumsum([len(proposal.columns) for proposal in proposed])[:-1])
+    groups, senses = list[Array](), list[int]()
+    for proposal, own in zip(proposed, places, strict=True):
+        each = [own] if proposal.together else np.split(own, len(own))
+        groups += each
+        senses += [proposal.sense] * len(each)
+    return ScoreTest(evidence, columns, groups, SENSITIVITY_LEFT).largest_by_chance(CHANCE_LEVEL, senses)
 
 
 def footprint(before: Evidence, after: Evidence) -> float:
