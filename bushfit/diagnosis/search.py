@@ -152,7 +152,7 @@ class Search:
         """Score every effect that the model lacks, and refit the best of those not known already.
 
         A model that lacks something large has bent its own parameters to make up for it: then the refits start from
-        the values read off the data, which is the shorter way.
+        those of a candidate that is known already, or from the values read off the data, which is the shorter way.
         """
         key = frozenset(added)
         if key not in self.rounds:
@@ -161,8 +161,9 @@ class Search:
             least = max(chance, _LEAST_SCORE * max((claim.score for claim in proposed), default=0.0))
             fitted = {candidate.name for candidate in known}
             best = [claim for claim in proposed[:_MOST_REFITTED] if claim.score > least and claim.name not in fitted]
-            read = self.start if not added and evidence.reduced > _BENT else {}
-            starts = {claim.name: self._found_earlier(key, claim.name) or read for claim in best}
+            near = known[0].evidence.model.values if known else {}
+            near = near or (self.start if not added and evidence.reduced > _BENT else {})
+            starts = {claim.name: self._found_earlier(key, claim.name) or near for claim in best}
             tried = refits(evidence, best, known, starts, self.held, self.bounds)
             self.rounds[key] = Round(evidence, proposed, tuple(self._with_limit(evidence, tried)))
         return self.rounds[key]
