@@ -48,6 +48,15 @@ def test_a_rival_is_not_left_on_its_way() -> None:
     assert not outcome.wrong_kept
 
 
+@pytest.mark.parametrize("seed", [979478117, 1762680746])
+def test_what_sticks_harder_than_it_slides_is_not_called_sliders(seed: int) -> None:
+    """What stands in place of a branch is asked for the form of its law too."""
+    (task,) = (task for task in tasks(110, 78010, "outside") if task.seed == seed)
+    outcome = work(task)
+    print(f"{task.outside}: {outcome.verdict} {outcome.sets}")
+    assert not outcome.wrong_kept
+
+
 def test_whichever_springpot_is_the_steep_one_becomes_the_dashpot() -> None:
     flat, steep = (0.2, 1.4e5), (0.999, 5286.0)
     becomes = effect_named("second_springpot").becomes
