@@ -23,6 +23,8 @@ EXCLUDED = 60.0
 _MOST_FALL = 4.0
 #: Evaluations of the model before which no refit is stopped.
 _FIRST_EVALUATIONS = 4
+#: Evaluations of the model that the best refit may take: where it stops short, the next effect makes up for it.
+_TO_ITS_END = 200
 #: Evaluations before which a refit goes on where its proposal claimed to come near the best.
 _CLAIM_HOLDS = 12
 
@@ -72,6 +74,9 @@ def refits(
             fits[name] = fits[name].stepped()
         least = min(least, *(fits[name].chi_square for name in running))
         running = [name for name in running if can_reach(fits[name], least + EXCLUDED, claimed[name])]
+    if fits:
+        first = min(fits, key=lambda name: fits[name].chi_square)
+        fits[first] = fits[first].finished(_TO_ITS_END)
     ends = {name: Evidence(fit.solution, evidence.data_sets) for name, fit in fits.items()}
     refitted = [
         Candidate(name, end, evidence.chi_square - end.chi_square, left=not _ended(fits[name]))

@@ -57,6 +57,14 @@ def test_what_sticks_harder_than_it_slides_is_not_called_sliders(seed: int) -> N
     assert not outcome.wrong_kept
 
 
+def test_the_best_refit_comes_to_its_end() -> None:
+    """A stiff friction lies at the end of a long valley; where its refit stopped short, a Maxwell arm made up for it."""
+    (task,) = (task for task in tasks(300, 11) if task.seed == 949206328)
+    outcome = work(task)
+    print(f"{task.hidden}: {outcome.verdict} {outcome.sets}")
+    assert outcome.exact
+
+
 def test_whichever_springpot_is_the_steep_one_becomes_the_dashpot() -> None:
     flat, steep = (0.2, 1.4e5), (0.999, 5286.0)
     becomes = effect_named("second_springpot").becomes
