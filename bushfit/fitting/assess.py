@@ -1,7 +1,5 @@
 """The uncertainty of a fit and how well it meets the data: covariance, quality, range measured, lack of fit."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 

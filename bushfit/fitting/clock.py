@@ -1,7 +1,5 @@
 """The clock of a loop: its frequency and how many cycles it holds, from the displacement alone."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array

@@ -4,8 +4,6 @@ A data set is one measured test with its noise. Fits, quality figures, pictures 
 of `DataSet` and need not know which kind of test it is.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Data sets of a campaign: one per measured loop, one per sweep."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ squares at the samples as they are (any number of cycles, sine or triangle, even
 turning points that friction needs are those of the motion and not of the sensor.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property

@@ -4,8 +4,6 @@ A series of order m has real coefficients (mean, m cosines, m negative sines), (
 (m + 1,): c_k stands for Re c_k exp(2 pi i k phase). Phase counts cycles.
 """
 
-from __future__ import annotations
-
 from itertools import accumulate, repeat
 
 import numpy as np

@@ -4,8 +4,6 @@ Each test that a lab could add is simulated as data sets with the noise of the c
 to what the campaign tells.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ A direction is an eigenvector of the Fisher information, with parameters scaled 
 over the root of the eigenvalue, which is a singular value of the Jacobian scaled by noise and size.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

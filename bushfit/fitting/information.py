@@ -1,7 +1,5 @@
 """What tests tell about parameters: Fisher information, and the standard errors that follow from it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -32,12 +30,12 @@ class Information:
     matrix: Array
 
     @classmethod
-    def of(cls, model: Model, data_sets: Sequence[DataSet], names: Sequence[str]) -> Information:
+    def of(cls, model: Model, data_sets: Sequence[DataSet], names: Sequence[str]) -> "Information":
         """What some data sets tell about the named parameters of a model at its values."""
         slope = jacobian(model, data_sets, names) * relative_sizes(model, names)[:, None]
         return cls(tuple(names), slope @ slope.T)
 
-    def with_more(self, model: Model, data_sets: Sequence[DataSet]) -> Information:
+    def with_more(self, model: Model, data_sets: Sequence[DataSet]) -> "Information":
         """What further data sets tell as well."""
         return replace(self, matrix=self.matrix + Information.of(model, data_sets, self.names).matrix)
 

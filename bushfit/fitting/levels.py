@@ -1,7 +1,5 @@
 """Errors that all runs of a level share: repeats do not show them, what a fitted model leaves of the levels does."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """One measured loop with its noise: force against time, the measured displacement driving the model."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

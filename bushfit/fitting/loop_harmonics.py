@@ -3,8 +3,6 @@
 Harmonics are fitted by least squares at the rows as they are; outliers do not bend them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

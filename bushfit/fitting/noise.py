@@ -5,8 +5,6 @@ and a phase error. Runs that hold the same are repeats of one line. Everything i
 gain errors are real and phase errors imaginary, both relative to |K|.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations

@@ -4,8 +4,6 @@ Physics that a model lacks misses whole stretches of a test and leaves neighbour
 puts one row far from the rows beside it. So a misfit, however large, makes no outliers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import pairwise
 

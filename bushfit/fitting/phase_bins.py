@@ -1,7 +1,5 @@
 """Rows of a long loop averaged into bins of phase."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array

@@ -1,7 +1,5 @@
 """Sentences on tests that no rubber could have given, or not at one temperature, and on tests that a fit left out."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

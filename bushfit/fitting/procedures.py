@@ -1,7 +1,5 @@
 """The fits a user asks for: static, dynamic, the two in turn, and all parameters together."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ A standard error takes the misfit for a parabola. The profile asks the data: it 
 anew, and looks where chi-square has risen too far. The two differ where a parameter is barely determined.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -11,8 +11,6 @@ Notes:
     number: an uneven clock changes nothing.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ does not, nothing is touched, so a record may start and end anywhere in its cycl
 is left out too, because nobody knows how many cycles went by there.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.effects.contract import Array

@@ -3,8 +3,6 @@
 They need only be of the right order; the fits end at one minimum from anywhere within two decades.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One measured sweep with its noise: dynamic stiffness over frequency and amplitude."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -3,8 +3,6 @@
 Its keys are those of `model.document`.
 """
 
-from __future__ import annotations
-
 import importlib.metadata
 import json
 from collections.abc import Mapping, Set

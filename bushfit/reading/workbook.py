@@ -4,8 +4,6 @@ python-calamine reads them: exactly, and imported in a millisecond where openpyx
 its own (`aside`), because an archive of some kilobytes may hold sheets of terabytes.
 """
 
-from __future__ import annotations
-
 import json
 import marshal
 import signal

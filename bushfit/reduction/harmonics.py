@@ -3,8 +3,6 @@
 Rows may lie anywhere in time. Drift and overtones are fitted with the fundamental, so that neither leaks into it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -53,7 +51,7 @@ class HarmonicFit:
     left_over: Complex
 
     @classmethod
-    def of(cls, time: Floats, displacement: Floats, force: Floats, edges: Floats) -> HarmonicFit:
+    def of(cls, time: Floats, displacement: Floats, force: Floats, edges: Floats) -> "HarmonicFit":
         """The fit with the frequency at which the phase of the displacement does not drift from cycle to cycle.
 
         Args:
@@ -76,7 +74,7 @@ class HarmonicFit:
         return cls._solved(time, values, count, frequency, _HARMONICS)
 
     @classmethod
-    def _solved(cls, time: Floats, values: Floats, count: int, frequency: float, order: int) -> HarmonicFit:
+    def _solved(cls, time: Floats, values: Floats, count: int, frequency: float, order: int) -> "HarmonicFit":
         """The fit over `count` cycles about time 0, with `order` harmonics or fewer, at a frequency that is given."""
         size = _DRIFT_TERMS + 2 * max(1, min(order, (time.size - _DRIFT_TERMS) // 4))
         gram, moments = np.zeros((size, size)), np.zeros((size, 2))

@@ -4,8 +4,6 @@ The strokes of the motion, from one turning point to the next, are told apart by
 the crossings of their middles. A run of alike ones is a part; ramps, pauses and single cycles between are left out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -89,12 +87,12 @@ class _Span:
         """Number of its cycles."""
         return (self.end - self.begin) / self.period
 
-    def like(self, other: _Span) -> bool:
+    def like(self, other: "_Span") -> bool:
         """Whether two parts have one amplitude and one rate."""
         ranges, periods = np.log(self.range / other.range), np.log(self.period / other.period)
         return bool(abs(ranges) < _SAME_AMPLITUDE and abs(periods) < _SAME_RATE)
 
-    def goes_on(self, other: _Span) -> bool:
+    def goes_on(self, other: "_Span") -> bool:
         """Whether the part after it is the same one, which a disturbance broke off."""
         gap = (other.begin - self.end) / self.period
         return self.like(other) and gap < _DISTURBED and abs(2.0 * gap - round(2.0 * gap)) < 2.0 * SAME_PHASE
