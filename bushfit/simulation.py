@@ -377,7 +377,7 @@ def to_files(simulated: Simulated, form: Form = "csv") -> dict[str, bytes]:
     A resonance test is what `bushfit reduce` takes; `campaign.toml` says how.
     """
     from bushfit.model.file import to_document
-    from bushfit.reading.csvfile import raw_loop_table, raw_resonance_table, raw_sweep_table
+    from bushfit.reading.rawtable import raw_loop_table, raw_resonance_table, raw_sweep_table
 
     tables = {
         **{loop.name: raw_loop_table(loop) for loop in simulated.loops},

@@ -20,8 +20,8 @@ from bushfit.geometry import Bushing, Direction, Specimen
 from bushfit.model import rig
 from bushfit.model.file import load_result
 from bushfit.model.model import FIVE, Model
-from bushfit.reading.csvfile import raw_sweep_table
 from bushfit.reading.measurement import Sweep
+from bushfit.reading.rawtable import raw_sweep_table
 from bushfit.simulation import Simulated, Undisturbed, measure, model_of, simulate, to_files, undisturbed
 
 LOOP = SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=2)

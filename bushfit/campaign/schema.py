@@ -9,7 +9,6 @@ from pydantic import ConfigDict, Field, InstanceOf, WithJsonSchema
 
 from bushfit.campaign.compound import Compound
 from bushfit.campaign.files import LoopFile, SweepFile
-from bushfit.campaign.parameters import Size, effect_values, parameter_settings, parameter_values
 from bushfit.campaign.places import KEYS, with_places
 from bushfit.campaign.quantities import (
     FIRST_ERROR,
@@ -22,8 +21,12 @@ from bushfit.campaign.quantities import (
     Frequency,
     Length,
     Share,
+    Size,
     Strain,
     Temperature,
+    effect_values,
+    parameter_settings,
+    parameter_values,
     si,
     table,
 )
