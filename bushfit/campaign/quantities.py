@@ -121,22 +121,25 @@ def parameter_values(raw: dict[str, Any]) -> dict[str, float]:
 
 def effect_values(raw: dict[str, Any]) -> dict[str, Any]:
     """Values by effect and parameter, in SI."""
-    return {
-        effect: {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in table.items()}
-        if isinstance(table, dict)
-        else table
-        for effect, table in raw.items()
-    }
+
+    def values(effect: str, own: dict[str, Any]) -> dict[str, float]:
+        return {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in own.items()}
+
+    return _each_table(raw, values)
 
 
 def with_sizes(raw: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
     """Tables by parameter with the values of some keys in SI; what is no table is left alone."""
-    return {
-        name: table | {key: parameter_value(f"{name}.{key}", name, table[key]) for key in keys if key in table}
-        if isinstance(table, dict)
-        else table
-        for name, table in raw.items()
-    }
+
+    def sized_table(name: str, own: dict[str, Any]) -> dict[str, Any]:
+        return own | {key: parameter_value(f"{name}.{key}", name, own[key]) for key in keys if key in own}
+
+    return _each_table(raw, sized_table)
+
+
+def _each_table(raw: dict[str, Any], convert: Callable[[str, dict[str, Any]], Any]) -> dict[str, Any]:
+    """Tables by name, each converted; what is no table is left to pydantic."""
+    return {name: convert(name, own) if isinstance(own, dict) else own for name, own in raw.items()}
 
 
 def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
