@@ -14,9 +14,8 @@ from bushfit.fitting.loop_harmonics import residual_limit
 from bushfit.fitting.outliers import gross_rows
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.cycles import HOLE
+from bushfit.reduction.programme import ENOUGH_ROWS, THREE_CYCLES, left_out
 
-#: Rows that are enough to find the cycles.
-_ENOUGH_ROWS = 200_000
 #: Difference from the motion a period later up to which it comes again, relative to its range.
 _SAME = 0.05
 #: Share of a period up to which a break in the steady motion, or what is left out, is too short to count.
@@ -27,8 +26,6 @@ _MOST_OFF = 8.0
 _LEAST_OFF = 5e-4
 #: Periods by which an end is drawn in at most.
 _EDGE = 0.5
-#: Cycles from which on the first one can go: three, for what noise may take off them.
-_THREE = 2.95
 #: Share of the range on either side of the middle within which the motion is not yet across: more than any noise.
 _BAND = 0.1
 #: Harmonics by which a frequency is refined at most; chosen: what a triangle has beyond them shifts no phase.
@@ -73,7 +70,7 @@ _CROWDED = 0.2
 
 def thinned(loop: Loop) -> tuple[Array, Array]:
     """Time [s] and displacement [m or rad] of rows that are enough to find the cycles, gross outliers left out."""
-    every = slice(None, None, -(-loop.time.size // _ENOUGH_ROWS))
+    every = slice(None, None, -(-loop.time.size // ENOUGH_ROWS))
     time, motion = loop.time[every], loop.displacement[every]
     rows = gross_rows(motion)
     return np.delete(time, rows), np.delete(motion, rows)
@@ -99,12 +96,8 @@ def steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | Non
     if ends is None:
         return loop, None
     first, last, after = ends
-    left_out = [
-        f"{duration:.3g} s {where} its steady cycles"
-        for duration, where in ((first - time[0], "before"), (time[-1] - last, "after"))
-        if duration > _BRIEF * period
-    ]
-    note = f"{' and '.join(left_out)} are left out; {(last - first) / period:.3g} cycles are used"
+    gaps = (f"{gap:.3g} s" if gap > _BRIEF * period else "" for gap in (first - time[0], time[-1] - last))
+    note = left_out(gaps, (last - first) / period)
     return _cut(loop, first, last if after else np.inf), note
 
 
@@ -123,7 +116,7 @@ def _steady_ends(time: Array, motion: Array, period: float) -> tuple[float, floa
     if after:
         end = min(other[clock[other] > clock[end - 1] - _EDGE * period], default=end)
     first, last = float(time[start]), float(time[end - 1]) + period
-    if before and last - first > _THREE * period:
+    if before and last - first > THREE_CYCLES * period:
         first += period  # after a run-in the first cycle still remembers it
     return first, last, bool(after)
 

@@ -47,9 +47,6 @@ _OUTLIER = 6.0
 #: Shared variance of an outlying pair of repeats over the median of all pairs: noise alone reaches it once in 500
 #: campaigns.
 _OUTLYING_PAIR = 100.0
-#: Rounds of reweighting towards the least sum of distances; chosen: nine of ten curves have then come within a third
-#: of the noise of where they end.
-_ROUNDS = 25
 #: Least distance relative to the median distance, so that no point takes all the weight.
 _LEAST_DISTANCE = 1e-3
 
@@ -153,7 +150,8 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
         for sweep, log_stiffness in [(sweep, _at_nominal(sweep)) for sweep in sweeps]
         for held in np.unique(sweep.held)
     }
-    slopes = {sweep.name: slope for sweep in sweeps if (slope := _slope(_of(sweep.name, lines)))}
+    by_sweep = {sweep.name: [line for key, line in lines.items() if key[0] == sweep.name] for sweep in sweeps}
+    slopes = {name: slope for name, own in by_sweep.items() if (slope := _slope(own))}
     for key, line in lines.items():
         if key[0] in slopes and line.steps.size:
             exponent, at = slopes[key[0]]
@@ -214,11 +212,6 @@ def _at_nominal(sweep: Sweep) -> Array:
     return value - (reached - surface(sweep.amplitude)) @ solution
 
 
-def _of(name: str, lines: Mapping[LineKey, _Line]) -> list[_Line]:
-    """The lines of one sweep that were repeated."""
-    return [line for key, line in lines.items() if key[0] == name and line.steps.size]
-
-
 def _slope(lines: Sequence[_Line]) -> tuple[float, float] | None:
     """Exponent with which the scatter of a sweep's lines goes with what is stepped, and a middle step; None where
     repeats show no growth.
@@ -231,7 +224,7 @@ def _slope(lines: Sequence[_Line]) -> tuple[float, float] | None:
     from scipy.optimize import minimize_scalar
 
     squares, logs = [], []
-    for line in lines:
+    for line in (line for line in lines if line.steps.size):
         steps, place = np.unique(line.steps, return_inverse=True)
         square = np.bincount(place, (np.square(line.scatter) / np.maximum(line.variance, FLOOR**2)).sum(axis=1))
         if steps.size >= _FEWEST_SOUGHT and square.any():
@@ -372,7 +365,7 @@ def _freed(basis: Array, values: Array) -> Array:
 def _least_absolute(basis: Array, values: Array) -> Array:
     """Coefficients of a curve, (n, k), with the least sum of distances to gain and phase, (n, 2) -> (k, 2)."""
     root_weight = np.ones((len(values), 1))
-    for _ in range(_ROUNDS):
+    for _ in range(25):  # chosen: nine of ten curves have then come within a third of the noise of where they end
         solution = np.linalg.lstsq(basis * root_weight, values * root_weight, rcond=None)[0]
         distance = np.linalg.norm(values - basis @ solution, axis=1, keepdims=True)
         root_weight = np.sqrt(1.0 / np.maximum(distance, _LEAST_DISTANCE * np.median(distance) + FLOOR**2))
