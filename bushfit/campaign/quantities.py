@@ -17,8 +17,6 @@ from bushfit.validation import LARGEST_NUMBER, converted, unknown_key
 _LARGEST_GRID = 100_000
 #: Relative width by which a range of frequencies is widened, so that rounding does not drop its last step.
 _ROUNDING = 1e-9
-#: Repeats or cycles at most: more than any rig runs.
-_LARGEST_COUNT = 1_000_000
 #: Mass [kg], acceleration [m/s^2] and frequency [Hz] of a resonance test at most, and their inverse at least; chosen:
 #: far beyond every shaker, and numbers stay finite.
 LARGEST_SHAKEN = 1e6
@@ -87,7 +85,7 @@ Frequencies = Annotated[tuple[Frequency, ...], FIRST_ERROR, table(_frequencies, 
 Displacement = Annotated[float, motion(), Field(gt=0)]
 SHAKEN = Field(ge=1.0 / LARGEST_SHAKEN, le=LARGEST_SHAKEN)
 Share = Annotated[float, si("1"), Field(ge=0, lt=1)]
-Count = Annotated[int, Field(strict=True, ge=1, le=_LARGEST_COUNT)]
+Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]  # of repeats or cycles: more than any rig runs
 
 
 #: The second to the power of alpha, at the end of the unit of m.

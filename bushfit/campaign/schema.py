@@ -43,9 +43,6 @@ Residuals = Literal["complex", "magnitude_loss_factor"]
 #: What is summed over the residuals: their squares, or soft_l1 with outliers left out.
 Loss = Literal["linear", "soft_l1"]
 
-#: [s] Pause in a simulated programme at most: a day is more than any rig rests between two loops.
-_LONGEST_PAUSE = 86_400.0
-
 
 def _fit_table(raw: dict[str, Any]) -> dict[str, Any]:
     """[fit] with its tables by parameter, such as [fit.mu] or [fit."inertia.mass"], under the key "parameters"."""
@@ -234,7 +231,7 @@ class SimulatedLoop(SimulatedTest):
     waveform: Waveform = "sine"
     amplitudes: Annotated[tuple[Displacement, ...], FIRST_ERROR, Field(min_length=1)] = ()
     frequencies: Annotated[tuple[Frequency, ...], FIRST_ERROR, Field(min_length=1)] = ()
-    pause: Annotated[float, si("s"), Field(ge=0, le=_LONGEST_PAUSE)] = 0.0
+    pause: Annotated[float, si("s"), Field(ge=0, le=86_400.0)] = 0.0  # a day: no rig rests for longer
 
     def __post_init__(self) -> None:
         for one, several in (("amplitude", "amplitudes"), ("frequency", "frequencies")):

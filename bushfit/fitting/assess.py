@@ -134,7 +134,7 @@ def _reduced(model: Model, data_sets: Sequence[DataSet], parameters: int) -> tup
 
 def quality(model: Model, data_sets: Sequence[DataSet], parameters: int) -> Quality:
     """How well a model meets data sets: NRMSE, reduced chi-square, number of residuals, relative noise."""
-    relative = np.concatenate([np.abs(data_set.relative(model)) for data_set in data_sets])
+    relative = np.concatenate([data_set.relative(model) for data_set in data_sets])
     noise = np.repeat([data_set.relative_noise for data_set in data_sets], [data_set.counted for data_set in data_sets])
     return Quality(
         nrmse=float(np.sqrt(np.mean(relative**2))),

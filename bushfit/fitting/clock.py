@@ -30,8 +30,6 @@ _EDGE = 0.5
 _BAND = 0.1
 #: Harmonics by which a frequency is refined at most; chosen: what a triangle has beyond them shifts no phase.
 _MOST_HARMONICS = 15
-#: Rounds of Gauss-Newton at most; chosen: nearly all frequencies take three to six.
-_MOST_ROUNDS = 10
 #: Step relative to the frequency below which Gauss-Newton has ended: rounding.
 _SETTLED = 1e-12
 #: Step relative to the frequency that Gauss-Newton takes at most: farther off it is not linear.
@@ -244,7 +242,7 @@ def _refined(clock: Array, x: Array, frequency: float, rows_per_cycle: float) ->
     order = resolved_order(rows_per_cycle * chosen.size / x.size, _MOST_HARMONICS)
     columns = basis(time * frequency, order)
     solution = least_squares(columns, motion)
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(10):  # of Gauss-Newton; chosen: nearly all frequencies take three to six
         residual = motion - columns @ solution
         kept = np.abs(residual) <= residual_limit(solution, residual, residual.size)
         by_frequency = 2.0 * np.pi * time * (columns @ derivative(solution))

@@ -23,8 +23,6 @@ _DRIFT_TERMS = 3
 _CHUNK_ROWS = 1 << 14
 #: [cycles] Drift of the phase over a whole step with which its frequency is found; chosen: far below its error.
 _SETTLED_DRIFT = 1e-7
-#: Corrections of the frequency; each squares what it is off by, so that fewer do.
-_MOST_CORRECTIONS = 4
 #: Rows that the search for the frequency takes of a long step; chosen: enough for its last digit.
 _FREQUENCY_ROWS = 1 << 17
 #: Probability below which chance alone does not make cycles scatter more than white noise does; chosen.
@@ -64,7 +62,7 @@ class HarmonicFit:
         frequency = count / float(edges[-1] - edges[0])
         thin = slice(None, None, max(1, time.size // _FREQUENCY_ROWS))
         number = np.arange(count) - (count - 1) / 2.0
-        for _ in range(_MOST_CORRECTIONS):
+        for _ in range(4):  # each squares what the frequency is off by, so that fewer do
             fit = cls._solved(time[thin], values[:, thin], count, frequency, _FREQUENCY_HARMONICS)
             phase = np.unwrap(np.angle(fit.coefficients[0, 1] + fit.left_over[0]))
             drift = float(number @ phase / (number @ number)) / (2.0 * np.pi)
