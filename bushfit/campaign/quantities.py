@@ -1,4 +1,4 @@
-"""Kinds of values in a campaign file: pydantic checks them, texts such as "10 mm" become SI."""
+"""Kinds of values in a campaign file, and model parameters by name: texts such as "10 mm" become SI."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -22,6 +22,12 @@ _ROUNDING = 1e-9
 LARGEST_SHAKEN = 1e6
 #: Ends the check of a list at its first error: those of a hundred thousand would fill the memory.
 FIRST_ERROR = Field(fail_fast=True)
+#: The second to the power of alpha, at the end of the unit of m.
+_S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
+#: A value of a parameter: a number here, a text or a number in the file.
+Size = Annotated[
+    float, WithJsonSchema({"type": ["string", "number"], "description": "with its unit; a ratio may be a number"})
+]
 
 
 def si(*units: str) -> BeforeValidator:
@@ -86,14 +92,6 @@ Displacement = Annotated[float, motion(), Field(gt=0)]
 SHAKEN = Field(ge=1.0 / LARGEST_SHAKEN, le=LARGEST_SHAKEN)
 Share = Annotated[float, si("1"), Field(ge=0, lt=1)]
 Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]  # of repeats or cycles: more than any rig runs
-
-
-#: The second to the power of alpha, at the end of the unit of m.
-_S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
-#: A value of a parameter: a number here, a text or a number in the file.
-Size = Annotated[
-    float, WithJsonSchema({"type": ["string", "number"], "description": "with its unit; a ratio may be a number"})
-]
 
 
 def parameter_value(place: str, name: str, raw: Any) -> float:

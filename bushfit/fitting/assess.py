@@ -1,4 +1,7 @@
-"""The uncertainty of a fit and how well it meets the data: covariance, quality, range measured, lack of fit."""
+"""The uncertainty of a fit and how well it meets the data: covariance, quality, range measured, lack of fit.
+
+Tests that no rubber could have given, that were not made at one temperature, or that a fit left out are told of.
+"""
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
@@ -20,6 +23,16 @@ _LACK_OF_FIT = 5.0
 #: Standard error given to a combination of parameters that the data leave open, in coordinates, which are of order
 #: one: beyond all bounds, and small enough to cancel where a quantity does not depend on the combination.
 _LARGEST_ERROR = 1e3
+#: Least shear modulus of a rubber [Pa]: that of the softest gel of a mount, with room.
+_SOFTEST = 5e4
+#: Largest shear modulus of a rubber [Pa]: that of the hardest compound at small strain, with room.
+_HARDEST = 1e8
+#: Modulus of the fastest and smallest test over that of the slowest and largest, at most, for any rubber.
+_MOST_STIFFENING = 20.0
+#: [K] Range of temperatures that the tests of one fit may have; chosen: filled rubber softens by up to 1 % a kelvin,
+#: and a test chamber keeps its temperature within less.
+_ONE_TEMPERATURE = 3.0
+_CHECK = "check the units of displacement and force, and the dimensions of what was tested"
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,18 +185,6 @@ def misfit(model: Model, data_sets: Sequence[DataSet], parameters: int, advice: 
         f"(reduced chi-square {number(reduced, 2)}{where}): intervals are invalid, though standard errors are scaled "
         f"up{advice}"
     ]
-
-
-#: Least shear modulus of a rubber [Pa]: that of the softest gel of a mount, with room.
-_SOFTEST = 5e4
-#: Largest shear modulus of a rubber [Pa]: that of the hardest compound at small strain, with room.
-_HARDEST = 1e8
-#: Modulus of the fastest and smallest test over that of the slowest and largest, at most, for any rubber.
-_MOST_STIFFENING = 20.0
-#: [K] Range of temperatures that the tests of one fit may have; chosen: filled rubber softens by up to 1 % a kelvin,
-#: and a test chamber keeps its temperature within less.
-_ONE_TEMPERATURE = 3.0
-_CHECK = "check the units of displacement and force, and the dimensions of what was tested"
 
 
 def implausible(bushing: Bushing | None, data_sets: Sequence[DataSet]) -> list[str]:

@@ -1,4 +1,4 @@
-"""Data sets of a campaign: one per measured loop, one per sweep."""
+"""Data sets of a campaign, one per measured loop, one per sweep; and of tests that are not made yet."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace

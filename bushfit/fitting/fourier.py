@@ -1,4 +1,4 @@
-"""Fourier series of a periodic record, fitted by least squares to its rows as they are.
+"""Fourier series of a periodic record, fitted by least squares to its rows as they are; of a long one in bins of phase.
 
 A series of order m has real coefficients (mean, m cosines, m negative sines), (2 m + 1,), or complex ones, mean first,
 (m + 1,): c_k stands for Re c_k exp(2 pi i k phase). Phase counts cycles.
@@ -20,6 +20,10 @@ GRID = 1024
 _ROWS_PER_HARMONIC = 5
 #: Golden ratio less 1; chosen: its multiples, less whole numbers, spread evenly and keep time with no cycle.
 _GOLDEN = 0.6180339887498949
+#: First cycles whose bins are kept apart, because a loop settles over them.
+_APART = 4
+#: Length of each group of later cycles over that of the one before it; chosen: a loop settles ever more slowly.
+_GROWTH = 1.5
 
 
 def spread_rows(rows: int, most: int) -> NDArray[np.intp]:
@@ -71,12 +75,6 @@ def first_amplitude(real: Array) -> float:
 def series(coefficients: Array, phase: Array) -> Array:
     """Values of a series with complex coefficients at any phase [cycles], (n,)."""
     return polyval(np.exp(2j * np.pi * phase), coefficients).real
-
-
-#: First cycles whose bins are kept apart, because a loop settles over them.
-_APART = 4
-#: Length of each group of later cycles over that of the one before it; chosen: a loop settles ever more slowly.
-_GROWTH = 1.5
 
 
 def phase_bins(

@@ -1,4 +1,8 @@
-"""What tests tell about parameters: Fisher information, and the standard errors that follow from it."""
+"""What tests tell about parameters: Fisher information, standard errors, and the further test that would help most.
+
+Each test that a lab could add is simulated as data sets with the noise of the campaign, and what it would tell is added
+to what the campaign tells.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,6 +20,26 @@ from bushfit.model.model import Model
 _LEAST_SIZE = 0.05
 #: Relative standard error beyond which a figure tells nothing more.
 _BEYOND = 10.0
+#: Rate of a proposed loop where there is none [Hz]: quasi-static on most rigs.
+_NEW_RATE = 0.1
+#: Its cycles, from rest: the first shows how it settles.
+_NEW_CYCLES = 2.0
+#: Its rows.
+_NEW_ROWS = 400
+#: Its noise over half its force range: that of most force sensors.
+_FORCE_NOISE = 5e-3
+#: Frequencies of a proposed sweep at each amplitude.
+_NEW_FREQUENCIES = 9
+#: Band of a proposed sweep where nothing fast was measured [Hz]: that of most rigs.
+_NEW_BAND = (5.0, 150.0)
+#: Highest frequency of the tests below which nothing fast was measured [Hz].
+_SLOW = 2.0
+#: Strain that a bushing can be asked to bear in a test.
+_BEARABLE = 0.5
+#: Worst standard error after a test over that before, up to which the test is worth its time.
+_LEAST_GAIN_RATIO = 0.8
+#: Relative standard error after a test from which on it is not worth its time, whatever it was before.
+_HOPELESS = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,28 +91,6 @@ def relative_sizes(model: Model, names: Sequence[str]) -> Array:
 def percent(error: float) -> str:
     """A relative standard error for people: "2.5 %"."""
     return f"{float(f'{100.0 * error:.2g}'):g} %" if error < _BEYOND else "beyond 1000 %"
-
-
-#: Rate of a proposed loop where there is none [Hz]: quasi-static on most rigs.
-_NEW_RATE = 0.1
-#: Its cycles, from rest: the first shows how it settles.
-_NEW_CYCLES = 2.0
-#: Its rows.
-_NEW_ROWS = 400
-#: Its noise over half its force range: that of most force sensors.
-_FORCE_NOISE = 5e-3
-#: Frequencies of a proposed sweep at each amplitude.
-_NEW_FREQUENCIES = 9
-#: Band of a proposed sweep where nothing fast was measured [Hz]: that of most rigs.
-_NEW_BAND = (5.0, 150.0)
-#: Highest frequency of the tests below which nothing fast was measured [Hz].
-_SLOW = 2.0
-#: Strain that a bushing can be asked to bear in a test.
-_BEARABLE = 0.5
-#: Worst standard error after a test over that before, up to which the test is worth its time.
-_LEAST_GAIN_RATIO = 0.8
-#: Relative standard error after a test from which on it is not worth its time, whatever it was before.
-_HOPELESS = 10.0
 
 
 def further_test(model: Model, data_sets: Sequence[DataSet], known: Information) -> list[str]:

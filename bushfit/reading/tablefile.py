@@ -29,6 +29,24 @@ if TYPE_CHECKING:
 Form = Literal["csv", "decimal-comma", "xlsx"]
 #: Cells of a row.
 Row = Iterable[str | float | None]
+#: The start of a text that a spreadsheet takes for a formula, in ASCII or full width, even after blanks.
+_FORMULA = re.compile("[\\s\"']*[=+\\-@\uff1d\uff0b\uff0d\uff20|%]|\\t")
+#: What parts the lines of a text.
+_LINE_ENDS = re.compile("[\\r\\n]+")
+#: Characters that the name of a sheet must not have: Excel's, and those that XML has none of.
+_UNSAFE_IN_SHEETS = re.compile(r"[\[\]:*?/\\\x00-\x1f\ufffe\uffff]")
+#: Characters of the name of a sheet at most, of which rare ones count twice: units of UTF-16.
+_LONGEST_SHEET = 31
+#: The name of a sheet that Excel keeps for itself.
+_RESERVED = "history"
+#: Characters of a cell at most.
+_LONGEST_TEXT = 32_767
+#: When a workbook says it was made: that of its zip archive, so that the same tables are the same bytes.
+_MADE = datetime(1980, 1, 1, tzinfo=UTC)
+#: Widest column [characters].
+_WIDEST = 60
+#: What XlsxWriter gives back for a cell that lies beyond the last row or column of a sheet.
+_BEYOND = -1
 
 
 def ending(form: Form) -> str:
@@ -61,12 +79,6 @@ def opened(file: Path, form: Form, headers: Iterable[str]) -> Iterator[Callable[
             yield Rows(stream, headers, decimal_comma=decimal_comma).add
     with file.open("rb") as written:
         os.fsync(written.fileno())
-
-
-#: The start of a text that a spreadsheet takes for a formula, in ASCII or full width, even after blanks.
-_FORMULA = re.compile("[\\s\"']*[=+\\-@\uff1d\uff0b\uff0d\uff20|%]|\\t")
-#: What parts the lines of a text.
-_LINE_ENDS = re.compile("[\\r\\n]+")
 
 
 class Rows:
@@ -119,22 +131,6 @@ def in_a_line(text: str) -> str:
 def undefused(text: str) -> str:
     """The text that was written so, but for the ends of its lines."""
     return text[1:] if text.startswith("'") and _FORMULA.match(text[1:]) else text
-
-
-#: Characters that the name of a sheet must not have: Excel's, and those that XML has none of.
-_UNSAFE_IN_SHEETS = re.compile(r"[\[\]:*?/\\\x00-\x1f\ufffe\uffff]")
-#: Characters of the name of a sheet at most, of which rare ones count twice: units of UTF-16.
-_LONGEST_SHEET = 31
-#: The name of a sheet that Excel keeps for itself.
-_RESERVED = "history"
-#: Characters of a cell at most.
-_LONGEST_TEXT = 32_767
-#: When a workbook says it was made: that of its zip archive, so that the same tables are the same bytes.
-_MADE = datetime(1980, 1, 1, tzinfo=UTC)
-#: Widest column [characters].
-_WIDEST = 60
-#: What XlsxWriter gives back for a cell that lies beyond the last row or column of a sheet.
-_BEYOND = -1
 
 
 class Sheet:
