@@ -1,5 +1,7 @@
 """Measured tests in SI units: a hysteresis loop, a stepped-sine sweep; and the time of a loop recorded without it."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -95,7 +97,7 @@ class Loop:
     def __post_init__(self) -> None:
         _check_lengths(self.name, self.time, self.displacement, self.force)
 
-    def at(self, rows: slice | NDArray[np.bool_]) -> "Loop":
+    def at(self, rows: slice | NDArray[np.bool_]) -> Loop:
         """The record of these rows alone."""
         channels = {name: getattr(self, name)[rows] for name in ("time", "displacement", "force")}
         return replace(self, **channels)

@@ -4,6 +4,8 @@ A run is what was recorded in one go: either the frequency is stepped and the am
 a mass swings on a mount, neither is held. Rigs miss what they are asked for: 0.0987 mm and 0.1004 mm are one level.
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

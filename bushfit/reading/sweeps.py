@@ -1,5 +1,7 @@
 """Stepped-sine sweeps read from files, or one error that tells why a file cannot be a sweep."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
