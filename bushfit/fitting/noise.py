@@ -14,6 +14,7 @@ from scipy.special import chdtrc
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
+from bushfit.fitting.outliers import least_absolute
 from bushfit.reading.measurement import Sweep
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 
@@ -47,8 +48,6 @@ _OUTLIER = 6.0
 #: Shared variance of an outlying pair of repeats over the median of all pairs: noise alone reaches it once in 500
 #: campaigns.
 _OUTLYING_PAIR = 100.0
-#: Least distance relative to the median distance, so that no point takes all the weight.
-_LEAST_DISTANCE = 1e-3
 
 #: A line: the name of the sweep, and what its runs hold.
 LineKey = tuple[str, float]
@@ -150,8 +149,7 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
         for sweep, log_stiffness in [(sweep, _at_nominal(sweep)) for sweep in sweeps]
         for held in np.unique(sweep.held)
     }
-    by_sweep = {sweep.name: [line for key, line in lines.items() if key[0] == sweep.name] for sweep in sweeps}
-    slopes = {name: slope for name, own in by_sweep.items() if (slope := _slope(own))}
+    slopes = _slopes(sweeps, lines)
     for key, line in lines.items():
         if key[0] in slopes and line.steps.size:
             exponent, at = slopes[key[0]]
@@ -212,8 +210,18 @@ def _at_nominal(sweep: Sweep) -> Array:
     return value - (reached - surface(sweep.amplitude)) @ solution
 
 
+def _slopes(sweeps: Sequence[Sweep], lines: Mapping[LineKey, _Line]) -> dict[str, tuple[float, float]]:
+    """How the scatter of a rig goes with what is stepped, see `_slope`: one law for all sweeps that step the same."""
+    found = dict[str, tuple[float, float]]()
+    for stepped in {sweep.stepped for sweep in sweeps}:
+        alike = {sweep.name for sweep in sweeps if sweep.stepped == stepped}
+        if slope := _slope([line for key, line in lines.items() if key[0] in alike and line.steps.size]):
+            found |= dict.fromkeys(alike, slope)
+    return found
+
+
 def _slope(lines: Sequence[_Line]) -> tuple[float, float] | None:
-    """Exponent with which the scatter of a sweep's lines goes with what is stepped, and a middle step; None where
+    """Exponent with which the scatter of lines goes with what is stepped, and a middle step; None where
     repeats show no growth.
 
     Notes:
@@ -224,7 +232,7 @@ def _slope(lines: Sequence[_Line]) -> tuple[float, float] | None:
     from scipy.optimize import minimize_scalar
 
     squares, logs = [], []
-    for line in (line for line in lines if line.steps.size):
+    for line in lines:
         steps, place = np.unique(line.steps, return_inverse=True)
         square = np.bincount(place, (np.square(line.scatter) / np.maximum(line.variance, FLOOR**2)).sum(axis=1))
         if steps.size >= _FEWEST_SOUGHT and square.any():
@@ -333,7 +341,7 @@ def _about_smooth_curve(log_step: Array, log_stiffness: Array) -> _Line:
         return _Line(np.full((1, 2), ASSUMED_SHARED[0]), 1, np.empty((0, 2)))
     values = _parts(log_stiffness)
     basis = np.polynomial.legendre.legvander(unit(log_step), degree)
-    residual = np.abs(values - basis @ _least_absolute(basis, values))
+    residual = np.abs(values - basis @ least_absolute(basis, values, FLOOR**2))
     usual = np.median(np.sort(residual, axis=0)[degree + 1 :], axis=0)  # the curve goes through degree + 1 points
     inliers = np.all(residual <= np.maximum(_OUTLIER * MEDIAN_TO_SIGMA * usual, FLOOR), axis=1)
     inliers |= np.count_nonzero(inliers) < degree + 2  # too few would leave nothing free
@@ -360,16 +368,6 @@ def _freed(basis: Array, values: Array) -> Array:
         mirror = np.append(1.0, column[place + 1 :])
         turned[place:] -= np.outer(factor * mirror, mirror @ turned[place:])
     return turned[basis.shape[1] :]
-
-
-def _least_absolute(basis: Array, values: Array) -> Array:
-    """Coefficients of a curve, (n, k), with the least sum of distances to gain and phase, (n, 2) -> (k, 2)."""
-    root_weight = np.ones((len(values), 1))
-    for _ in range(25):  # chosen: nine of ten curves have then come within a third of the noise of where they end
-        solution = np.linalg.lstsq(basis * root_weight, values * root_weight, rcond=None)[0]
-        distance = np.linalg.norm(values - basis @ solution, axis=1, keepdims=True)
-        root_weight = np.sqrt(1.0 / np.maximum(distance, _LEAST_DISTANCE * np.median(distance) + FLOOR**2))
-    return np.asarray(solution)
 
 
 def _parts(values: Array) -> Array:
