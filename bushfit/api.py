@@ -189,8 +189,9 @@ def simulate(
     Raises:
         BushfitError: no model, or files that stand there.
     """
-    from bushfit.simulation import model_of, to_files
+    from bushfit.campaign.campaign import model_of
     from bushfit.simulation import simulate as measured
+    from bushfit.simulation import to_files
 
     if isinstance(source, Campaign):
         truth, plan = model_of(source), source.simulate or SimulateSettings()

@@ -22,13 +22,13 @@ from bushfit.campaign.noise import filtered_noise, of_levels, reached_over_asked
 from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulatedTest, SimulateSettings
 from bushfit.campaign.session import planned_session
 from bushfit.campaign.written import body_lines, table_lines
-from bushfit.effects import Level, effect_of, with_base
+from bushfit.effects import Level
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances
-from bushfit.errors import CampaignError, naming, typed
+from bushfit.errors import CampaignError, typed
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.model import rig
 from bushfit.model.document import ModelFile
-from bushfit.model.model import FIVE, Model
+from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.reading.measurement import Loop, Source, Sweep
 from bushfit.reading.resonance import ResonanceTest
@@ -114,38 +114,6 @@ class Simulated:
         bushing, name = self.truth.bushing, self.result.name
         loops = tuple(part for loop in self.loops for part in programme(loop))
         return Campaign(name, Path(name), bushing, loops, self.sweeps + reduced, specimens=self.specimens)
-
-
-def model_of(campaign: Campaign) -> Model:
-    """The model that a campaign's [simulate] table describes.
-
-    Raises:
-        CampaignError: no such table, or a parameter of the paper's five that has no value.
-        ModelError: an unknown effect or an impossible value.
-    """
-    if campaign.simulate is None:
-        raise CampaignError(
-            "nothing says what to simulate",
-            file=campaign.path,
-            expected="a [simulate] table with parameters",
-            hint="or fit the campaign first and simulate its model.json",
-        )
-    values = campaign.simulate.parameters
-    missing = [name for name in FIVE if name not in values]
-    if missing:
-        raise CampaignError(
-            "parameters without a value",
-            file=campaign.path,
-            place="[simulate.parameters]",
-            found="no " + ", ".join(missing),
-            expected="all of " + ", ".join(FIVE),
-        )
-    effects = campaign.simulate.effects
-    own = {f"{effect}.{name}": value for effect, table in effects.items() for name, value in table.items()}
-    with naming(campaign.path):
-        names = with_base(dict.fromkeys(map(effect_of, own)))
-        kept = {name: value for name, value in values.items() if effect_of(name) in names}
-        return Model(campaign.bushing, names, {**kept, **own})
 
 
 def simulate(truth: Model, plan: SimulateSettings) -> Simulated:
@@ -377,7 +345,7 @@ def to_files(simulated: Simulated, form: Form = "csv") -> dict[str, bytes]:
     A resonance test is what `bushfit reduce` takes; `campaign.toml` says how.
     """
     from bushfit.model.file import to_document
-    from bushfit.reading.csvfile import raw_loop_table, raw_resonance_table, raw_sweep_table
+    from bushfit.reading.rawtable import raw_loop_table, raw_resonance_table, raw_sweep_table
 
     tables = {
         **{loop.name: raw_loop_table(loop) for loop in simulated.loops},

@@ -23,13 +23,13 @@ from pydantic import TypeAdapter
 
 from bushfit.batch.limits import Limits
 from bushfit.batch.manifest import ManifestFile
-from bushfit.campaign.campaign import load_campaign
+from bushfit.campaign.campaign import load_campaign, model_of
 from bushfit.campaign.schema import CampaignFile
 from bushfit.cli import cli
 from bushfit.geometry import Direction
 from bushfit.reading.loops import read_loop
 from bushfit.reading.sweeps import read_sweep
-from bushfit.simulation import model_of, simulate, to_files
+from bushfit.simulation import simulate, to_files
 
 
 def blocks(page: Path, language: str) -> list[str]:

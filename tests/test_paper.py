@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.campaign.campaign import Campaign, load_campaign, model_of
 from bushfit.campaign.schema import SimulateSettings
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_two_step
-from bushfit.simulation import measure, model_of, undisturbed
+from bushfit.simulation import measure, undisturbed
 
 #: Draws of noise; simulated data.
 SEEDS = 20

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.campaign.campaign import Campaign, load_campaign, model_of
 from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE
 from bushfit.errors import CampaignError, ModelError
@@ -20,9 +20,9 @@ from bushfit.geometry import Bushing, Direction, Specimen
 from bushfit.model import rig
 from bushfit.model.file import load_result
 from bushfit.model.model import FIVE, Model
-from bushfit.reading.csvfile import raw_sweep_table
 from bushfit.reading.measurement import Sweep
-from bushfit.simulation import Simulated, Undisturbed, measure, model_of, simulate, to_files, undisturbed
+from bushfit.reading.rawtable import raw_sweep_table
+from bushfit.simulation import Simulated, Undisturbed, measure, simulate, to_files, undisturbed
 
 LOOP = SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=2)
 SWEEP = SimulatedSweep(Direction.AXIAL, (1e-4, 5e-4), (5.0, 50.0, 155.0))

@@ -25,8 +25,7 @@ from bushfit.batch.document import Record
 from bushfit.batch.manifest import Row
 from bushfit.batch.points import At, Point
 from bushfit.batch.quantities import LOSS_FACTOR, OF_FIT, STIFFNESS, Figures, Quantity, at_point, figures
-from bushfit.campaign.parameters import Size, with_sizes
-from bushfit.campaign.quantities import Share, table, text
+from bushfit.campaign.quantities import Share, Size, table, text, with_sizes
 from bushfit.campaign.toml import read_toml
 from bushfit.diagnosis import document
 from bushfit.effects.contract import Array

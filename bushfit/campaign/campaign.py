@@ -20,9 +20,10 @@ from bushfit.campaign.schema import (
     SimulateSettings,
 )
 from bushfit.campaign.toml import read_toml
-from bushfit.effects import place_of
+from bushfit.effects import effect_of, place_of, with_base
 from bushfit.errors import CampaignError, naming, typed
 from bushfit.geometry import Bushing, Specimen, place_named
+from bushfit.model.model import FIVE, Model
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
@@ -153,6 +154,38 @@ def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
         if place := place_of(name):
             with naming(place=name):
                 place_named(place, specimens)
+
+
+def model_of(campaign: Campaign) -> Model:
+    """The model that a campaign's [simulate] table describes.
+
+    Raises:
+        CampaignError: no such table, or a parameter of the paper's five that has no value.
+        ModelError: an unknown effect or an impossible value.
+    """
+    if campaign.simulate is None:
+        raise CampaignError(
+            "nothing says what to simulate",
+            file=campaign.path,
+            expected="a [simulate] table with parameters",
+            hint="or fit the campaign first and simulate its model.json",
+        )
+    values = campaign.simulate.parameters
+    missing = [name for name in FIVE if name not in values]
+    if missing:
+        raise CampaignError(
+            "parameters without a value",
+            file=campaign.path,
+            place="[simulate.parameters]",
+            found="no " + ", ".join(missing),
+            expected="all of " + ", ".join(FIVE),
+        )
+    effects = campaign.simulate.effects
+    own = {f"{effect}.{name}": value for effect, table in effects.items() for name, value in table.items()}
+    with naming(campaign.path):
+        names = with_base(dict.fromkeys(map(effect_of, own)))
+        kept = {name: value for name, value in values.items() if effect_of(name) in names}
+        return Model(campaign.bushing, names, {**kept, **own})
 
 
 def refuse_tests(paths: Sequence[Path]) -> None:

@@ -1,27 +1,33 @@
-"""Kinds of values in a campaign file: pydantic checks them, texts such as "10 mm" become SI."""
+"""Kinds of values in a campaign file, and model parameters by name: texts such as "10 mm" become SI."""
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from bushfit.errors import CampaignError
+from bushfit.effects import is_parameter, parameter_named, parameter_names
+from bushfit.errors import CampaignError, naming
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Place
-from bushfit.units import quantity, temperature
-from bushfit.validation import converted
+from bushfit.units import quantity, sized, temperature
+from bushfit.validation import LARGEST_NUMBER, converted, unknown_key
 
 #: Steps of a range of frequencies at most: more than any sweep has, and quick to predict.
 _LARGEST_GRID = 100_000
 #: Relative width by which a range of frequencies is widened, so that rounding does not drop its last step.
 _ROUNDING = 1e-9
-#: Repeats or cycles at most: more than any rig runs.
-_LARGEST_COUNT = 1_000_000
 #: Mass [kg], acceleration [m/s^2] and frequency [Hz] of a resonance test at most, and their inverse at least; chosen:
 #: far beyond every shaker, and numbers stay finite.
 LARGEST_SHAKEN = 1e6
 #: Ends the check of a list at its first error: those of a hundred thousand would fill the memory.
 FIRST_ERROR = Field(fail_fast=True)
+#: The second to the power of alpha, at the end of the unit of m.
+_S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
+#: A value of a parameter: a number here, a text or a number in the file.
+Size = Annotated[
+    float, WithJsonSchema({"type": ["string", "number"], "description": "with its unit; a ratio may be a number"})
+]
 
 
 def si(*units: str) -> BeforeValidator:
@@ -85,4 +91,60 @@ Frequencies = Annotated[tuple[Frequency, ...], FIRST_ERROR, table(_frequencies, 
 Displacement = Annotated[float, motion(), Field(gt=0)]
 SHAKEN = Field(ge=1.0 / LARGEST_SHAKEN, le=LARGEST_SHAKEN)
 Share = Annotated[float, si("1"), Field(ge=0, lt=1)]
-Count = Annotated[int, Field(strict=True, ge=1, le=_LARGEST_COUNT)]
+Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]  # of repeats or cycles: more than any rig runs
+
+
+def parameter_value(place: str, name: str, raw: Any) -> float:
+    """The SI value of a model parameter by its name in files; an error names the place.
+
+    Ratios, and parameters of added effects, may be plain numbers.
+    """
+    with naming(place=place):
+        if not is_parameter(name):
+            raise unknown_key(name, parameter_names())
+        stated = parameter_named(name).unit
+        unit = _S_TO_ALPHA.sub("", stated)
+        is_number = isinstance(raw, int | float) and not isinstance(raw, bool)
+        if is_number and (unit == "1" or "." in name) and abs(raw) <= LARGEST_NUMBER:
+            return sized(float(raw), unit)
+        return quantity(_S_TO_ALPHA.sub("", raw) if unit != stated and isinstance(raw, str) else raw, unit)
+
+
+def parameter_values(raw: dict[str, Any]) -> dict[str, float]:
+    """Values by parameter, in SI."""
+    return {name: parameter_value(name, name, value) for name, value in raw.items()}
+
+
+def effect_values(raw: dict[str, Any]) -> dict[str, Any]:
+    """Values by effect and parameter, in SI."""
+
+    def values(effect: str, own: dict[str, Any]) -> dict[str, float]:
+        return {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in own.items()}
+
+    return _each_table(raw, values)
+
+
+def with_sizes(raw: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
+    """Tables by parameter with the values of some keys in SI; what is no table is left alone."""
+
+    def sized_table(name: str, own: dict[str, Any]) -> dict[str, Any]:
+        return own | {key: parameter_value(f"{name}.{key}", name, own[key]) for key in keys if key in own}
+
+    return _each_table(raw, sized_table)
+
+
+def _each_table(raw: dict[str, Any], convert: Callable[[str, dict[str, Any]], Any]) -> dict[str, Any]:
+    """Tables by name, each converted; what is no table is left to pydantic."""
+    return {name: convert(name, own) if isinstance(own, dict) else own for name, own in raw.items()}
+
+
+def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
+    """Tables of value, min, max and vary by parameter, with the first three in SI."""
+    keys = ("min", "value", "max")
+    settings = with_sizes(raw, keys)
+    for name, table in settings.items():
+        ordered = [table[key] for key in keys if key in table] if isinstance(table, dict) else []
+        if ordered != sorted(ordered) or (ordered and table.get("min", -np.inf) == table.get("max", np.inf)):
+            expected = "min below max, and value between them"
+            raise CampaignError("these limits hold no value", place=name, found=str(raw[name]), expected=expected)
+    return settings

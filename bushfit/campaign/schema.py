@@ -9,7 +9,6 @@ from pydantic import ConfigDict, Field, InstanceOf, WithJsonSchema
 
 from bushfit.campaign.compound import Compound
 from bushfit.campaign.files import LoopFile, SweepFile
-from bushfit.campaign.parameters import Size, effect_values, parameter_settings, parameter_values
 from bushfit.campaign.places import KEYS, with_places
 from bushfit.campaign.quantities import (
     FIRST_ERROR,
@@ -22,8 +21,12 @@ from bushfit.campaign.quantities import (
     Frequency,
     Length,
     Share,
+    Size,
     Strain,
     Temperature,
+    effect_values,
+    parameter_settings,
+    parameter_values,
     si,
     table,
 )
@@ -39,9 +42,6 @@ from bushfit.validation import Flag, Name, Text, converted, known_keys, standing
 Residuals = Literal["complex", "magnitude_loss_factor"]
 #: What is summed over the residuals: their squares, or soft_l1 with outliers left out.
 Loss = Literal["linear", "soft_l1"]
-
-#: [s] Pause in a simulated programme at most: a day is more than any rig rests between two loops.
-_LONGEST_PAUSE = 86_400.0
 
 
 def _fit_table(raw: dict[str, Any]) -> dict[str, Any]:
@@ -231,7 +231,7 @@ class SimulatedLoop(SimulatedTest):
     waveform: Waveform = "sine"
     amplitudes: Annotated[tuple[Displacement, ...], FIRST_ERROR, Field(min_length=1)] = ()
     frequencies: Annotated[tuple[Frequency, ...], FIRST_ERROR, Field(min_length=1)] = ()
-    pause: Annotated[float, si("s"), Field(ge=0, le=_LONGEST_PAUSE)] = 0.0
+    pause: Annotated[float, si("s"), Field(ge=0, le=86_400.0)] = 0.0  # a day: no rig rests for longer
 
     def __post_init__(self) -> None:
         for one, several in (("amplitude", "amplitudes"), ("frequency", "frequencies")):

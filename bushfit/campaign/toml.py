@@ -11,19 +11,17 @@ from bushfit.validation import check_tables
 
 T = TypeVar("T")
 
-#: Size of a campaign file at most [bytes]: thousands of tests.
-_LARGEST_BYTES = 1_000_000
 #: A key of more than 16 parts, such as a.b.c; parsing one takes time in proportion to the square of their number.
 _DEEP_KEY = re.compile(rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}""")
 
 
-def read_toml(path: Path, schema: type[T], *, what: str = "a campaign file", largest: int = _LARGEST_BYTES) -> T:
+def read_toml(path: Path, schema: type[T], *, what: str = "a campaign file", largest: int = 1_000_000) -> T:
     """The content of a TOML file as the dataclass `schema`, all quantities in SI.
 
     Args:
         schema: a pydantic dataclass, or one of its tables; unknown keys are refused.
         what: the file in words, for errors.
-        largest: size of the file at most [bytes].
+        largest: size of the file at most [bytes]; that of a campaign of thousands of tests.
 
     Raises:
         CampaignError: the file is missing, too large, no TOML, or has keys or values that are not understood.

@@ -12,7 +12,9 @@ def body_lines(bushing: Bushing | None, specimens: Iterable[Specimen]) -> list[s
     lines = []
     if bushing:
         lines += ["[bushing]", f"name = {toml_value(bushing.name)}"]
-        lines += [f"{key} = {_mm(getattr(bushing, key))}" for key in ("inner_radius", "outer_radius", "length")]
+        lines += [
+            f'{key} = "{getattr(bushing, key) * 1e3:.6g} mm"' for key in ("inner_radius", "outer_radius", "length")
+        ]
         lines += [f'shape = "{bushing.shape}"'] if bushing.shape != "paper" else []
     for specimen in specimens:
         lines += ["", *specimen_lines(specimen)]
@@ -45,7 +47,3 @@ def toml_value(value: Any) -> str:
         escaped = value.replace("\\", "\\\\").replace('"', '\\"')
         return '"' + "".join(c if c >= " " and c != "\x7f" else f"\\u{ord(c):04x}" for c in escaped) + '"'
     return str(value)
-
-
-def _mm(length: float) -> str:
-    return f'"{length * 1e3:.6g} mm"'

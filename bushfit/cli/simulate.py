@@ -69,9 +69,8 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
 
 
 def _task(source: Path) -> tuple[Model, SimulateSettings]:
-    from bushfit.campaign.campaign import load_campaign
+    from bushfit.campaign.campaign import load_campaign, model_of
     from bushfit.campaign.schema import SimulateSettings
-    from bushfit.simulation import model_of
 
     if source.suffix.lower() == ".json":
         return open_model(source).model, SimulateSettings()

@@ -3,8 +3,6 @@
 Where each test, and each level of it, has its own figures, thousands of rows of a loop do not hide a sweep that is off.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
@@ -62,7 +60,7 @@ class LeaveOut:
     residual: Array
 
     @classmethod
-    def of(cls, jacobian: Array, residual: Array) -> LeaveOut:
+    def of(cls, jacobian: Array, residual: Array) -> "LeaveOut":
         """The same from the derivatives of the whitened residuals by coordinate, (k, n), and the residuals, (n,).
 
         What all rows together leave open moves no residual, and stays where it is.

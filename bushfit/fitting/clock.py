@@ -1,6 +1,9 @@
-"""The clock of a loop: its frequency and how many cycles it holds, from the displacement alone."""
+"""The cycles of a loop: the steady ones, their frequency and number, and the course of the motion, in words.
 
-from __future__ import annotations
+A motion is steady where it comes again a period later. The longest stretch that does so is kept; without a stretch that
+does not, nothing is touched, so a record may start and end anywhere in its cycle. What lies beyond a hole in the record
+is left out too, because nobody knows how many cycles went by there.
+"""
 
 import numpy as np
 
@@ -8,19 +11,31 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.fourier import basis, derivative, least_squares, resolved_order, spread_rows
 from bushfit.fitting.loop_harmonics import residual_limit
-from bushfit.fitting.runin import crossings
+from bushfit.fitting.outliers import gross_rows
 from bushfit.reading.measurement import Loop
+from bushfit.reduction.cycles import HOLE
+from bushfit.reduction.programme import ENOUGH_ROWS, THREE_CYCLES, left_out
 
+#: Difference from the motion a period later up to which it comes again, relative to its range.
+_SAME = 0.05
+#: Share of a period up to which a break in the steady motion, or what is left out, is too short to count.
+_BRIEF = 0.02
+#: Difference from the motion a period later, in units of its median, beyond which an end is drawn in.
+_MOST_OFF = 8.0
+#: The same relative to the range of the motion, which is added for motions without noise.
+_LEAST_OFF = 5e-4
+#: Periods by which an end is drawn in at most.
+_EDGE = 0.5
+#: Share of the range on either side of the middle within which the motion is not yet across: more than any noise.
+_BAND = 0.1
 #: Harmonics by which a frequency is refined at most; chosen: what a triangle has beyond them shifts no phase.
 _MOST_HARMONICS = 15
-#: Rounds of Gauss-Newton at most; chosen: nearly all frequencies take three to six.
-_MOST_ROUNDS = 10
 #: Step relative to the frequency below which Gauss-Newton has ended: rounding.
 _SETTLED = 1e-12
 #: Step relative to the frequency that Gauss-Newton takes at most: farther off it is not linear.
 _LARGEST_STEP = 0.05
 #: Rows that are enough to refine a frequency.
-_ENOUGH_ROWS = 2000
+_ROWS_TO_REFINE = 2000
 #: Distance between the ends of a record, as a share of its range, from which on it holds no whole cycle: more than
 #: any noise.
 _OPEN = 0.1
@@ -36,11 +51,111 @@ _MORE_THAN_ONE_THAT_MEETS = 1.1
 #: Error of an end's line relative to its length from which on the motion stands still there.
 _STANDS_STILL = 0.25
 #: Standard deviations within which a period is taken for that of the record.
-_SAME = 4.0
+_SAME_PERIOD = 4.0
 #: Root mean square by which what comes after one cycle may differ from its start, relative to the amplitude.
 _REPEATS = 0.02
 #: The same in units of the scatter of neighbouring rows, where that is more.
 _REPEATS_SCATTER = 6.0
+#: Third harmonic of a triangle over its first.
+_TRIANGLE = 1.0 / 9.0
+#: Difference of a motion's third harmonic over its first up to which it is called by a name: a rounded triangle has it.
+_LIKE = 0.03
+#: Share of the amplitude beyond which rows are counted.
+_OUTER = 0.9
+#: Share of the rows beyond it that parts a sine from a triangle: evenly in time a triangle has 10 % there, a sine 29 %.
+_CROWDED = 0.2
+
+
+def thinned(loop: Loop) -> tuple[Array, Array]:
+    """Time [s] and displacement [m or rad] of rows that are enough to find the cycles, gross outliers left out."""
+    every = slice(None, None, -(-loop.time.size // ENOUGH_ROWS))
+    time, motion = loop.time[every], loop.displacement[every]
+    rows = gross_rows(motion)
+    return np.delete(time, rows), np.delete(motion, rows)
+
+
+def crossings(motion: Array) -> tuple[Array, Array, Array]:
+    """A motion about its middle, (n,), and the last row before and the first after each crossing of it, (k,) each."""
+    centred = motion - (motion.max() + motion.min()) / 2.0
+    marks = np.flatnonzero(np.abs(centred) > _BAND * np.ptp(centred))
+    across = np.flatnonzero(np.diff(centred[marks] > 0.0))
+    return centred, marks[across], marks[across + 1]
+
+
+def steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | None]:
+    """A loop without what comes before and after its steady cycles, and a sentence on what was left out or None."""
+    period = _period(time, motion)
+    if period is None or time[-1] - time[0] <= period:
+        return loop, None
+    holes = np.flatnonzero(np.diff(time) > HOLE * period)
+    if holes.size:
+        return _steady_part_between(loop, time, holes)
+    ends = _steady_ends(time, motion, period)
+    if ends is None:
+        return loop, None
+    first, last, after = ends
+    gaps = (f"{gap:.3g} s" if gap > _BRIEF * period else "" for gap in (first - time[0], time[-1] - last))
+    note = left_out(gaps, (last - first) / period)
+    return _cut(loop, first, last if after else np.inf), note
+
+
+def _steady_ends(time: Array, motion: Array, period: float) -> tuple[float, float, bool] | None:
+    """First and last time of the steady cycles [s], and whether anything follows; None where all or none are steady."""
+    clock = time[time + period <= time[-1]]
+    off = np.abs(np.interp(clock + period, time, motion) - motion[: clock.size])
+    start, end = _longest_stretch(off < _SAME * np.ptp(motion), clock, _BRIEF * period)
+    before, after = start > 0, end < off.size
+    if start == end or not (before or after):
+        return None
+    most_off = _MOST_OFF * np.median(off[start:end]) + _LEAST_OFF * np.ptp(motion)
+    other = np.flatnonzero(off[start:end] > most_off) + start
+    if before:
+        start = max(other[clock[other] < clock[start] + _EDGE * period], default=start - 1) + 1
+    if after:
+        end = min(other[clock[other] > clock[end - 1] - _EDGE * period], default=end)
+    first, last = float(time[start]), float(time[end - 1]) + period
+    if before and last - first > THREE_CYCLES * period:
+        first += period  # after a run-in the first cycle still remembers it
+    return first, last, bool(after)
+
+
+def _steady_part_between(loop: Loop, time: Array, holes: Array) -> tuple[Loop, str]:
+    """As `steady_part`, of the longest part of a loop without a hole; `holes` are the steps of `time` that are one."""
+    starts, ends = time[np.append(0, holes + 1)], time[np.append(holes, time.size - 1)]
+    first, last = max(zip(starts, ends, strict=True), key=lambda part: part[1] - part[0])
+    whole = _cut(loop, first, last)
+    part, note = steady_part(whole, *thinned(whole))
+    said = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
+    return part, said if note is None else f"{said}, and of these {note}"
+
+
+def _cut(loop: Loop, first: float, last: float) -> Loop:
+    """The rows between two times [s], both counted in."""
+    kept = slice(np.searchsorted(loop.time, first), np.searchsorted(loop.time, last, side="right"))
+    return loop.at(kept)
+
+
+def _period(time: Array, motion: Array) -> float | None:
+    """Usual time between crossings of the middle in one sense, in the later half of the record [s].
+
+    Twice a stroke where there is one cycle. What holds a hole does not count; None where nothing is left.
+    """
+    after = crossings(motion)[2]
+    strokes, steps = np.diff(time[after]), np.diff(time)
+    widest = np.maximum(np.maximum.reduceat(steps, after - 1)[:-1], steps[after[1:] - 1])
+    intervals = strokes[1:] + strokes[:-1]
+    intervals = intervals[np.maximum(widest[1:], widest[:-1]) < HOLE * intervals]
+    if not intervals.size:
+        intervals = 2.0 * strokes[widest < HOLE * strokes]
+    return float(np.median(intervals[intervals.size // 2 :])) if intervals.size else None
+
+
+def _longest_stretch(alike: Array, time: Array, brief: float) -> Array:
+    """Start and end of the longest stretch of rows that are alike; breaks no longer than `brief` [s] count as alike."""
+    breaks = np.flatnonzero(np.diff(alike, prepend=True, append=True)).reshape(-1, 2)
+    breaks = breaks[time[breaks[:, 1] - 1] - time[breaks[:, 0]] > brief]
+    stretches = np.concatenate(([0], breaks.ravel(), [alike.size])).reshape(-1, 2)
+    return stretches[np.argmax(np.diff(stretches))]
 
 
 def fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, float]:
@@ -111,7 +226,7 @@ def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> fl
     if error > _STANDS_STILL * few * step:
         return None
     period = duration - (last - first) / slope
-    return period if period < whole - max(1.5 * step, _SAME * error) else whole
+    return period if period < whole - max(1.5 * step, _SAME_PERIOD * error) else whole
 
 
 def _line(time: Array, x: Array) -> tuple[float, float, float]:
@@ -122,12 +237,12 @@ def _line(time: Array, x: Array) -> tuple[float, float, float]:
 
 def _refined(clock: Array, x: Array, frequency: float, rows_per_cycle: float) -> float:
     """Frequency [Hz] of several cycles, by Gauss-Newton on the motion's harmonics and their frequency together."""
-    chosen = spread_rows(x.size, _ENOUGH_ROWS)
+    chosen = spread_rows(x.size, _ROWS_TO_REFINE)
     time, motion = clock[chosen], x[chosen]
     order = resolved_order(rows_per_cycle * chosen.size / x.size, _MOST_HARMONICS)
     columns = basis(time * frequency, order)
     solution = least_squares(columns, motion)
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(10):  # of Gauss-Newton; chosen: nearly all frequencies take three to six
         residual = motion - columns @ solution
         kept = np.abs(residual) <= residual_limit(solution, residual, residual.size)
         by_frequency = 2.0 * np.pi * time * (columns @ derivative(solution))
@@ -148,3 +263,28 @@ def _repeats(clock: Array, x: Array, period: float) -> bool:
     off = x[begin:] - np.interp(clock[begin:] - period, clock, x)
     scatter = np.median(np.abs(np.diff(x, 2))) if x.size > 4 else 0.0
     return float(np.sqrt(np.mean(np.square(off)))) < max(_REPEATS * np.ptp(x) / 2.0, _REPEATS_SCATTER * scatter)
+
+
+def waveform(coefficients: Array) -> str:
+    """The name of a motion, in words, from its complex harmonics, mean first."""
+    share = abs(coefficients[3]) / abs(coefficients[1]) if coefficients.size > 3 else 0.0
+    if abs(share - _TRIANGLE) < _LIKE:
+        return "a triangle"
+    return "a sine" if share < _LIKE else f"neither sine nor triangle (third harmonic {100 * share:.2g} %)"
+
+
+def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
+    """A sentence where a loop's time was made from its motion, but not as its rows lie; else None."""
+    if loop.timed:
+        return None
+    motion = loop.displacement
+    half = np.ptp(motion) / 2.0
+    outer = float(np.mean(np.abs(motion - motion.min() - half) > _OUTER * half))
+    like, other = ("a sine", "a triangle") if outer > _CROWDED else ("a triangle", "a sine")
+    if waveform(coefficients) != other:
+        return None
+    return (
+        f"{100 * outer:.2g} % of the rows lie beyond {_OUTER:g} of the amplitude, as those of {like} recorded evenly "
+        f"in time, but the {loop.direction.motion.words[0]} over time is {other}: where a file has no time, rate means "
+        'a triangle, and frequency with waveform = "sine" a sine'
+    )

@@ -1,7 +1,5 @@
 """A campaign made ready to fit."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -38,7 +36,7 @@ class Data:
     bounds: Bounds = field(default_factory=dict)
 
     @classmethod
-    def of(cls, campaign: Campaign) -> Data:
+    def of(cls, campaign: Campaign) -> "Data":
         """The data sets of a campaign as its [fit] asks for them.
 
         Raises:
@@ -54,7 +52,7 @@ class Data:
             {name: (setting.min, setting.max) for name, setting in campaign.fit.parameters.items()},
         ).in_session()
 
-    def in_session(self) -> Data:
+    def in_session(self) -> "Data":
         """The same data, each point with what it was measured under."""
         tests = [data_set.test for data_set in (*self.loops, *self.sweeps)]
         under = iter(measured_session(self.campaign.bushing, tests))
@@ -74,7 +72,7 @@ class Data:
             raise FitError(message, file=self.campaign.path, found=found, hint=hint)
         return tests
 
-    def without(self, outliers: Sequence[Outlier]) -> Data:
+    def without(self, outliers: Sequence[Outlier]) -> "Data":
         """The same data with no weight on these outliers of the sweeps; those of loops have none where `robust`."""
         sweeps = []
         for data_set in self.sweeps:
@@ -82,7 +80,7 @@ class Data:
             sweeps.append(data_set.without(np.flatnonzero(np.isin(data_set.order, rows))))
         return replace(self, sweeps=tuple(sweeps))
 
-    def with_sweeps(self, sweeps: Sequence[Sweep]) -> Data:
+    def with_sweeps(self, sweeps: Sequence[Sweep]) -> "Data":
         """The same data with its sweeps read anew, row by row: noise is estimated again, rows left out stay so."""
         fit, new = self.campaign.fit, []
         for old, data_set in zip(self.sweeps, sweep_data(sweeps, fit.residuals, self.campaign.rig), strict=True):
@@ -91,7 +89,7 @@ class Data:
         noise = self.sweeps[0].noise
         return replace(self, sweeps=with_level_errors(new, noise.level, noise.level_freedom))
 
-    def with_level_errors(self, error: tuple[float, float], freedom: int) -> Data:
+    def with_level_errors(self, error: tuple[float, float], freedom: int) -> "Data":
         """The same data with an error of each level of the sweeps; see `data_sets.with_level_errors`."""
         return replace(self, sweeps=with_level_errors(self.sweeps, error, freedom))
 

@@ -4,13 +4,13 @@ A data set is one measured test with its noise. Fits, quality figures, pictures 
 of `DataSet` and need not know which kind of test it is.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
 
 from bushfit.effects.contract import Array, Circumstances, Values
 from bushfit.geometry import Place
@@ -185,9 +185,14 @@ class DataSet(ABC):
     def off(self, model: Model) -> Array:
         """Model less measured of every point, relative to |K| or to half a loop's force range, (parts, n)."""
 
+    @property
     @abstractmethod
+    def weights(self) -> Array:
+        """Share of its weight that each point has, (n,); of a long loop the rows behind it."""
+
     def relative(self, model: Model) -> Array:
-        """Misfit of the points that carry weight, relative to |K| or to half a loop's force range, for NRMSE."""
+        """Size of the misfit of the points that carry weight, relative as `off`, for NRMSE."""
+        return np.linalg.norm(self.off(model)[:, self.weights > 0.0], axis=0)
 
     @abstractmethod
     def distance(self, model: Model) -> Array:
@@ -201,9 +206,9 @@ class DataSet(ABC):
     def shown(self, model: Model) -> Array:
         """As `misfit`, and of points without weight how far one lies off, in units of noise, (size,)."""
 
-    @abstractmethod
     def change(self, one: Model, other: Model) -> float:
-        """Largest difference between two models, relative to |K| or to half a loop's force range."""
+        """Largest difference between two models, relative as `off`."""
+        return float(np.linalg.norm(self.off(one) - self.off(other), axis=0).max())
 
     @abstractmethod
     def noise_free(self, model: Model) -> Self:

@@ -1,6 +1,4 @@
-"""Data sets of a campaign: one per measured loop, one per sweep."""
-
-from __future__ import annotations
+"""Data sets of a campaign, one per measured loop, one per sweep; and of tests that are not made yet."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -8,12 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from bushfit.campaign.schema import UNSTATED, Residuals, RigSettings
+from bushfit.effects.contract import Array
 from bushfit.fitting.data_set import DataSet
-from bushfit.fitting.drive import drive_of
+from bushfit.fitting.drive import Drive, drive_of
 from bushfit.fitting.loop_data import LoopData
-from bushfit.fitting.noise import of_class, sweep_noise
+from bushfit.fitting.noise import SweepNoise, of_class, sweep_noise
 from bushfit.fitting.sweep_data import SweepData
-from bushfit.geometry import Specimen
+from bushfit.geometry import Place, Specimen
+from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Source, Sweep
 
 __all__ = ["DataSet", "LoopData", "SweepData", "loop_data", "parted", "sources", "sweep_data"]
@@ -58,3 +58,55 @@ def sources(data_sets: Iterable[DataSet]) -> tuple[Source, ...]:
     """The files that data sets came from, each once: a record may hold several loops."""
     found = [data_set.source for data_set in data_sets if data_set.source is not None]
     return tuple(source for place, source in enumerate(found) if source not in found[:place])
+
+
+def new_loop(
+    model: Model,
+    place: Place,
+    frequency: float,
+    amplitude: float,
+    noise: float,
+    *,
+    cycles: float = 1.0,
+    rows: int,
+    from_rest: bool = False,
+) -> LoopData:
+    """A sinusoidal loop of so many rows in all.
+
+    Args:
+        frequency: [Hz].
+        amplitude: zero-to-peak [m or rad].
+        noise: standard deviation of one row, relative to half the force range.
+    """
+    phase, nil = cycles * np.arange(rows) / rows, np.zeros(rows)
+    motion = amplitude * np.sin(2.0 * np.pi * phase)
+    silent = Drive(
+        loop=Loop("new", place, phase / frequency, motion, nil),
+        frequency=frequency,
+        cycles=cycles,
+        from_rest=from_rest,
+        phase=phase,
+        force=nil,
+        weight=np.ones(rows),
+        noise=1.0,
+        coefficients=np.array([0.0, -1j * amplitude]),
+        half_range=1.0,
+    )
+    return LoopData(silent).noise_free(model).with_noise(noise)
+
+
+def new_sweep(
+    model: Model,
+    place: Place,
+    frequency: Array,
+    amplitude: Array,
+    scatter: tuple[float, float],
+    shared: tuple[float, float],
+) -> SweepData:
+    """A sweep at operating points [Hz, m or rad], (n,) each, a run for each amplitude.
+
+    Args:
+        scatter, shared: standard deviations of gain and phase, from point to point and of a run.
+    """
+    noise = SweepNoise({("new", float(x)): scatter for x in np.unique(amplitude)}, shared, "stated", 0)
+    return SweepData(Sweep("new", place, frequency, amplitude, model.stiffness(place, frequency, amplitude)), noise)

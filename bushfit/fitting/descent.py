@@ -11,8 +11,6 @@ Notes:
     verdicts change.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -84,7 +82,7 @@ class Descent:
     growth: float = _FIRST_GROWTH
 
     @classmethod
-    def start(cls, model: Model, data_sets: Sequence[DataSet], names: Sequence[str], bounds: Bounds) -> Descent:
+    def start(cls, model: Model, data_sets: Sequence[DataSet], names: Sequence[str], bounds: Bounds) -> "Descent":
         """A fit of the named parameters, the others held, that has not yet left the model's own values.
 
         Raises:
@@ -118,7 +116,7 @@ class Descent:
             self.model, self.coordinates, self.residual, self.jacobian, self.evaluations, ends, not self.converged
         )
 
-    def stepped(self) -> Descent:
+    def stepped(self) -> "Descent":
         """The fit one evaluation on: at a lower chi-square with less damping, or where it was with more."""
         damping = self.damping
         step, expected = self._step(damping)
@@ -156,7 +154,7 @@ class Descent:
             growth=_FIRST_GROWTH,
         )
 
-    def finished(self, evaluations: int) -> Descent:
+    def finished(self, evaluations: int) -> "Descent":
         """The fit at its end, or after so many evaluations of the model."""
         here = self
         while not here.converged and here.evaluations < evaluations:

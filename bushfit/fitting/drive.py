@@ -5,8 +5,6 @@ squares at the samples as they are (any number of cycles, sine or triangle, even
 turning points that friction needs are those of the motion and not of the sensor.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -16,17 +14,14 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History, reversals
 from bushfit.errors import FitError
-from bushfit.fitting.clock import fundamental
-from bushfit.fitting.fourier import GRID, as_complex, basis, least_squares, series
+from bushfit.fitting.clock import fundamental, steady_part, thinned, wrong_clock
+from bushfit.fitting.fourier import GRID, as_complex, basis, least_squares, phase_bins, series
 from bushfit.fitting.loop_harmonics import MOST_ROWS, LoopHarmonics, OutlierRows, less_slow, loop_harmonics
-from bushfit.fitting.motion import mean_of_preload, preload, wrong_clock
 from bushfit.fitting.noise import FLOOR
-from bushfit.fitting.phase_bins import phase_bins
 from bushfit.fitting.row_noise import RowNoise, of_a_lone_cycle, row_noise
-from bushfit.fitting.runin import steady_part, thinned
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.cycles import HOLE
-from bushfit.units import number
+from bushfit.units import for_people, number
 
 #: Distance from a turning point up to which rows carry no weight [steps of the grid]: one step, and the half by which
 #: the point may lie beside its sample.
@@ -50,6 +45,12 @@ _MEDIAN_OVER_MEAN = 1.25
 _NO_LOSS = 2e-3
 #: Share of the amplitude by which a motion may lie off zero before its middle is taken for unknown.
 _CENTRED = 0.01
+#: Share of half the force's range by which the mean force of a motion about zero may exceed its second harmonic before
+#: it is taken for a preload; chosen: wrong zeros of load cells are less, and an uneven stiffness makes both alike.
+_PRELOADED = 0.25
+#: Share of the amplitude, or of half the force's range, from which on a mean is told as a preload; chosen: sensors are
+#: off zero by less.
+TOLD_MEAN = 0.05
 #: Rows of a cycle behind an estimate of how its noise depends from row to row; chosen: fewer resolve no correlation.
 _FEWEST_ROWS = 32
 #: Share of a cycle by which a record may go on after its last whole one and still count as whole: rounding.
@@ -209,8 +210,8 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
         drive = replace(drive, datum=float(np.average(drive.force, weights=drive.weight)))
     elif not from_rest:
         unknown = drive.follows or abs(found.motion[0]) > _CENTRED * half_motion
-        drive = replace(drive, datum=found.force_mean if unknown else mean_of_preload(drive))
-    return replace(drive, notes=(*drive.notes, *preload(drive)))
+        drive = replace(drive, datum=found.force_mean if unknown else _mean_of_preload(drive))
+    return replace(drive, notes=(*drive.notes, *_preload(drive)))
 
 
 def _of_the_record(loop: Loop) -> Iterator[str]:
@@ -340,3 +341,29 @@ def _change(loop: Loop, frequency: float, noise: float, half_force: float) -> fl
     change = abs(float(np.median(np.interp(first + 1.0 / frequency, clock, force) - force[: first.size])))
     chance = _CERTAIN * noise * np.sqrt(2.0 / first.size)
     return change if change > max(_MEDIAN_OVER_MEAN * chance, _SETTLES * half_force) else 0.0
+
+
+def _mean_of_preload(drive: Drive) -> float | None:
+    """The mean force of a preload about which the displacement counts from zero [N or N m]; None where there is none.
+
+    A stiffness that is not the same to either side makes a mean force too, and a second harmonic of its size.
+    """
+    mean, _, cosine, _, sine = least_squares(basis(drive.phase, 2), drive.force, drive.weight)
+    return float(mean) if abs(mean) - np.hypot(cosine, sine) > _PRELOADED * drive.half_range else None
+
+
+def _preload(drive: Drive) -> Iterator[str]:
+    """A sentence on the means that a loop counts from, where they are no sensor's zero."""
+    if drive.datum is None:
+        return
+    (motion, force, _), units = drive.loop.direction.motion.words, drive.loop.direction.display
+    mean_motion = float(drive.coefficients[0].real)
+    off_zero = abs(mean_motion) > TOLD_MEAN * drive.amplitude
+    means = [
+        f"a mean {motion} of {number(units.displacement.factor * mean_motion, 3)} {units.displacement.name}"
+    ] * off_zero
+    if abs(drive.datum) > (TOLD_MEAN if off_zero else _PRELOADED) * drive.half_range:
+        unit, factor = for_people(*units.force, drive.datum)
+        means.append(f"a mean {force} of {number(factor * drive.datum, 3)} {unit}")
+    if means:
+        yield f"recorded about {' and '.join(means)}; the model knows no preload: the fit takes the loop about its mean"

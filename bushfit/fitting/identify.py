@@ -4,8 +4,6 @@ A direction is an eigenvector of the Fisher information, with parameters scaled 
 over the root of the eigenvalue, which is a singular value of the Jacobian scaled by noise and size.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,8 +13,7 @@ import numpy as np
 from bushfit.effects import effect_of
 from bushfit.fitting.assess import measured_range
 from bushfit.fitting.data_sets import DataSet, parted
-from bushfit.fitting.further_test import further_test
-from bushfit.fitting.information import Information, percent, relative_sizes
+from bushfit.fitting.information import Information, further_test, percent, relative_sizes
 from bushfit.fitting.solve import Coordinates
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model

@@ -1,14 +1,18 @@
-"""What tests tell about parameters: Fisher information, and the standard errors that follow from it."""
+"""What tests tell about parameters: Fisher information, standard errors, and the further test that would help most.
 
-from __future__ import annotations
+Each test that a lab could add is simulated as data sets with the noise of the campaign, and what it would tell is added
+to what the campaign tells.
+"""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.assess import measured_range
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, new_loop, new_sweep, parted
+from bushfit.fitting.noise import ASSUMED_SHARED
 from bushfit.fitting.solve import jacobian
 from bushfit.model.model import Model
 
@@ -16,6 +20,26 @@ from bushfit.model.model import Model
 _LEAST_SIZE = 0.05
 #: Relative standard error beyond which a figure tells nothing more.
 _BEYOND = 10.0
+#: Rate of a proposed loop where there is none [Hz]: quasi-static on most rigs.
+_NEW_RATE = 0.1
+#: Its cycles, from rest: the first shows how it settles.
+_NEW_CYCLES = 2.0
+#: Its rows.
+_NEW_ROWS = 400
+#: Its noise over half its force range: that of most force sensors.
+_FORCE_NOISE = 5e-3
+#: Frequencies of a proposed sweep at each amplitude.
+_NEW_FREQUENCIES = 9
+#: Band of a proposed sweep where nothing fast was measured [Hz]: that of most rigs.
+_NEW_BAND = (5.0, 150.0)
+#: Highest frequency of the tests below which nothing fast was measured [Hz].
+_SLOW = 2.0
+#: Strain that a bushing can be asked to bear in a test.
+_BEARABLE = 0.5
+#: Worst standard error after a test over that before, up to which the test is worth its time.
+_LEAST_GAIN_RATIO = 0.8
+#: Relative standard error after a test from which on it is not worth its time, whatever it was before.
+_HOPELESS = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,12 +56,12 @@ class Information:
     matrix: Array
 
     @classmethod
-    def of(cls, model: Model, data_sets: Sequence[DataSet], names: Sequence[str]) -> Information:
+    def of(cls, model: Model, data_sets: Sequence[DataSet], names: Sequence[str]) -> "Information":
         """What some data sets tell about the named parameters of a model at its values."""
         slope = jacobian(model, data_sets, names) * relative_sizes(model, names)[:, None]
         return cls(tuple(names), slope @ slope.T)
 
-    def with_more(self, model: Model, data_sets: Sequence[DataSet]) -> Information:
+    def with_more(self, model: Model, data_sets: Sequence[DataSet]) -> "Information":
         """What further data sets tell as well."""
         return replace(self, matrix=self.matrix + Information.of(model, data_sets, self.names).matrix)
 
@@ -67,3 +91,93 @@ def relative_sizes(model: Model, names: Sequence[str]) -> Array:
 def percent(error: float) -> str:
     """A relative standard error for people: "2.5 %"."""
     return f"{float(f'{100.0 * error:.2g}'):g} %" if error < _BEYOND else "beyond 1000 %"
+
+
+def further_test(model: Model, data_sets: Sequence[DataSet], known: Information) -> list[str]:
+    """A sentence on the test that shrinks the worst standard error most, and to what; none where none helps."""
+    before = known.errors()
+    worst = int(np.argmax(before))
+    bearable = max(_BEARABLE, measured_range(model, data_sets).strain[1])
+    after = {
+        words: known.with_more(model, more).errors()
+        for words, more in _tests(model, data_sets)
+        if measured_range(model, more).strain[1] <= bearable
+    }
+    best = min(after, key=lambda words: float(after[words].max()))
+    if after[best].max() > min(_LEAST_GAIN_RATIO * before[worst], _HOPELESS):
+        return []
+    return [
+        f"the further test that would help most: {best}; the standard error of {known.names[worst]} would fall from "
+        f"{percent(float(before[worst]))} to {percent(float(after[best][worst]))}"
+    ]
+
+
+def _tests(model: Model, data_sets: Sequence[DataSet]) -> Iterator[tuple[str, list[DataSet]]]:
+    """Tests that a lab could add: in words, and as the data sets that they would make."""
+    loops, sweeps = parted(data_sets)
+    yield "every test once more", list(data_sets)
+    for words, loop in _repeated_loops(model, loops) if loops else _new_loops(model, data_sets):
+        yield words, [loop]
+    for words, sweep in _new_sweeps(model, data_sets, sweeps):
+        yield words, [sweep]
+
+
+def _repeated_loops(model: Model, loops: Sequence[LoopData]) -> Iterator[tuple[str, LoopData]]:
+    """The loop of the largest strain at other amplitudes and rates."""
+    largest = max(loops, key=lambda loop: loop.drive.amplitude * model.unit_strain(loop.direction))
+    for factor in (3.0, 10.0):
+        yield f"a loop of {factor:g} times the largest amplitude", _changed(largest, model, amplitude=factor)
+    for words, factor in (("a tenth of", 0.1), ("ten times", 10.0)):
+        yield f"a loop at {words} the rate", _changed(largest, model, rate=factor)
+
+
+def _new_loops(model: Model, data_sets: Sequence[DataSet]) -> Iterator[tuple[str, LoopData]]:
+    """Slow loops of the largest amplitude and more, where the campaign has none."""
+    direction = data_sets[0].direction
+    largest = max(float(data_set.amplitude.max()) for data_set in data_sets if data_set.direction == direction)
+    for times, words in ((1.0, ""), (3.0, "three times "), (10.0, "ten times ")):
+        size = times * largest
+        loop = new_loop(
+            model, direction, _NEW_RATE, size, _FORCE_NOISE, cycles=_NEW_CYCLES, rows=_NEW_ROWS, from_rest=True
+        )
+        yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", loop
+
+
+def _changed(loop: LoopData, model: Model, *, amplitude: float = 1.0, rate: float = 1.0) -> LoopData:
+    """A loop of so many times the amplitude and rate, as the model would have it, with the same relative noise."""
+    drive = loop.drive
+    moved = replace(drive, coefficients=drive.coefficients * amplitude, frequency=drive.frequency * rate)
+    return LoopData(moved).noise_free(model).with_noise(loop.relative_noise)
+
+
+def _new_sweeps(
+    model: Model, data_sets: Sequence[DataSet], sweeps: Sequence[SweepData]
+) -> Iterator[tuple[str, SweepData]]:
+    """Sweeps beyond the frequencies and amplitudes of the campaign, and within them."""
+    reach = measured_range(model, data_sets)
+    unit_strain = model.unit_strain(data_sets[0].direction)
+    small, large = (strain / unit_strain for strain in reach.strain)
+    slow, fast = reach.frequency
+    low, high = band = _NEW_BAND if fast < _SLOW else (slow, fast)
+    beyond = [
+        (f"a sweep to {2.0 * fast:.3g} Hz", (fast, 2.0 * fast), (small, large)),
+        (f"a sweep down to {slow / 10.0:.3g} Hz", (slow / 10.0, slow), (small, large)),
+    ]
+    within = f"a sweep from {low:.3g} to {high:.3g} Hz at" if low < high else f"a sweep at {low:.3g} Hz and"
+    for words, ends, amplitudes in (
+        *(beyond if sweeps else ()),
+        (f"{within} a tenth and all of the largest amplitude", band, (0.1 * large, large)),
+        (f"{within} three times the largest amplitude", band, (3.0 * large,)),
+    ):
+        yield words, _sweep(model, sweeps, data_sets[-1], ends, amplitudes)
+
+
+def _sweep(
+    model: Model, sweeps: Sequence[SweepData], like: DataSet, band: tuple[float, float], amplitudes: Sequence[float]
+) -> SweepData:
+    """A sweep as the model would have it, as noisy as the campaign's or most rigs', in its direction or `like`'s."""
+    frequency, amplitude = (x.ravel() for x in np.meshgrid(np.geomspace(*band, _NEW_FREQUENCIES), amplitudes))
+    direction = sweeps[0].direction if sweeps else like.direction
+    shared = sweeps[0].noise.shared if sweeps else ASSUMED_SHARED
+    random = sweeps[0].relative_noise if sweeps else ASSUMED_SHARED[0]
+    return new_sweep(model, direction, frequency, amplitude, (random, random), shared)

@@ -1,7 +1,5 @@
 """Errors that all runs of a level share: repeats do not show them, what a fitted model leaves of the levels does."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -15,8 +13,6 @@ from bushfit.fitting.noise import ASSUMED_SHARED, of_class, words_of
 #: Error of a level, in units of the rig's class, up to which it counts as one of the rig; chosen: as for outliers of
 #: normal errors.
 _MOST_CLASSES = 3.0
-#: Rounds of Fisher scoring at most; chosen.
-_ROUNDS = 40
 #: Relative change of the variances at which the scoring ends: far below their standard error.
 _SETTLED = 1e-3
 #: What an error must take off twice the negative logarithm of the likelihood to count; chosen on 40 simulated
@@ -96,7 +92,7 @@ def level_errors(
         curvature = 0.5 * np.einsum("kij,lji->kl", solved, solved)
         return slope, curvature, float(np.linalg.slogdet(covariance)[1] + along @ white)
 
-    for _ in range(_ROUNDS):
+    for _ in range(40):  # of Fisher scoring; chosen: more than it takes
         slope, curvature, _ = at(added)
         step = slope / np.maximum(np.diag(curvature), np.finfo(float).tiny)
         moved = np.clip(added + step, 0.0, most_added)

@@ -1,7 +1,5 @@
 """One measured loop with its noise: force against time, the measured displacement driving the model."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -78,6 +76,10 @@ class LoopData(DataSet):
         return np.array([self.drive.first_harmonic()])
 
     @property
+    def weights(self) -> Array:
+        return self.drive.weight
+
+    @property
     def relative_noise(self) -> float:
         return self.drive.noise / self.drive.half_range
 
@@ -123,14 +125,8 @@ class LoopData(DataSet):
         """The same loop with another standard deviation of one row, relative to half the force range."""
         return replace(self, drive=replace(self.drive, noise=relative * self.drive.half_range))
 
-    def change(self, one: Model, other: Model) -> float:
-        return float(np.max(np.abs(self.force(one) - self.force(other)))) / self.drive.half_range
-
     def off(self, model: Model) -> Array:
         return ((self.force(model) - self.drive.force) / self.drive.half_range)[None]
-
-    def relative(self, model: Model) -> Array:
-        return self.off(model)[0, self.drive.weight > 0.0]
 
     def distance(self, model: Model) -> Array:
         return np.abs(self.misfit(model))
@@ -140,7 +136,7 @@ class LoopData(DataSet):
 
     def shown(self, model: Model) -> Array:
         off = (self.force(model) - self.drive.force) / self.drive.noise
-        return np.where(self.drive.weight > 0.0, self.misfit(model), off)
+        return np.where(self.weights > 0.0, self.misfit(model), off)
 
     def weighted(self, weight: Array) -> Self:
         return replace(self, drive=replace(self.drive, weight=self.drive.weight * weight))
@@ -170,7 +166,7 @@ class LoopData(DataSet):
 
     def smooth_misfit(self, model: Model) -> float:
         sizes = np.linalg.lstsq(self.contrasts().T, self.residual(model), rcond=None)[0]
-        return float(np.abs(sizes @ self._waves[:, self.drive.weight > 0.0]).max())
+        return float(np.abs(sizes @ self._waves[:, self.weights > 0.0]).max())
 
     def suspects(self) -> Iterator[Suspect]:
         """The loop as a whole, wrong in gain or offset."""
@@ -227,7 +223,7 @@ class LoopData(DataSet):
         the model smaller than it is (Peelle's puzzle: R. Fruehwirth, D. Neudecker, H. Leeb, EPJ Web of Conferences 27
         (2012) 00008).
         """
-        waves, counted = self._waves.T, self.drive.weight > 0.0
+        waves, counted = self._waves.T, self.weights > 0.0
         smooth = waves @ np.linalg.lstsq(waves[counted], self.drive.force[counted], rcond=None)[0]
         rows = self.drive.row_noise.whiten(smooth * self._per_noise) * self._told
         return self._counted(rows)

@@ -3,8 +3,6 @@
 Harmonics are fitted by least squares at the rows as they are; outliers do not bend them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -45,10 +43,6 @@ _TRIANGLE_RATIO = 1.02
 _NO_TRIANGLE = 3.0
 #: Share of the amplitude, over the number of harmonics, by which these may miss a corner of the motion.
 _CORNER = 0.5
-#: Rounds in which rows are weighted down by their distance; chosen.
-_REWEIGHTINGS = 10
-#: Rounds of leaving outliers out at most; chosen: nearly all records settle in two.
-_MOST_ROUNDS = 10
 
 
 class OutlierRows(NamedTuple):
@@ -170,11 +164,11 @@ def fit_without_outliers(columns: Array, values: Array, solution: Array) -> tupl
     inliers, stuck = np.ones(values.size, dtype=bool), are_stuck(values)
     if _inliers(columns, values, solution, stuck).all():
         return solution, inliers
-    for _ in range(_REWEIGHTINGS):
+    for _ in range(10):  # of weighting down; chosen
         residual = values - columns @ solution
         weight = ~stuck / np.sqrt(1.0 + np.square(residual / _noise(solution, residual[~stuck])))
         solution = least_squares(columns, values, weight)
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(10):  # of leaving out; chosen: nearly all records settle in two
         found = _inliers(columns, values, solution, stuck)
         if np.array_equal(found, inliers) or np.count_nonzero(found) < 2 * solution.size:
             break

@@ -5,8 +5,6 @@ and a phase error. Runs that hold the same are repeats of one line. Everything i
 gain errors are real and phase errors imaginary, both relative to |K|.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
@@ -16,6 +14,7 @@ from scipy.special import chdtrc
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
+from bushfit.fitting.outliers import least_absolute
 from bushfit.reading.measurement import Sweep
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 
@@ -49,11 +48,6 @@ _OUTLIER = 6.0
 #: Shared variance of an outlying pair of repeats over the median of all pairs: noise alone reaches it once in 500
 #: campaigns.
 _OUTLYING_PAIR = 100.0
-#: Rounds of reweighting towards the least sum of distances; chosen: nine of ten curves have then come within a third
-#: of the noise of where they end.
-_ROUNDS = 25
-#: Least distance relative to the median distance, so that no point takes all the weight.
-_LEAST_DISTANCE = 1e-3
 
 #: A line: the name of the sweep, and what its runs hold.
 LineKey = tuple[str, float]
@@ -347,7 +341,7 @@ def _about_smooth_curve(log_step: Array, log_stiffness: Array) -> _Line:
         return _Line(np.full((1, 2), ASSUMED_SHARED[0]), 1, np.empty((0, 2)))
     values = _parts(log_stiffness)
     basis = np.polynomial.legendre.legvander(unit(log_step), degree)
-    residual = np.abs(values - basis @ _least_absolute(basis, values))
+    residual = np.abs(values - basis @ least_absolute(basis, values, FLOOR**2))
     usual = np.median(np.sort(residual, axis=0)[degree + 1 :], axis=0)  # the curve goes through degree + 1 points
     inliers = np.all(residual <= np.maximum(_OUTLIER * MEDIAN_TO_SIGMA * usual, FLOOR), axis=1)
     inliers |= np.count_nonzero(inliers) < degree + 2  # too few would leave nothing free
@@ -374,16 +368,6 @@ def _freed(basis: Array, values: Array) -> Array:
         mirror = np.append(1.0, column[place + 1 :])
         turned[place:] -= np.outer(factor * mirror, mirror @ turned[place:])
     return turned[basis.shape[1] :]
-
-
-def _least_absolute(basis: Array, values: Array) -> Array:
-    """Coefficients of a curve, (n, k), with the least sum of distances to gain and phase, (n, 2) -> (k, 2)."""
-    root_weight = np.ones((len(values), 1))
-    for _ in range(_ROUNDS):
-        solution = np.linalg.lstsq(basis * root_weight, values * root_weight, rcond=None)[0]
-        distance = np.linalg.norm(values - basis @ solution, axis=1, keepdims=True)
-        root_weight = np.sqrt(1.0 / np.maximum(distance, _LEAST_DISTANCE * np.median(distance) + FLOOR**2))
-    return np.asarray(solution)
 
 
 def _parts(values: Array) -> Array:

@@ -1,7 +1,5 @@
 """The fits a user asks for: static, dynamic, the two in turn, and all parameters together."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -11,13 +9,22 @@ from bushfit.effects import BASE, effect_named
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.agreement import misfits, usable
-from bushfit.fitting.assess import Stage, covariance, lack_of_fit, measured_range, misfit, quality
+from bushfit.fitting.assess import (
+    Stage,
+    apart_in_temperature,
+    covariance,
+    implausible,
+    lack_of_fit,
+    measured_range,
+    misfit,
+    quality,
+    unfitted,
+)
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, parted, sources, with_level_errors
 from bushfit.fitting.identify import left_open
 from bushfit.fitting.levels import largest_level_error, level_errors
 from bushfit.fitting.noise import words_of
-from bushfit.fitting.plausible import apart_in_temperature, implausible, unfitted
 from bushfit.fitting.profile import profile95
 from bushfit.fitting.robust import Estimate, estimate, told
 from bushfit.fitting.solve import Bounds, Coordinates, Solution

@@ -4,8 +4,6 @@ A standard error takes the misfit for a parabola. The profile asks the data: it 
 anew, and looks where chi-square has risen too far. The two differ where a parameter is barely determined.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -27,10 +25,6 @@ _FIRST_REACH = 1.1
 _MOST_STEPS = 200
 #: How closely an end is found, in steps: far closer than the three digits that are printed.
 _PRECISION = 1e-4
-#: Evaluations of the model for the fit of the others at one point at most: chosen, five to ten are the rule.
-_EVALUATIONS = 100
-#: Relative change of chi-square at which the fit of the others stops: far less than what the rise is compared with.
-_TOLERANCE = 1e-7
 #: Noise that was itself estimated widens an interval by no more than this factor (Student's t of two degrees of
 #: freedom).
 _WIDEST = 2.2
@@ -66,8 +60,8 @@ class _Profile:
                 self.data_sets,
                 [name for name in self.best.coordinates.names if name != self.name],
                 self.bounds,
-                evaluations=_EVALUATIONS,
-                tolerance=_TOLERANCE,
+                evaluations=100,  # chosen: five to ten are the rule
+                tolerance=1e-7,  # far less than what the rise of chi-square is compared with
                 strict=False,
             )
         return self.known[at]

@@ -6,8 +6,6 @@ Notes:
     reweighted, sqrt-weights into the noise of each point, and the loss not put on whitened residuals one by one.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -11,8 +11,6 @@ Notes:
     number: an uneven clock changes nothing.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -32,10 +30,6 @@ _FEWEST = 4
 _IN_VAIN = 2
 #: Lowest frequencies seen whose power is where filling in those below begins.
 _LOWEST = 3
-#: Rounds of filling these in at most; nearly all take ten.
-_ROUNDS = 60
-#: Relative change of what is filled in below which these rounds have settled.
-_SETTLED = 1e-3
 #: Harmonics of one cycle up to which cycles may differ by settling or drift, and so not by noise alone.
 _SLOW = 3.5
 #: Power between these harmonics up to which it counts as noise, over the most that a filter of one pole makes there.
@@ -178,14 +172,14 @@ def _fitted(power: Array, waves: Array, used: Array) -> _Model:
     filled[:lowest] = power[seen[:_LOWEST]].mean()
     models, prices = [], []
     for order in (order for order in _ORDERS if order * _FEWEST <= seen.size):
-        for _ in range(_ROUNDS):
+        for _ in range(60):  # of filling in; nearly all take ten
             correlations = cosines[: order + 1] @ filled
             correlations[0] *= 1.0 + _FLOOR
             predictor = -np.linalg.solve(toeplitz(correlations[:-1]), correlations[1:])
             model = _Model(np.append(1.0, predictor), correlations)
             before = filled[:lowest].copy()
             filled[:lowest] = model.spectrum(waves[:, np.maximum(np.arange(lowest), (lowest + 1) // 2)])
-            if np.allclose(filled[:lowest], before, rtol=_SETTLED):
+            if np.allclose(filled[:lowest], before, rtol=1e-3):
                 break
         spectrum = model.spectrum(waves)[used]
         models.append(model)

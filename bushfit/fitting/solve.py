@@ -27,10 +27,6 @@ if TYPE_CHECKING:
 
 Bounds = Mapping[str, tuple[float | None, float | None]]
 
-#: Relative change of chi-square, and of the point, at which a fit stops: far below what noise lets one see.
-_TOLERANCE = 1e-9
-#: Evaluations of the model in one fit at most: chosen, ten to forty are the rule.
-_MOST_EVALUATIONS = 400
 #: Smallest singular value of the derivatives that counts, relative to the largest: below it is their rounding.
 _LEAST_SINGULAR_VALUE = 1e-10
 #: A parameter this close to a bound rests on it, in coordinates, which are of order one however wide the bounds.
@@ -125,16 +121,17 @@ def solve(
     names: Sequence[str],
     bounds: Bounds | None = None,
     *,
-    evaluations: int = _MOST_EVALUATIONS,
-    tolerance: float = _TOLERANCE,
+    evaluations: int = 400,
+    tolerance: float = 1e-9,
     strict: bool = True,
 ) -> Solution:
     """Fit the named parameters by least squares, from the model's own values, the others held; without names all are.
 
     Args:
         bounds: limits inside the parameters' own; a parameter may come to rest on one.
-        evaluations: most evaluations of the model.
-        tolerance: relative change of chi-square and of the point at which the fit stops.
+        evaluations: of the model at most; chosen: ten to forty are the rule.
+        tolerance: relative change of chi-square and of the point at which the fit stops; far below what noise lets
+            one see.
         strict: whether a fit that has used up its evaluations is an error, unless chi-square is flat where it is.
 
     Raises:

@@ -3,8 +3,6 @@
 They need only be of the right order; the fits end at one minimum from anywhere within two decades.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -13,8 +11,8 @@ from bushfit.effects import parameter_named
 from bushfit.effects.contract import Array
 from bushfit.effects.friction import harmonic_shape
 from bushfit.errors import FitError
+from bushfit.fitting.assess import implausible
 from bushfit.fitting.data_sets import DataSet
-from bushfit.fitting.plausible import implausible
 from bushfit.geometry import Bushing, stiffness_per_modulus, unit_strain
 
 #: Strain amplitude of the largest test over eps_half, before anything is known; chosen: the fit finds the rest.

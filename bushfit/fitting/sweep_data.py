@@ -1,7 +1,5 @@
 """One measured sweep with its noise: dynamic stiffness over frequency and amplitude."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -215,15 +213,9 @@ class SweepData(DataSet):
         off = (self.stiffness(model) - self.measured) / np.abs(self.measured)
         return np.stack((off.real, off.imag))
 
-    def relative(self, model: Model) -> Array:
-        return np.abs(self.stiffness(model) / self.measured - 1.0)[self.weights > 0.0]
-
     def distance(self, model: Model) -> Array:
         """As of `DataSet`, less what its block shares; of gain and phase the root mean square."""
         return self.apart(self.deviation(model)) / np.sqrt(2.0)
-
-    def change(self, one: Model, other: Model) -> float:
-        return float(np.max(np.abs((self.stiffness(one) - self.stiffness(other)) / self.measured)))
 
     def apart(self, deviation: Array, *, shared: bool = True) -> Array:
         """Length of deviations, (n,), in units of the random noise, less the likeliest error that a block shares."""
@@ -296,7 +288,6 @@ class SweepData(DataSet):
 
     @cached_property
     def weights(self) -> Array:
-        """Share of its weight that each point has, (n,)."""
         return np.ones(self.frequency.size) if self.weight is None else self.weight
 
     def outlying(self, model: Model) -> Array:

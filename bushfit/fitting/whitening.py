@@ -8,8 +8,6 @@ Notes:
     for shared errors either.
 """
 
-from __future__ import annotations
-
 from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """The tests among files, the sheets of workbooks, and the files of folders."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -38,7 +36,7 @@ class Source:
     def __str__(self) -> str:
         return f"{self.file}, sheet {self.sheet}" if self.sheet else str(self.file)
 
-    def without(self, *keys: str) -> Source:
+    def without(self, *keys: str) -> "Source":
         """The same of which some keys are not stated."""
         return replace(self, stated={key: value for key, value in (self.stated or {}).items() if key not in keys})
 

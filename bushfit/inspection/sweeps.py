@@ -8,11 +8,13 @@ from scipy.stats import linregress, poisson
 from bushfit.effects.contract import Array
 from bushfit.effects.mistake import told
 from bushfit.effects.mistakes import MISTAKES
+from bushfit.fitting.data_set import shown_amplitude
 from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.inspection.outside import wrong_labels
 from bushfit.inspection.record import Looked, told_frequencies
 from bushfit.reading.measurement import Sweep, loss_factor
 from bushfit.reading.names import Said
+from bushfit.reading.runs import rows_alike
 from bushfit.reduction.result import MISSED_LEVEL
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 from bushfit.units import number
@@ -80,7 +82,7 @@ def _copies(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
     )
     finest = _finest(magnitude)
     copies, expected, first = 0, 0.0, sweep.frequency.size
-    for rows in _groups(sweep.frequency, sweep.amplitude):
+    for rows in rows_alike(sweep.frequency, sweep.amplitude):
         points = np.stack((magnitude[rows], phase[rows]))
         _, start, count = np.unique(points, axis=1, return_index=True, return_counts=True)
         copies += int((count - 1).sum())
@@ -107,7 +109,7 @@ def _untold_repeats(sweep: Sweep) -> Iterator[str]:
     passes, of_frequency = np.unique(sweep.repeat).size, sweep.frequency.size / np.unique(sweep.frequency).size
     steps = [
         (float(sweep.frequency[rows[0]]), float(np.diff(np.log(levels)).min()))
-        for rows in _groups(sweep.frequency)
+        for rows in rows_alike(sweep.frequency)
         if (levels := np.unique(sweep.amplitude[rows])).size > 1
     ]
     frequency, least = min(steps, key=lambda step: step[1], default=(0.0, np.inf))
@@ -131,7 +133,7 @@ def _missing(sweep: Sweep) -> Iterator[str]:
         if absent.size and len(names) > 1:
             which = f", repeat {repeat:.0f}," if np.unique(sweep.repeat).size > 1 else ""
             listed = ", ".join([*(f"{f:.4g}" for f in absent[:_MOST_LISTED]), *["..."] * (absent.size > _MOST_LISTED)])
-            yield f"{_told(sweep, level)}{which} lacks {listed} Hz, which most others have"
+            yield f"{shown_amplitude(sweep.direction, level)}{which} lacks {listed} Hz, which most others have"
 
 
 def _outliers(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
@@ -143,10 +145,11 @@ def _outliers(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
     parts = np.stack((off.real, off.imag), axis=1)
     far = np.any((np.abs(parts) > _FAR * random) & (np.abs(parts) > _LEAST_OUTLIER), axis=1)
     for row in np.flatnonzero(far)[:_MOST_LISTED]:
+        level = shown_amplitude(sweep.direction, sweep.amplitude[row])
         yield (
-            f"data row {row + 1} ({sweep.frequency[row]:.4g} Hz, {_told(sweep, sweep.amplitude[row])}, repeat "
-            f"{sweep.repeat[row]}) is {number(100 * np.expm1(parts[row, 0]), 2, '+')} % in |K| and "
-            f"{np.degrees(parts[row, 1]):+.2g} deg off its repeats"
+            f"data row {row + 1} ({sweep.frequency[row]:.4g} Hz, {level}, repeat {sweep.repeat[row]}) is "
+            f"{number(100 * np.expm1(parts[row, 0]), 2, '+')} % in |K| and {np.degrees(parts[row, 1]):+.2g} deg off "
+            "its repeats"
         )
     if far.sum() > _MOST_LISTED:
         yield f"{int(far.sum()) - _MOST_LISTED} more points are as far off their repeats"
@@ -155,7 +158,7 @@ def _outliers(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
 def _from_repeats(sweep: Sweep) -> Array:
     """Distance of ln K from the median of its repeats, nan where there are fewer than three, (n,)."""
     value, off = np.log(sweep.stiffness), np.full(sweep.frequency.size, np.nan + 0j)
-    for rows in _groups(sweep.frequency, sweep.amplitude):
+    for rows in rows_alike(sweep.frequency, sweep.amplitude):
         if rows.size > 2:
             off[rows] = value[rows] - _median(value[rows])
     return off
@@ -163,7 +166,7 @@ def _from_repeats(sweep: Sweep) -> Array:
 
 def _blocks(sweep: Sweep) -> list[Array]:
     """The rows of each block: a repeat of a level over all frequencies."""
-    return _groups(sweep.repeat.astype(float), sweep.amplitude)
+    return rows_alike(sweep.repeat.astype(float), sweep.amplitude)
 
 
 def _odd_blocks(sweep: Sweep) -> Iterator[str]:
@@ -177,7 +180,7 @@ def _odd_blocks(sweep: Sweep) -> Iterator[str]:
     for rows, own in zip(blocks, gain, strict=True):
         if abs(own) > max(_FAR * usual, _LEAST_BLOCK_OFFSET):
             yield (
-                f"{_told(sweep, sweep.amplitude[rows[0]])}, repeat {sweep.repeat[rows[0]]} lies "
+                f"{shown_amplitude(sweep.direction, sweep.amplitude[rows[0]])}, repeat {sweep.repeat[rows[0]]} lies "
                 f"{number(100 * np.expm1(own), 2, '+')} % off the other repeats as a whole: "
                 "other amplitude, temperature or mounting?"
             )
@@ -197,7 +200,10 @@ def _missed(sweep: Sweep) -> Iterator[str]:
     off = sweep.amplitude_reached / sweep.amplitude - 1.0
     row = int(np.argmax(np.abs(off)))
     if abs(off[row]) > MISSED_LEVEL:
-        reached, level = _told(sweep, sweep.amplitude_reached[row]), _told(sweep, sweep.amplitude[row])
+        reached, level = (
+            shown_amplitude(sweep.direction, sweep.amplitude_reached[row]),
+            shown_amplitude(sweep.direction, sweep.amplitude[row]),
+        )
         yield f"{reached} was reached where the level is {level} ({sweep.frequency[row]:.4g} Hz)"
 
 
@@ -205,10 +211,10 @@ def _negative(sweep: Sweep) -> Iterator[str]:
     """A sentence on points whose loss factor is below zero."""
     bad = np.flatnonzero(sweep.stiffness.imag < 0.0)
     if bad.size:
-        row = int(bad[0])
+        level = shown_amplitude(sweep.direction, sweep.amplitude[bad[0]])
         yield (
             f"{bad.size} point{'s' * (bad.size > 1)} with a loss factor below zero, the first at "
-            f"{sweep.frequency[row]:.4g} Hz, {_told(sweep, sweep.amplitude[row])}: is the force channel late?"
+            f"{sweep.frequency[bad[0]]:.4g} Hz, {level}: is the force channel late?"
         )
 
 
@@ -219,19 +225,6 @@ def _doubtful_loss(sweep: Sweep) -> Iterator[str]:
         unless = ", or ".join(told(mistake, sweep) for mistake in mistakes)
         loss = float(np.median(loss_factor(sweep.stiffness)))
         yield f"the loss factor is {number(loss, 2)} in the median, that of hardly any rubber, unless {unless}"
-
-
-def _told(sweep: Sweep, amplitude: float) -> str:
-    """An amplitude in the units of engineers."""
-    unit, factor = sweep.direction.display.displacement
-    return f"{factor * amplitude:.4g} {unit}"
-
-
-def _groups(*keys: Array) -> list[Array]:
-    """The rows of each group that shares all keys; each key (n,)."""
-    _, group = np.unique(np.stack(keys), axis=1, return_inverse=True)
-    order = np.argsort(group.ravel(), kind="stable")
-    return np.split(order, np.cumsum(np.bincount(group.ravel()))[:-1])
 
 
 def _median(values: Array) -> complex:

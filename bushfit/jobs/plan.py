@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.campaign import Campaign, model_of
 from bushfit.campaign.schema import PredictSettings, RigSettings, SimulatedLoop
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.fitting.data import Data
@@ -26,7 +26,6 @@ from bushfit.planning.knowledge import of_campaign, of_result, rig_of
 from bushfit.planning.plan import FOUND, plan
 from bushfit.report.contents import Contents, Kinds
 from bushfit.report.planned import plan_contents
-from bushfit.simulation import model_of
 
 if TYPE_CHECKING:
     from bushfit.effects.contract import Array

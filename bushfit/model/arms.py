@@ -213,9 +213,8 @@ def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 
     low, high = (np.repeat([reach, end], count) for reach, end in zip((-np.inf, np.inf), ends, strict=True))
     x, best = np.concatenate((np.log(moduli / unit), np.log(time))), (np.inf, moduli, time)
     for _ in range(rounds):
-        x = least_squares(
-            residual, np.clip(x, low + 1e-9, high - 1e-9), slopes, bounds=(low, high), max_nfev=_EVALUATIONS
-        ).x
+        start = np.clip(x, low + _INSIDE, high - _INSIDE)
+        x = least_squares(residual, start, slopes, bounds=(low, high), max_nfev=_EVALUATIONS).x
         off = np.abs(parts(x)[0].sum(axis=1) - 1.0)
         if off.max() < best[0]:
             best = off.max(), unit * np.exp(x[:count]), np.exp(x[count:])

@@ -1,7 +1,5 @@
 """The covariance of fitted parameters, and the widths of the intervals that follow from it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -84,7 +82,7 @@ class Covariance:
         ]
         return sorted(pairs, key=lambda pair: -abs(pair[2]))
 
-    def restricted(self, names: Sequence[str]) -> Covariance:
+    def restricted(self, names: Sequence[str]) -> "Covariance":
         """The covariance of some of the parameters, in the order that they have here."""
         kept = [i for i, name in enumerate(self.names) if name in names]
         square = np.ix_(kept, kept)

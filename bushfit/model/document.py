@@ -26,9 +26,6 @@ SCHEMAS: tuple[SchemaName, ...] = get_args(SchemaName)
 Matrix = tuple[tuple[Number, ...], ...]
 #: Share of a variance by which rounding in a file may take the least eigenvalue below zero.
 _ROUNDING = 1e-6
-#: Characters of a text, and warnings, at most: what people read, and a table shows in no time.
-_LONGEST_TEXT = 10_000
-_MOST_WARNINGS = 10_000
 
 
 @dataclass(frozen=True)
@@ -282,7 +279,7 @@ class ModelFile:
         campaign: that the model was fitted to; null where it is known of none.
     """
 
-    __pydantic_config__ = ConfigDict(str_max_length=_LONGEST_TEXT)
+    __pydantic_config__ = ConfigDict(str_max_length=10_000)  # what people read, and a table shows in no time
 
     schema: SchemaName
     bushing: BushingTable | None
@@ -290,7 +287,7 @@ class ModelFile:
     parameters: Mapping[str, ParameterTable]
     covariance: CovarianceTable | None = None
     fit: FitTable | None = None
-    warnings: Annotated[tuple[str, ...], Field(max_length=_MOST_WARNINGS)] = ()
+    warnings: Annotated[tuple[str, ...], Field(max_length=10_000)] = ()
     outliers: tuple[Outlier, ...] = ()
     provenance: ProvenanceTable = field(default_factory=ProvenanceTable)
     specimens: tuple[SpecimenTable, ...] = ()

@@ -3,8 +3,6 @@
 Its keys are those of `model.document`.
 """
 
-from __future__ import annotations
-
 import importlib.metadata
 import json
 from collections.abc import Mapping, Set
@@ -56,11 +54,7 @@ def read_document(file: Path) -> dict[str, Any]:
     Raises:
         ModelError: as `load_result`, of any schema.
     """
-    if isinstance(document := _read_json(file), dict):
-        return document
-    raise ModelError(
-        "not a result", file=file, found=_KINDS.get(type(document), "null"), expected="a JSON object { ... }"
-    )
+    return _object(_read_json(file), file, "a result")
 
 
 def _read_json(file: Path) -> Any:
@@ -74,15 +68,20 @@ def from_document(document: object, file: Path | None = None) -> Result:
     Raises:
         ModelError: another schema, a key that is missing or of the wrong kind, or values that are no model.
     """
-    if not isinstance(document, dict):
-        raise ModelError(
-            "not a model", file=file, found=_KINDS.get(type(document), "null"), expected="a JSON object { ... }"
-        )
     hint = "use a file written by bushfit fit-static, fit-dynamic, fit or diagnose"
-    require_schema(document, file, "a model", *SCHEMAS, hint=hint)
-    tables = check_tables(_renamed(document), file, ModelFile, kind=ModelError)
+    tables = _object(document, file, "a model")
+    require_schema(tables, file, "a model", *SCHEMAS, hint=hint)
+    checked = check_tables(_renamed(tables), file, ModelFile, kind=ModelError)
     with naming(file):
-        return _result(tables)
+        return _result(checked)
+
+
+def _object(document: object, file: Path | None, what: str) -> dict[str, Any]:
+    """A parsed file that is a JSON object, or a ModelError."""
+    if isinstance(document, dict):
+        return document
+    found = _KINDS.get(type(document), "null")
+    raise ModelError(f"not {what}", file=file, found=found, expected="a JSON object { ... }")
 
 
 def require_schema(document: Mapping[str, Any], file: Path | None, what: str, *schemas: str, hint: str) -> None:

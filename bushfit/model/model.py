@@ -1,7 +1,5 @@
 """The model of a bushing: its geometry, the effects that its response is made of, and their values."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial, reduce
@@ -53,7 +51,7 @@ class _Structure:
 
     @classmethod
     @lru_cache(maxsize=256)
-    def of(cls, names: tuple[str, ...]) -> _Structure:
+    def of(cls, names: tuple[str, ...]) -> "_Structure":
         """The structure of a model with these effects, in any order; kept, because a fit makes thousands of models."""
         doubles = {name for name in names if names.count(name) > 1}
         if doubles:
@@ -149,7 +147,7 @@ class Model:
         """Stiffness per unit equivalent shear modulus: [m], [m^3/rad] of a rotation, [1] of a modulus."""
         return geometry.stiffness_per_modulus(self.bushing, place)
 
-    def with_values(self, values: Mapping[str, float]) -> Model:
+    def with_values(self, values: Mapping[str, float]) -> "Model":
         """The same model with some values replaced."""
         return replace(self, values={**self.values, **values})
 
@@ -160,7 +158,7 @@ class Model:
         effects: Sequence[str],
         values: Mapping[str, float],
         unnamed: Unnamed | None = None,
-    ) -> Model:
+    ) -> "Model":
         """A model with the values given; other parameters have their neutral value, or a typical one."""
         defaults = {
             qualified(effect, parameter): parameter.typical if parameter.neutral is None else parameter.neutral
@@ -170,7 +168,7 @@ class Model:
         found = {name: values.get(name, default) for name, default in defaults.items()}
         return cls(bushing, tuple(effects), found, unnamed)
 
-    def with_effect(self, name: str, values: Mapping[str, float] | None = None) -> Model:
+    def with_effect(self, name: str, values: Mapping[str, float] | None = None) -> "Model":
         """The model with one effect more, in place of the branch that it replaces, if it replaces one.
 
         Parameters of it without a value start from those of that branch, or else as in `started`.
@@ -183,7 +181,7 @@ class Model:
         kept = [other for other in self.effects if other != effect.replaces]
         return Model.started(self.bushing, (*kept, name), {**self.values, **starts, **(values or {})}, self.unnamed)
 
-    def with_twin(self, name: str) -> Model:
+    def with_twin(self, name: str) -> "Model":
         """The model with that effect in place of its twins, of the same values; as it is where it has none of them."""
         twins = [effect for effect in self.records if effect.name in twins_of(name) and effect.name != name]
         effects = [effect.name for effect in self.records if effect not in twins]
@@ -197,7 +195,7 @@ class Model:
             return self
         return Model.started(self.bushing, [*effects, *added], {**self.values, **moved}, self.unnamed)
 
-    def without(self, *left: Level | str) -> Model:
+    def without(self, *left: Level | str) -> "Model":
         """The model without the effects of these levels and names."""
         kept = [effect.name for effect in self.records if not {effect.level, effect.name} & {*left}]
         return Model.started(self.bushing, kept, self.values, self.unnamed if UNNAMED in kept else None)

@@ -15,6 +15,7 @@ from bushfit.effects.history import History
 from bushfit.errors import ModelError
 from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model
+from bushfit.reduction.harmonics import cycle_harmonics
 
 #: Time steps in a cycle, where none are asked for: within 0.03 % of the closed form at 20 Hz.
 STEPS_PER_CYCLE = 2048
@@ -96,18 +97,11 @@ def imposed(
     return Record(np.arange(motion.size) * step, motion, force)
 
 
-def first_harmonic(time: Array, signal: Array, frequency: float) -> complex:
-    """Complex amplitude c of a signal ~ mean + Re(c exp(i omega t)), (n,), at a frequency [Hz], by least squares."""
-    phase = 2.0 * np.pi * frequency * time
-    basis = np.stack([np.ones_like(phase), np.cos(phase), -np.sin(phase)], axis=1)
-    _, real, imag = np.linalg.lstsq(basis, signal, rcond=None)[0]
-    return complex(real, imag)
-
-
 def lock_in(measured: Record, frequency: float) -> complex:
     """Complex dynamic stiffness of a record at its frequency [Hz], overtones dropped: [N/m or N m/rad] (Eq. 9)."""
-    force = first_harmonic(measured.time, measured.force, frequency)
-    return force / first_harmonic(measured.time, measured.displacement, frequency)
+    channels = np.column_stack((measured.displacement, measured.force))
+    _, (displacement, force), _ = cycle_harmonics(measured.time * frequency, channels, 1)
+    return complex(force / displacement)
 
 
 def dynamic_stiffness(

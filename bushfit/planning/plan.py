@@ -10,7 +10,7 @@ from bushfit.campaign.schema import SimulatedLoop
 from bushfit.effects import qualified
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
-from bushfit.fitting.new_tests import new_sweep
+from bushfit.fitting.data_sets import new_sweep
 from bushfit.fitting.solve import residual
 from bushfit.model.covariance import Z95
 from bushfit.planning.candidates import candidates, minutes, setup_minutes, standard_tests

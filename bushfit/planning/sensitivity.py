@@ -18,9 +18,8 @@ from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.propose import missing_effects, sensitivity
 from bushfit.effects import Effect
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import DataSet, parted
+from bushfit.fitting.data_sets import DataSet, new_loop, new_sweep, parted
 from bushfit.fitting.information import relative_sizes
-from bushfit.fitting.new_tests import new_loop, new_sweep
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.solve import jacobian, residual
 from bushfit.fitting.whitening import Whitening

@@ -6,8 +6,6 @@ bytes of a workbook on standard input and an order in JSON as its argument, and 
 It imports nothing of bushfit, to be there within a fiftieth of a second.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import marshal

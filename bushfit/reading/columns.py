@@ -1,7 +1,5 @@
 """The recognised columns of a table: how they write their numbers, and their values in SI."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

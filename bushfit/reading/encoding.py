@@ -7,8 +7,6 @@ Notes:
     and Western Latin for the rest (cp1252, or Latin-1 where it has bytes that cp1252 lacks).
 """
 
-from __future__ import annotations
-
 import codecs
 import io
 import re

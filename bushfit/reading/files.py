@@ -1,7 +1,5 @@
 """Files given by the user: their bytes, or one clear error."""
 
-from __future__ import annotations
-
 import codecs
 import hashlib
 from concurrent.futures import Future, ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """What the header of a column says in a test file: its role, its unit, and how it counts amplitudes."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence

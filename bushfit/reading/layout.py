@@ -8,8 +8,6 @@ Notes:
     columns of nearly all.
 """
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Hysteresis loops read from files, or one error that tells why a file cannot be a loop."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the name of a file or sheet, and the lines above its table, say of its test: amplitude, direction and so on."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Iterable, Sequence
@@ -92,7 +90,7 @@ class Said:
         found = [each for each in dict.fromkeys(self.quantities) if units.agrees(each.unit, expected)]
         return [each for each in found if each.is_marked] or found
 
-    def __or__(self, other: Said) -> Said:
+    def __or__(self, other: "Said") -> "Said":
         """What both say; what this one says goes first."""
         own = {unit for unit in ("m", "rad", "1", "Hz") if self.of(unit)}
         more = tuple(each for each in other.quantities if not any(units.agrees(each.unit, unit) for unit in own))

@@ -4,8 +4,6 @@
 numbers tell; where all of them can be read both ways, that is an error and not a guess.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass

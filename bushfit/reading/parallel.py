@@ -1,7 +1,5 @@
 """Work on long arrays, chunk by chunk on all cores; a chunk stays in a core's cache."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor

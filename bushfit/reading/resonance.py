@@ -1,7 +1,5 @@
 """Resonance tests read from files: a mass on a mount on a shaker, as accelerations or as their ratio."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -101,7 +101,7 @@ def _by_frequency(frequency: Floats, amplitude: Floats) -> Floats:
     """
     rank = np.empty(amplitude.size, dtype=np.intp)
     shapes = set()
-    for rows in _members(np.unique(frequency, return_inverse=True)[1]):
+    for rows in rows_alike(frequency):
         levels, rank[rows], counts = np.unique(nominal(amplitude[rows]), return_inverse=True, return_counts=True)
         shapes.add((levels.size, counts.min(), counts.max()))
         if len(shapes) > 1 or counts.min() != counts.max() or counts.max() < 2 or levels.size < _FEWEST_POINTS:
@@ -137,10 +137,10 @@ def _of_passes(amplitude: Floats, passes: NDArray[np.intp]) -> Floats | None:
     return nominal(_middle(amplitude, passes)) if widest < _WIDEST_PASS else None
 
 
-def _members(group: NDArray[np.intp]) -> list[NDArray[np.intp]]:
-    """The indices of the members of each group, in order, where groups count from 0 and none is empty."""
-    order = np.argsort(group, kind="stable")
-    return np.split(order, np.cumsum(np.bincount(group))[:-1])
+def rows_alike(*keys: Floats) -> list[NDArray[np.intp]]:
+    """The rows of each group that shares all keys, in order; each key (n,)."""
+    group = _number(*keys)
+    return np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1])
 
 
 def _spans(values: Floats, group: NDArray[np.intp]) -> Floats:

@@ -1,7 +1,5 @@
 """A table of a test: its columns recognised by their headers, with units, and its numbers in SI."""
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -51,7 +49,7 @@ class Table(Columns):
         stated_units: Mapping[str, str] | None = None,
         stated: FileFormat | None = None,
         motion: Motion = TRANSLATION,
-    ) -> Table:
+    ) -> "Table":
         """Read a file and understand its header.
 
         Args:

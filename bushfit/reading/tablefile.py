@@ -1,20 +1,52 @@
-"""Tables as files, in the form that their reader wants: CSV, CSV with decimal commas, or a workbook."""
+"""Tables as files, in the form that their reader wants: CSV, CSV with decimal commas, or a workbook.
+
+A CSV file has seven digits, UTF-8, and no text that a spreadsheet would run as a formula. It has commas and decimal
+points; or semicolons and decimal commas, as Excel expects where numbers are written so, after the byte order mark by
+which Excel knows UTF-8. A workbook has numbers in full, and texts as texts, whatever they look like.
+"""
 
 from __future__ import annotations
 
+import csv
+import io
 import os
-from collections.abc import Callable, Iterable, Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import IO, TYPE_CHECKING, Literal, TextIO
+
+from bushfit.errors import OutputError, printable
 
 if TYPE_CHECKING:
     import pandas as pd
+    from xlsxwriter import Workbook
+    from xlsxwriter.format import Format
 
 #: Commas and decimal points; semicolons and decimal commas; a workbook.
 Form = Literal["csv", "decimal-comma", "xlsx"]
 #: Cells of a row.
 Row = Iterable[str | float | None]
+#: The start of a text that a spreadsheet takes for a formula, in ASCII or full width, even after blanks.
+_FORMULA = re.compile("[\\s\"']*[=+\\-@\uff1d\uff0b\uff0d\uff20|%]|\\t")
+#: What parts the lines of a text.
+_LINE_ENDS = re.compile("[\\r\\n]+")
+#: Characters that the name of a sheet must not have: Excel's, and those that XML has none of.
+_UNSAFE_IN_SHEETS = re.compile(r"[\[\]:*?/\\\x00-\x1f\ufffe\uffff]")
+#: Characters of the name of a sheet at most, of which rare ones count twice: units of UTF-16.
+_LONGEST_SHEET = 31
+#: The name of a sheet that Excel keeps for itself.
+_RESERVED = "history"
+#: Characters of a cell at most.
+_LONGEST_TEXT = 32_767
+#: When a workbook says it was made: that of its zip archive, so that the same tables are the same bytes.
+_MADE = datetime(1980, 1, 1, tzinfo=UTC)
+#: Widest column [characters].
+_WIDEST = 60
+#: What XlsxWriter gives back for a cell that lies beyond the last row or column of a sheet.
+_BEYOND = -1
 
 
 def ending(form: Form) -> str:
@@ -28,9 +60,6 @@ def to_bytes(name: str, table: pd.DataFrame, form: Form) -> bytes:
     Raises:
         OutputError: a table that is too large for a sheet.
     """
-    from bushfit.reading.csvfile import to_csv
-    from bushfit.reading.xlsxfile import to_xlsx
-
     return to_xlsx({name: table}) if form == "xlsx" else to_csv(table, decimal_comma=form == "decimal-comma")
 
 
@@ -41,9 +70,6 @@ def opened(file: Path, form: Form, headers: Iterable[str]) -> Iterator[Callable[
     Raises:
         OutputError: more rows than a sheet has.
     """
-    from bushfit.reading.csvfile import Rows, encoding
-    from bushfit.reading.xlsxfile import streamed
-
     if form == "xlsx":
         with streamed(file, headers) as sheet:
             yield sheet.add
@@ -53,3 +79,157 @@ def opened(file: Path, form: Form, headers: Iterable[str]) -> Iterator[Callable[
             yield Rows(stream, headers, decimal_comma=decimal_comma).add
     with file.open("rb") as written:
         os.fsync(written.fileno())
+
+
+class Rows:
+    """Writes rows of texts and numbers to a stream as they come."""
+
+    def __init__(self, stream: TextIO, headers: Iterable[str], *, decimal_comma: bool = False) -> None:
+        self._point = "," if decimal_comma else "."
+        self._writer = csv.writer(stream, delimiter=";" if decimal_comma else ",", lineterminator="\n")
+        self._writer.writerow([defused(header) for header in headers])
+
+    def add(self, cells: Iterable[str | float | None]) -> None:
+        """Write one row; None and nan become empty cells."""
+        self._writer.writerow([_cell(value, self._point) for value in cells])
+
+
+def encoding(decimal_comma: bool) -> str:
+    """The encoding of a file: UTF-8, before decimal commas with a byte order mark."""
+    return "utf-8-sig" if decimal_comma else "utf-8"
+
+
+def to_csv(table: pd.DataFrame, *, decimal_comma: bool = False) -> bytes:
+    """The bytes of a table's file."""
+    text = io.StringIO()
+    rows = Rows(text, map(str, table.columns), decimal_comma=decimal_comma)
+    for cells in zip(*(column.tolist() for _, column in table.items()), strict=True):
+        rows.add(cells)
+    return text.getvalue().encode(encoding(decimal_comma), "replace")
+
+
+def _cell(value: object, point: str) -> str:
+    if isinstance(value, float):
+        return "" if value != value else f"{value:.7g}".replace(".", point)
+    if isinstance(value, str):
+        return defused(value)
+    return "" if value is None else str(value)
+
+
+@lru_cache(maxsize=4096)
+def defused(text: str) -> str:
+    """A text in one line, after an apostrophe where a spreadsheet would run it as a formula."""
+    line = in_a_line(text)
+    return f"'{line}" if _FORMULA.match(line) else line
+
+
+def in_a_line(text: str) -> str:
+    """A text as a cell has it: in one line, control characters as escapes."""
+    return "\t".join(map(printable, " ".join(_LINE_ENDS.split(text)).split("\t")))
+
+
+def undefused(text: str) -> str:
+    """The text that was written so, but for the ends of its lines."""
+    return text[1:] if text.startswith("'") and _FORMULA.match(text[1:]) else text
+
+
+class Sheet:
+    """Writes rows of texts and numbers to a sheet as they come, below headers in bold that stay in sight.
+
+    Every text is written as a text: nothing is run as a formula or taken for a link or a number. Cells without a value,
+    and nan, stay empty.
+    """
+
+    def __init__(self, book: Workbook, name: str, headers: Iterable[str]) -> None:
+        self._sheet = book.add_worksheet(name)
+        self._sheet.freeze_panes(1, 0)
+        self._widths: dict[int, int] = {}
+        self._count = 0
+        self._add(headers, book.add_format({"bold": True}))
+
+    def add(self, cells: Iterable[str | float | None]) -> None:
+        """Write one row.
+
+        Raises:
+            OutputError: more rows or columns than a sheet has.
+        """
+        self._add(cells)
+
+    def _add(self, cells: Iterable[str | float | None], look: Format | None = None) -> None:
+        for place, cell in enumerate(cells):
+            if isinstance(cell, str):
+                self._widen(place, len(cell))
+                beyond = self._sheet.write_string(self._count, place, _text(cell), look) == _BEYOND
+            elif cell is not None and cell - cell == 0:  # neither nan nor infinite, which no cell holds
+                beyond = self._sheet.write_number(self._count, place, cell) == _BEYOND
+            else:
+                continue
+            if beyond:
+                raise OutputError(
+                    "a table is too large for a sheet",
+                    place=self._sheet.name,
+                    expected="at most 1,048,576 rows and 16,384 columns",
+                    hint="--table-format csv has no such limit",
+                )
+        self._count += 1
+
+    def _widen(self, place: int, letters: int) -> None:
+        """Make a column as wide as its widest text, as far as that goes."""
+        width = min(_WIDEST, letters + 1)
+        if width > self._widths.get(place, 0):
+            self._widths[place] = width
+            self._sheet.set_column(place, place, width)
+
+
+def to_xlsx(tables: Mapping[str, pd.DataFrame]) -> bytes:
+    """The bytes of a workbook with a sheet for each table, by its name, which is changed where Excel does not take it.
+
+    Raises:
+        OutputError: a table that is too large for a sheet.
+    """
+    stream, names = io.BytesIO(), set[str]()
+    with _book(stream, in_memory=True) as book:
+        for title, table in tables.items():
+            sheet = Sheet(book, _sheet_name(title, names), map(str, table.columns))
+            for cells in zip(*(column.tolist() for _, column in table.items()), strict=True):
+                sheet.add(cells)
+    return stream.getvalue()
+
+
+@contextmanager
+def streamed(file: Path, headers: Iterable[str]) -> Iterator[Sheet]:
+    """The one sheet of a new workbook, named after its file, whose rows are held in a file beside it until its end."""
+    with file.open("wb") as stream, _book(stream, constant_memory=True, tmpdir=str(file.parent)) as book:
+        yield Sheet(book, _sheet_name(file.stem, set()), headers)
+
+
+@contextmanager
+def _book(stream: IO[bytes], **options: object) -> Iterator[Workbook]:
+    """A workbook that is whole in the end; also after an error, so that no file of its rows stays."""
+    from xlsxwriter import Workbook
+
+    with Workbook(stream, options) as book:
+        book.set_properties({"created": _MADE})
+        yield book
+
+
+def _text(text: str) -> str:
+    """A text as a cell holds it."""
+    return printable(text, lines=True)[:_LONGEST_TEXT]
+
+
+def _cut(text: str, most: int) -> str:
+    """As many first characters of a text as have so many units of UTF-16 at most."""
+    return text.encode("utf-16-le")[: 2 * most].decode("utf-16-le", "ignore")
+
+
+def _sheet_name(title: str, taken: set[str]) -> str:
+    """A name that Excel takes and no other sheet has, its capitals aside; it joins those that are taken."""
+    plain = _cut(_UNSAFE_IN_SHEETS.sub("_", _text(title)), _LONGEST_SHEET).strip(" '") or "table"
+    name, count = plain, 1
+    while name.lower() in taken or name.lower() == _RESERVED:
+        count += 1
+        end = f"_{count}"
+        name = _cut(plain, _LONGEST_SHEET - len(end)) + end
+    taken.add(name.lower())
+    return name

@@ -8,8 +8,6 @@ cell ("K* 0.1 mm [N/mm]") or in several, of which those that are merged over col
     5        ;1520  ;1390        f [Hz];K*    ;tan d  ;K*    ;tan d         5     ;1520           ;0.101      ;...
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections import Counter
@@ -60,7 +58,7 @@ class _Said(NamedTuple):
     level_unit: str | None = None
     convention: AmplitudeConvention | None = None
 
-    def also(self, other: _Said) -> _Said:
+    def also(self, other: "_Said") -> "_Said":
         """What this says, and where it does not, the other."""
         return other._replace(**{name: said for name, said in self._asdict().items() if said is not None})
 

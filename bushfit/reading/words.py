@@ -1,7 +1,5 @@
 """The words that columns go by in test files, from words.toml."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -4,8 +4,6 @@ python-calamine reads them: exactly, and imported in a millisecond where openpyx
 its own (`aside`), because an archive of some kilobytes may hold sheets of terabytes.
 """
 
-from __future__ import annotations
-
 import json
 import marshal
 import signal
@@ -102,7 +100,9 @@ def read_sheets(
         answer = _asked(data, file, kind, sheets=wanted, cells=book["left"])
         book.update(answer, sheets=book["sheets"] | answer["sheets"])
     return book["names"], [
-        Sheet(title, book["sheets"][title], lambda: _lacks_values(data, file))
+        Sheet(
+            title, book["sheets"][title], lambda: bool(_asked(data, file, MeasurementError, formulas=True)["formulas"])
+        )
         for title in (book["shown"] if name is None else [name])
         if title in book["sheets"]
     ]
@@ -112,11 +112,6 @@ def read_sheets(
 def _known(_: bytes) -> dict[str, Any]:
     """What was read of the last workbook, to be added to: to look at one takes several passes."""
     return {"sheets": {}, "left": _MOST_CELLS}
-
-
-def _lacks_values(data: bytes, file: Path) -> bool:
-    """Whether a workbook has formulas whose values were not saved."""
-    return bool(_asked(data, file, MeasurementError, formulas=True)["formulas"])
 
 
 def _asked(data: bytes, file: Path, kind: type[BushfitError], **order: object) -> Mapping[str, Any]:

@@ -3,8 +3,6 @@
 They are counted on the displacement, in arrays of all rows or of all cycles at once.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 from math import comb, prod
@@ -87,7 +85,7 @@ class Cycles:
     range: Floats
 
     @classmethod
-    def of(cls, time: Floats, motion: Floats) -> Cycles:
+    def of(cls, time: Floats, motion: Floats) -> "Cycles":
         """The cycles of a motion, at any frequency and of any amplitude that stands out of the noise."""
         turns = turning_points(motion, least_prominence(motion))
         if turns.size < 4:

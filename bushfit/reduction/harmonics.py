@@ -3,8 +3,6 @@
 Rows may lie anywhere in time. Drift and overtones are fitted with the fundamental, so that neither leaks into it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -25,8 +23,6 @@ _DRIFT_TERMS = 3
 _CHUNK_ROWS = 1 << 14
 #: [cycles] Drift of the phase over a whole step with which its frequency is found; chosen: far below its error.
 _SETTLED_DRIFT = 1e-7
-#: Corrections of the frequency; each squares what it is off by, so that fewer do.
-_MOST_CORRECTIONS = 4
 #: Rows that the search for the frequency takes of a long step; chosen: enough for its last digit.
 _FREQUENCY_ROWS = 1 << 17
 #: Probability below which chance alone does not make cycles scatter more than white noise does; chosen.
@@ -53,7 +49,7 @@ class HarmonicFit:
     left_over: Complex
 
     @classmethod
-    def of(cls, time: Floats, displacement: Floats, force: Floats, edges: Floats) -> HarmonicFit:
+    def of(cls, time: Floats, displacement: Floats, force: Floats, edges: Floats) -> "HarmonicFit":
         """The fit with the frequency at which the phase of the displacement does not drift from cycle to cycle.
 
         Args:
@@ -66,7 +62,7 @@ class HarmonicFit:
         frequency = count / float(edges[-1] - edges[0])
         thin = slice(None, None, max(1, time.size // _FREQUENCY_ROWS))
         number = np.arange(count) - (count - 1) / 2.0
-        for _ in range(_MOST_CORRECTIONS):
+        for _ in range(4):  # each squares what the frequency is off by, so that fewer do
             fit = cls._solved(time[thin], values[:, thin], count, frequency, _FREQUENCY_HARMONICS)
             phase = np.unwrap(np.angle(fit.coefficients[0, 1] + fit.left_over[0]))
             drift = float(number @ phase / (number @ number)) / (2.0 * np.pi)
@@ -76,7 +72,7 @@ class HarmonicFit:
         return cls._solved(time, values, count, frequency, _HARMONICS)
 
     @classmethod
-    def _solved(cls, time: Floats, values: Floats, count: int, frequency: float, order: int) -> HarmonicFit:
+    def _solved(cls, time: Floats, values: Floats, count: int, frequency: float, order: int) -> "HarmonicFit":
         """The fit over `count` cycles about time 0, with `order` harmonics or fewer, at a frequency that is given."""
         size = _DRIFT_TERMS + 2 * max(1, min(order, (time.size - _DRIFT_TERMS) // 4))
         gram, moments = np.zeros((size, size)), np.zeros((size, 2))

@@ -4,9 +4,7 @@ The strokes of the motion, from one turning point to the next, are told apart by
 the crossings of their middles. A run of alike ones is a part; ramps, pauses and single cycles between are left out.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -19,8 +17,8 @@ from bushfit.reading.measurement import Floats, Loop, Part, rebuild_time
 from bushfit.reduction.cycles import SAME_PHASE, least_prominence, lone_outliers, middle_crossings, turning_points
 from bushfit.reduction.harmonics import cycle_harmonics
 
-#: Rows that are enough to find the parts.
-_ENOUGH_ROWS = 200_000
+#: Rows that are enough to find the cycles.
+ENOUGH_ROWS = 200_000
 #: Relative difference of the ranges of two strokes that are alike; chosen: rigs keep theirs better, and step by more.
 _SAME_RANGE = 0.03
 #: The same beyond noise, as a share of what a turning point stands out by, which is ten standard deviations.
@@ -48,7 +46,7 @@ _SAME_MOTION = 0.05
 #: Share of a cycle from either end of the record up to which a part reaches to it.
 _AT_END = 0.1
 #: Cycles from which on the first one, which remembers what came before, goes: three, for what noise may take off them.
-_THREE = 2.95
+THREE_CYCLES = 2.95
 #: Cycles from which on first and last are held against each other.
 _TWO = 1.95
 #: Softening from which on it is told; chosen: less does not matter to a fit.
@@ -89,12 +87,12 @@ class _Span:
         """Number of its cycles."""
         return (self.end - self.begin) / self.period
 
-    def like(self, other: _Span) -> bool:
+    def like(self, other: "_Span") -> bool:
         """Whether two parts have one amplitude and one rate."""
         ranges, periods = np.log(self.range / other.range), np.log(self.period / other.period)
         return bool(abs(ranges) < _SAME_AMPLITUDE and abs(periods) < _SAME_RATE)
 
-    def goes_on(self, other: _Span) -> bool:
+    def goes_on(self, other: "_Span") -> bool:
         """Whether the part after it is the same one, which a disturbance broke off."""
         gap = (other.begin - self.end) / self.period
         return self.like(other) and gap < _DISTURBED and abs(2.0 * gap - round(2.0 * gap)) < 2.0 * SAME_PHASE
@@ -130,7 +128,7 @@ def programme(loop: Loop, **keywords: Any) -> tuple[Loop, ...]:
 
 def _thinned(loop: Loop) -> tuple[Floats, Floats]:
     """Time [s], or number of the row where none was recorded, and displacement of rows enough to find the parts."""
-    every = slice(None, None, -(-loop.displacement.size // _ENOUGH_ROWS))
+    every = slice(None, None, -(-loop.displacement.size // ENOUGH_ROWS))
     time, motion = _clock(loop)[every], loop.displacement[every]
     sound = ~lone_outliers(time, motion)
     return time[sound], motion[sound]
@@ -239,17 +237,15 @@ def _loops(loop: Loop, time: Floats, spans: Sequence[_Span], clock: dict[str, An
     whole, last_end = _clock(loop), float(time[0])
     for number, span in enumerate(spans, start=1):
         begin = span.begin
-        if begin > time[0] and span.cycles > _THREE:
+        if begin > time[0] and span.cycles > THREE_CYCLES:
             begin += span.period
         ends = np.searchsorted(whole, [begin, span.end])
         rows = slice(int(ends[0]), int(ends[1]) + (span.end == time[-1]))
-        left_out = [
-            f"{f'{gap:.3g} s' if loop.timed else f'{gap:.0f} rows'} {where} its steady cycles"
-            for gap, where in ((begin - last_end, "before"), (time[-1] - span.end, "after"))
-            if gap > _AT_END * span.period and (where == "before" or number == len(spans))
+        gaps = begin - last_end, float(time[-1]) - span.end if number == len(spans) else 0.0
+        left = [
+            "" if gap <= _AT_END * span.period else f"{gap:.3g} s" if loop.timed else f"{gap:.0f} rows" for gap in gaps
         ]
-        cycles = (span.end - begin) / span.period
-        said = f"{' and '.join(left_out)} are left out; {cycles:.3g} cycles are used" if left_out else None
+        said = left_out(left, (span.end - begin) / span.period) if any(left) else None
         part = replace(
             loop.at(rows),
             name=f"{loop.name}_part_{number}",
@@ -258,6 +254,12 @@ def _loops(loop: Loop, time: Floats, spans: Sequence[_Span], clock: dict[str, An
         )
         yield part if loop.timed else replace(part, time=rebuild_time(part.displacement, **clock))
         last_end = span.end
+
+
+def left_out(gaps: Iterable[str], cycles: float) -> str:
+    """A sentence on how much of a record lies before and after its steady cycles, "" for nothing; so many are used."""
+    parts = [f"{gap} {where} its steady cycles" for gap, where in zip(gaps, ("before", "after"), strict=True) if gap]
+    return f"{' and '.join(parts)} are left out; {cycles:.3g} cycles are used"
 
 
 def _softening(loop: Loop, span: _Span, *, from_rest: bool) -> float | None:

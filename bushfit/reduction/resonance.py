@@ -31,10 +31,6 @@ _NEIGHBOURS = 15
 _MEDIAN_TO_SIGMA = 1.1774100225154747
 #: Standard deviations from which a point pulls less on the smooth curve (Huber's).
 _PULLS_LESS = 2.0
-#: Rounds in which the weights of the smooth curve settle; chosen: they change by per cents after five.
-_ROUNDS = 10
-#: Halvings of the interval of a response; its width of up to 20 in ln X then is 2e-14.
-_HALVINGS = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +130,7 @@ def response(
         low = np.where(above, low / 2.0, low)
     while (below := excess(high) < 0.0).any():
         high = np.where(below, high * 2.0, high)
-    for _ in range(_HALVINGS):
+    for _ in range(50):  # halvings: a width of up to 20 in ln X then is 2e-14
         middle = np.sqrt(low * high)
         above = excess(middle) > 0.0
         low, high = np.where(above, low, middle), np.where(above, middle, high)
@@ -239,7 +235,7 @@ def _scatter(frequency: Floats, amplitude: Floats, ratio: Complex) -> Floats:
     design = terms * (np.abs(ratio) * frequency**2)[:, None]
     measured = (1.0 - 1.0 / ratio) * np.abs(ratio)
     weight = np.ones_like(frequency)
-    for _ in range(_ROUNDS):
+    for _ in range(10):  # in which the weights settle; chosen: they change by per cents after five
         root = np.sqrt(weight)
         left = np.abs(measured - design @ np.linalg.lstsq(root[:, None] * design, root * measured, rcond=None)[0])
         sigma = np.median(left) / _MEDIAN_TO_SIGMA

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 from bushfit import __version__
 from bushfit.export.contract import Exported, Order
 from bushfit.export.losses import NO_LOOPS
-from bushfit.reading.csvfile import to_csv
-from bushfit.reading.xlsxfile import to_xlsx
+from bushfit.reading.tablefile import to_csv, to_xlsx
 from bushfit.report.artifacts import place_names
 from bushfit.report.tables import prediction_table, wide_table
 

@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bushfit.campaign.campaign import load_campaign
+from bushfit.campaign.campaign import load_campaign, model_of
 from bushfit.campaign.schema import SimulateSettings
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.fitting.data import Data
 from bushfit.model import rig
 from bushfit.model.model import Model
-from bushfit.simulation import Undisturbed, measure, model_of, undisturbed
+from bushfit.simulation import Undisturbed, measure, undisturbed
 
 #: Time steps in a cycle of the rig.
 STEPS = 1024

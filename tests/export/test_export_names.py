@@ -15,7 +15,7 @@ from readers import abaqus_options, bulk_cards, by_abaqus, by_pynastran, teimorb
 
 from bushfit.export import abaqus, adams, nastran
 from bushfit.export.contract import Order
-from bushfit.reading.xlsxfile import to_xlsx
+from bushfit.reading.tablefile import to_xlsx
 from bushfit.report import spreadsheets
 
 #: Names that break out of what is not escaped: line ends, comment marks, cards, keywords, formulas, markup, quotes.

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from bushfit.errors import FitError
-from bushfit.fitting.clock import fundamental
-from bushfit.fitting.runin import thinned
+from bushfit.fitting.clock import fundamental, thinned
 from bushfit.geometry import Direction
 from bushfit.reading.measurement import Loop
 

@@ -11,8 +11,9 @@ from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSetti
 from bushfit.geometry import Direction
 from bushfit.inspection.opening import inspect
 from bushfit.inspection.record import Inspected
-from bushfit.reading.csvfile import raw_loop_table, raw_sweep_table, to_csv
 from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
+from bushfit.reading.tablefile import to_csv
 
 NOISE = {
     "good": {"noise": 1e-3, "force_noise": 5e-4, "displacement_noise": 1e-4},

@@ -11,8 +11,8 @@ import pytest
 from looking import look, without
 
 from bushfit.inspection.opening import inspect
-from bushfit.reading.csvfile import raw_sweep_table
 from bushfit.reading.measurement import Sweep
+from bushfit.reading.rawtable import raw_sweep_table
 
 
 def spoiled(sweep: Sweep, rows: np.ndarray, factor: complex) -> Sweep:

@@ -12,8 +12,9 @@ from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
 from bushfit.inspection.draft import file_text
 from bushfit.inspection.opening import inspect
-from bushfit.reading.csvfile import raw_loop_table, to_csv
 from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.rawtable import raw_loop_table
+from bushfit.reading.tablefile import to_csv
 
 
 @pytest.mark.parametrize(

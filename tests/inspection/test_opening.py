@@ -16,8 +16,8 @@ from bushfit.geometry import Direction
 from bushfit.inspection.draft import file_text
 from bushfit.inspection.opening import inspect
 from bushfit.model.model import Model
-from bushfit.reading.csvfile import raw_loop_table, raw_sweep_table
 from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
 from bushfit.simulation import Undisturbed, measure, simulate
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bushfit.campaign.campaign import load_campaign
+from bushfit.campaign.campaign import load_campaign, model_of
 from bushfit.campaign.compound import Compound
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.geometry import Bushing, Direction, Specimen
@@ -17,7 +17,6 @@ from bushfit.planning.guess import guess
 from bushfit.planning.plan import plan
 from bushfit.report.contents import Formats
 from bushfit.report.planned import plan_contents, plan_sheet
-from bushfit.simulation import model_of
 
 AXIAL, RADIAL = Direction.AXIAL, Direction.RADIAL
 RIG = RigSettings(gain_error=0.005, phase_error=0.0044, max_force=5e3, max_frequency=200.0)

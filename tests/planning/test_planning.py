@@ -10,8 +10,7 @@ from bushfit.campaign.compound import Compound
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
-from bushfit.fitting.data_sets import SweepData
-from bushfit.fitting.new_tests import new_loop, new_sweep
+from bushfit.fitting.data_sets import SweepData, new_loop, new_sweep
 from bushfit.fitting.solve import residual, solve
 from bushfit.geometry import Bushing, Direction, Place
 from bushfit.model.model import Model

@@ -13,10 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bushfit.geometry import Direction
-from bushfit.reading.csvfile import Rows, defused, raw_loop_table, raw_sweep_table, to_csv
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep, loss_factor
+from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
 from bushfit.reading.sweeps import read_sweep
+from bushfit.reading.tablefile import Rows, defused, to_csv
 
 PHASE = np.linspace(0.0, 12.0, 50)
 

@@ -14,12 +14,11 @@ import pytest
 
 from bushfit.errors import OutputError
 from bushfit.geometry import Direction
-from bushfit.reading.csvfile import raw_loop_table, raw_sweep_table
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
 from bushfit.reading.sweeps import read_sweep
-from bushfit.reading.tablefile import Form, ending, opened, to_bytes
-from bushfit.reading.xlsxfile import streamed
+from bushfit.reading.tablefile import Form, ending, opened, streamed, to_bytes
 
 FORMS: tuple[Form, ...] = get_args(Form)
 PHASE = np.linspace(0.0, 12.0, 50)

@@ -12,8 +12,8 @@ import numpy as np
 
 from bushfit.errors import ModelError
 from bushfit.model.file import read_document
-from bushfit.reading.csvfile import in_a_line, undefused
 from bushfit.reading.files import read_utf8, view_bytes
+from bushfit.reading.tablefile import in_a_line, undefused
 from bushfit.reading.workbook import read_sheets
 from bushfit.report.artifacts import place_names
 from bushfit.report.page.schema import MODELS, PLAIN, checked
