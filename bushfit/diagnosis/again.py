@@ -21,7 +21,7 @@ class Again:
     Args:
         came_again: whether every effect that was named leads a set, or stands in one, or all of them together close
             what is left of the gap better than what was found in their place.
-        others: effects that lead a set in place of one that was named.
+        others: effects that lead a set in place of one that was named, other than its look-alikes.
     """
 
     part: str
@@ -37,7 +37,7 @@ def searched_again(search: Search, final: Evidence, steps: Sequence[Step], held:
     step and may miss what fits the rest best: where what was named does, it came again.
     """
     named, told = {step.name for step in steps}, {part.part for part in held.parts}
-    known = {name for step in steps for name in (step.name, *(rival.name for rival in step.richer))}
+    known = {name for step in steps for name in (step.name, *(each.name for each in (*step.rivals, *step.richer)))}
     settings, found = replace(search.settings, max_effects=len(steps)), []
     for part in parts(search.base.data_sets):
         if part.name not in told:

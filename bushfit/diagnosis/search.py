@@ -161,8 +161,8 @@ class Search:
             least = max(chance, _LEAST_SCORE * max((claim.score for claim in proposed), default=0.0))
             fitted = {candidate.name for candidate in known}
             best = [claim for claim in proposed[:_MOST_REFITTED] if claim.score > least and claim.name not in fitted]
-            near = {}
-            near = near or (self.start if not added and evidence.reduced > _BENT else {})
+            read: Mapping[str, float] = self.start if not added and evidence.reduced > _BENT else {}
+            near = known[0].evidence.model.values if known else read
             starts = {claim.name: self._found_earlier(key, claim.name) or near for claim in best}
             tried = refits(evidence, best, known, starts, self.held, self.bounds)
             self.rounds[key] = Round(evidence, proposed, tuple(self._with_limit(evidence, tried)))

@@ -58,7 +58,7 @@ def test_what_sticks_harder_than_it_slides_is_not_called_sliders(seed: int) -> N
 
 
 def test_the_best_refit_comes_to_its_end() -> None:
-    """A stiff friction lies at the end of a long valley; where its refit stopped short, a Maxwell arm made up for it."""
+    """A stiff friction lies at the end of a long valley; where its refit stopped short, a Maxwell arm made up."""
     (task,) = (task for task in tasks(300, 11) if task.seed == 949206328)
     outcome = work(task)
     print(f"{task.hidden}: {outcome.verdict} {outcome.sets}")
