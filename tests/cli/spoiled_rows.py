@@ -296,7 +296,7 @@ USAGE = [
     ("fit|campaign.toml|--effect|elastic", "an effect is listed twice"),
     ("fit|campaign.toml|--max-nrmse|-1", "Invalid value for '--max-nrmse': -1.0 is not in the range x>0.0."),
     ("fit|campaign.toml|--max-nrmse|nan", "Invalid value for '--max-nrmse': nan is no share such as 0.02"),
-    ("fit|campaign.toml|--max-nrmse|2 %", "Invalid value for '--max-nrmse': '2 %' is not a valid share, such as 0.02."),
+    ("fit|campaign.toml|--max-nrmse|2 %", "Invalid value for '--max-nrmse': '2 %' is not a valid share such as 0.02."),
     ("fit|loop.csv", "loop.csv: a campaign is needed", "found: a test file", "try: bushfit init loop.csv --inner-radius"),
     ("fit|.", ".: a campaign is needed", "found: a folder", "try: bushfit init . --inner-radius"),
     ("fit|", ".: a campaign is needed", "found: a folder"),
