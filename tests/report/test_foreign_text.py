@@ -1,4 +1,4 @@
-"""What stands in files of others passes one door: no text steers a terminal, is a formula of a sheet, or mathematics."""
+"""Text of others passes one door: none steers a terminal, is a formula of a sheet, or is taken for mathematics."""
 
 from __future__ import annotations
 
