@@ -36,6 +36,16 @@ if TYPE_CHECKING:
 
 #: Frequencies or amplitudes.
 Numbers = Sequence[float] | Array
+#: The command that writes what such an outcome holds; of a fit, by its document.
+_COMMANDS = {
+    "static": "fit-static",
+    "dynamic": "fit-dynamic",
+    "model": "fit",
+    Diagnosed: "diagnose",
+    Ran: "run",
+    Predicted: "predict",
+    Compared: "compare",
+}
 
 
 def load_model(path: str | Path) -> Result:
@@ -197,7 +207,7 @@ def simulate(
         truth, plan = model_of(source), source.simulate or SimulateSettings()
     else:
         truth, plan = source if isinstance(source, Model) else _result(source).model, SimulateSettings()
-    write_files(Path(folder), to_files(measured(truth, replace(plan, **settings))), force=force)
+    write_files(Path(folder), to_files(measured(truth, replace(plan, **settings))), force=force, by="simulate")
     return load_campaign(Path(folder) / "campaign.toml")
 
 
@@ -232,12 +242,13 @@ def save(
     """Write what was found into a folder, all of it or none, as the command would, and return the folder.
 
     Args:
-        force: replaces results that stand there.
+        force: replaces results that stand there, and removes what the same command wrote before and does not now.
 
     Raises:
         OutputError: the folder cannot be written, or results stand there.
     """
-    write_files(Path(folder), Formats(tables, pictures).files(outcome.contents), force=force)
+    by = _COMMANDS[outcome.stem if isinstance(outcome, Fitted) else type(outcome)]
+    write_files(Path(folder), Formats(tables, pictures).files(outcome.contents), force=force, by=by)
     return Path(folder)
 
 

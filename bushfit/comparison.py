@@ -28,6 +28,8 @@ CHANCE = 0.05
 _DRAWS = 20_000
 #: Eigenvalue of a correlation matrix, relative to the largest, below which it is rounding.
 _LEAST_EIGENVALUE = 1e-10
+#: Size of a parameter over its typical one, below which its logarithm tells no differences any more.
+_NOTHING = 1e-9
 #: Digits of a difference at most, however small its error.
 _MOST_DIGITS = 4
 #: Decimals of a difference without an error at most: those that follow are rounding.
@@ -268,11 +270,13 @@ def _side(result: Result, rows: Sequence[tuple[str, str | None]], omega: float) 
     values, names = result.model.values, list(result.covariance.names)
     quantities, slopes = np.empty(len(rows)), np.zeros((len(rows), len(names)))
     for i, (name, exponent) in enumerate(rows):
-        logarithmic = result.model.parameters[name].log or exponent is not None
+        parameter = result.model.parameters[name]
+        logarithmic = parameter.log or exponent is not None
         with np.errstate(divide="ignore"):
             quantities[i] = np.log(values[name]) if logarithmic else values[name]
         if name in names:
-            slopes[i, names.index(name)] = 1.0 / max(values[name], np.finfo(float).tiny) if logarithmic else 1.0
+            least = max(parameter.bounds[0], _NOTHING * parameter.typical)
+            slopes[i, names.index(name)] = 1.0 / max(values[name], least) if logarithmic else 1.0
         if exponent:
             quantities[i] += values[exponent] * np.log(omega)
             if exponent in names:

@@ -153,7 +153,8 @@ def check_free(plan: Plan, *, force: bool) -> None:
         with _blamed_on(plan.junit):
             place, own = plan.junit.resolve(), output.resolve()
             if place in [own / name for name in FILES] or own / ledger.ROWS in (place, *place.parents):
-                raise OutputError("the report cannot stand among the results of the rows, nor in place of the table")
+                problem = "the report cannot stand among the results of the rows, nor in place of the table"
+                raise OutputError(problem, file=plan.junit)
             check_writable(plan.junit.parent, [plan.junit.name], force=over)
 
 
@@ -163,17 +164,20 @@ def _blamed_on(junit: Path) -> Iterator[None]:
     try:
         yield
     except OutputError as error:
-        error.file, error.place = junit, "--junit"
-        error.hint = "name another file with --junit; --force replaces a report that stands"
+        if error.file:
+            error.file, error.place = junit, "--junit"
+            error.hint = "name another file with --junit; --force replaces a report that stands"
         raise
 
 
-def run(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Summary:
+def run(plan: Plan, workers: Pool, progress: Callable[[str], None], tell: Callable[[Summary], None]) -> Summary:
     """Do every row, then write the table, the picture, the summary, the page and the JUnit report.
 
     Args:
         plan, workers: the batch, and where its rows are done.
         progress: called with the status of each row as it comes.
+        tell: called with what came of it when all is on the disk and only stands elsewhere; if it raises, the rows are
+            kept, and nothing is written of the whole.
 
     Raises:
         BatchError: the workers are gone for good; what was done is kept.
@@ -194,12 +198,21 @@ def run(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Summary:
             for number, (status, line) in pool.run(plan.rows, task, given_up, workers):
                 spool.put(number, line)
                 progress(status)
-            summary = Summary(time.perf_counter() - begin)
-            _report(plan, spool, summary)
+            summary, ready = Summary(time.perf_counter() - begin), output / ledger.ASIDE / "whole"
+            ready.mkdir()
+            report = _report(plan, spool, summary, ready)
             if strays:
                 summary.notes.append(
                     f"results of {len(strays)} bushings of an earlier batch, no rows of this one, {fate}"
                 )
+            if plan.junit:
+                with _blamed_on(plan.junit):
+                    files = {plan.junit.name: report.to_xml()}
+                    write_files(plan.junit.parent, files, force=True, before=lambda: tell(summary))
+            else:
+                tell(summary)
+            for file in sorted(ready.iterdir()):
+                file.replace(output / file.name)
             return summary
     except OSError as error:
         raise OutputError(
@@ -207,40 +220,36 @@ def run(plan: Plan, workers: Pool, progress: Callable[[str], None]) -> Summary:
         ) from error
 
 
-def _report(plan: Plan, spool: Spool, summary: Summary) -> None:
-    """Hold every record against the limits, write what people read, and fill the summary."""
+def _report(plan: Plan, spool: Spool, summary: Summary, ready: Path) -> Report:
+    """Hold every record against the limits, fill the summary, and write what people read into the folder `ready`."""
     columns, intervals = spool.columns()
     parameters = parameter_quantities(columns)
     points = [at_point(point, what) for point in plan.orders.points for what in (STIFFNESS, LOSS_FACTOR)]
     quantities = {quantity.name: quantity for quantity in (*parameters, *OF_FIT.values(), *points)}
     judge = Judge(plan.limits, columns, quantities) if plan.limits else None
-    report = Report(plan.title) if plan.junit else None
-    name = plan.formats.table("batch")
-    aside = plan.orders.output / ledger.ASIDE / name
+    report, name = Report(plan.title), plan.formats.table("batch")
     diagnosed = any(row.settings.diagnosed for row in plan.rows)
     table = Table(parameters, points, verdicts=diagnosed, limits=judge is not None)
-    with opened(aside, plan.formats.table_form, table.headers) as write:
+    with opened(ready / name, plan.formats.table_form, table.headers) as write:
         for number, (row, record) in enumerate(zip(plan.rows, spool, strict=True)):
             judged = judge(record) if judge and record["status"] == "done" else None
             write(table.row(row, record, judged))
             summary.add(number, row, record, judged)
-            if report:
+            if plan.junit:
                 report.add(row, record, judged)
-    aside.replace(plan.orders.output / name)
-    if plan.formats.pictures:
-        _draw(plan, columns, intervals, quantities, judge, summary.missing)
-    if report and plan.junit:
-        with _blamed_on(plan.junit):
-            write_files(plan.junit.parent, {plan.junit.name: report.to_xml()}, force=True)
     values = {quantity: columns[name] for name, quantity in quantities.items() if name in columns}
     scattered = {quantity: scatter(sizes[np.isfinite(sizes)]) for quantity, sizes in values.items()}
     summary.scatter = {q: (middle * q.factor, spread * q.factor) for q, (middle, spread) in scattered.items()}
     summary.notes += [*(judge.notes if judge else ()), *_notes(summary, name)]
-    write_files(plan.orders.output, {"batch.json": to_json(summary.to_file(plan.title, judge))}, force=True)
+    (ready / "batch.json").write_bytes(to_json(summary.to_file(plan.title, judge)))
+    files = _drawn(plan, columns, intervals, quantities, judge, summary.missing) if plan.formats.pictures else {}
     if plan.formats.pages:
         from bushfit.report.page.index import read_batch
 
-        write_files(plan.orders.output, pages_of(read_batch(plan.orders.output)), force=True)
+        files |= pages_of(read_batch(ready, rows=plan.orders.output))
+    for file, content in files.items():
+        (ready / file).write_bytes(content)
+    return report
 
 
 def _notes(summary: Summary, table: str) -> Iterator[str]:
@@ -255,14 +264,15 @@ def _notes(summary: Summary, table: str) -> Iterator[str]:
             yield f"{count} bushing{'s' * (count > 1)} with {words} of {table}"
 
 
-def _draw(
+def _drawn(
     plan: Plan,
     columns: dict[str, Array],
     intervals: dict[str, Array],
     quantities: dict[str, Quantity],
     judge: Judge | None,
     missing: Mapping[str, Collection[int]],
-) -> None:
+) -> dict[str, bytes]:
+    """The files of the picture; none where there is nothing to draw."""
     from bushfit.report.plots.batch import Panel, batch_figure
 
     panels = []
@@ -275,7 +285,6 @@ def _draw(
             out = {number for number in missing.get(name, ()) if known[number]}
             ends = intervals[name] * shown.factor if name in intervals else None
             panels.append(Panel(shown.header, values, limits, out, ends))
-    if panels:
-        names = [row.name for row in plan.rows]
-        drawn = Contents(pictures={"batch": lambda: batch_figure(panels, plan.title, names)})
-        write_files(plan.orders.output, plan.formats.files(drawn), force=True)
+    names = [row.name for row in plan.rows]
+    drawn = {"batch": lambda: batch_figure(panels, plan.title, names)} if panels else {}
+    return plan.formats.files(Contents(pictures=drawn))

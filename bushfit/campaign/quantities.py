@@ -139,12 +139,20 @@ def _each_table(raw: dict[str, Any], convert: Callable[[str, dict[str, Any]], An
 
 
 def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
-    """Tables of value, min, max and vary by parameter, with the first three in SI."""
+    """Tables of value, min, max and vary by parameter, with the first three in SI.
+
+    A min or a max beyond what the parameter can have is moved there: "0 MPa" as the least modulus is meant well.
+    """
     keys = ("min", "value", "max")
     settings = with_sizes(raw, keys)
     for name, table in settings.items():
-        ordered = [table[key] for key in keys if key in table] if isinstance(table, dict) else []
-        if ordered != sorted(ordered) or (ordered and table.get("min", -np.inf) == table.get("max", np.inf)):
-            expected = "min below max, and value between them"
-            raise CampaignError("these limits hold no value", place=name, found=str(raw[name]), expected=expected)
+        if isinstance(table, dict):
+            ordered = [table[key] for key in keys if key in table]
+            parameter = parameter_named(name)
+            low, high = parameter.bounds
+            ends = np.clip([table.get("min", low), table.get("max", high)], low, high)
+            if ordered != sorted(ordered) or ends[0] == ends[1]:
+                expected = f"min below max within {low:g} to {high:g} {parameter.unit}, and value between them"
+                raise CampaignError("these limits hold no value", place=name, found=str(raw[name]), expected=expected)
+            table |= {key: float(end) for key, end in zip(("min", "max"), ends, strict=True) if key in table}
     return settings

@@ -118,9 +118,8 @@ def command(
     check_free(plan, force=options.force)
     workers: Pool = DaskPool(scheduler) if scheduler else LocalPool(jobs or os.cpu_count() or 1)
     with _progress(options, len(plan.rows)) as advance:
-        summary = run(plan, workers, advance)
+        summary = run(plan, workers, advance, lambda summary: options.tell(summary.to_document()))
     _tell(options, summary, options.folder(read.stem), plan)
-    options.tell(summary.to_document())
     if summary.status["failed"] or summary.missed:
         click.get_current_context().exit(1)
 
@@ -158,6 +157,8 @@ def _progress(options: Options, total: int) -> Iterator[Callable[[str], None]]:
             rate = done / max(now - begin, 1e-9)
             failures = f"{count['failed']} failed" if count["failed"] else ""
             bar.update(task, completed=done, rate=f"{rate:.1f}/s", failures=failures)
+            if done == total:
+                bar.stop()  # it takes what is printed for its own as long as it stands
             due = now - begin >= _SECONDS_A_LINE and 10 * done // total != tenth
             if not console.is_terminal and (due or now - said >= _SECONDS_A_LINE):
                 said, tenth = now, 10 * done // total

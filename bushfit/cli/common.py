@@ -61,14 +61,16 @@ class _Folder(click.Path):
         )
 
 
-class _Share(click.FloatRange):
-    """A share above zero; nan is none."""
+class Size(click.FloatRange):
+    """A number within ends, called by what it is of; nan, which click takes, is none."""
 
-    name = "share, such as 0.02"
+    def __init__(self, name: str, **ends: Any) -> None:
+        super().__init__(**ends)
+        self.name = name
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        share = super().convert(value, param, ctx)
-        return share if math.isfinite(share) else self.fail(f"{value} is no share such as 0.02", param, ctx)
+        size = super().convert(value, param, ctx)
+        return size if math.isfinite(size) else self.fail(f"{value} is no {self.name}", param, ctx)
 
 
 #: Decorator of a command that takes a direction, or several.
@@ -260,7 +262,7 @@ def campaign_options(
     )
     @click.option(
         "--max-nrmse",
-        type=_Share(min=0.0, min_open=True),
+        type=Size("share such as 0.02", min=0.0, min_open=True),
         metavar="SHARE",
         help="Exit with status 1 if the NRMSE is above this share (0.02 is 2 %).",
     )

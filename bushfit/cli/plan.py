@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, cast
 import click
 from rich.markup import escape
 
-from bushfit.cli.common import Options, example, open_source, path_option, place_option, shared_options
+from bushfit.cli.common import Options, Size, example, open_source, path_option, place_option, shared_options
 from bushfit.cli.grids import grid_options, parse_grids
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import naming
@@ -50,7 +50,7 @@ _MOST_VALUES = 6
 )
 @click.option(
     "--hours",
-    type=click.FloatRange(0.0, _MOST_HOURS, min_open=True),
+    type=Size("time in hours such as 8", min=0.0, max=_MOST_HOURS, min_open=True),
     default=8.0,
     show_default=True,
     help="Of the rig, at most.",
@@ -117,9 +117,9 @@ def command(
     _tell(options, outcome)
     if count:
         outcome = replace(outcome, check=_checked(options, outcome, count, seed))
-    options.write(folder, {**options.formats.files(outcome.contents), CAMPAIGN_FILE: outcome.campaign})
+    files = {**options.formats.files(outcome.contents), CAMPAIGN_FILE: outcome.campaign}
+    options.write(folder, files, outcome.document)
     options.say(f"next: make the tests in the order of {folder / options.formats.table('plan')}")
-    options.tell(outcome.document)
 
 
 def _names(text: str | None) -> tuple[str, ...]:

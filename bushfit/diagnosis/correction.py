@@ -60,6 +60,8 @@ _NEXT_TO_NOTHING = 1e-6
 _BETWEEN = 1.0
 #: Digits of the logarithms of points that tell them apart.
 _DIGITS = 6
+#: Peaks times residuals that are looked at together; chosen: a few hundred megabytes.
+_TOGETHER = 2_000_000
 #: Width of the band over that of one that would hold the gap, at the most: a correction that only widens its band has
 #: explained nothing.
 _HALF = 0.5
@@ -115,12 +117,16 @@ def _peak(terms: Terms, weight: Array) -> tuple[float, float] | None:
     weighted = replace(solution, residual=solution.residual * weight, jacobian=solution.jacobian * weight)
     evidence = replace(terms.evidence, solution=weighted)
     logs = np.array(list(product(np.arange(steps[0], steps[-1], _STEP), np.log(_WIDTHS))))
-    for finer in (*_FINER, 0.0):
-        shapes = [peak_at((np.exp(m), np.exp(m + w)), terms.points, terms.points).T for m, w in logs]
+
+    def gains(peaks: Array) -> list[float]:
+        shapes = [peak_at((np.exp(m), np.exp(m + w)), terms.points, terms.points).T for m, w in peaks]
         values = np.concatenate([part for shape in shapes for part in (shape, 1j * shape)])
-        groups = list(np.arange(len(values)).reshape(len(logs), -1))
-        gains = ScoreTest(evidence, terms.columns(values, evidence.model) * weight, groups, _PEAK_LEFT).gains()
-        best = logs[int(np.argmax(gains))]
+        groups = list(np.arange(len(values)).reshape(len(peaks), -1))
+        return ScoreTest(evidence, terms.columns(values, evidence.model) * weight, groups, _PEAK_LEFT).gains()
+
+    for finer in (*_FINER, 0.0):
+        parts = np.array_split(logs, min(len(logs), 1 + len(logs) * weight.size // _TOGETHER))
+        best = logs[int(np.argmax(np.concatenate([gains(part) for part in parts])))]
         logs = best + finer * np.array(_ABOUT)
     middle, width = float(np.exp(best[0])), float(np.exp(best.sum()))
     above = int(np.searchsorted(steps, best[0]))

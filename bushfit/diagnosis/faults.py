@@ -20,6 +20,9 @@ from bushfit.fitting.data_sets import SweepData, parted
 _WIDEST = 3
 #: Frequencies that a campaign has at least before one of them can be a suspect.
 _FEWEST_FREQUENCIES = 5
+#: Suspects of one frequency at most; of more frequencies neighbours count as one, or time and memory grew with the
+#: square of the points. Chosen: four times those of a sweep with many.
+_MOST_FREQUENCIES = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,18 +83,19 @@ def _frequencies(evidence: Evidence) -> Iterator[Suspect]:
     steps = np.unique(np.concatenate([sweep.frequency for sweep in sweeps])) if sweeps else np.empty(0)
     if steps.size < _FEWEST_FREQUENCIES:
         return
+    bands = [part[[0, -1]] for part in np.array_split(steps, min(steps.size, _MOST_FREQUENCIES))]
     for scope in [[sweep] for sweep in sweeps] + ([sweeps] if len(sweeps) > 1 else []):
-        touched = [[sweep.frequency == step for sweep in scope] for step in steps]
+        touched = [[(low <= sweep.frequency) & (sweep.frequency <= high) for sweep in scope] for low, high in bands]
         columns = [_moved_together(evidence, scope, chosen) for chosen in touched]
         where = scope[0].direction if len(scope) == 1 else "all directions"
         for width in range(1, _WIDEST + 1):
-            for first in range(steps.size - width + 1):
+            for first in range(len(bands) - width + 1):
                 window = slice(first, first + width)
                 if not all(rows.any() for chosen in touched[window] for rows in chosen):
                     continue
                 pairs = [pair for chosen in touched[window] for pair in zip(scope, chosen, strict=True)]
                 reached = np.concatenate([sweep.amplitude[rows] for sweep, rows in pairs])
-                low, high = steps[[first, first + width - 1]].tolist()
+                low, high = float(bands[first][0]), float(bands[first + width - 1][-1])
                 span = " to ".join(f"{step:.4g}" for step in dict.fromkeys((low, high)))
                 yield Suspect(
                     f"{span} Hz in {where}, at every amplitude",

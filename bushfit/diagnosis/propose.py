@@ -59,8 +59,13 @@ def proposals(evidence: Evidence, excluded: Collection[str], held: Sequence[str]
     `held` are parameters of the model that do not move.
     """
     missing = missing_effects(evidence.model, [str(data_set.direction) for data_set in evidence.data_sets], excluded)
-    asked = [effect for effect in missing if effect.replaces is None]
-    probed = [sensitivity(evidence.model, evidence.data_sets, evidence.residual, effect) for effect in asked]
+    answers = {
+        effect: sensitivity(evidence.model, evidence.data_sets, evidence.residual, effect)
+        for effect in missing
+        if effect.replaces is None
+    }
+    asked = [effect for effect, (shapes, _) in answers.items() if shapes]
+    probed = [answers[effect] for effect in asked]
     ends = np.cumsum([0, *(len(columns) for _, columns in probed)])
     every = np.concatenate([np.empty((0, evidence.residual.size)), *(columns for _, columns in probed)])
     test = ScoreTest(evidence, every, list(np.arange(len(every))[:, None]), SENSITIVITY_LEFT)
@@ -122,6 +127,7 @@ def sensitivity(
     """Shapes of an effect on a grid that the tests suggest, and its whitened sensitivity in each, (shapes, n).
 
     It is that at next to no amount, per typical amount; the residuals are those of the model without the effect, (n,).
+    Shapes with which there is no finite response, as within free play, are left out.
     """
     model = model.with_effect(effect.name)
     axes = {
@@ -137,7 +143,9 @@ def sensitivity(
     answers = [
         np.broadcast_to(data_set.residual(model, values), (len(shapes), data_set.size)) for data_set in data_sets
     ]
-    return shapes, (np.concatenate(answers, axis=-1) - residual) / _STEP
+    rows = np.concatenate(answers, axis=-1)
+    finite = np.isfinite(rows).all(axis=1)
+    return [shapes[i] for i in np.flatnonzero(finite)], (rows[finite] - residual) / _STEP
 
 
 def probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> Array:

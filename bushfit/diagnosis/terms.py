@@ -21,6 +21,9 @@ Measure = Literal["stiffness", "modulus", "gain"]
 #: Squared standard error of a coordinate at the largest, inverse: coordinates are of order one, and what the tests
 #: leave open stays open a thousand times that.
 _LEAST_PRECISION = 1e-6
+#: The same relative to what the tests tell of each amount, at the least: below it, columns that are alike to rounding
+#: leave nothing that could be inverted.
+_ROUNDING = 1e-12
 #: Share of the excess over the noise floor that may be left of what was held out.
 _HALF = 0.5
 #: How much the gap of a single part may grow: chance makes about a tenth.
@@ -133,7 +136,7 @@ def predicted(residual: Array, columns: Array, precision: Array, chosen: Array) 
     rest = columns[:, ~chosen]
     scale = 1.0 / np.sqrt(np.sum(np.square(rest), axis=1) + precision + _LEAST_PRECISION)
     information = (rest * scale[:, None]) @ (rest * scale[:, None]).T
-    information += np.diag((precision + _LEAST_PRECISION) * scale**2)
+    information += np.diag(np.maximum((precision + _LEAST_PRECISION) * scale**2, _ROUNDING))
     covariance = np.linalg.inv(information) * np.outer(scale, scale)
     own = columns[:, chosen]
     left = residual[chosen] - (rest @ residual[~chosen]) @ covariance @ own

@@ -240,7 +240,8 @@ class SweepData(DataSet):
 
     @kept
     def residual(self, model: Model, values: Values | None = None) -> Array:
-        return self.whiten(self.deviation(model, values))
+        with np.errstate(divide="ignore", invalid="ignore"):  # not finite where there is no stiffness: within free play
+            return self.whiten(self.deviation(model, values))
 
     @kept
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:

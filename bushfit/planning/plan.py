@@ -161,14 +161,21 @@ class _Planner:
             again = mine[self.budget.runs[mine] > 1]
             if mine.size > 2 and counts[mine].max() < 2:
                 few = again[np.argsort(self.budget.minutes[again])][:_REPEATED]
-                counts = min((self._fitting(counts + one[twice]) for twice in few), key=strict.together, default=counts)
+                made = [fits for twice in few if (fits := self._fitting(counts + one[twice])) is not None]
+                counts = min(made, key=strict.together, default=counts)
         return counts
 
-    def _fitting(self, counts: Array) -> Array:
-        """The runs that fit into the hours: of tests that are made once, the least useful are left out in turn."""
+    def _fitting(self, counts: Array) -> Array | None:
+        """The runs that fit into the hours: of tests that are made once, the least useful are left out in turn.
+
+        None where the others alone take longer.
+        """
         one, strict = np.eye(len(self.tests), dtype=int), self._criterion(_STRICT)
         while self.budget.spent(counts) > self.budget.most:
-            counts = min((counts - one[test] for test in np.flatnonzero(counts == 1)), key=strict.together)
+            fewer = [counts - one[test] for test in np.flatnonzero(counts == 1)]
+            if not fewer:
+                return None
+            counts = min(fewer, key=strict.together)
         return counts
 
     def _criterion(self, penalty: float) -> Criterion:

@@ -184,7 +184,7 @@ class Grid:
         missing = [effect for effect in missing_effects(model, places) if not (effect.replaces or effect.under)]
         blank = residual(model, self.data_sets)
         of_effects = [(effect, sensitivity(model, self.data_sets, blank, effect)[1]) for effect in missing]
-        return [Column(effect, row) for effect, rows in of_effects for row in rows if np.isfinite(row).all()]
+        return [Column(effect, row) for effect, rows in of_effects for row in rows]
 
 
 def relative_slopes(known: Knowledge, data_sets: Sequence[DataSet]) -> Array:

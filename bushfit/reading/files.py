@@ -21,7 +21,8 @@ def view_bytes(
     """The bytes of a file: read and not mapped, because a mapped file that becomes shorter ends the process.
 
     Raises:
-        kind: the file is missing, no regular file, not readable, empty, or has more than `largest` bytes (with `hint`).
+        kind: the file is missing, no regular file, not readable, empty, becomes shorter or longer meanwhile, or has
+            more than `largest` bytes (with `hint`).
     """
     try:
         if not file.exists():
@@ -33,9 +34,13 @@ def view_bytes(
             limit = f"at most {largest} bytes"
             raise kind("the file is too large", file=file, found=f"{size} bytes", expected=limit, hint=hint)
         with file.open("rb") as stream:
-            data = stream.read(largest)
+            data = stream.read(size + 1)
     except OSError as error:
         raise kind("the file cannot be read", file=file, found=error.strerror or str(error)) from error
+    if len(data) != size:
+        found = f"{'more than' if len(data) > size else f'{len(data)} of'} {size} bytes"
+        hint = "wait until it is written, or copied, to its end"
+        raise kind("the file changes while it is read", file=file, found=found, hint=hint)
     if data.isspace() or not data:
         raise kind("the file is empty", file=file, expected="text", hint="export it again")
     return data

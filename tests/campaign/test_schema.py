@@ -113,6 +113,11 @@ BAD: list[tuple[type[BushfitError], str, list[str]]] = [
     (UnitError, SIMULATE + "[fit.alpha]\nvalue = nan", ["fit.alpha.value", "no quantity"]),
     (UnitError, SIMULATE + '[fit."inertia.mass"]\nvalue = "1 N"', ["fit.inertia.mass.value", "kg"]),
     (CampaignError, SIMULATE + '[fit.mu]\nvalue = "1 Pa"\nmin = "2 Pa"', ["fit.mu", "limits", "min below max"]),
+    (
+        CampaignError,
+        SIMULATE + '[fit.mu]\nmin = "2 GPa"\nmax = "3 GPa"',
+        ["fit.mu", "within 1000 to 1e+09 Pa"],
+    ),
     (CampaignError, SIMULATE + '[fit.mu]\nvary = "no"', ["fit.mu.vary", "no", "true or false"]),
     (CampaignError, SIMULATE + "[predict]\nfrequencies = []", ["predict.frequencies", "at least one"]),
     (UnitError, SIMULATE + '[predict]\nfrequencies = ["5 mm"]', ["predict.frequencies #1", "a frequency"]),
@@ -173,3 +178,9 @@ def test_any_value_is_understood_or_a_clear_error(
     header = f"[[{table}]]" if table in ("loops", "sweeps") else f"[{table}]"
     with contextlib.suppress(BushfitError):
         campaign_from(f"{BUSHING}\n{header}\n{key} = {value}\n", tmp_path_factory.getbasetemp())
+
+
+def test_a_limit_beyond_what_a_parameter_can_have_is_moved_there(folder: Path) -> None:
+    """A least modulus of 0 says that it is not negative; a logarithm has no 0."""
+    limits = campaign_from(SIMULATE + '[fit.mu]\nmin = "0 MPa"\nmax = "1e6 MPa"', folder).fit.parameters["mu"]
+    assert (limits.min, limits.max) == (1e3, 1e9)

@@ -70,7 +70,9 @@ LIMITS = [
 #: (arguments parted by |, what the error says ...)
 USAGE = [
     *((f"predict|model.json|--frequencies|{size} Hz", "--frequencies: no bushing has this") for size in ("1e-300", "1e300")),
-    ("predict|model.json|--amplitudes|1e-300 mm", "--amplitudes: no bushing has this"),
+    *((f"{command}|--amplitudes|{size}mm", "--amplitudes: no bushing has this", "a length from 1e-10 to 100 m") for command in ("predict|model.json", "compare|model.json|model.json", "plan|model.json") for size in ("1e-300", "1e300")),
+    ("plan|model.json|--hours|nan", "Invalid value for '--hours': nan is no time in hours such as 8"),
+    ("plan|model.json|--hours|1e-300", "--hours: no test fits into the hours"),
     ("init|loop.csv|--direction|axial|--inner-radius|1e-300 mm|--outer-radius|18 mm|--length|34 mm", "--inner-radius: no bushing has this"),
     ("reduce|shaker.csv|--mass|1e300 kg|--direction|axial", "--mass: no bushing has this"),
     ("fit|campaign.toml|lo\u202est", "Got unexpected extra argument (lo\\u202est)"),

@@ -14,6 +14,7 @@ import pytest
 from spoiled import FILES, MODEL
 
 PREDICT = ("predict", "model.json", "-o", "x", "--no-plots", "--json", "-q")
+BATCH = ("batch", "campaign.toml", "more.toml", "-o", "x", "--json", "-q")
 BUSHFIT = (sys.executable, "-m", "bushfit")
 
 
@@ -32,13 +33,13 @@ def assert_one_line(status: int, err: bytes) -> None:
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
-@pytest.mark.parametrize("arguments", [PREDICT, ("--help",), ("schema", "model", "-q")], ids=lambda given: given[0])
+@pytest.mark.parametrize("arguments", [PREDICT, BATCH, ("--help",), ("schema", "model", "-q")], ids=lambda it: it[0])
 def test_a_full_device(arguments: tuple[str, ...], folder: Path) -> None:
     with Path("/dev/full").open("wb") as full:
         done = subprocess.run([*BUSHFIT, *arguments], stdout=full, stderr=subprocess.PIPE, check=False)
     assert_one_line(done.returncode, done.stderr)
     assert b"standard output cannot be written: No space left on device" in done.stderr
-    assert not (folder / "x").exists()
+    assert not list(folder.glob("x/*.*")), "the rows of a batch alone are kept, for --resume"
 
 
 def test_a_pipe_that_nobody_reads(folder: Path) -> None:

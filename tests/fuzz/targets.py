@@ -16,6 +16,7 @@ from bushfit.errors import BushfitError
 from bushfit.geometry import Direction, Specimen
 from bushfit.inspection.gathering import gather
 from bushfit.jobs.compare import Compare
+from bushfit.jobs.plan import PlanTests
 from bushfit.jobs.predict import Predict
 from bushfit.model.file import load_result, to_document
 from bushfit.reading.loops import read_loop
@@ -69,6 +70,19 @@ def campaign(folder: Path, data: bytes) -> None:
         load_campaign(file)
 
 
+def plan(folder: Path, data: bytes) -> None:
+    """A campaign file, for the tests of an hour: with tests of its own they would be fitted first."""
+    file = folder / "plan.toml"
+    file.write_bytes(data)
+    with clear_errors():
+        source = load_campaign(file)
+        if not source.loops and not source.sweeps:
+            planned = PlanTests(hours=1.0).run(source)
+            to_json(planned.document)
+            file.write_bytes(planned.campaign)
+            load_campaign(file)
+
+
 def model(folder: Path, data: bytes) -> None:
     file = folder / "model.json"
     file.write_bytes(data)
@@ -116,6 +130,7 @@ def clear_errors() -> Iterator[None]:
 TARGETS: dict[str, Callable[[Path, bytes], None]] = {
     "readers": readers,
     "campaign": campaign,
+    "plan": plan,
     "model": model,
     "workbook": workbook,
     "report": report,

@@ -14,8 +14,8 @@ from bushfit.campaign.campaign import load_campaign
 from bushfit.errors import BushfitError
 from bushfit.model.file import load_result
 
-#: Fewer of what takes longer: workbooks are read in a process of their own.
-EXAMPLES = {"workbook": 15, "report": 60}
+#: Fewer of what takes longer: workbooks are read in a process of their own, and a plan is a search.
+EXAMPLES = {"workbook": 15, "report": 60, "plan": 20}
 each_target = pytest.mark.parametrize("name", TARGETS)
 
 

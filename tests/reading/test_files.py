@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from pathlib import Path
+from typing import BinaryIO
 
 import pytest
 
@@ -58,9 +60,26 @@ def test_bytes_that_are_no_utf8_are_named_with_their_line(
         read_utf8(file, CampaignError)
 
 
+@pytest.mark.parametrize(
+    ("then", "found"), [(8_000_000, "8000000 of 9600000"), (0, "0 of 9600000"), (10_000_000, "more than 9600000")]
+)
+def test_a_file_that_changes_while_it_is_read(then: int, found: str, tmp_path: Path) -> None:
+    """As a test machine, or a copy over the network, may do: in a moment between its opening and its first byte."""
+
+    class Changing(type(tmp_path)):  # type: ignore[misc]
+        def open(self, mode: str) -> BinaryIO:
+            stream: BinaryIO = super().open(mode)
+            os.truncate(self, then)
+            return stream
+
+    (tmp_path / "loop.csv").write_text("time_s,displacement_mm,force_N\n" + "\n" * 9_599_969)
+    with pytest.raises(MeasurementError, match=f"file changes while it is read\n  found: {found} bytes\n  try: wait"):
+        read_loop(Changing(tmp_path / "loop.csv"), Direction.AXIAL)
+
+
 @pytest.mark.parametrize("size", [1, (1 << 22) + 1])
 def test_a_checksum_is_that_of_all_bytes(size: int, tmp_path: Path) -> None:
-    """A large file is mapped, and summed in a thread."""
+    """It is summed in a thread."""
     data = bytes(range(256)) * (size // 256 + 1)
     file = tmp_path / "x.csv"
     file.write_bytes(data)

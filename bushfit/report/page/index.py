@@ -74,8 +74,11 @@ def is_batch(folder: Path) -> bool:
     return (folder / "batch.json").exists() or (folder / "batch.csv").exists()
 
 
-def read_batch(folder: Path, base: str = "") -> Contents:
+def read_batch(folder: Path, base: str = "", rows: Path | None = None) -> Contents:
     """What a batch wrote, with its page; links begin with `base`.
+
+    Args:
+        rows: folder of the batch, where these are not in it yet.
 
     Raises:
         ModelError: files that are missing, or not as bushfit writes them.
@@ -89,7 +92,9 @@ def read_batch(folder: Path, base: str = "") -> Contents:
         raise ModelError(
             "the table of the batch is missing", file=folder / "batch.csv", hint="run the batch again with --resume"
         )
-    pages = frozenset(f"{page.parent.parent.name}/{page.parent.name}" for page in folder.glob("bushings/*/report.html"))
+    pages = frozenset(
+        f"{page.parent.parent.name}/{page.parent.name}" for page in (rows or folder).glob("bushings/*/report.html")
+    )
     page = partial(index_page, reported=pages, base=base)
     return Contents({"batch": document}, {"batch": lambda: table}, {}, {"index": page})
 
