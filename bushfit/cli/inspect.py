@@ -15,6 +15,7 @@ from bushfit.cli.common import Options, example, shared_options
 from bushfit.cli.raw import file_options, options_named
 from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError
+from bushfit.report import plots
 from bushfit.report.contents import Contents, Kinds
 
 if TYPE_CHECKING:
@@ -82,10 +83,10 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
         "campaign": text,
     }
     if options.formats.pictures:
-        from bushfit.report.plots import inspection_figure
-
         groups = (seen[start : start + _FILES_A_PICTURE] for start in range(0, len(seen), _FILES_A_PICTURE))
-        figures = {page: partial(inspection_figure, group) for page, group in zip(pages, groups, strict=True)}
+        figures = {
+            page: partial(plots.inspection.inspection_figure, group) for page, group in zip(pages, groups, strict=True)
+        }
         options.write(folder, options.formats.files(Contents(pictures=figures)), document)
     else:
         options.tell(document)

@@ -17,6 +17,7 @@ from bushfit.cli.grids import parse_grid, positive
 from bushfit.cli.raw import direction_error, file_options, options_named
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import BushfitError, MeasurementError
+from bushfit.report import plots
 from bushfit.report.contents import Contents, Kinds
 from bushfit.units import alike, number
 
@@ -116,10 +117,10 @@ def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | N
     reduction = reduce(histories, fewest_cycles=cycles, levels=asked)
 
     def figure() -> Figure:
-        from bushfit.report.plots import reduction_figure
-
         names = histories[0].name if len(histories) == 1 else f"{len(histories)} histories"
-        return reduction_figure(reduction, histories, f"{names}: {len(reduction.steps)} points, {direction}")
+        return plots.reduction.reduction_figure(
+            reduction, histories, f"{names}: {len(reduction.steps)} points, {direction}"
+        )
 
     points, warnings = reduced_table(reduction), reduction.warnings
     return _Found("direction", str(direction), points, warnings, lambda options: _tell(options, reduction), figure)
@@ -176,9 +177,7 @@ def _resonance(
         reduction = reduce_resonance(read_resonance(table, read_as, base_acceleration), mass)
 
     def figure() -> Figure:
-        from bushfit.report.plots import resonance_figure
-
-        return resonance_figure(
+        return plots.resonance.resonance_figure(
             reduction, f"{table.file.stem}, {specimen or direction}: {number(mass, 4)} kg on a shaker"
         )
 

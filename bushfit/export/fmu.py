@@ -4,8 +4,6 @@ The libraries are compiled when the export is made, not when the package is buil
 so that an FMU reads no file while it runs, and who writes none needs no compiler.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import re

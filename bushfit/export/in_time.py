@@ -1,7 +1,5 @@
 """What of a model runs in time, on lists that the C sources of an FMU read: values, directions and Maxwell arms."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

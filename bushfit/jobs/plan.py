@@ -1,19 +1,17 @@
 """plan: which tests next, chosen for what they would tell."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings, RigSettings, SimulatedLoop
+from bushfit.effects.contract import Array
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.fitting.data import Data
-from bushfit.geometry import Direction, place_named
+from bushfit.geometry import Direction, Place, place_named
 from bushfit.jobs.grid import default_grid
 from bushfit.jobs.plan_document import Checked, PlanFile, PlannedRun, Reached, Rivalry, Shown
 from bushfit.jobs.predict import AMPLITUDES
@@ -27,10 +25,6 @@ from bushfit.planning.plan import FOUND, plan
 from bushfit.report.contents import Contents, Kinds
 from bushfit.report.planned import plan_contents
 from bushfit.simulation import model_of
-
-if TYPE_CHECKING:
-    from bushfit.effects.contract import Array
-    from bushfit.geometry import Place
 
 #: File of the plan that `simulate` takes.
 CAMPAIGN_FILE = "campaign.toml"

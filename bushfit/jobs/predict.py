@@ -1,12 +1,13 @@
 """predict: stiffness tables of one fitted model."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import pandas as pd
+
+from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
 from bushfit.campaign.session import measured_session
 from bushfit.caveats import caveats
@@ -14,30 +15,23 @@ from bushfit.effects import Level
 from bushfit.errors import ModelError
 from bushfit.fitting.agreement import met_within, misfits
 from bushfit.fitting.data_sets import SweepData, sweep_data
-from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Specimen, place_named
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Place, Specimen, place_named
 from bushfit.jobs.grid import default_grid
 from bushfit.model.arms import Arms, model_arms
+from bushfit.model.model import Model
+from bushfit.model.result import Misfit, Result, Usable
 from bushfit.prediction import PredictedResonance, Prediction, predict, predict_resonance
 from bushfit.report.artifacts import (
     arms_contents,
     measured_contents,
+    more_contents,
     names_of_more,
     place_names,
     prediction_contents,
-    resonance_contents,
-    wide_contents,
 )
 from bushfit.report.contents import Contents, Kinds
-from bushfit.report.tables import prediction_table, shaken_table
+from bushfit.report.tables import prediction_table, shaken_table, wide_table
 from bushfit.units import CELSIUS
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from bushfit.campaign.campaign import Campaign
-    from bushfit.geometry import Place
-    from bushfit.model.model import Model
-    from bushfit.model.result import Misfit, Result, Usable
 
 #: Tables by place, the columns of each by header, null where a cell is empty; and "warnings".
 PredictionDocument = dict[str, dict[str, list[float | None]] | list[str]]
@@ -108,11 +102,13 @@ class Predicted:
 
     @property
     def contents(self) -> Contents:
-        found = prediction_contents(self.result, self.predictions, self.measured, self.notes)
-        found |= wide_contents(self.predictions if self.wide else ())
         places = [prediction.direction for prediction in self.predictions]
+        found = prediction_contents(self.result, self.predictions, self.measured, self.notes)
+        if self.wide:
+            found |= more_contents("wide", wide_table, places, self.predictions)
         found |= arms_contents(self.result.model, self.arms, places, self.result.name)
-        return found | resonance_contents(self.resonances)
+        shaken = [resonance.place for resonance in self.resonances]
+        return found | more_contents("resonance", shaken_table, shaken, self.resonances)
 
     @property
     def contents_beside(self) -> Contents:

@@ -1,31 +1,24 @@
 """Tables for spreadsheets: units in every header, one row a point."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
+from bushfit.comparison import Comparison, Contrast
+from bushfit.diagnosis.record import Diagnosis
+from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
-from bushfit.geometry import ROTATION, STRAINING, TRANSLATION
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Display, Place
+from bushfit.model.arms import Arms
+from bushfit.model.model import Model
+from bushfit.prediction import PredictedResonance, Prediction
 from bushfit.reading.measurement import loss_factor
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from bushfit.comparison import Comparison, Contrast
-    from bushfit.diagnosis.record import Diagnosis
-    from bushfit.effects.contract import Array
-    from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
-    from bushfit.geometry import Display, Place
-    from bushfit.model.arms import Arms
-    from bushfit.model.model import Model
-    from bushfit.prediction import PredictedResonance, Prediction
-    from bushfit.reduction.resonance import Resonance
-    from bushfit.reduction.result import Reduction
-
+from bushfit.reduction.resonance import Resonance
+from bushfit.reduction.result import Reduction
 
 #: Headers of what was measured and of the model beside it, in the tables of loops and sweeps.
 _MEASURED = re.compile(
@@ -58,8 +51,6 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
     """The table of `predict`: six columns, then low and high of the last four; where something is unresolved these four
     if it is the rig's; and where sweeps are known what they measured at each point. Its units are those of the place,
     or of `display`."""
-    import pandas as pd
-
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     moved, _, resisted = words(prediction.direction)
     force = f"{resisted} [{stiffness}]"
@@ -88,8 +79,6 @@ def wide_table(prediction: Prediction, display: Display | None = None) -> pd.Dat
 
     A point that the grid lacks is an empty cell.
     """
-    import pandas as pd
-
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     frequency, row = np.unique(prediction.frequency, return_inverse=True)
     amplitude, column = np.unique(prediction.amplitude, return_inverse=True)
@@ -108,8 +97,6 @@ def wide_table(prediction: Prediction, display: Display | None = None) -> pd.Dat
 
 def shaken_table(found: PredictedResonance) -> pd.DataFrame:
     """The table of a mass on a mount: transmissibility, deformation and stiffness over frequency."""
-    import pandas as pd
-
     (length, length_factor), _, (stiffness, factor) = found.place.display
     table = pd.DataFrame(
         {
@@ -130,8 +117,6 @@ def shaken_table(found: PredictedResonance) -> pd.DataFrame:
 def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> pd.DataFrame:
     """Maxwell arms, a row an arm, and before them the spring that stands beside: modulus, stiffness at each place,
     relaxation time."""
-    import pandas as pd
-
     from bushfit.model.arms import listed
 
     names, moduli, times = zip(*listed(model, arms), strict=True)
@@ -145,7 +130,6 @@ def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> p
 
 def loops_table(model: Model, data_sets: Sequence[LoopData]) -> pd.DataFrame:
     """Measured and modelled force of every loop, row by row (or by bin of phase where a loop is long)."""
-    import pandas as pd
 
     def rows(data_set: LoopData) -> pd.DataFrame:
         (length, length_factor), (force, force_factor), _ = data_set.direction.display
@@ -168,7 +152,6 @@ def loops_table(model: Model, data_sets: Sequence[LoopData]) -> pd.DataFrame:
 
 def sweeps_table(model: Model, data_sets: Sequence[SweepData]) -> pd.DataFrame:
     """Measured and modelled dynamic stiffness of every sweep, sorted by amplitude, repeat and frequency."""
-    import pandas as pd
 
     def rows(data_set: SweepData) -> pd.DataFrame:
         (length, length_factor), _, (stiffness, factor) = data_set.direction.display
@@ -208,7 +191,6 @@ def gap_table(
     `mended` are the tests that belong to the model after, where they are others: a row says where it was recorded.
     `result` is the model to use, `after` unless given, whose response stands beside what was measured.
     """
-    import pandas as pd
 
     def rows(data_set: DataSet, later: DataSet) -> pd.DataFrame:
         columns: dict[str, Any] = {"test": data_set.name, "kind": data_set.kind, "direction": str(data_set.direction)}
@@ -227,8 +209,6 @@ def gap_table(
 
 def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """Every effect of the library, judged: score, gain, BIC, held-out gap, parameters, and why it won or lost."""
-    import pandas as pd
-
     from bushfit.diagnosis.record import level_of
 
     rows = [
@@ -253,8 +233,6 @@ def contrast_table(found: Comparison, each: Contrast) -> pd.DataFrame:
 
     Stiffness in the units of its place; `sure` is what differs where the bands of all points hold at once.
     """
-    import pandas as pd
-
     (length, length_factor), _, (unit, factor) = each.place.display
     moved, _, resisted = words(each.place)
     values: dict[str, Any] = {
@@ -298,8 +276,6 @@ _OF_STEPS = {
 
 def reduced_table(reduction: Reduction) -> pd.DataFrame:
     """Raw histories reduced to a sweep: what the sweep reader takes, then what tells how good each point is."""
-    import pandas as pd
-
     (length, length_factor), _, (stiffness, factor) = reduction.direction.display
     steps = pd.DataFrame([vars(step) for step in reduction.steps])
     magnitude, factors = factor * steps["stiffness"].abs(), loss_factor(steps["stiffness"].to_numpy())
@@ -322,8 +298,6 @@ def reduced_table(reduction: Reduction) -> pd.DataFrame:
 
 def resonance_table(found: Resonance) -> pd.DataFrame:
     """A resonance test reduced to a sweep: what the sweep reader takes, then what tells how each point came about."""
-    import pandas as pd
-
     (length, length_factor), _, (stiffness, factor) = TRANSLATION.display
     return pd.DataFrame(
         {

@@ -1,17 +1,16 @@
 """The pictures of a result: each place's sweeps and loops beside the model, and what is left before and after."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from markupsafe import Markup
 
 from bushfit.effects.contract import Array
 from bushfit.geometry import Place
+from bushfit.model.document import TestTable
 from bushfit.model.result import Result
+from bushfit.report.contents import Tables
 from bushfit.report.page.chart import DASHES, Cells, Rule, Series, chart, colors, maps
 from bushfit.report.page.gathered import (
     MOST_LEVELS,
@@ -27,10 +26,6 @@ from bushfit.report.page.gathered import (
     tests_of,
 )
 from bushfit.units import number
-
-if TYPE_CHECKING:
-    from bushfit.model.document import TestTable
-    from bushfit.report.contents import Tables
 
 #: Points of sweeps, and rows of loops, of a whole page: with these it stays below 500 kB.
 _MOST_POINTS, _MOST_ROWS = 3200, 2400

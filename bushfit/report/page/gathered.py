@@ -1,26 +1,21 @@
 """What is drawn, gathered from the tables of a result: sweeps by level, loops, and where model and tests differ."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from bushfit.effects.contract import Array
 from bushfit.geometry import Direction, Place
+from bushfit.model.document import TestTable
 from bushfit.model.result import Result
 from bushfit.report.artifacts import place_names
+from bushfit.report.contents import Tables
 from bushfit.report.page.chart import Cells
 from bushfit.report.tables import IF_RIGS, complete, numbers, required, spread, words
 from bushfit.units import split_header, told
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from bushfit.model.document import TestTable
-    from bushfit.report.contents import Tables
 
 #: How near a predicted level lies to the measured one that it stands for, relative.
 _SAME_LEVEL = 0.02

@@ -6,9 +6,9 @@ import io
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from bushfit.errors import ModelError
 from bushfit.model.file import read_document
@@ -16,14 +16,10 @@ from bushfit.reading.csvfile import in_a_line, undefused
 from bushfit.reading.files import read_utf8, view_bytes
 from bushfit.reading.workbook import read_sheets
 from bushfit.report.artifacts import place_names
+from bushfit.report.contents import Contents
 from bushfit.report.page.schema import MODELS, PLAIN, checked
 from bushfit.report.tables import TEXTS
 from bushfit.validation import LARGEST_NUMBER
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from bushfit.report.contents import Contents
 
 #: Documents of a result.
 _DOCUMENTS = (*MODELS, PLAIN, "diagnosis")
@@ -69,7 +65,6 @@ def read_results(folder: Path) -> Contents:
 
 def canonical(table: pd.DataFrame) -> pd.DataFrame:
     """A table as its file would give it back: texts, and numbers of seven digits; nan where a cell is empty."""
-    import pandas as pd
 
     def column(name: str) -> object:
         values = table[name]
@@ -91,8 +86,6 @@ def read_table(folder: Path, name: str) -> pd.DataFrame | None:
     Raises:
         ModelError: a table that is not as bushfit writes it.
     """
-    import pandas as pd
-
     for ending, read in (("csv", _csv), ("xlsx", _workbook)):
         file = folder / f"{name}.{ending}"
         if not file.exists():
@@ -123,8 +116,6 @@ def _column(header: str, cells: pd.Series[str]) -> object:
 
 def _csv(file: Path) -> pd.DataFrame:
     """Cells of a CSV file as texts, with commas and points, or semicolons and decimal commas."""
-    import pandas as pd
-
     data = read_utf8(file, ModelError, largest=_LARGEST)
     mark = re.search("[,;]", data.partition(b"\n")[0].decode("utf-8-sig"))
     return pd.read_csv(
@@ -134,8 +125,6 @@ def _csv(file: Path) -> pd.DataFrame:
 
 def _workbook(file: Path) -> pd.DataFrame:
     """Cells of the first sheet of a workbook as texts."""
-    import pandas as pd
-
     first, *_ = read_sheets(view_bytes(file, ModelError, largest=_LARGEST), file, kind=ModelError)[1]
     header, *rows = first.content
     return pd.DataFrame([[str(cell) for cell in row] for row in rows if row], columns=[str(cell) for cell in header])

@@ -1,7 +1,5 @@
 """What a page reads of the JSON documents: pydantic checks them, so that what is spoiled is one clear error."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
