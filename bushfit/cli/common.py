@@ -2,86 +2,30 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 
+from bushfit.cli.options import F, declared
 from bushfit.errors import ModelError, printable, typed
-from bushfit.reading.tablefile import Form
-from bushfit.report.contents import Formats, Picture
+from bushfit.report.contents import Formats
 from bushfit.report.folder import check_free, to_json, write_files
 
 if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
     from bushfit.campaign.schema import Loss
-    from bushfit.geometry import Direction
     from bushfit.jobs import Found, Job
     from bushfit.model.result import Result
 
-F = TypeVar("F", bound=Callable[..., Any])
-
 #: Width of tables where standard error is no terminal, in characters.
 _WIDTH = 100
-
-
-class _Direction(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows none
-    """A direction of a test; geometry, which lists them, is slow to import, and is asked when they are needed."""
-
-    name = "direction"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Direction:
-        from bushfit.geometry import Direction
-
-        return Direction(click.Choice([str(direction) for direction in Direction]).convert(value, param, ctx))
-
-
-class _Place(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows none
-    """A direction, or a specimen of a campaign, which only the campaign knows."""
-
-    name = "place"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        return str(value) if str(value).strip() else self.fail("this is no direction: an empty text", param, ctx)
-
-
-class _Folder(click.Path):
-    """A folder for results; an empty text, as of a variable that is not set, is none."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        return (
-            super().convert(value, param, ctx) if value else self.fail("this is no folder: an empty text", param, ctx)
-        )
-
-
-class _Share(click.FloatRange):
-    """A share above zero; nan is none."""
-
-    name = "share, such as 0.02"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        share = super().convert(value, param, ctx)
-        return share if math.isfinite(share) else self.fail(f"{value} is no share such as 0.02", param, ctx)
-
-
-#: Decorator of a command that takes a direction, or several.
-direction_option = partial(click.option, "--direction", type=_Direction())
-#: The same of a command that takes specimens by their names, too.
-place_option = partial(click.option, "--direction", type=_Place())
-#: Decorator of a command that takes a file.
-path_option = partial(click.option, type=click.Path(path_type=Path))
-
-
-def option_of(key: str) -> str:
-    """The option of a key: --force-sign of force_sign."""
-    return "--" + key.replace("_", "-")
 
 
 class _Console(Console):
@@ -142,36 +86,8 @@ class Options:
             sys.stdout.flush()
 
 
-def example(*commands: str) -> str:
-    """The end of a command's help: commands that work in a copy of the repository."""
-    return "\b\n" + "\n".join([f"Example{'s' * (len(commands) > 1)}:", *(f"  {command}" for command in commands)])
-
-
-#: Options of the forms of files; each may also be set by a variable of the environment, once for all commands.
-_FORMS = {
-    "tables": click.option(
-        "--table-format",
-        type=click.Choice(get_args(Form)),
-        metavar="FORM",
-        default=Formats.table_form,
-        envvar="BUSHFIT_TABLE_FORMAT",
-        show_envvar=True,
-        help="csv, decimal-comma (for a German Excel), xlsx [csv].",
-    ),
-    "pictures": click.option(
-        "--plot-format",
-        type=click.Choice(get_args(Picture)),
-        metavar="FORM",
-        multiple=True,
-        default=Formats.picture_forms,
-        envvar="BUSHFIT_PLOT_FORMAT",
-        show_envvar=True,
-        help="png, svg, pdf; may be given again [png].",
-    ),
-    "pages": click.option("--no-report", is_flag=True, help="Write no page (HTML)."),
-}
-#: All of them, of a command that writes a page too.
-ALL_FORMS = tuple(_FORMS)
+#: The tables of commands.toml for the forms of all kinds of files, of a command that writes a page too.
+ALL_FORMS = ("tables", "pictures", "pages")
 
 
 def shared_options(
@@ -181,15 +97,8 @@ def shared_options(
 
     Without -o results go to `where`; `forms` says whether a command writes tables, pictures and pages.
     """
-    for form in reversed(forms):
-        function = _FORMS[form](function)
 
-    @click.option("-o", "--output", type=_Folder(path_type=Path), help=f"Folder for the results [{where}].")
-    @click.option("-v", "--verbose", is_flag=True, help="Say more: steps on the way, correlations, files.")
-    @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
-    @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on standard output.")
-    @click.option("--no-plots", is_flag=True, help="Write no plots.")
-    @click.option("--force", is_flag=True, help="Replace results that stand.")
+    @declared("shared", *forms, without=where)
     @wraps(function)
     def wrapped(*args: Any, **kwargs: Any) -> Any:
         given = {name: kwargs.pop(name) for name in ("output", "verbose", "quiet", "as_json", "force")}
@@ -253,17 +162,7 @@ def campaign_options(
     """
 
     @click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=click.Path(path_type=Path))
-    @click.option(
-        "--loss",
-        type=click.Choice(["linear", "soft_l1"]),
-        help=f"linear: least squares [the campaign's, else this]. soft_l1: {soft_l1}.",
-    )
-    @click.option(
-        "--max-nrmse",
-        type=_Share(min=0.0, min_open=True),
-        metavar="SHARE",
-        help="Exit with status 1 if the NRMSE is above this share (0.02 is 2 %).",
-    )
+    @declared("task", without=soft_l1)
     @partial(shared_options, forms=forms)
     @wraps(function)
     def wrapped(*args: Any, options: Options, **kwargs: Any) -> Any:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import ALL_FORMS, Options, example, open_source, option_of, place_option, shared_options
-from bushfit.cli.grids import grid_options, parse_grids
+from bushfit.cli.common import ALL_FORMS, Options, open_source, shared_options
+from bushfit.cli.grids import parse_grids
+from bushfit.cli.options import command_called, declared, option_of
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import naming, typed
 
@@ -24,29 +25,9 @@ _ALL = "all"
 _MOST_WARNINGS = 8
 
 
-@click.command(
-    "compare",
-    epilog=example(
-        "bushfit compare configs/cmp_15961.toml configs/arm_bushing.toml",
-        "bushfit compare configs/arm_bushing.toml --families sliders,kraus",
-    ),
-)
+@command_called("compare")
 @click.argument("sources", metavar="A [B]...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option(
-    "--families",
-    metavar="[NAME,...]",
-    is_flag=False,
-    flag_value=_ALL,
-    help="Compare model families on the one campaign A: the paper's, and those named, effects joined by + [all that "
-    "stand in place of a branch].",
-)
-@place_option(
-    "directions",
-    multiple=True,
-    help="axial, radial or torsion, or a specimen's name: where to compare, and which tests of campaigns to fit; may "
-    "be given again [all where each was fitted].",
-)
-@partial(grid_options, default="as far as all were measured")
+@declared("compare")
 @partial(shared_options, forms=ALL_FORMS)
 def command(
     sources: tuple[Path, ...],

@@ -5,38 +5,15 @@ from typing import Literal
 
 import click
 
-from bushfit.cli.common import Options, example, open_model, path_option, place_option, shared_options
-from bushfit.cli.grids import grid_options, parse_grids, positive
+from bushfit.cli.common import Options, open_model, shared_options
+from bushfit.cli.grids import parse_grids, positive
+from bushfit.cli.options import command_called, declared
 from bushfit.cli.show import warn
 
-#: Names of the formats; jobs/export.py, which knows where each is written, is slow to import.
-_FORMATS = ("fmu", "nastran", "abaqus", "adams", "csv", "xlsx")
 
-
-@click.command(
-    "export",
-    epilog=example(
-        "bushfit export data/arm_bushing/truth.json --format nastran --format xlsx",
-        'bushfit export data/arm_bushing/truth.json --format abaqus --units "m kg s N" -o results/si',
-    ),
-)
+@command_called("export")
 @click.argument("model", type=click.Path(path_type=Path))
-@click.option(
-    "--format", "formats", type=click.Choice(_FORMATS), multiple=True, required=True, help="May be given again."
-)
-@path_option("--campaign", help="Take the grid of this campaign's [predict], or of its sweeps.")
-@place_option(
-    "directions",
-    multiple=True,
-    help="axial, radial or torsion, or a specimen's name; may be given again [axial and radial, and all specimens].",
-)
-@grid_options
-@click.option(
-    "--units",
-    help='Length, mass, time and force that fit together [decks "mm t s N"; tables as predict; fmu SI].',
-)
-@click.option("--dialect", type=click.Choice(["optistruct"]), help="Of --format nastran: |K| and loss angle.")
-@click.option("--accuracy", default="1 %", help="Largest error of the modulus that an fmu may have [1 %].")
+@declared("export")
 @shared_options
 def command(
     model: Path,

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, example, option_of, shared_options
+from bushfit.cli.common import Options, shared_options
 from bushfit.cli.inspect import tell_left_out
+from bushfit.cli.options import command_called, declared, files_argument, option_of
 from bushfit.cli.raw import direction_error, file_options, options_named
 from bushfit.cli.show import warn
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, naming, typed
@@ -23,20 +24,9 @@ if TYPE_CHECKING:
 _SIDES = ("inner", "outer")
 
 
-@click.command(
-    "init",
-    epilog=example(
-        "bushfit init data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_axial.csv "
-        '--inner-diameter "28 mm" --outer-diameter "40 mm" --length "45 mm"'
-    ),
-)
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--inner-radius", help='Of the rubber, such as "10 mm"; or else')
-@click.option("--inner-diameter", help='such as "20 mm".')
-@click.option("--outer-radius", help='Of the rubber, such as "18 mm"; or else')
-@click.option("--outer-diameter", help='such as "36 mm".')
-@click.option("--length", help='Mean length of the rubber, such as "34 mm".')
-@click.option("--name", help="Of the bushing [the folder of the first file].")
+@command_called("init")
+@files_argument
+@declared("init")
 @file_options()
 @partial(shared_options, forms=())
 def command(

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
-from bushfit.cli.common import Options, example, shared_options
+from bushfit.cli.common import Options, shared_options
+from bushfit.cli.options import command_called, files_argument
 from bushfit.cli.raw import file_options, options_named
 from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError
@@ -27,11 +28,8 @@ _KINDS = {"loop": "a hysteresis loop", "sweep": "a sweep", "history": "a raw ste
 _FILES_A_PICTURE = 5
 
 
-@click.command(
-    "inspect",
-    epilog=example("bushfit inspect data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_radial.csv"),
-)
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@command_called("inspect")
+@files_argument
 @file_options()
 @partial(shared_options, where="results/<first file>", forms=["pictures"])
 def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options) -> None:

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, cast
 import click
 from rich.markup import escape
 
-from bushfit.cli.common import Options, example, open_source, path_option, place_option, shared_options
-from bushfit.cli.grids import grid_options, parse_grids
+from bushfit.cli.common import Options, open_source, shared_options
+from bushfit.cli.grids import parse_grids
+from bushfit.cli.options import command_called, declared
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import naming
 from bushfit.units import for_people, number
@@ -26,53 +27,15 @@ if TYPE_CHECKING:
     from bushfit.planning.check import Check
     from bushfit.planning.contract import Aim
 
-#: Hours of the rig at most: months, as a typing error.
-_MOST_HOURS = 2000.0
 #: Effects that the terminal shows at most without -v: those that the plan shows least well beside the standard.
 _MOST_EFFECTS = 6
 #: Amplitudes or frequencies of a test that are listed in full at most.
 _MOST_VALUES = 6
 
 
-@click.command(
-    "plan",
-    epilog=example(
-        "bushfit plan configs/arm_bushing.toml --hours 4",
-        "bushfit plan configs/new_bushing.toml --hours 2.5 --for parameters",
-    ),
-)
+@command_called("plan")
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=click.Path(path_type=Path))
-@click.option(
-    "--for",
-    "aim",
-    type=click.Choice(["parameters", "predictions", "rivals"]),
-    help="What the tests are to tell best: errors of parameters, of stiffness, or rivals apart [predictions].",
-)
-@click.option(
-    "--hours",
-    type=click.FloatRange(0.0, _MOST_HOURS, min_open=True),
-    default=8.0,
-    show_default=True,
-    help="Of the rig, at most.",
-)
-@place_option(
-    "directions",
-    multiple=True,
-    help="axial, radial or torsion, or a specimen's name: where the rig can test; may be given again [axial and radial "
-    "of a bushing, else all specimens].",
-)
-@click.option("--parameters", metavar="NAME,...", help="Whose errors count, with --for parameters [all].")
-@click.option(
-    "--rivals",
-    metavar="NAME,...",
-    help="Effects to be told apart [those that a diagnosis of the campaign cannot tell].",
-)
-@grid_options
-@path_option("--campaign", help="Of MODEL.json: take the [rig] and [predict] of this campaign.")
-@click.option(
-    "--check", "count", type=click.IntRange(2, 100_000), metavar="N", help="Simulate the plan N times, and fit each."
-)
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of --check.")
+@declared("plan")
 @partial(shared_options, where="results/plan <name>")
 def command(
     source: Path,

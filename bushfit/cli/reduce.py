@@ -10,10 +10,9 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import click
-
-from bushfit.cli.common import Options, example, shared_options
+from bushfit.cli.common import Options, shared_options
 from bushfit.cli.grids import parse_grid, positive
+from bushfit.cli.options import command_called, declared, files_argument
 from bushfit.cli.raw import direction_error, file_options, options_named
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import BushfitError, MeasurementError
@@ -35,21 +34,10 @@ if TYPE_CHECKING:
 _LINES_AN_OCTAVE = 3
 
 
-@click.command(
-    "reduce",
-    epilog=example(
-        "bushfit reduce data/cmp_15961_raw/stepped_sine_axial.csv",
-        'bushfit reduce data/measured/epdm_70/shaker_1g_573g.csv --mass "0.5878 kg" --specimen mount',
-    ),
-)
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@command_called("reduce")
+@files_argument
 @file_options(sweeps=False)
-@click.option("--levels", help='Amplitudes that were asked for, such as "0.1, 0.2 mm" [found].')
-@click.option("--cycles", type=click.IntRange(3, 1000), default=3, show_default=True, help="Fewest steady cycles.")
-@click.option("--mass", help='Of a resonance test, such as "0.5 kg".')
-@click.option("--mass-added", help='What moves with it, such as "15 g".')
-@click.option("--specimen", help="What was tested, where it is no bushing.")
-@click.option("--base-acceleration", help='Such as "0.1 g", where no column says it.')
+@declared("reduce")
 @partial(shared_options, where="results/<first file>")
 def command(
     files: tuple[Path, ...],

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import click
 
-from bushfit.cli.common import Options, example, shared_options
+from bushfit.cli.common import Options, shared_options
+from bushfit.cli.options import command_called
 
 
-@click.command("report", epilog=example("bushfit report data/reports/mystery_mount -o results/page"))
+@command_called("report")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @partial(shared_options, where="DIR", forms=())
 def command(folder: Path, options: Options) -> None:

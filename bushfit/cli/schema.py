@@ -6,11 +6,12 @@ from typing import Any
 
 import click
 
-from bushfit.cli.common import Options, example, shared_options
+from bushfit.cli.common import Options, shared_options
+from bushfit.cli.options import command_called
 from bushfit.cli.show import new_table
 
 
-@click.command("schema", epilog=example("bushfit schema", "bushfit schema model"))
+@command_called("schema")
 @click.argument("name", required=False)
 @partial(shared_options, where="nothing is written", forms=())
 def command(name: str | None, options: Options) -> None:
