@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bushfit.cli.common import ALL_FORMS, Options, open_source, shared_options
-from bushfit.cli.grids import parse_grids
+from bushfit.cli.grids import asked_for
 from bushfit.cli.options import command_called, declared, option_of
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import naming, typed
@@ -50,7 +50,6 @@ def command(
     """
     from bushfit.campaign.campaign import load_campaign
     from bushfit.campaign.naming import folder_name
-    from bushfit.campaign.schema import PredictSettings
     from bushfit.effects import effect_named
     from bushfit.jobs import about
     from bushfit.jobs.compare import MOST, Compare
@@ -59,11 +58,11 @@ def command(
         raise click.UsageError(f"2 to {MOST} results are compared; one campaign alone with '--families' after it.")
     if families is not None and len(sources) > 1:
         raise click.UsageError("'--families' is of one campaign.")
-    asked = parse_grids(grids)
+    asked = asked_for(directions, grids)
     words = about.asked(direction=directions, **{option_of(name)[2:]: [text] for name, text in grids.items() if text})
     words = (*map(str, sources), *about.asked(families=[families] if families is not None else []), *words)
     typed_words = ["bushfit", "compare", *(typed(Path(word)) for word in words)]
-    job = Compare(PredictSettings(directions=directions or None, **asked), " ".join(typed_words))
+    job = Compare(asked, " ".join(typed_words))
     if families is not None:
         names = () if families == _ALL else tuple(name.replace(" ", "") for name in families.split(","))
         with naming(place="--families"):

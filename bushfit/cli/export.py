@@ -6,7 +6,7 @@ from typing import Literal
 import click
 
 from bushfit.cli.common import Options, open_model, shared_options
-from bushfit.cli.grids import parse_grids, positive
+from bushfit.cli.grids import asked_for, positive
 from bushfit.cli.options import command_called, declared
 from bushfit.cli.show import warn
 
@@ -35,21 +35,20 @@ def command(
     """
     from bushfit.campaign.campaign import load_campaign
     from bushfit.campaign.naming import folder_name
-    from bushfit.campaign.schema import PredictSettings
     from bushfit.errors import naming
     from bushfit.export.systems import UnitSystem
     from bushfit.jobs.export import Export, source_of
     from bushfit.jobs.predict import Predict
 
     result, loaded = open_model(model), load_campaign(campaign) if campaign else None
-    asked = parse_grids(grids)
+    asked = asked_for(directions, grids)
     if dialect and "nastran" not in formats:
         raise click.UsageError("'--dialect' is of '--format nastran'.")
     with naming(place="--units"):
         system = UnitSystem.parse(units) if units is not None else None
     job = Export(
         tuple(dict.fromkeys(formats)),
-        Predict(PredictSettings(directions=directions or None, **asked)),
+        Predict(asked),
         positive(accuracy, "--accuracy", "1") or 0.0,
         system,
         dialect or "nastran",

@@ -1,11 +1,17 @@
 """Grids on the command line: "5:155:10 Hz" or "0.1, 0.2, 0.5 mm"."""
 
+from __future__ import annotations
+
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from bushfit.cli.options import option_of
 from bushfit.errors import UnitError, naming
 from bushfit.units import quantity
+
+if TYPE_CHECKING:
+    from bushfit.campaign.schema import PredictSettings
 
 #: Values of a grid at most: more is a typing error in the step.
 _MOST_VALUES = 100_000
@@ -13,13 +19,16 @@ _MOST_VALUES = 100_000
 _UNITS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
 
 
-def parse_grids(given: Mapping[str, str | None]) -> dict[str, tuple[float, ...] | None]:
-    """The values of the options of a grid in SI, by their keys.
+def asked_for(directions: Sequence[str], grids: Mapping[str, str | None]) -> PredictSettings:
+    """Places, and the values of the options of a grid in SI; None where they were not given.
 
     Raises:
         UnitError: as `parse_grid`.
     """
-    return {key: parse_grid(given[key], option_of(key), unit) for key, unit in _UNITS.items()}
+    from bushfit.campaign.schema import PredictSettings
+
+    axes = {key: parse_grid(grids[key], option_of(key), unit) for key, unit in _UNITS.items()}
+    return PredictSettings(directions=tuple(directions) or None, **axes)
 
 
 def positive(text: str | None, option: str, unit: str) -> float | None:

@@ -15,7 +15,7 @@ import click
 from rich.markup import escape
 
 from bushfit.cli.common import Options, open_source, shared_options
-from bushfit.cli.grids import parse_grids
+from bushfit.cli.grids import asked_for
 from bushfit.cli.options import command_called, declared
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import naming
@@ -60,7 +60,6 @@ def command(
     """
     from bushfit.campaign.campaign import Campaign, load_campaign
     from bushfit.campaign.naming import folder_name
-    from bushfit.campaign.schema import PredictSettings
     from bushfit.jobs.plan import CAMPAIGN_FILE, PlanTests
 
     if aim not in (None, "rivals") and rivals:
@@ -68,8 +67,7 @@ def command(
     if aim not in (None, "parameters") and parameters:
         raise click.UsageError("'--parameters' goes with '--for parameters'.")
     chosen = cast("Aim", aim) if aim else ("rivals" if rivals else "parameters" if parameters else "predictions")
-    asked = PredictSettings(directions=None, **parse_grids(grids))
-    job = PlanTests(chosen, hours, directions, _names(parameters), _names(rivals), asked)
+    job = PlanTests(chosen, hours, directions, _names(parameters), _names(rivals), asked_for((), grids))
     opened, beside = open_source(source), load_campaign(campaign) if campaign else None
     if beside and isinstance(opened, Campaign):
         raise click.UsageError("'--campaign' goes with MODEL.json.")

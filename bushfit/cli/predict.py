@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bushfit.cli.common import Options, open_model, shared_options
-from bushfit.cli.grids import parse_grids, positive
+from bushfit.cli.grids import asked_for, positive
 from bushfit.cli.options import command_called, declared
 from bushfit.cli.show import new_table, tell_tests, warn
 
@@ -52,7 +52,6 @@ def command(
     """
     from bushfit.campaign.campaign import load_bushing, load_campaign
     from bushfit.campaign.naming import folder_name
-    from bushfit.campaign.schema import PredictSettings
     from bushfit.errors import naming
     from bushfit.jobs.predict import Predict
     from bushfit.model.result import carried
@@ -68,14 +67,14 @@ def command(
         notes.append(note)
         directions = directions or ("axial", "radial")
     loaded = load_campaign(campaign) if campaign else None
-    asked = parse_grids(grids)
+    asked = asked_for(directions, grids)
     if (mass is None) != (base_acceleration is None):
         raise click.UsageError("'--mass' and '--base-acceleration' go together.")
     shaken = positive(mass, "--mass", "kg"), positive(base_acceleration, "--base-acceleration", "m/s^2")
     with naming(place="--temperature"):
         warm = None if temperature is None else kelvin(temperature)
     within = positive(arms, "--arms", "1")
-    job = Predict(PredictSettings(directions=directions or None, **asked), *shaken, warm, wide, within)
+    job = Predict(asked, *shaken, warm, wide, within)
     folder = options.folder(loaded.slug if loaded else folder_name(result.name))
     measured = Kinds(tables=("measured",) if loaded and loaded.sweeps else ())
     options.require_free(folder, options.formats.names(job.kinds(result, loaded) + measured))

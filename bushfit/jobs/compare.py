@@ -1,6 +1,6 @@
 """compare: several results side by side, the first the reference; or model families on one campaign."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
@@ -19,8 +19,8 @@ from bushfit.fitting.assess import lack_of_fit
 from bushfit.fitting.data import Data
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.jobs.fits import Fit
-from bushfit.jobs.grid import common_grid
-from bushfit.jobs.predict import AMPLITUDES, filled
+from bushfit.jobs.grid import AMPLITUDES, common_grid
+from bushfit.jobs.predict import filled
 from bushfit.model.document import BushingTable
 from bushfit.model.file import model_document, versions
 from bushfit.model.model import Model
@@ -38,6 +38,8 @@ MOST = 8
 _COMPOUND = Specimen("compound", "modulus")
 #: What is said of a family where the first has no gap.
 _NO_GAP = "the first family meets these tests within their noise: nothing in them asks for another"
+#: A record as JSON has it.
+_plain: Callable[[Any], Any] = asdict
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,11 +149,6 @@ class Compared:
     @property
     def contents(self) -> Contents:
         return comparison_contents(self.document)
-
-
-def _plain(record: Any) -> Any:
-    """A record as JSON has it."""
-    return asdict(record)
 
 
 def _entry(label: str, entry: Entry) -> ComparedEntry:

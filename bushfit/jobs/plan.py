@@ -1,7 +1,7 @@
 """plan: which tests next, chosen for what they would tell."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -12,9 +12,8 @@ from bushfit.effects.contract import Array
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.fitting.data import Data
 from bushfit.geometry import Direction, Place, place_named
-from bushfit.jobs.grid import default_grid
+from bushfit.jobs.grid import grid_at, wanted
 from bushfit.jobs.plan_document import Checked, PlanFile, PlannedRun, Reached, Rivalry, Shown
-from bushfit.jobs.predict import AMPLITUDES
 from bushfit.model.result import Result
 from bushfit.planning.campaign import campaign_toml
 from bushfit.planning.check import Check
@@ -159,13 +158,11 @@ class PlanTests:
 
     def _points(self, result: Result, campaign: Campaign | None, usual: Sequence[Place]) -> Iterator[Points]:
         """Where the stiffness is wanted: as asked, as the campaign's [predict] says, or on the grid of `predict`."""
-        given = {key: value for key, value in vars(self.asked).items() if value is not None}
-        settings = replace(campaign.predict if campaign else PredictSettings(), **given)
+        settings = wanted(self.asked, campaign)
         places = [place_named(name, result.specimens) for name in settings.directions or ()]
         for place in places or usual:
-            frequencies, amplitudes = default_grid(result, place, campaign.sweeps if campaign else ())
-            sizes = np.unique(getattr(settings, AMPLITUDES[place.motion]) or amplitudes)
-            amplitude, frequency = np.meshgrid(sizes, np.unique(settings.frequencies or frequencies), indexing="ij")
+            frequencies, amplitudes = grid_at(settings, result, place, campaign.sweeps if campaign else ())
+            amplitude, frequency = np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
             yield Points(place, frequency.ravel(), amplitude.ravel())
 
 

@@ -18,13 +18,13 @@ from bushfit.report.page.gathered import (
     LoopCurve,
     Sweeps,
     cells_at,
-    columns_of,
     gap_of,
     loops_at,
     places_of,
     sweeps_at,
     tests_of,
 )
+from bushfit.report.tables import columns_of
 from bushfit.units import number
 
 #: Points of sweeps, and rows of loops, of a whole page: with these it stays below 500 kB.
