@@ -8,15 +8,14 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from bushfit.cli.common import ALL_FORMS, Options, shared_options
-from bushfit.cli.options import command_called, declared
+from bushfit.cli.common import Options, with_options
+from bushfit.cli.options import command_called
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import naming
 from bushfit.units import alike, for_people
@@ -34,8 +33,7 @@ _SECONDS_A_LINE = 10.0
 
 @command_called("batch")
 @click.argument("manifest", metavar="MANIFEST", nargs=-1, required=True)
-@declared("batch")
-@partial(shared_options, forms=ALL_FORMS)
+@with_options
 def command(
     manifest: tuple[str, ...],
     at: tuple[str, ...],

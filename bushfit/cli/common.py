@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial, wraps
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -13,7 +13,7 @@ import click
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 
-from bushfit.cli.options import F, declared
+from bushfit.campaign.naming import folder_name
 from bushfit.errors import ModelError, printable, typed
 from bushfit.report.contents import Formats
 from bushfit.report.folder import check_free, to_json, write_files
@@ -47,9 +47,9 @@ class Options:
     formats: Formats
     force: bool
 
-    def folder(self, name: str) -> Path:
-        """Where results go: --output, or results/<name>."""
-        return self.output or Path("results") / name
+    def folder(self, name: str, form: str = "{}") -> Path:
+        """Where results go: --output, or results/<name>, in which `form` says what stands around it."""
+        return self.output or Path("results") / form.format(folder_name(name))
 
     @property
     def console(self) -> Console:
@@ -86,19 +86,9 @@ class Options:
             sys.stdout.flush()
 
 
-#: The tables of commands.toml for the forms of all kinds of files, of a command that writes a page too.
-ALL_FORMS = ("tables", "pictures", "pages")
+def with_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator of a command: the options that all have, and those of the files it writes, become one `options`."""
 
-
-def shared_options(
-    function: F, where: str = "results/<campaign or file>", forms: Sequence[str] = ("tables", "pictures")
-) -> F:
-    """-o, -v, -q, --json, --no-plots, --force, and those of `forms`, gathered into one `options` argument.
-
-    Without -o results go to `where`; `forms` says whether a command writes tables, pictures and pages.
-    """
-
-    @declared("shared", *forms, without=where)
     @wraps(function)
     def wrapped(*args: Any, **kwargs: Any) -> Any:
         given = {name: kwargs.pop(name) for name in ("output", "verbose", "quiet", "as_json", "force")}
@@ -110,7 +100,7 @@ def shared_options(
         )
         return function(*args, options=Options(formats=formats, **given), **kwargs)
 
-    return wrapped  # type: ignore[return-value]
+    return wrapped
 
 
 @dataclass(frozen=True)
@@ -138,7 +128,7 @@ class Task:
         options, loaded = self.options, load_campaign(self.campaign)
         if self.loss:
             loaded = replace(loaded, fit=replace(loaded.fit, loss=cast("Loss", self.loss)))
-        folder = options.folder(loaded.slug)
+        folder = options.folder(loaded.name)
         options.require_free(folder, options.formats.names(job.kinds(loaded)))
         outcome = job.run(Data.of(loaded))
         tell(options, loaded.name, outcome)
@@ -151,26 +141,18 @@ class Task:
             click.get_current_context().exit(1)
 
 
-def campaign_options(
-    function: F,
-    soft_l1: str = "points far off pull less, outliers not at all",
-    forms: Sequence[str] = ("tables", "pictures"),
-) -> F:
-    """CAMPAIGN, --loss, --max-nrmse and the shared options, those of `forms` too, gathered into one `task` argument.
-
-    `soft_l1` says what the robust loss does in this command, for its help.
-    """
+def with_task(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator of a command on one campaign: CAMPAIGN and its options become one `task`."""
 
     @click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=click.Path(path_type=Path))
-    @declared("task", without=soft_l1)
-    @partial(shared_options, forms=forms)
+    @with_options
     @wraps(function)
     def wrapped(*args: Any, options: Options, **kwargs: Any) -> Any:
         campaign = _only(kwargs.pop("campaigns"))
         task = Task(campaign, kwargs.pop("loss"), kwargs.pop("max_nrmse"), options)
         return function(*args, task=task, **kwargs)
 
-    return wrapped  # type: ignore[return-value]
+    return wrapped
 
 
 def _only(campaigns: Sequence[Path]) -> Path:

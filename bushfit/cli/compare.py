@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import ALL_FORMS, Options, open_source, shared_options
+from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for
-from bushfit.cli.options import command_called, declared, option_of
+from bushfit.cli.options import command_called, option_of
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import naming, typed
 
@@ -27,8 +26,7 @@ _MOST_WARNINGS = 8
 
 @command_called("compare")
 @click.argument("sources", metavar="A [B]...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@declared("compare")
-@partial(shared_options, forms=ALL_FORMS)
+@with_options
 def command(
     sources: tuple[Path, ...],
     families: str | None,
@@ -49,7 +47,6 @@ def command(
     compare.html, a page to show, to print and to mail, and with --families families.csv.
     """
     from bushfit.campaign.campaign import load_campaign
-    from bushfit.campaign.naming import folder_name
     from bushfit.effects import effect_named
     from bushfit.jobs import about
     from bushfit.jobs.compare import MOST, Compare
@@ -69,12 +66,12 @@ def command(
             for name in names:
                 all(map(effect_named, name.split("+")))
         campaign = load_campaign(sources[0])
-        folder = options.folder(f"{campaign.slug} families")
+        folder = options.folder(campaign.name, "{} families")
         options.require_free(folder, options.formats.names(job.kinds(families=True)))
         outcome = job.run_families(campaign, str(sources[0]), names)
     else:
         opened = [_opened(source) for source in sources]
-        folder = options.folder(folder_name(" and ".join(each.name for each, *_ in opened)))
+        folder = options.folder(" and ".join(each.name for each, *_ in opened))
         options.require_free(folder, options.formats.names(job.kinds()))
         outcome = job.run([job.entry(*each) for each in opened])
     _tell(options, outcome)

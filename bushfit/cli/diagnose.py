@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 
-from bushfit.cli.common import ALL_FORMS, Options, Task, campaign_options, open_model
-from bushfit.cli.options import command_called, declared
+from bushfit.cli.common import Options, Task, open_model, with_task
+from bushfit.cli.options import command_called
 from bushfit.cli.show import new_table, parameter_table, warn
 from bushfit.errors import BushfitError, naming
 from bushfit.units import alike, for_people, number, quantity
@@ -24,8 +23,7 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 
 
 @command_called("diagnose")
-@declared("diagnose")
-@partial(campaign_options, soft_l1="the same with outliers left out", forms=ALL_FORMS)
+@with_task
 def command(
     model: Path | None,
     adopt: tuple[str, ...],

@@ -5,16 +5,15 @@ from typing import Literal
 
 import click
 
-from bushfit.cli.common import Options, open_model, shared_options
+from bushfit.cli.common import Options, open_model, with_options
 from bushfit.cli.grids import asked_for, positive
-from bushfit.cli.options import command_called, declared
+from bushfit.cli.options import command_called
 from bushfit.cli.show import warn
 
 
 @command_called("export")
 @click.argument("model", type=click.Path(path_type=Path))
-@declared("export")
-@shared_options
+@with_options
 def command(
     model: Path,
     formats: tuple[str, ...],
@@ -34,7 +33,6 @@ def command(
     out. z is the bushing's axis.
     """
     from bushfit.campaign.campaign import load_campaign
-    from bushfit.campaign.naming import folder_name
     from bushfit.errors import naming
     from bushfit.export.systems import UnitSystem
     from bushfit.jobs.export import Export, source_of
@@ -54,7 +52,7 @@ def command(
         dialect or "nastran",
         options.formats.table_form == "decimal-comma",
     )
-    folder = options.folder(loaded.slug if loaded else folder_name(result.name))
+    folder = options.folder((loaded or result).name)
     options.require_free(folder, [])
     outcome = job.run(result, source_of(model), loaded)
     for name, exported in outcome.exported.items():

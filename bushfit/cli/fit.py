@@ -6,14 +6,13 @@ from pathlib import Path
 
 from rich.progress import Progress
 
-from bushfit.cli.common import Options, Task, campaign_options, open_model
-from bushfit.cli.options import command_called, declared
+from bushfit.cli.common import Options, Task, open_model, with_task
+from bushfit.cli.options import command_called
 from bushfit.cli.show import tell_fit
 
 
 @command_called("fit-static")
-@declared("fit-static")
-@campaign_options
+@with_task
 def static(dynamic: Path | None, task: Task) -> None:
     """Fit mu, sigma_fmax and eps_half to the hysteresis loops of CAMPAIGN, the springpot held.
 
@@ -28,8 +27,7 @@ def static(dynamic: Path | None, task: Task) -> None:
 
 
 @command_called("fit-dynamic")
-@declared("fit-dynamic")
-@campaign_options
+@with_task
 def dynamic(static: Path | None, task: Task) -> None:
     """Fit m and alpha to the smallest-amplitude sweep of CAMPAIGN, the other three held.
 
@@ -44,8 +42,7 @@ def dynamic(static: Path | None, task: Task) -> None:
 
 
 @command_called("fit")
-@declared("fit")
-@campaign_options
+@with_task
 def fit(directions: tuple[str, ...], effects: tuple[str, ...], profile: bool, task: Task) -> None:
     """Fit all five parameters to the loops and sweeps of CAMPAIGN together.
 

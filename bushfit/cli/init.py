@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, shared_options
+from bushfit.cli.common import Options, with_options
 from bushfit.cli.inspect import tell_left_out
-from bushfit.cli.options import command_called, declared, files_argument, option_of
-from bushfit.cli.raw import direction_error, file_options, options_named
+from bushfit.cli.options import command_called, files_argument, option_of
+from bushfit.cli.raw import direction_error, options_named, with_stated
 from bushfit.cli.show import warn
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, naming, typed
 from bushfit.units import quantity
@@ -26,9 +25,8 @@ _SIDES = ("inner", "outer")
 
 @command_called("init")
 @files_argument
-@declared("init")
-@file_options()
-@partial(shared_options, forms=())
+@with_stated
+@with_options
 def command(
     files: tuple[Path, ...], name: str | None, stated: Mapping[str, Any], options: Options, **sizes: str | None
 ) -> None:
@@ -85,12 +83,11 @@ def _radius(side: str, sizes: Mapping[str, str | None]) -> str:
 
 def _place(options: Options, name: str) -> tuple[Path, str]:
     """Folder and name of the campaign."""
-    from bushfit.campaign.naming import folder_name
 
     file = options.output
     if file and file.suffix == ".toml":
         return file.parent, file.name
-    return options.folder(folder_name(name)), "campaign.toml"
+    return options.folder(name), "campaign.toml"
 
 
 def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[str, str]]:

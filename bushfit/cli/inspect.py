@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
-from bushfit.cli.common import Options, shared_options
+from bushfit.cli.common import Options, with_options
 from bushfit.cli.options import command_called, files_argument
-from bushfit.cli.raw import file_options, options_named
+from bushfit.cli.raw import options_named, with_stated
 from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError
 from bushfit.report import plots
@@ -30,8 +30,8 @@ _FILES_A_PICTURE = 5
 
 @command_called("inspect")
 @files_argument
-@file_options()
-@partial(shared_options, where="results/<first file>", forms=["pictures"])
+@with_stated
+@with_options
 def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options) -> None:
     """Look at test files before a campaign names them: loops, sweeps, raw stepped-sine histories, in any mixture.
 
@@ -47,11 +47,10 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
 
     Writes inspect.png, and inspect_2.png and so on of more than five files.
     """
-    from bushfit.campaign.naming import folder_name
     from bushfit.inspection.draft import named_apart, pasted_text
     from bushfit.inspection.gathering import gather
 
-    folder = options.folder(folder_name(files[0].stem))
+    folder = options.folder(files[0].stem)
     sources, left_out = gather(files, stated)
     tell_left_out(options, left_out)
     last = math.ceil(len(sources) / _FILES_A_PICTURE)

@@ -4,15 +4,13 @@ import math
 import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, get_args
 
 import click
 
 from bushfit.cli import TABLES
 from bushfit.reading.tablefile import Form
 from bushfit.report.contents import Picture
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 #: Hours of the rig at most: months, as a typing error.
 _MOST_HOURS = 2000.0
@@ -73,22 +71,15 @@ _TYPES: Mapping[str, Mapping[str, Any]] = {
 
 
 def command_called(name: str) -> Callable[[Callable[..., Any]], click.Command]:
-    """Decorator that makes a function a command, with its examples at the end of the help."""
+    """Decorator that makes a function a command, with its options, and its examples at the end of the help."""
     lines = TABLES["examples"][name]
     title = f"Example{'s' * (len(lines) > 1)}:"
-    return click.command(name, epilog="\n".join(["\b", title, *(f"  bushfit {line}" for line in lines)]))
+    epilog = "\n".join(["\b", title, *(f"  bushfit {line}" for line in lines)])
 
-
-def declared(*tables: str, without: str = "") -> Callable[[F], F]:
-    """Decorator of a command: the options of some tables of commands.toml, in their order.
-
-    `without` stands in their help where it says what holds without an option.
-    """
-
-    def decorate(function: F) -> F:
-        for decorator in reversed([each for table in tables for each in _declared(table, without)]):
-            function = decorator(function)
-        return function
+    def decorate(function: Callable[..., Any]) -> click.Command:
+        command = click.command(name, epilog=epilog)(function)
+        command.params.extend(_options(name))
+        return command
 
     return decorate
 
@@ -107,10 +98,11 @@ def option_of(key: str) -> str:
 files_argument = click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
 
 
-def _declared(table: str, without: str) -> Iterator[Callable[[Any], Any]]:
+def _options(table: str, without: str = "") -> Iterator[click.Option]:
+    """The options of a table; `without` stands in their help where it says what holds without them."""
     for name, row in TABLES[table].items():
         if isinstance(row, str):  # the rows of another table stand here
-            yield from _declared(name, row)
+            yield from _options(name, row)
             continue
         given = dict(row)
         kind, ends = given.pop("type", None), given.pop("range", None)
@@ -121,5 +113,5 @@ def _declared(table: str, without: str) -> Iterator[Callable[[Any], Any]]:
             given["default"] = os.cpu_count() or 1
         to = given.pop("to", "directions" if kind == "place" else name.replace("-", "_"))
         short = [given.pop("short")] if "short" in given else []
-        help_ = given.pop("help").replace("{}", without)
-        yield click.option(*short, f"--{name}", to, help=help_, **known, **given)
+        words = given.pop("help").replace("{}", without)
+        yield click.Option([*short, f"--{name}", to], help=words, **known, **given)

@@ -7,16 +7,15 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import click
 from rich.markup import escape
 
-from bushfit.cli.common import Options, open_source, shared_options
+from bushfit.cli.common import Options, open_source, with_options
 from bushfit.cli.grids import asked_for
-from bushfit.cli.options import command_called, declared
+from bushfit.cli.options import command_called
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import naming
 from bushfit.units import for_people, number
@@ -35,8 +34,7 @@ _MOST_VALUES = 6
 
 @command_called("plan")
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=click.Path(path_type=Path))
-@declared("plan")
-@partial(shared_options, where="results/plan <name>")
+@with_options
 def command(
     source: Path,
     aim: str | None,
@@ -59,7 +57,6 @@ def command(
     Writes plan.csv, a sheet for who runs the rig, plan.png, plan.json, and campaign.toml for `bushfit simulate`.
     """
     from bushfit.campaign.campaign import Campaign, load_campaign
-    from bushfit.campaign.naming import folder_name
     from bushfit.jobs.plan import CAMPAIGN_FILE, PlanTests
 
     if aim not in (None, "rivals") and rivals:
@@ -71,7 +68,7 @@ def command(
     opened, beside = open_source(source), load_campaign(campaign) if campaign else None
     if beside and isinstance(opened, Campaign):
         raise click.UsageError("'--campaign' goes with MODEL.json.")
-    folder = options.folder(f"plan {folder_name(opened.name)}")
+    folder = options.folder(opened.name, "plan {}")
     options.require_free(folder, [*options.formats.names(job.kinds()), CAMPAIGN_FILE])
     with naming(source):
         outcome = job.run(opened, beside)

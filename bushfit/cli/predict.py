@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, open_model, shared_options
+from bushfit.cli.common import Options, open_model, with_options
 from bushfit.cli.grids import asked_for, positive
-from bushfit.cli.options import command_called, declared
+from bushfit.cli.options import command_called
 from bushfit.cli.show import new_table, tell_tests, warn
 
 if TYPE_CHECKING:
@@ -23,8 +23,7 @@ _MOST_OF_FIT = 3
 
 @command_called("predict")
 @click.argument("model", type=click.Path(path_type=Path))
-@declared("predict")
-@shared_options
+@with_options
 def command(
     model: Path,
     campaign: Path | None,
@@ -51,7 +50,6 @@ def command(
     --bushing carries the compound to another shape: effects of its material are kept, those of bushing and rig are not.
     """
     from bushfit.campaign.campaign import load_bushing, load_campaign
-    from bushfit.campaign.naming import folder_name
     from bushfit.errors import naming
     from bushfit.jobs.predict import Predict
     from bushfit.model.result import carried
@@ -75,7 +73,7 @@ def command(
         warm = None if temperature is None else kelvin(temperature)
     within = positive(arms, "--arms", "1")
     job = Predict(asked, *shaken, warm, wide, within)
-    folder = options.folder(loaded.slug if loaded else folder_name(result.name))
+    folder = options.folder((loaded or result).name)
     measured = Kinds(tables=("measured",) if loaded and loaded.sweeps else ())
     options.require_free(folder, options.formats.names(job.kinds(result, loaded) + measured))
     outcome = job.run(result, loaded, tuple(notes))

@@ -7,7 +7,7 @@ from functools import wraps
 from pathlib import Path
 from typing import Any, get_args
 
-from bushfit.cli.options import F, declared, option_of, rows
+from bushfit.cli.options import option_of, rows
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.reading.headers import AmplitudeConvention
 from bushfit.reading.words import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
@@ -19,29 +19,24 @@ _TABLE = re.compile(r"\{[^}]*\}")
 _PAIRED = re.compile(r'(column|unit)s = \{ (\w+) = "([^"]*)"')
 
 
-def file_options(*, sweeps: bool = True) -> Callable[[F], F]:
-    """--direction, --column, --unit and an option for each of some keys of a campaign, gathered into one `stated`.
+def with_stated(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator of a command on test files: what its options say of them becomes one `stated`.
 
-    Beside loops the command takes sweeps, with all keys, or else resonance tests, with those of any file.
+    Beside loops there are sweeps, with all keys of a campaign, or else resonance tests, with those of any file.
     """
-    other = SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS
-    known = tuple(dict.fromkeys((*LOOP_COLUMNS, *other)))
-    tables = ("file", *["test"] * sweeps, "written")
-    keys = [key for key in rows(*tables) if key not in ("column", "unit")]
-    roles = f"ROLEs{' of loops' * sweeps}: {', '.join(LOOP_COLUMNS)}; of {'sweeps' if sweeps else 'resonance tests'}: "
 
-    def decorate(function: F) -> F:
-        @wraps(function)
-        def wrapped(*args: Any, **kwargs: Any) -> Any:
-            stated = {key: kwargs.pop(key) for key in keys}
-            stated["columns"] = _pairs(kwargs.pop("columns"), "--column", "force=Kraft", known)
-            stated["units"] = _pairs(kwargs.pop("units"), "--unit", "force=kN", known)
-            _check_amplitude(stated.get("amplitude"))
-            return function(*args, stated={key: value for key, value in stated.items() if value}, **kwargs)
+    @wraps(function)
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        sweeps = "rate" in kwargs
+        known = tuple(dict.fromkeys((*LOOP_COLUMNS, *(SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS))))
+        keys = [*rows("file"), *(rows("test") if sweeps else ()), *rows("written")]
+        stated = {key: kwargs.pop(key) for key in keys if key not in ("column", "unit")}
+        stated["columns"] = _pairs(kwargs.pop("columns"), "--column", "force=Kraft", known)
+        stated["units"] = _pairs(kwargs.pop("units"), "--unit", "force=kN", known)
+        _check_amplitude(stated.get("amplitude"))
+        return function(*args, stated={key: value for key, value in stated.items() if value}, **kwargs)
 
-        return declared(*tables, without=roles + ", ".join(other))(wrapped)  # type: ignore[return-value]
-
-    return decorate
+    return wrapped
 
 
 @contextmanager

@@ -5,15 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from bushfit.cli.common import Options, shared_options
+from bushfit.cli.common import Options, with_options
 from bushfit.cli.grids import parse_grid, positive
-from bushfit.cli.options import command_called, declared, files_argument
-from bushfit.cli.raw import direction_error, file_options, options_named
+from bushfit.cli.options import command_called, files_argument
+from bushfit.cli.raw import direction_error, options_named, with_stated
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.report import plots
@@ -36,9 +35,8 @@ _LINES_AN_OCTAVE = 3
 
 @command_called("reduce")
 @files_argument
-@file_options(sweeps=False)
-@declared("reduce")
-@partial(shared_options, where="results/<first file>")
+@with_stated
+@with_options
 def command(
     files: tuple[Path, ...],
     stated: Mapping[str, Any],
@@ -60,9 +58,8 @@ def command(
 
     Writes sweep.csv, for [[sweeps]] of a campaign or `bushfit init`, and reduce.png.
     """
-    from bushfit.campaign.naming import folder_name
 
-    folder, formats = options.folder(folder_name(files[0].stem)), options.formats
+    folder, formats = options.folder(files[0].stem), options.formats
     options.require_free(folder, formats.names(Kinds(tables=("sweep",), pictures=("reduce",))))
     table = _resonance_table(files[0], stated, moving)
     found = (

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bushfit.cli.common import ALL_FORMS, Options, Task, campaign_options
+from bushfit.cli.common import Options, Task, with_task
 from bushfit.cli.diagnose import tell_findings, tell_verdict
 from bushfit.cli.options import command_called
 from bushfit.cli.predict import tell_predictions
@@ -29,7 +28,7 @@ _OPEN = 100.0
 
 
 @command_called("run")
-@partial(campaign_options, forms=ALL_FORMS)
+@with_task
 def command(task: Task) -> None:
     """Fit CAMPAIGN in every way, ask what the model lacks, and predict from the result.
 

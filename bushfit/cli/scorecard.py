@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 from rich.progress import Progress
 
 from bushfit import __version__
-from bushfit.cli.common import Options, shared_options
-from bushfit.cli.options import command_called, declared
+from bushfit.cli.common import Options, with_options
+from bushfit.cli.options import command_called
 from bushfit.cli.show import new_table
 
 if TYPE_CHECKING:
@@ -23,8 +22,7 @@ if TYPE_CHECKING:
 
 
 @command_called("scorecard")
-@declared("scorecard")
-@partial(shared_options, where="nothing is written", forms=())
+@with_options
 def command(campaigns: int, seed: int, jobs: int, family: str, keep: bool, options: Options) -> None:
     """Judge `diagnose` on hidden campaigns of random bushings, and print how often it is right.
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, open_model, shared_options
-from bushfit.cli.options import command_called, declared, option_of
+from bushfit.cli.common import Options, open_model, with_options
+from bushfit.cli.options import command_called, option_of
 from bushfit.errors import ModelError, UnitError, naming
 from bushfit.units import is_number, quantity
 
@@ -21,8 +20,7 @@ if TYPE_CHECKING:
 
 @command_called("simulate")
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=click.Path(path_type=Path))
-@declared("simulate")
-@partial(shared_options, forms=["tables"])
+@with_options
 def command(source: Path, effects: tuple[str, ...], options: Options, **settings: Any) -> None:
     """Put a model on the virtual rig and write a campaign of simulated raw tests.
 
@@ -33,7 +31,6 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
 
     Writes campaign.toml, the tables it names, and truth.json, the model behind them.
     """
-    from bushfit.campaign.naming import folder_name
     from bushfit.model.file import to_document
     from bushfit.simulation import simulate, to_files
 
@@ -44,7 +41,7 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
     with naming(source):
         simulated = simulate(truth, plan)
     files = to_files(simulated, options.formats.table_form)
-    folder = options.folder(f"simulated {folder_name(simulated.result.name)}")
+    folder = options.folder(simulated.result.name, "simulated {}")
     options.say(truth.equation())
     options.write(folder, files, {"truth": to_document(simulated.result), "files": sorted(files)})
 
