@@ -101,14 +101,16 @@ def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | N
     asked = parse_grid(levels, "--levels", direction.motion.displacement_unit) or ()
     reduction = reduce(histories, fewest_cycles=cycles, levels=asked)
 
-    def figure() -> Figure:
-        names = histories[0].name if len(histories) == 1 else f"{len(histories)} histories"
-        return plots.reduction.reduction_figure(
-            reduction, histories, f"{names}: {len(reduction.steps)} points, {direction}"
-        )
-
-    points, warnings = reduced_table(reduction), reduction.warnings
-    return _Found("direction", str(direction), points, warnings, lambda options: _tell(options, reduction), figure)
+    names = histories[0].name if len(histories) == 1 else f"{len(histories)} histories"
+    title = f"{names}: {len(reduction.steps)} points, {direction}"
+    return _Found(
+        "direction",
+        str(direction),
+        reduced_table(reduction),
+        reduction.warnings,
+        lambda options: _tell(options, reduction),
+        lambda: plots.reduction.reduction_figure(reduction, histories, title),
+    )
 
 
 def _resonance_table(file: Path, stated: Mapping[str, Any], moving: Mapping[str, str | None]) -> Table | None:
@@ -161,11 +163,7 @@ def _resonance(
     with options_named():
         reduction = reduce_resonance(read_resonance(table, read_as, base_acceleration), mass)
 
-    def figure() -> Figure:
-        return plots.resonance.resonance_figure(
-            reduction, f"{table.file.stem}, {specimen or direction}: {number(mass, 4)} kg on a shaker"
-        )
-
+    title = f"{table.file.stem}, {specimen or direction}: {number(mass, 4)} kg on a shaker"
     frequency, largest = reduction.peak
     return _Found(
         "specimen" if specimen else "direction",
@@ -173,7 +171,7 @@ def _resonance(
         resonance_table(reduction),
         reduction.warnings,
         lambda options: _tell_resonance(options, reduction),
-        figure,
+        lambda: plots.resonance.resonance_figure(reduction, title),
         {"mass_kg": mass, "resonance_Hz": frequency, "transmissibility_at_resonance": largest},
     )
 

@@ -13,7 +13,7 @@ from bushfit.model.result import Misfit, Result, Usable
 from bushfit.report.contents import Tables
 from bushfit.report.page.drawings import MOST_PLACES, gap_panels, loop_panels, tested_panels
 from bushfit.report.page.gathered import places_of
-from bushfit.report.page.schema import Checked
+from bushfit.report.page.readback import Checked
 from bushfit.report.parameters import interval_kind, parameter_rows
 from bushfit.report.tables import DISPLAYS, columns_of, complete, spread
 from bushfit.units import alike, for_people, number, told
