@@ -5,7 +5,7 @@ Numbers are in SI: Hz, m, rad, N/m, and shares such as 0.01. See python.md.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -76,7 +76,9 @@ def fit(
     Raises:
         BushfitError: tests or settings that cannot support it.
     """
-    return Fit(tuple(directions), tuple(effects), _untold if profile else None).run(_data(campaign, loss))
+    if loss:
+        campaign = replace(campaign, fit=replace(campaign.fit, loss=loss))
+    return Fit(tuple(directions), tuple(effects), _untold if profile else None).run(Data.of(campaign))
 
 
 def fit_static(campaign: Campaign, *, dynamic: Result | Outcome | None = None) -> Fitted:
@@ -213,16 +215,12 @@ def simulate(
 
 def table(outcome: Outcome | Compared, name: str) -> pd.DataFrame:
     """A table of what was found, by the name of its file: "axial" of a prediction, "sweeps" of a fit."""
-    tables = outcome.contents.tables
-    _require(name, list(tables), "table")
-    return tables[name]()
+    return _made(outcome.contents.tables, name, "table")
 
 
 def picture(outcome: Outcome | Compared, name: str) -> Figure:
     """A picture of what was found, by the name of its file, as a figure of matplotlib."""
-    pictures = outcome.contents.pictures
-    _require(name, list(pictures), "picture")
-    return pictures[name]()
+    return _made(outcome.contents.pictures, name, "picture")
 
 
 def parameters(model: Result | Outcome) -> pd.DataFrame:
@@ -256,10 +254,6 @@ def _untold(name: str, left: int) -> None:
     """Says nothing of a profile that is done."""
 
 
-def _data(campaign: Campaign, loss: Loss | None) -> Data:
-    return Data.of(replace(campaign, fit=replace(campaign.fit, loss=loss)) if loss else campaign)
-
-
 def _asked(directions: Sequence[str] | None, *axes: Numbers | None) -> PredictSettings:
     """Places, then frequencies and amplitudes of displacements, rotations and strains, as they are asked for."""
     frequencies, amplitudes, rotations, strains = map(_values, axes)
@@ -276,7 +270,9 @@ def _result(model: Result | Outcome) -> Result:
     return model if isinstance(model, Result) else model.result
 
 
-def _require(name: str, known: Sequence[str], what: str) -> None:
+def _made(known: Mapping[str, Callable[[], Any]], name: str, what: str) -> Any:
+    """A table or a picture, made now."""
     if name not in known:
         expected = "one of " + ", ".join(known) if known else f"an outcome with a {what}"
         raise BushfitError(f"there is no such {what}", found=name, expected=expected, hint=did_you_mean(name, known))
+    return known[name]()

@@ -7,8 +7,10 @@ that none can be out of date.
 import importlib
 import inspect
 import re
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, is_dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 from bushfit.errors import BushfitError, did_you_mean
@@ -30,31 +32,10 @@ class Described:
     way: Literal["written", "read", "toml"]
 
 
-#: Every schema by its name.
+#: Every schema by its name, as schemas.toml lists them.
 DESCRIBED = {
-    "model": Described(
-        "model.json, static.json, dynamic.json, joint.json, truth.json of simulate; --json of the fits",
-        "model.document.ModelFile",
-        "read",
-    ),
-    "diagnosis": Described("diagnosis.json; --json of diagnose", "diagnosis.document.DiagnosisFile", "written"),
-    "run": Described("--json of run", "jobs.run.RunDocument", "read"),
-    "prediction": Described("--json of predict", "jobs.predict.PredictionDocument", "written"),
-    "comparison": Described("compare.json; --json of compare", "report.compare_document.ComparisonFile", "written"),
-    "plan": Described("plan.json; --json of plan", "jobs.plan_document.PlanFile", "written"),
-    "batch": Described("batch.json", "batch.document.BatchFile", "written"),
-    "summary": Described("--json of batch", "batch.document.BatchSummary", "written"),
-    "row": Described("bushings/<name>/row.json of batch", "batch.document.Record", "written"),
-    "scorecard": Described("scorecard.json; --json of scorecard", "scorecard.document.Scorecard", "written"),
-    "outcome": Described("a line of outcomes.jsonl of scorecard", "scorecard.document.Line", "written"),
-    "sealed": Described("campaigns/sealed/<campaign>.json of scorecard --keep", "scorecard.hidden.Sealed", "written"),
-    "inspection": Described("--json of inspect and init", "inspection.record.InspectionDocument", "written"),
-    "reduction": Described("--json of reduce", "reduction.result.ReductionDocument", "written"),
-    "simulation": Described("--json of simulate", "simulation.SimulationDocument", "read"),
-    "export": Described("--json of export", "jobs.export.ExportDocument", "written"),
-    "campaign": Described("a campaign, in TOML", "campaign.schema.CampaignFile", "toml"),
-    "manifest": Described("a list of campaigns for batch, in TOML", "batch.manifest.ManifestFile", "toml"),
-    "limits": Described("--limits of batch, in TOML", "batch.limits.Limits", "toml"),
+    name: Described(**row)
+    for name, row in tomllib.loads(Path(__file__).with_name("schemas.toml").read_text(encoding="utf-8")).items()
 }
 #: Keywords that pydantic leaves beside the type of a text that becomes a number; JSON Schema does not know them.
 _NO_KEYWORDS = frozenset({"gt", "ge", "lt", "le"})

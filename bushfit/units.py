@@ -24,24 +24,16 @@ _WORDS: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("unit
 #: By expected SI unit: what it measures, and a unit that a user would write for it.
 _KINDS: dict[str, tuple[str, str]] = {unit: tuple(words) for unit, words in _WORDS["kinds"].items()}
 #: By SI unit: the unit in which people write it, and the factor from SI to it; MPa*s^alpha is the paper's.
-_WRITTEN = {
-    "m": ("mm", 1e3),
-    "m/N": ("mm/kN", 1e6),
-    "N/m": ("N/mm", 1e-3),
-    "1": ("-", 1.0),
-    "Pa*s^alpha": ("MPa*s^alpha", 1e-6),
-}
+_WRITTEN: dict[str, tuple[str, float]] = {unit: tuple(words) for unit, words in _WORDS["written"].items()}
 #: By SI unit: the least and the largest size that a quantity of a bushing, of its tests or of its rig may have.
-_SIZES = {"m": (1e-10, 100.0), "rad": (1e-10, 1e3), "s": (1e-9, 1e9), "Hz": (1e-9, 1e9), "1": (1e-12, 1e9)}
+_SIZES: dict[str, tuple[float, float]] = {unit: tuple(ends) for unit, ends in _WORDS["sizes"].items()}
 #: The same of every other unit; chosen: far beyond all of them, and powers of it are numbers still.
 SIZES = (1e-15, 1e15)
 #: Zero of the Celsius scale [K].
 CELSIUS = 273.15
 #: By the unit of a temperature: kelvin per unit, and kelvin at zero of the unit.
-_TEMPERATURES = {
-    **dict.fromkeys(("degc", "c", "celsius"), (1.0, CELSIUS)),
-    **dict.fromkeys(("k", "kelvin"), (1.0, 0.0)),
-    **dict.fromkeys(("degf", "f", "fahrenheit"), (5.0 / 9.0, CELSIUS - 32.0 * 5.0 / 9.0)),
+_TEMPERATURES: dict[str, tuple[float, float]] = {
+    word: (scale, zero) for words, (scale, zero) in _WORDS["temperatures"].items() for word in words.split()
 }
 #: Times below this many seconds are written in milliseconds.
 _LEAST_IN_SECONDS = 0.1
@@ -72,24 +64,8 @@ _SPELLINGS, _EXACT, _OF_ACCELERATION = (
 )
 #: Everyday units, as pint has them: factor to SI, and SI base. A run that meets no other does not load pint, which
 #: takes longer than a fit.
-_EVERYDAY = {
-    unit: (scale, base)
-    for base, scales in {
-        "dimensionless": {"1": 1.0, "%": 0.01},
-        "meter": {"m": 1.0, "mm": 1e-3, "µm": 1e-6},
-        "radian": {"rad": 1.0, "deg": math.pi / 180.0},
-        "second": {"s": 1.0, "ms": 1e-3, "min": 60.0},
-        "1 / second": {"Hz": 1.0},
-        "radian / second": {"rad/s": 1.0},
-        "kilogram * meter / second ** 2": {"N": 1.0, "kN": 1e3},
-        "kilogram * meter ** 2 / second ** 2": {"N*m": 1.0, "N m": 1.0, "Nm": 1.0},
-        "kilogram / second ** 2": {"N/m": 1.0, "N/mm": 1e3, "kN/mm": 1e6},
-        "kilogram * meter ** 2 / radian / second ** 2": {"N*m/rad": 1.0, "N m/deg": 180.0 / math.pi},
-        "kilogram": {"kg": 1.0, "g": 1e-3},
-        "meter / second ** 2": {"m/s^2": 1.0},
-        "kilogram / meter / second ** 2": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6},
-    }.items()
-    for unit, scale in scales.items()
+_EVERYDAY: dict[str, tuple[float, str]] = {
+    unit: (scale, base) for base, scales in _WORDS["everyday"].items() for unit, scale in scales.items()
 }
 #: The letters of one unit.
 _WORD = re.compile(r"[^\W\d_]+|[º˚]")

@@ -4,8 +4,6 @@ It knows no campaign and no model. A table of the file is a frozen dataclass. Wh
 table itself and not under the field's own name, the field says so with `field(metadata=standing_in_table(keys))`.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass

@@ -1,34 +1,30 @@
 """One row, as a worker does it: the jobs of the single commands, and a record of what they found."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from bushfit import __version__
 from bushfit.batch import ledger
 from bushfit.batch.document import Found, Record
+from bushfit.batch.manifest import Row, Settings
 from bushfit.batch.points import Point
 from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import effect_named
 from bushfit.effects.contract import Parameter
 from bushfit.errors import BatchError, BushfitError
 from bushfit.fitting.data import Data
+from bushfit.jobs.diagnose import Diagnose, Diagnosed
 from bushfit.model.file import load_result
 from bushfit.model.result import End, Result
 from bushfit.prediction import Band, predict
+from bushfit.reading.measurement import Loop, Sweep
 from bushfit.report.contents import Formats
-
-if TYPE_CHECKING:
-    from bushfit.batch.manifest import Row, Settings
-    from bushfit.diagnosis.record import Diagnosis
-    from bushfit.jobs.diagnose import Diagnose, Diagnosed
-    from bushfit.reading.measurement import Loop, Sweep
 
 #: Size below which an effect is as good as none, relative to its parameter's typical size (chosen).
 _NO_EFFECT = 1e-3

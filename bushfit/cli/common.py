@@ -2,88 +2,30 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial, wraps
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 
+from bushfit.campaign.naming import folder_name
 from bushfit.errors import ModelError, printable, typed
-from bushfit.reading.tablefile import Form
-from bushfit.report.contents import Formats, Picture
+from bushfit.report.contents import Formats
 from bushfit.report.folder import check_free, to_json, write_files
 
 if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
     from bushfit.campaign.schema import Loss
-    from bushfit.geometry import Direction
     from bushfit.jobs import Found, Job
     from bushfit.model.result import Result
 
-F = TypeVar("F", bound=Callable[..., Any])
-
 #: Width of tables where standard error is no terminal, in characters.
 _WIDTH = 100
-
-
-class _Direction(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows none
-    """A direction of a test; geometry, which lists them, is slow to import, and is asked when they are needed."""
-
-    name = "direction"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Direction:
-        from bushfit.geometry import Direction
-
-        return Direction(click.Choice([str(direction) for direction in Direction]).convert(value, param, ctx))
-
-
-class _Place(click.ParamType):  # type: ignore[type-arg]  # click 8.1 knows none
-    """A direction, or a specimen of a campaign, which only the campaign knows."""
-
-    name = "place"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        return str(value) if str(value).strip() else self.fail("this is no direction: an empty text", param, ctx)
-
-
-class _Folder(click.Path):
-    """A folder for results; an empty text, as of a variable that is not set, is none."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        return (
-            super().convert(value, param, ctx) if value else self.fail("this is no folder: an empty text", param, ctx)
-        )
-
-
-class Size(click.FloatRange):
-    """A number within ends, called by what it is of; nan, which click takes, is none."""
-
-    def __init__(self, name: str, **ends: Any) -> None:
-        super().__init__(**ends)
-        self.name = name
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        size = super().convert(value, param, ctx)
-        return size if math.isfinite(size) else self.fail(f"{value} is no {self.name}", param, ctx)
-
-
-#: Decorator of a command that takes a direction, or several.
-direction_option = partial(click.option, "--direction", type=_Direction())
-#: The same of a command that takes specimens by their names, too.
-place_option = partial(click.option, "--direction", type=_Place())
-#: Decorator of a command that takes a file.
-path_option = partial(click.option, type=click.Path(path_type=Path))
-
-
-def option_of(key: str) -> str:
-    """The option of a key: --force-sign of force_sign."""
-    return "--" + key.replace("_", "-")
 
 
 class _Console(Console):
@@ -105,9 +47,9 @@ class Options:
     formats: Formats
     force: bool
 
-    def folder(self, name: str) -> Path:
-        """Where results go: --output, or results/<name>."""
-        return self.output or Path("results") / name
+    def folder(self, name: str, form: str = "{}") -> Path:
+        """Where results go: --output, or results/<name>, in which `form` says what stands around it."""
+        return self.output or Path("results") / form.format(folder_name(name))
 
     @property
     def console(self) -> Console:
@@ -144,54 +86,9 @@ class Options:
             sys.stdout.flush()
 
 
-def example(*commands: str) -> str:
-    """The end of a command's help: commands that work in a copy of the repository."""
-    return "\b\n" + "\n".join([f"Example{'s' * (len(commands) > 1)}:", *(f"  {command}" for command in commands)])
+def with_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator of a command: the options that all have, and those of the files it writes, become one `options`."""
 
-
-#: Options of the forms of files; each may also be set by a variable of the environment, once for all commands.
-_FORMS = {
-    "tables": click.option(
-        "--table-format",
-        type=click.Choice(get_args(Form)),
-        metavar="FORM",
-        default=Formats.table_form,
-        envvar="BUSHFIT_TABLE_FORMAT",
-        show_envvar=True,
-        help="csv, decimal-comma (for a German Excel), xlsx [csv].",
-    ),
-    "pictures": click.option(
-        "--plot-format",
-        type=click.Choice(get_args(Picture)),
-        metavar="FORM",
-        multiple=True,
-        default=Formats.picture_forms,
-        envvar="BUSHFIT_PLOT_FORMAT",
-        show_envvar=True,
-        help="png, svg, pdf; may be given again [png].",
-    ),
-    "pages": click.option("--no-report", is_flag=True, help="Write no page (HTML)."),
-}
-#: All of them, of a command that writes a page too.
-ALL_FORMS = tuple(_FORMS)
-
-
-def shared_options(
-    function: F, where: str = "results/<campaign or file>", forms: Sequence[str] = ("tables", "pictures")
-) -> F:
-    """-o, -v, -q, --json, --no-plots, --force, and those of `forms`, gathered into one `options` argument.
-
-    Without -o results go to `where`; `forms` says whether a command writes tables, pictures and pages.
-    """
-    for form in reversed(forms):
-        function = _FORMS[form](function)
-
-    @click.option("-o", "--output", type=_Folder(path_type=Path), help=f"Folder for the results [{where}].")
-    @click.option("-v", "--verbose", is_flag=True, help="Say more: steps on the way, correlations, files.")
-    @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
-    @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on standard output.")
-    @click.option("--no-plots", is_flag=True, help="Write no plots.")
-    @click.option("--force", is_flag=True, help="Replace results that stand.")
     @wraps(function)
     def wrapped(*args: Any, **kwargs: Any) -> Any:
         given = {name: kwargs.pop(name) for name in ("output", "verbose", "quiet", "as_json", "force")}
@@ -203,7 +100,7 @@ def shared_options(
         )
         return function(*args, options=Options(formats=formats, **given), **kwargs)
 
-    return wrapped  # type: ignore[return-value]
+    return wrapped
 
 
 @dataclass(frozen=True)
@@ -231,7 +128,7 @@ class Task:
         options, loaded = self.options, load_campaign(self.campaign)
         if self.loss:
             loaded = replace(loaded, fit=replace(loaded.fit, loss=cast("Loss", self.loss)))
-        folder = options.folder(loaded.slug)
+        folder = options.folder(loaded.name)
         options.require_free(folder, options.formats.names(job.kinds(loaded)))
         outcome = job.run(Data.of(loaded))
         tell(options, loaded.name, outcome)
@@ -244,36 +141,18 @@ class Task:
             click.get_current_context().exit(1)
 
 
-def campaign_options(
-    function: F,
-    soft_l1: str = "points far off pull less, outliers not at all",
-    forms: Sequence[str] = ("tables", "pictures"),
-) -> F:
-    """CAMPAIGN, --loss, --max-nrmse and the shared options, those of `forms` too, gathered into one `task` argument.
-
-    `soft_l1` says what the robust loss does in this command, for its help.
-    """
+def with_task(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator of a command on one campaign: CAMPAIGN and its options become one `task`."""
 
     @click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=click.Path(path_type=Path))
-    @click.option(
-        "--loss",
-        type=click.Choice(["linear", "soft_l1"]),
-        help=f"linear: least squares [the campaign's, else this]. soft_l1: {soft_l1}.",
-    )
-    @click.option(
-        "--max-nrmse",
-        type=Size("share such as 0.02", min=0.0, min_open=True),
-        metavar="SHARE",
-        help="Exit with status 1 if the NRMSE is above this share (0.02 is 2 %).",
-    )
-    @partial(shared_options, forms=forms)
+    @with_options
     @wraps(function)
     def wrapped(*args: Any, options: Options, **kwargs: Any) -> Any:
         campaign = _only(kwargs.pop("campaigns"))
         task = Task(campaign, kwargs.pop("loss"), kwargs.pop("max_nrmse"), options)
         return function(*args, task=task, **kwargs)
 
-    return wrapped  # type: ignore[return-value]
+    return wrapped
 
 
 def _only(campaigns: Sequence[Path]) -> Path:

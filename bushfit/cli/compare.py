@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import ALL_FORMS, Options, example, open_source, option_of, place_option, shared_options
-from bushfit.cli.grids import grid_options, parse_grids
+from bushfit.cli.common import Options, open_source, with_options
+from bushfit.cli.grids import asked_for
+from bushfit.cli.options import command_called, option_of
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import naming, typed
 
@@ -24,30 +24,9 @@ _ALL = "all"
 _MOST_WARNINGS = 8
 
 
-@click.command(
-    "compare",
-    epilog=example(
-        "bushfit compare configs/cmp_15961.toml configs/arm_bushing.toml",
-        "bushfit compare configs/arm_bushing.toml --families sliders,kraus",
-    ),
-)
+@command_called("compare")
 @click.argument("sources", metavar="A [B]...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option(
-    "--families",
-    metavar="[NAME,...]",
-    is_flag=False,
-    flag_value=_ALL,
-    help="Compare model families on the one campaign A: the paper's, and those named, effects joined by + [all that "
-    "stand in place of a branch].",
-)
-@place_option(
-    "directions",
-    multiple=True,
-    help="axial, radial or torsion, or a specimen's name: where to compare, and which tests of campaigns to fit; may "
-    "be given again [all where each was fitted].",
-)
-@partial(grid_options, default="as far as all were measured")
-@partial(shared_options, forms=ALL_FORMS)
+@with_options
 def command(
     sources: tuple[Path, ...],
     families: str | None,
@@ -68,8 +47,6 @@ def command(
     compare.html, a page to show, to print and to mail, and with --families families.csv.
     """
     from bushfit.campaign.campaign import load_campaign
-    from bushfit.campaign.naming import folder_name
-    from bushfit.campaign.schema import PredictSettings
     from bushfit.effects import effect_named
     from bushfit.jobs import about
     from bushfit.jobs.compare import MOST, Compare
@@ -78,23 +55,23 @@ def command(
         raise click.UsageError(f"2 to {MOST} results are compared; one campaign alone with '--families' after it.")
     if families is not None and len(sources) > 1:
         raise click.UsageError("'--families' is of one campaign.")
-    asked = parse_grids(grids)
+    asked = asked_for(directions, grids)
     words = about.asked(direction=directions, **{option_of(name)[2:]: [text] for name, text in grids.items() if text})
     words = (*map(str, sources), *about.asked(families=[families] if families is not None else []), *words)
     typed_words = ["bushfit", "compare", *(typed(Path(word)) for word in words)]
-    job = Compare(PredictSettings(directions=directions or None, **asked), " ".join(typed_words))
+    job = Compare(asked, " ".join(typed_words))
     if families is not None:
         names = () if families == _ALL else tuple(name.replace(" ", "") for name in families.split(","))
         with naming(place="--families"):
             for name in names:
                 all(map(effect_named, name.split("+")))
         campaign = load_campaign(sources[0])
-        folder = options.folder(f"{campaign.slug} families")
+        folder = options.folder(campaign.name, "{} families")
         options.require_free(folder, options.formats.names(job.kinds(families=True)))
         outcome = job.run_families(campaign, str(sources[0]), names)
     else:
         opened = [_opened(source) for source in sources]
-        folder = options.folder(folder_name(" and ".join(each.name for each, *_ in opened)))
+        folder = options.folder(" and ".join(each.name for each, *_ in opened))
         options.require_free(folder, options.formats.names(job.kinds()))
         outcome = job.run([job.entry(*each) for each in opened])
     _tell(options, outcome)

@@ -5,39 +5,15 @@ from typing import Literal
 
 import click
 
-from bushfit.cli.common import Options, example, open_model, path_option, place_option, shared_options
-from bushfit.cli.grids import grid_options, parse_grids, positive
+from bushfit.cli.common import Options, open_model, with_options
+from bushfit.cli.grids import asked_for, positive
+from bushfit.cli.options import command_called
 from bushfit.cli.show import warn
 
-#: Names of the formats; jobs/export.py, which knows where each is written, is slow to import.
-_FORMATS = ("fmu", "nastran", "abaqus", "adams", "csv", "xlsx")
 
-
-@click.command(
-    "export",
-    epilog=example(
-        "bushfit export data/arm_bushing/truth.json --format nastran --format xlsx",
-        'bushfit export data/arm_bushing/truth.json --format abaqus --units "m kg s N" -o results/si',
-    ),
-)
+@command_called("export")
 @click.argument("model", type=click.Path(path_type=Path))
-@click.option(
-    "--format", "formats", type=click.Choice(_FORMATS), multiple=True, required=True, help="May be given again."
-)
-@path_option("--campaign", help="Take the grid of this campaign's [predict], or of its sweeps.")
-@place_option(
-    "directions",
-    multiple=True,
-    help="axial, radial or torsion, or a specimen's name; may be given again [axial and radial, and all specimens].",
-)
-@grid_options
-@click.option(
-    "--units",
-    help='Length, mass, time and force that fit together [decks "mm t s N"; tables as predict; fmu SI].',
-)
-@click.option("--dialect", type=click.Choice(["optistruct"]), help="Of --format nastran: |K| and loss angle.")
-@click.option("--accuracy", default="1 %", help="Largest error of the modulus that an fmu may have [1 %].")
-@shared_options
+@with_options
 def command(
     model: Path,
     formats: tuple[str, ...],
@@ -57,28 +33,26 @@ def command(
     out. z is the bushing's axis.
     """
     from bushfit.campaign.campaign import load_campaign
-    from bushfit.campaign.naming import folder_name
-    from bushfit.campaign.schema import PredictSettings
     from bushfit.errors import naming
     from bushfit.export.systems import UnitSystem
     from bushfit.jobs.export import Export, source_of
     from bushfit.jobs.predict import Predict
 
     result, loaded = open_model(model), load_campaign(campaign) if campaign else None
-    asked = parse_grids(grids)
+    asked = asked_for(directions, grids)
     if dialect and "nastran" not in formats:
         raise click.UsageError("'--dialect' is of '--format nastran'.")
     with naming(place="--units"):
         system = UnitSystem.parse(units) if units is not None else None
     job = Export(
         tuple(dict.fromkeys(formats)),
-        Predict(PredictSettings(directions=directions or None, **asked)),
+        Predict(asked),
         positive(accuracy, "--accuracy", "1") or 0.0,
         system,
         dialect or "nastran",
         options.formats.table_form == "decimal-comma",
     )
-    folder = options.folder(loaded.slug if loaded else folder_name(result.name))
+    folder = options.folder((loaded or result).name)
     options.require_free(folder, [])
     outcome = job.run(result, source_of(model), loaded)
     for name, exported in outcome.exported.items():

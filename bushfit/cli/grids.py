@@ -1,42 +1,34 @@
 """Grids on the command line: "5:155:10 Hz" or "0.1, 0.2, 0.5 mm"."""
 
+from __future__ import annotations
+
 import re
-from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
-import click
-
-from bushfit.cli.common import option_of
+from bushfit.cli.options import option_of
 from bushfit.errors import UnitError, naming
 from bushfit.units import quantity
 
-F = TypeVar("F", bound=Callable[..., Any])
+if TYPE_CHECKING:
+    from bushfit.campaign.schema import PredictSettings
 
 #: Values of a grid at most: more is a typing error in the step.
 _MOST_VALUES = 100_000
-#: Options of a grid by their keys: the SI unit and the help of each.
-_GRIDS = {
-    "frequencies": ("Hz", 'Such as "5:155:10 Hz" or "20, 50, 100 Hz" [{}].'),
-    "amplitudes": ("m", 'Zero-to-peak, such as "0.1, 0.2, 0.5 mm" [{}].'),
-    "torsion_amplitudes": ("rad", 'Zero-to-peak rotation, for --direction torsion ["0.5, 1, 2 deg"].'),
-    "strain_amplitudes": ("1", 'Zero-to-peak strain, for specimens that give a modulus ["1, 2, 5 %"].'),
-}
+#: SI units of the options of a grid, by their keys.
+_UNITS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
 
 
-def grid_options(function: F, default: str = "the campaign's") -> F:
-    """Decorator of a command that takes a grid: an option for each of its axes, and in words what holds without."""
-    for key, (_, words) in reversed(_GRIDS.items()):
-        function = click.option(option_of(key), help=words.format(default))(function)
-    return function
-
-
-def parse_grids(given: Mapping[str, str | None]) -> dict[str, tuple[float, ...] | None]:
-    """The values of the options of a grid in SI, by their keys.
+def asked_for(directions: Sequence[str], grids: Mapping[str, str | None]) -> PredictSettings:
+    """Places, and the values of the options of a grid in SI; None where they were not given.
 
     Raises:
         UnitError: as `parse_grid`.
     """
-    return {key: parse_grid(given[key], option_of(key), unit) for key, (unit, _) in _GRIDS.items()}
+    from bushfit.campaign.schema import PredictSettings
+
+    axes = {key: parse_grid(grids[key], option_of(key), unit) for key, unit in _UNITS.items()}
+    return PredictSettings(directions=tuple(directions) or None, **axes)
 
 
 def positive(text: str | None, option: str, unit: str) -> float | None:

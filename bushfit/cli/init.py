@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, example, option_of, shared_options
+from bushfit.cli.common import Options, with_options
 from bushfit.cli.inspect import tell_left_out
-from bushfit.cli.raw import direction_error, file_options, options_named
+from bushfit.cli.options import command_called, files_argument, option_of
+from bushfit.cli.raw import direction_error, options_named, with_stated
 from bushfit.cli.show import warn
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, naming, typed
 from bushfit.units import quantity
@@ -23,22 +23,10 @@ if TYPE_CHECKING:
 _SIDES = ("inner", "outer")
 
 
-@click.command(
-    "init",
-    epilog=example(
-        "bushfit init data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_axial.csv "
-        '--inner-diameter "28 mm" --outer-diameter "40 mm" --length "45 mm"'
-    ),
-)
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--inner-radius", help='Of the rubber, such as "10 mm"; or else')
-@click.option("--inner-diameter", help='such as "20 mm".')
-@click.option("--outer-radius", help='Of the rubber, such as "18 mm"; or else')
-@click.option("--outer-diameter", help='such as "36 mm".')
-@click.option("--length", help='Mean length of the rubber, such as "34 mm".')
-@click.option("--name", help="Of the bushing [the folder of the first file].")
-@file_options()
-@partial(shared_options, forms=())
+@command_called("init")
+@files_argument
+@with_stated
+@with_options
 def command(
     files: tuple[Path, ...], name: str | None, stated: Mapping[str, Any], options: Options, **sizes: str | None
 ) -> None:
@@ -95,12 +83,11 @@ def _radius(side: str, sizes: Mapping[str, str | None]) -> str:
 
 def _place(options: Options, name: str) -> tuple[Path, str]:
     """Folder and name of the campaign."""
-    from bushfit.campaign.naming import folder_name
 
     file = options.output
     if file and file.suffix == ".toml":
         return file.parent, file.name
-    return options.folder(folder_name(name)), "campaign.toml"
+    return options.folder(name), "campaign.toml"
 
 
 def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[str, str]]:

@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
-from bushfit.cli.common import Options, example, shared_options
-from bushfit.cli.raw import file_options, options_named
+from bushfit.cli.common import Options, with_options
+from bushfit.cli.options import command_called, files_argument
+from bushfit.cli.raw import options_named, with_stated
 from bushfit.cli.show import new_table
 from bushfit.errors import BushfitError
+from bushfit.report import plots
 from bushfit.report.contents import Contents, Kinds
 
 if TYPE_CHECKING:
@@ -26,13 +28,10 @@ _KINDS = {"loop": "a hysteresis loop", "sweep": "a sweep", "history": "a raw ste
 _FILES_A_PICTURE = 5
 
 
-@click.command(
-    "inspect",
-    epilog=example("bushfit inspect data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_radial.csv"),
-)
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@file_options()
-@partial(shared_options, where="results/<first file>", forms=["pictures"])
+@command_called("inspect")
+@files_argument
+@with_stated
+@with_options
 def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options) -> None:
     """Look at test files before a campaign names them: loops, sweeps, raw stepped-sine histories, in any mixture.
 
@@ -48,11 +47,10 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
 
     Writes inspect.png, and inspect_2.png and so on of more than five files.
     """
-    from bushfit.campaign.naming import folder_name
     from bushfit.inspection.draft import named_apart, pasted_text
     from bushfit.inspection.gathering import gather
 
-    folder = options.folder(folder_name(files[0].stem))
+    folder = options.folder(files[0].stem)
     sources, left_out = gather(files, stated)
     tell_left_out(options, left_out)
     last = math.ceil(len(sources) / _FILES_A_PICTURE)
@@ -82,10 +80,10 @@ def command(files: tuple[Path, ...], stated: Mapping[str, Any], options: Options
         "campaign": text,
     }
     if options.formats.pictures:
-        from bushfit.report.plots import inspection_figure
-
         groups = (seen[start : start + _FILES_A_PICTURE] for start in range(0, len(seen), _FILES_A_PICTURE))
-        figures = {page: partial(inspection_figure, group) for page, group in zip(pages, groups, strict=True)}
+        figures = {
+            page: partial(plots.inspection.inspection_figure, group) for page, group in zip(pages, groups, strict=True)
+        }
         options.write(folder, options.formats.files(Contents(pictures=figures)), document)
     else:
         options.tell(document)

@@ -7,15 +7,15 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import click
 from rich.markup import escape
 
-from bushfit.cli.common import Options, Size, example, open_source, path_option, place_option, shared_options
-from bushfit.cli.grids import grid_options, parse_grids
+from bushfit.cli.common import Options, open_source, with_options
+from bushfit.cli.grids import asked_for
+from bushfit.cli.options import command_called
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import naming
 from bushfit.units import for_people, number
@@ -26,54 +26,15 @@ if TYPE_CHECKING:
     from bushfit.planning.check import Check
     from bushfit.planning.contract import Aim
 
-#: Hours of the rig at most: months, as a typing error.
-_MOST_HOURS = 2000.0
 #: Effects that the terminal shows at most without -v: those that the plan shows least well beside the standard.
 _MOST_EFFECTS = 6
 #: Amplitudes or frequencies of a test that are listed in full at most.
 _MOST_VALUES = 6
 
 
-@click.command(
-    "plan",
-    epilog=example(
-        "bushfit plan configs/arm_bushing.toml --hours 4",
-        "bushfit plan configs/new_bushing.toml --hours 2.5 --for parameters",
-    ),
-)
+@command_called("plan")
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=click.Path(path_type=Path))
-@click.option(
-    "--for",
-    "aim",
-    type=click.Choice(["parameters", "predictions", "rivals"]),
-    help="What the tests are to tell best: errors of parameters, of stiffness, or rivals apart [predictions].",
-)
-@click.option(
-    "--hours",
-    type=Size("time in hours such as 8", min=0.0, max=_MOST_HOURS, min_open=True),
-    default=8.0,
-    show_default=True,
-    help="Of the rig, at most.",
-)
-@place_option(
-    "directions",
-    multiple=True,
-    help="axial, radial or torsion, or a specimen's name: where the rig can test; may be given again [axial and radial "
-    "of a bushing, else all specimens].",
-)
-@click.option("--parameters", metavar="NAME,...", help="Whose errors count, with --for parameters [all].")
-@click.option(
-    "--rivals",
-    metavar="NAME,...",
-    help="Effects to be told apart [those that a diagnosis of the campaign cannot tell].",
-)
-@grid_options
-@path_option("--campaign", help="Of MODEL.json: take the [rig] and [predict] of this campaign.")
-@click.option(
-    "--check", "count", type=click.IntRange(2, 100_000), metavar="N", help="Simulate the plan N times, and fit each."
-)
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of --check.")
-@partial(shared_options, where="results/plan <name>")
+@with_options
 def command(
     source: Path,
     aim: str | None,
@@ -96,8 +57,6 @@ def command(
     Writes plan.csv, a sheet for who runs the rig, plan.png, plan.json, and campaign.toml for `bushfit simulate`.
     """
     from bushfit.campaign.campaign import Campaign, load_campaign
-    from bushfit.campaign.naming import folder_name
-    from bushfit.campaign.schema import PredictSettings
     from bushfit.jobs.plan import CAMPAIGN_FILE, PlanTests
 
     if aim not in (None, "rivals") and rivals:
@@ -105,12 +64,11 @@ def command(
     if aim not in (None, "parameters") and parameters:
         raise click.UsageError("'--parameters' goes with '--for parameters'.")
     chosen = cast("Aim", aim) if aim else ("rivals" if rivals else "parameters" if parameters else "predictions")
-    asked = PredictSettings(directions=None, **parse_grids(grids))
-    job = PlanTests(chosen, hours, directions, _names(parameters), _names(rivals), asked)
+    job = PlanTests(chosen, hours, directions, _names(parameters), _names(rivals), asked_for((), grids))
     opened, beside = open_source(source), load_campaign(campaign) if campaign else None
     if beside and isinstance(opened, Campaign):
         raise click.UsageError("'--campaign' goes with MODEL.json.")
-    folder = options.folder(f"plan {folder_name(opened.name)}")
+    folder = options.folder(opened.name, "plan {}")
     options.require_free(folder, [*options.formats.names(job.kinds()), CAMPAIGN_FILE])
     with naming(source):
         outcome = job.run(opened, beside)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.common import Options, example, open_model, path_option, place_option, shared_options
-from bushfit.cli.grids import grid_options, parse_grids, positive
+from bushfit.cli.common import Options, open_model, with_options
+from bushfit.cli.grids import asked_for, positive
+from bushfit.cli.options import command_called
 from bushfit.cli.show import new_table, tell_tests, warn
 
 if TYPE_CHECKING:
@@ -20,41 +21,9 @@ _MOST_AMPLITUDES = 8
 _MOST_OF_FIT = 3
 
 
-@click.command(
-    "predict",
-    epilog=example(
-        'bushfit predict data/arm_bushing/truth.json --frequencies "10:100:10 Hz" --amplitudes "0.1, 0.5 mm"'
-    ),
-)
+@command_called("predict")
 @click.argument("model", type=click.Path(path_type=Path))
-@path_option(
-    "--campaign",
-    help="Lay its sweeps over the plots and beside the prediction, and use its [predict] grid.",
-)
-@path_option(
-    "--bushing",
-    metavar="FILE",
-    help="Predict another bushing of the same compound: the [bushing] table of this TOML file.",
-)
-@place_option(
-    "directions",
-    multiple=True,
-    help="axial, radial or torsion, or a specimen's name; may be given again [axial and radial of a bushing, and all "
-    "specimens].",
-)
-@grid_options
-@click.option("--temperature", help='Of the rubber, such as "40 degC", for a model with the effect of it [23 degC].')
-@click.option("--mass", help='Predict its resonance on each place, too: such as "1.2 kg", with --base-acceleration.')
-@click.option("--base-acceleration", help='Amplitude of the base under the mass, such as "0.1 g" or "1 m/s^2".')
-@click.option("--wide", is_flag=True, help="Also <place>_wide.csv: frequency down, amplitude across, no bands.")
-@click.option(
-    "--arms",
-    is_flag=False,
-    flag_value="1 %",
-    metavar="[ERROR]",
-    help="Also arms.csv, arms.png: Maxwell arms for the springpot, within this error [1 %].",
-)
-@shared_options
+@with_options
 def command(
     model: Path,
     campaign: Path | None,
@@ -81,8 +50,6 @@ def command(
     --bushing carries the compound to another shape: effects of its material are kept, those of bushing and rig are not.
     """
     from bushfit.campaign.campaign import load_bushing, load_campaign
-    from bushfit.campaign.naming import folder_name
-    from bushfit.campaign.schema import PredictSettings
     from bushfit.errors import naming
     from bushfit.jobs.predict import Predict
     from bushfit.model.result import carried
@@ -98,15 +65,15 @@ def command(
         notes.append(note)
         directions = directions or ("axial", "radial")
     loaded = load_campaign(campaign) if campaign else None
-    asked = parse_grids(grids)
+    asked = asked_for(directions, grids)
     if (mass is None) != (base_acceleration is None):
         raise click.UsageError("'--mass' and '--base-acceleration' go together.")
     shaken = positive(mass, "--mass", "kg"), positive(base_acceleration, "--base-acceleration", "m/s^2")
     with naming(place="--temperature"):
         warm = None if temperature is None else kelvin(temperature)
     within = positive(arms, "--arms", "1")
-    job = Predict(PredictSettings(directions=directions or None, **asked), *shaken, warm, wide, within)
-    folder = options.folder(loaded.slug if loaded else folder_name(result.name))
+    job = Predict(asked, *shaken, warm, wide, within)
+    folder = options.folder((loaded or result).name)
     measured = Kinds(tables=("measured",) if loaded and loaded.sweeps else ())
     options.require_free(folder, options.formats.names(job.kinds(result, loaded) + measured))
     outcome = job.run(result, loaded, tuple(notes))

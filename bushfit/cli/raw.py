@@ -3,82 +3,40 @@
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import fields
-from functools import reduce, wraps
+from functools import wraps
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, get_args
 
-import click
-
-from bushfit.cli.common import direction_option, option_of
+from bushfit.cli.options import option_of, rows
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.reading.headers import AmplitudeConvention
-from bushfit.reading.layout import FileFormat
 from bushfit.reading.words import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
 
-F = TypeVar("F", bound=Callable[..., Any])
-#: Keys of a campaign's tables that are an option of the same name here, and its help.
-_SAME_NAME = {
-    "force_sign": "-1: the load cell counts the other way.",
-    "rate": 'Of a loop without time, a triangle: "10 mm/min".',
-    "frequency": 'Of a loop without time, with --waveform: "0.1 Hz".',
-    "waveform": "sine or triangle.",
-    "amplitude": "zero-to-peak or peak-to-peak, if headers do not say.",
-    "at_amplitude": 'Without a column: "0.1 mm" [found in the name].',
-    "at_frequency": 'Without a column: "10 Hz" [found in the name].',
-    "temperature": 'Of the test, or of the rows to take: "23 degC".',
-    "specimen": "Its name, if no bushing [coupon, or bar in tension].",
-    "area": 'Of one rubber block in shear, such as "772 mm^2".',
-    "thickness": 'Of one rubber block in shear, such as "6 mm".',
-    "elements": "Rubber blocks in parallel [1].",
-    "encoding": 'Such as "cp1252" [detected].',
-    "delimiter": "comma, semicolon, tab, pipe or blanks [detected].",
-    "decimal": '"." or "," [detected].',
-    "thousands": '".", ",", " ", "\'" or none [detected].',
-    "header_line": "Line of the header, from 1 [found].",
-    "sheet": "Of a workbook [all with a test].",
-}
-#: Keys of them that a command on raw histories takes: they tell how any file is written.
-_OF_ANY_FILE = ("force_sign", *(field.name for field in fields(FileFormat)))
-#: Keys that are whole numbers.
-_NUMBERS = ("force_sign", "header_line", "elements")
+_SAME_NAME = ("force_sign", *rows("test", "written"))
 #: An inline table of TOML in the hint of an error.
 _TABLE = re.compile(r"\{[^}]*\}")
 #: One entry of such a table that is an option here.
 _PAIRED = re.compile(r'(column|unit)s = \{ (\w+) = "([^"]*)"')
 
 
-def file_options(*, sweeps: bool = True) -> Callable[[F], F]:
-    """--direction, --column, --unit and an option for each of some keys of a campaign, gathered into one `stated`.
+def with_stated(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator of a command on test files: what its options say of them becomes one `stated`.
 
-    Beside loops the command takes sweeps, with all keys, or else resonance tests, with those of any file.
+    Beside loops there are sweeps, with all keys of a campaign, or else resonance tests, with those of any file.
     """
-    other = SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS
-    known = tuple(dict.fromkeys((*LOOP_COLUMNS, *other)))
-    keys = [key for key in _SAME_NAME if sweeps or key in _OF_ANY_FILE]
-    roles = f"ROLEs{' of loops' * sweeps}: {', '.join(LOOP_COLUMNS)}; of {'sweeps' if sweeps else 'resonance tests'}: "
-    help_ = f'Such as "force=Fz", of files that have this header; may be given again. {roles}{", ".join(other)}.'
-    options: list[Callable[[Any], Any]] = [
-        direction_option(help="axial, radial or torsion [found in names or columns]."),
-        click.option("--column", "columns", multiple=True, metavar="ROLE=HEADER", help=help_),
-        click.option("--unit", "units", multiple=True, metavar="ROLE=UNIT", help='Such as "force=kN"; ROLEs as above.'),
-    ]
-    for key in keys:
-        kind = int if key in _NUMBERS else str
-        options.append(click.option(option_of(key), key, type=kind, help=_SAME_NAME[key]))
 
-    def decorate(function: F) -> F:
-        @wraps(function)
-        def wrapped(*args: Any, **kwargs: Any) -> Any:
-            stated = {key: kwargs.pop(key) for key in ("direction", *keys)}
-            stated["columns"] = _pairs(kwargs.pop("columns"), "--column", "force=Kraft", known)
-            stated["units"] = _pairs(kwargs.pop("units"), "--unit", "force=kN", known)
-            _check_amplitude(stated.get("amplitude"))
-            return function(*args, stated={key: value for key, value in stated.items() if value}, **kwargs)
+    @wraps(function)
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        sweeps = "rate" in kwargs
+        known = tuple(dict.fromkeys((*LOOP_COLUMNS, *(SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS))))
+        keys = [*rows("file"), *(rows("test") if sweeps else ()), *rows("written")]
+        stated = {key: kwargs.pop(key) for key in keys if key not in ("column", "unit")}
+        stated["columns"] = _pairs(kwargs.pop("columns"), "--column", "force=Kraft", known)
+        stated["units"] = _pairs(kwargs.pop("units"), "--unit", "force=kN", known)
+        _check_amplitude(stated.get("amplitude"))
+        return function(*args, stated={key: value for key, value in stated.items() if value}, **kwargs)
 
-        return reduce(lambda command, option: option(command), reversed(options), wrapped)  # type: ignore[return-value]
-
-    return decorate
+    return wrapped
 
 
 @contextmanager

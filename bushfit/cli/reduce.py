@@ -5,18 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import click
-
-from bushfit.cli.common import Options, example, shared_options
+from bushfit.cli.common import Options, with_options
 from bushfit.cli.grids import parse_grid, positive
-from bushfit.cli.raw import direction_error, file_options, options_named
+from bushfit.cli.options import command_called, files_argument
+from bushfit.cli.raw import direction_error, options_named, with_stated
 from bushfit.cli.show import new_table, warn
 from bushfit.errors import BushfitError, MeasurementError
+from bushfit.report import plots
 from bushfit.report.contents import Contents, Kinds
 from bushfit.units import alike, number
 
@@ -34,22 +33,10 @@ if TYPE_CHECKING:
 _LINES_AN_OCTAVE = 3
 
 
-@click.command(
-    "reduce",
-    epilog=example(
-        "bushfit reduce data/cmp_15961_raw/stepped_sine_axial.csv",
-        'bushfit reduce data/measured/epdm_70/shaker_1g_573g.csv --mass "0.5878 kg" --specimen mount',
-    ),
-)
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@file_options(sweeps=False)
-@click.option("--levels", help='Amplitudes that were asked for, such as "0.1, 0.2 mm" [found].')
-@click.option("--cycles", type=click.IntRange(3, 1000), default=3, show_default=True, help="Fewest steady cycles.")
-@click.option("--mass", help='Of a resonance test, such as "0.5 kg".')
-@click.option("--mass-added", help='What moves with it, such as "15 g".')
-@click.option("--specimen", help="What was tested, where it is no bushing.")
-@click.option("--base-acceleration", help='Such as "0.1 g", where no column says it.')
-@partial(shared_options, where="results/<first file>")
+@command_called("reduce")
+@files_argument
+@with_stated
+@with_options
 def command(
     files: tuple[Path, ...],
     stated: Mapping[str, Any],
@@ -71,9 +58,8 @@ def command(
 
     Writes sweep.csv, for [[sweeps]] of a campaign or `bushfit init`, and reduce.png.
     """
-    from bushfit.campaign.naming import folder_name
 
-    folder, formats = options.folder(folder_name(files[0].stem)), options.formats
+    folder, formats = options.folder(files[0].stem), options.formats
     options.require_free(folder, formats.names(Kinds(tables=("sweep",), pictures=("reduce",))))
     table = _resonance_table(files[0], stated, moving)
     found = (
@@ -115,14 +101,16 @@ def _histories(files: Sequence[Path], stated: Mapping[str, Any], levels: str | N
     asked = parse_grid(levels, "--levels", direction.motion.displacement_unit) or ()
     reduction = reduce(histories, fewest_cycles=cycles, levels=asked)
 
-    def figure() -> Figure:
-        from bushfit.report.plots import reduction_figure
-
-        names = histories[0].name if len(histories) == 1 else f"{len(histories)} histories"
-        return reduction_figure(reduction, histories, f"{names}: {len(reduction.steps)} points, {direction}")
-
-    points, warnings = reduced_table(reduction), reduction.warnings
-    return _Found("direction", str(direction), points, warnings, lambda options: _tell(options, reduction), figure)
+    names = histories[0].name if len(histories) == 1 else f"{len(histories)} histories"
+    title = f"{names}: {len(reduction.steps)} points, {direction}"
+    return _Found(
+        "direction",
+        str(direction),
+        reduced_table(reduction),
+        reduction.warnings,
+        lambda options: _tell(options, reduction),
+        lambda: plots.reduction.reduction_figure(reduction, histories, title),
+    )
 
 
 def _resonance_table(file: Path, stated: Mapping[str, Any], moving: Mapping[str, str | None]) -> Table | None:
@@ -175,13 +163,7 @@ def _resonance(
     with options_named():
         reduction = reduce_resonance(read_resonance(table, read_as, base_acceleration), mass)
 
-    def figure() -> Figure:
-        from bushfit.report.plots import resonance_figure
-
-        return resonance_figure(
-            reduction, f"{table.file.stem}, {specimen or direction}: {number(mass, 4)} kg on a shaker"
-        )
-
+    title = f"{table.file.stem}, {specimen or direction}: {number(mass, 4)} kg on a shaker"
     frequency, largest = reduction.peak
     return _Found(
         "specimen" if specimen else "direction",
@@ -189,7 +171,7 @@ def _resonance(
         resonance_table(reduction),
         reduction.warnings,
         lambda options: _tell_resonance(options, reduction),
-        figure,
+        lambda: plots.resonance.resonance_figure(reduction, title),
         {"mass_kg": mass, "resonance_Hz": frequency, "transmissibility_at_resonance": largest},
     )
 

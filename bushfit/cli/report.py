@@ -1,16 +1,16 @@
 """`bushfit report`: a folder of results -> one page to show, to print and to mail."""
 
-from functools import partial
 from pathlib import Path
 
 import click
 
-from bushfit.cli.common import Options, example, shared_options
+from bushfit.cli.common import Options, with_options
+from bushfit.cli.options import command_called
 
 
-@click.command("report", epilog=example("bushfit report data/reports/mystery_mount -o results/page"))
+@command_called("report")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@partial(shared_options, where="DIR", forms=())
+@with_options
 def command(folder: Path, options: Options) -> None:
     """Make one page of DIR, the results of run, diagnose, a fit, or of a batch: to show, to print, to mail.
 

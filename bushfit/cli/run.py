@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
-from bushfit.cli.common import ALL_FORMS, Options, Task, campaign_options, example
+from bushfit.cli.common import Options, Task, with_task
 from bushfit.cli.diagnose import tell_findings, tell_verdict
+from bushfit.cli.options import command_called
 from bushfit.cli.predict import tell_predictions
 from bushfit.cli.show import new_table, parameter_table, report, tell_fit, tell_result, tell_sources, warn
 from bushfit.units import alike, for_people, number
@@ -29,8 +27,8 @@ _COUNTED = 10.0
 _OPEN = 100.0
 
 
-@click.command("run", epilog=example("bushfit run configs/cmp_15961.toml"))
-@partial(campaign_options, forms=ALL_FORMS)
+@command_called("run")
+@with_task
 def command(task: Task) -> None:
     """Fit CAMPAIGN in every way, ask what the model lacks, and predict from the result.
 

@@ -1,18 +1,18 @@
 """`bushfit schema`: what stands in the files, for other programs and for editors."""
 
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import click
 
-from bushfit.cli.common import Options, example, shared_options
+from bushfit.cli.common import Options, with_options
+from bushfit.cli.options import command_called
 from bushfit.cli.show import new_table
 
 
-@click.command("schema", epilog=example("bushfit schema", "bushfit schema model"))
+@command_called("schema")
 @click.argument("name", required=False)
-@partial(shared_options, where="nothing is written", forms=())
+@with_options
 def command(name: str | None, options: Options) -> None:
     """Print the JSON Schema (draft 2020-12) of NAME on standard output; without NAME, tell which there are.
 

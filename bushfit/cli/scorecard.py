@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 from rich.progress import Progress
 
 from bushfit import __version__
-from bushfit.cli.common import Options, example, shared_options
+from bushfit.cli.common import Options, with_options
+from bushfit.cli.options import command_called
 from bushfit.cli.show import new_table
 
 if TYPE_CHECKING:
@@ -21,28 +20,9 @@ if TYPE_CHECKING:
     from bushfit.scorecard.document import Asked
     from bushfit.scorecard.outcome import Outcome, Task
 
-#: What `--family` takes, beside `all`: those of `bushfit.scorecard.families`, which is slow to import.
-_FAMILIES = ("effects", "mistakes", "amplitude_sweeps", "awkward", "faults", "outside", "library")
 
-
-@click.command(
-    "scorecard",
-    epilog=example("bushfit scorecard --campaigns 5 --seed 3"),
-)
-@click.option(
-    "--campaigns", type=click.IntRange(min=5), default=300, show_default=True, help="Hidden campaigns of each family."
-)
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of everything random.")
-@click.option("--jobs", type=click.IntRange(min=1), default=os.cpu_count() or 1, show_default=True, help="Cores.")
-@click.option(
-    "--family",
-    type=click.Choice([*_FAMILIES, "all"]),
-    default="effects",
-    show_default=True,
-    help="What is hidden, or awkward, in the campaigns.",
-)
-@click.option("--keep", is_flag=True, help="Keep the campaigns and the sealed truths, in -o/campaigns.")
-@partial(shared_options, where="nothing is written", forms=())
+@command_called("scorecard")
+@with_options
 def command(campaigns: int, seed: int, jobs: int, family: str, keep: bool, options: Options) -> None:
     """Judge `diagnose` on hidden campaigns of random bushings, and print how often it is right.
 

@@ -9,10 +9,10 @@ from rich import box
 from rich.markup import escape
 from rich.table import Table
 
+from bushfit.cli.common import Options
 from bushfit.units import number, told
 
 if TYPE_CHECKING:
-    from bushfit.cli.common import Options
     from bushfit.jobs.fits import Fitted
     from bushfit.model.result import Misfit, Result, Usable
 

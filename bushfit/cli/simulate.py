@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.common import Options, example, open_model, option_of, shared_options
+from bushfit.cli.common import Options, open_model, with_options
+from bushfit.cli.options import command_called, option_of
 from bushfit.errors import ModelError, UnitError, naming
 from bushfit.units import is_number, quantity
 
@@ -18,30 +18,9 @@ if TYPE_CHECKING:
     from bushfit.model.model import Model
 
 
-@click.command("simulate", epilog=example("bushfit simulate configs/simulate_arm_bushing.toml --seed 7"))
+@command_called("simulate")
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=click.Path(path_type=Path))
-@click.option(
-    "--seed", type=click.IntRange(min=0), help="Of the random numbers; the same seed gives the same data [0]."
-)
-@click.option("--repeats", type=click.IntRange(1, 1000), help="Of each sweep [1].")
-@click.option("--noise", help='Scatter of a sweep point relative to |K|, such as "0.5 %".')
-@click.option("--force-noise", help='Scatter of a loop\'s force relative to its half range, such as "0.3 %".')
-@click.option(
-    "--displacement-noise", help='Scatter of a loop\'s displacement relative to its amplitude, such as "0.02 %".'
-)
-@click.option(
-    "--gain-error",
-    help='Gain error shared by a run (one repeat of one amplitude, or of what is held), such as "0.4 %".',
-)
-@click.option("--phase-error", help='Phase error shared by a run, such as "0.2 deg".')
-@click.option(
-    "--effect",
-    "effects",
-    multiple=True,
-    metavar="NAME.PARAMETER=VALUE",
-    help='Hide an effect, such as "inertia.mass=0.1 kg".',
-)
-@partial(shared_options, forms=["tables"])
+@with_options
 def command(source: Path, effects: tuple[str, ...], options: Options, **settings: Any) -> None:
     """Put a model on the virtual rig and write a campaign of simulated raw tests.
 
@@ -52,7 +31,6 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
 
     Writes campaign.toml, the tables it names, and truth.json, the model behind them.
     """
-    from bushfit.campaign.naming import folder_name
     from bushfit.model.file import to_document
     from bushfit.simulation import simulate, to_files
 
@@ -63,7 +41,7 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
     with naming(source):
         simulated = simulate(truth, plan)
     files = to_files(simulated, options.formats.table_form)
-    folder = options.folder(f"simulated {folder_name(simulated.result.name)}")
+    folder = options.folder(simulated.result.name, "simulated {}")
     options.say(truth.equation())
     options.write(folder, files, {"truth": to_document(simulated.result), "files": sorted(files)})
 

@@ -11,8 +11,6 @@ Source: Abaqus Keywords Reference Guide, *CONNECTOR ELASTICITY, *CONNECTOR DAMPI
 Abaqus Analysis User's Guide, "Frequency domain viscoelasticity".
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -10,8 +10,6 @@ attributes and units as in the public fixture `fixture.bus` of the package suspe
 Altair TeimOrbit format and AutoBush, which reads the same files.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 

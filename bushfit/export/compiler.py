@@ -4,8 +4,6 @@ The compiler is zig's, from the package `ziglang`. The sources need no C library
 has to be there, and the libraries depend on nothing.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import struct
 import subprocess

@@ -1,7 +1,5 @@
 """What every export format is given, and what it gives back."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal

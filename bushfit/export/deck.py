@@ -1,7 +1,5 @@
 """Texts of solver decks: comments that no foreign text breaks out of, and the heading that every deck has."""
 
-from __future__ import annotations
-
 import re
 import textwrap
 from collections.abc import Iterable

@@ -4,8 +4,6 @@ The libraries are compiled when the export is made, not when the package is buil
 so that an FMU reads no file while it runs, and who writes none needs no compiler.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import re
@@ -19,25 +17,13 @@ from bushfit import __version__
 from bushfit.campaign.naming import folder_name
 from bushfit.export.compiler import SYSTEMS, libraries
 from bushfit.export.contract import Exported, Order
-from bushfit.export.in_time import FIELDS, InTime, in_time, neutral
+from bushfit.export.in_time import FIELDS, TABLES, InTime, in_time, neutral
 from bushfit.geometry import Place, Unit
 
 #: The sources that all FMUs share.
 _SHARED = ("fmu.c", "bushing.c", "bushing.h", "fmi2.h")
 #: Exponents of SI base units of the units that have whole ones; others are known by name alone.
-_BASE: Mapping[str, dict[str, int]] = {
-    "m": {"m": 1},
-    "rad": {"rad": 1},
-    "s": {"s": 1},
-    "N": {"kg": 1, "m": 1, "s": -2},
-    "N*m": {"kg": 1, "m": 2, "s": -2},
-    "N/m": {"kg": 1, "s": -2},
-    "m/N": {"kg": -1, "s": 2},
-    "Pa": {"kg": 1, "m": -1, "s": -2},
-    "Pa*s": {"kg": 1, "m": -1, "s": -1},
-    "1/m": {"m": -1},
-    "1/rad": {"rad": -1},
-}
+_BASE: Mapping[str, Mapping[str, int]] = TABLES["units"]
 #: What XML cannot hold.
 _NO_XML = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 #: Letters of a library's name at most, less those of "bushfit_".

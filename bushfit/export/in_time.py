@@ -1,9 +1,9 @@
 """What of a model runs in time, on lists that the C sources of an FMU read: values, directions and Maxwell arms."""
 
-from __future__ import annotations
-
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -19,25 +19,9 @@ from bushfit.model.model import Model
 from bushfit.prediction import Prediction
 from bushfit.units import number
 
-#: What of `Direction` in c/bushing.h each effect sets, by parameter; an effect of a place goes by its kind and a dot.
-FIELDS: Mapping[str, tuple[str, ...]] = {
-    "elastic": ("mu",),
-    "asymmetry": ("c2",),
-    "strain_stiffening": ("c3",),
-    "fifth_power_stiffening": ("c5",),
-    "friction": ("sigma_fmax[0]", "eps_half[0]"),
-    "second_friction": ("sigma_fmax[1]", "eps_half[1]"),
-    "sliders": ("sigma", "e_s", "spread"),
-    "strain_scale.": ("scale",),
-    "clearance": ("play",),
-    "interface_slip": ("slip",),
-    "bump_stop": ("gap", "stop"),
-    "one_sided_stop": ("one_gap", "one_stop"),
-    "stiffness_factor.": ("factor",),
-    "preload_stiffening.": ("preload",),
-    "sleeve_compliance": ("give",),
-    "sleeve_compliance.": ("own_give",),
-}
+#: The tables of fmu.toml: fields of the C sources by effect, and units.
+TABLES = tomllib.loads(Path(__file__).with_name("fmu.toml").read_text(encoding="utf-8"))
+FIELDS: Mapping[str, list[str]] = TABLES["fields"]
 #: Of these fields, those that are 1 where a direction has no such effect; the others are 0.
 _ONE = {"eps_half[0]", "eps_half[1]", "e_s", "spread", "scale", "factor", "preload"}
 #: How far below and above the frequencies of model and grid the arms go: loops are slow, and a triangle has overtones.

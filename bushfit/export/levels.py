@@ -1,7 +1,5 @@
 """The grid of an export as solvers take it: a set of tables over frequency for each amplitude."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 

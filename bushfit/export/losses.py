@@ -1,7 +1,5 @@
 """What formats cannot carry, in words, with the error that it costs over the exported grid."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 

@@ -7,8 +7,6 @@ tan(ANGLE), the angle in deg.
 Source: Autodesk Nastran 2025 reference, PBUSHT; Altair OptiStruct 2021 reference, PBUSH (example 3) and PBUSHT.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 

@@ -4,16 +4,13 @@ A job is a frozen set of settings. It names the files it will write, and takes a
 outcome knows its JSON documents and makes its files.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
-if TYPE_CHECKING:
-    from bushfit.campaign.campaign import Campaign
-    from bushfit.fitting.data import Data
-    from bushfit.model.result import Result
-    from bushfit.report.contents import Contents, Kinds
+from bushfit.campaign.campaign import Campaign
+from bushfit.fitting.data import Data
+from bushfit.model.result import Result
+from bushfit.report.contents import Contents, Kinds
 
 
 class Outcome(Protocol):

@@ -1,18 +1,14 @@
 """What a result says of its campaign: which file, which tests under which conditions, and the command that made it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bushfit.errors import typed
+from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, SweepData
 from bushfit.model.file import to_document
-
-if TYPE_CHECKING:
-    from bushfit.fitting.data import Data
-    from bushfit.model.result import Result
+from bushfit.model.result import Result
 
 
 def document_of(result: Result, campaign: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,13 +1,11 @@
 """compare: several results side by side, the first the reference; or model families on one campaign."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
 from string import ascii_uppercase
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bushfit import __version__
 from bushfit.campaign.campaign import Campaign
@@ -19,24 +17,20 @@ from bushfit.diagnosis.families import FittedFamily, fit_families, known_familie
 from bushfit.errors import ModelError
 from bushfit.fitting.assess import lack_of_fit
 from bushfit.fitting.data import Data
-from bushfit.geometry import Direction, Specimen
+from bushfit.geometry import Direction, Place, Specimen
 from bushfit.jobs.fits import Fit
-from bushfit.jobs.grid import common_grid
-from bushfit.jobs.predict import AMPLITUDES, filled
+from bushfit.jobs.grid import AMPLITUDES, common_grid
+from bushfit.jobs.predict import filled
 from bushfit.model.document import BushingTable
 from bushfit.model.file import model_document, versions
 from bushfit.model.model import Model
-from bushfit.reading.measurement import Source
+from bushfit.model.result import Result
+from bushfit.reading.measurement import Source, Sweep
 from bushfit.report.artifacts import comparison_contents
 from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparisonFile, Family, Pair
 from bushfit.report.contents import Contents, Kinds
 from bushfit.report.tables import contrast_table
 from bushfit.validation import plain
-
-if TYPE_CHECKING:
-    from bushfit.geometry import Place
-    from bushfit.model.result import Result
-    from bushfit.reading.measurement import Sweep
 
 #: Results that are compared at most: the colours of a picture, and the columns of a table.
 MOST = 8
@@ -44,6 +38,8 @@ MOST = 8
 _COMPOUND = Specimen("compound", "modulus")
 #: What is said of a family where the first has no gap.
 _NO_GAP = "the first family meets these tests within their noise: nothing in them asks for another"
+#: A record as JSON has it.
+_plain: Callable[[Any], Any] = asdict
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,11 +149,6 @@ class Compared:
     @property
     def contents(self) -> Contents:
         return comparison_contents(self.document)
-
-
-def _plain(record: Any) -> Any:
-    """A record as JSON has it."""
-    return asdict(record)
 
 
 def _entry(label: str, entry: Entry) -> ComparedEntry:

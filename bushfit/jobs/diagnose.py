@@ -1,25 +1,21 @@
 """diagnose: the discrepancy workflow on one campaign."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from bushfit.campaign.campaign import Campaign
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.errors import FitError, typed
+from bushfit.fitting.data import Data
 from bushfit.jobs.about import about, asked, document_of
 from bushfit.model.model import Model
+from bushfit.model.result import Result
 from bushfit.report.artifacts import diagnosis_contents
 from bushfit.report.contents import Contents, Kinds
-
-if TYPE_CHECKING:
-    from bushfit.campaign.campaign import Campaign
-    from bushfit.fitting.data import Data
-    from bushfit.model.result import Result
 
 
 @dataclass(frozen=True, eq=False, repr=False)

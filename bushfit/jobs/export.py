@@ -1,28 +1,23 @@
 """export: one fitted model in the files of other programs."""
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from typing_extensions import TypedDict
 
+from bushfit.campaign.campaign import Campaign
 from bushfit.errors import ModelError
 from bushfit.export.contract import Dialect, Exported, Order
+from bushfit.export.systems import UnitSystem
 from bushfit.jobs.predict import Predict, Predicted
+from bushfit.model.result import Result
 from bushfit.reading.files import sha256, view_bytes
 from bushfit.reading.measurement import Source
 from bushfit.report.artifacts import arms_contents
 from bushfit.report.contents import Contents
-
-if TYPE_CHECKING:
-    from bushfit.campaign.campaign import Campaign
-    from bushfit.export.systems import UnitSystem
-    from bushfit.model.result import Result
 
 #: Where each format is written: a module below bushfit, and its function of an Order; loaded when asked for.
 FORMATS = {

@@ -1,22 +1,18 @@
 """fit-static, fit-dynamic and fit: one frame, three procedures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from bushfit.campaign.campaign import Campaign
 from bushfit.errors import FitError
+from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, given_static
 from bushfit.jobs.about import about, asked, document_of
+from bushfit.model.result import Result
 from bushfit.report.artifacts import fit_contents
 from bushfit.report.contents import Contents, Kinds
-
-if TYPE_CHECKING:
-    from bushfit.campaign.campaign import Campaign
-    from bushfit.fitting.data import Data
-    from bushfit.model.result import Result
 
 
 @dataclass(frozen=True, eq=False, repr=False)

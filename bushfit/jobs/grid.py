@@ -6,6 +6,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import PredictSettings
 from bushfit.caveats import MARGIN
 from bushfit.effects.contract import Array
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Place, Specimen
@@ -22,6 +24,8 @@ _AMPLITUDES_OF = {
     ROTATION: tuple(float(np.radians(x)) for x in (0.5, 1.0, 2.0)),
     STRAINING: (0.01, 0.02, 0.05),
 }
+#: Keys of [predict] that have the amplitudes of each motion.
+AMPLITUDES = {TRANSLATION: "amplitudes", ROTATION: "torsion_amplitudes", STRAINING: "strain_amplitudes"}
 #: Frequencies of a grid where the paper's were not measured.
 _FREQUENCIES = 9
 #: Amplitudes of a grid where the paper's were not measured.
@@ -30,6 +34,20 @@ _AMPLITUDES = 3
 _SLOW = 1.0
 #: Values of a grid at most of what was stepped through as it came: tables stay readable, and lines smooth.
 _MOST_STEPS = 10
+
+
+def grid_at(
+    asked: PredictSettings, result: Result, place: Place, sweeps: Sequence[Sweep] = ()
+) -> tuple[Sequence[float] | Array, Sequence[float] | Array]:
+    """Frequencies and amplitudes at a place as they are asked for, else those of `default_grid`."""
+    frequencies, amplitudes = default_grid(result, place, sweeps)
+    return asked.frequencies or frequencies, getattr(asked, AMPLITUDES[place.motion]) or amplitudes
+
+
+def wanted(asked: PredictSettings, campaign: Campaign | None) -> PredictSettings:
+    """What is asked for, and where that says nothing the [predict] of a campaign."""
+    given = {key: value for key, value in vars(asked).items() if value is not None}
+    return replace(campaign.predict if campaign else PredictSettings(), **given)
 
 
 def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ()) -> tuple[Array, Array]:

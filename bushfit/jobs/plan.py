@@ -1,22 +1,19 @@
 """plan: which tests next, chosen for what they would tell."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bushfit.campaign.campaign import Campaign, model_of
 from bushfit.campaign.schema import PredictSettings, RigSettings, SimulatedLoop
+from bushfit.effects.contract import Array
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.fitting.data import Data
-from bushfit.geometry import Direction, place_named
-from bushfit.jobs.grid import default_grid
+from bushfit.geometry import Direction, Place, place_named
+from bushfit.jobs.grid import grid_at, wanted
 from bushfit.jobs.plan_document import Checked, PlanFile, PlannedRun, Reached, Rivalry, Shown
-from bushfit.jobs.predict import AMPLITUDES
 from bushfit.model.result import Result
 from bushfit.planning.campaign import campaign_toml
 from bushfit.planning.check import Check
@@ -26,10 +23,6 @@ from bushfit.planning.knowledge import of_campaign, of_result, rig_of
 from bushfit.planning.plan import FOUND, plan
 from bushfit.report.contents import Contents, Kinds
 from bushfit.report.planned import plan_contents
-
-if TYPE_CHECKING:
-    from bushfit.effects.contract import Array
-    from bushfit.geometry import Place
 
 #: File of the plan that `simulate` takes.
 CAMPAIGN_FILE = "campaign.toml"
@@ -164,13 +157,11 @@ class PlanTests:
 
     def _points(self, result: Result, campaign: Campaign | None, usual: Sequence[Place]) -> Iterator[Points]:
         """Where the stiffness is wanted: as asked, as the campaign's [predict] says, or on the grid of `predict`."""
-        given = {key: value for key, value in vars(self.asked).items() if value is not None}
-        settings = replace(campaign.predict if campaign else PredictSettings(), **given)
+        settings = wanted(self.asked, campaign)
         places = [place_named(name, result.specimens) for name in settings.directions or ()]
         for place in places or usual:
-            frequencies, amplitudes = default_grid(result, place, campaign.sweeps if campaign else ())
-            sizes = np.unique(getattr(settings, AMPLITUDES[place.motion]) or amplitudes)
-            amplitude, frequency = np.meshgrid(sizes, np.unique(settings.frequencies or frequencies), indexing="ij")
+            frequencies, amplitudes = grid_at(settings, result, place, campaign.sweeps if campaign else ())
+            amplitude, frequency = np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
             yield Points(place, frequency.ravel(), amplitude.ravel())
 
 

@@ -1,12 +1,13 @@
 """predict: stiffness tables of one fitted model."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import pandas as pd
+
+from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
 from bushfit.campaign.session import measured_session
 from bushfit.caveats import caveats
@@ -14,37 +15,28 @@ from bushfit.effects import Level
 from bushfit.errors import ModelError
 from bushfit.fitting.agreement import met_within, misfits
 from bushfit.fitting.data_sets import SweepData, sweep_data
-from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Specimen, place_named
-from bushfit.jobs.grid import default_grid
+from bushfit.geometry import Direction, Place, Specimen, place_named
+from bushfit.jobs.grid import grid_at, wanted
 from bushfit.model.arms import Arms, model_arms
+from bushfit.model.model import Model
+from bushfit.model.result import Misfit, Result, Usable
 from bushfit.prediction import PredictedResonance, Prediction, predict, predict_resonance
 from bushfit.report.artifacts import (
     arms_contents,
     measured_contents,
+    more_contents,
     names_of_more,
     place_names,
     prediction_contents,
-    resonance_contents,
-    wide_contents,
 )
 from bushfit.report.contents import Contents, Kinds
-from bushfit.report.tables import prediction_table, shaken_table
+from bushfit.report.tables import prediction_table, shaken_table, wide_table
 from bushfit.units import CELSIUS
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from bushfit.campaign.campaign import Campaign
-    from bushfit.geometry import Place
-    from bushfit.model.model import Model
-    from bushfit.model.result import Misfit, Result, Usable
 
 #: Tables by place, the columns of each by header, null where a cell is empty; and "warnings".
 PredictionDocument = dict[str, dict[str, list[float | None]] | list[str]]
 #: Directions that are predicted where none is asked for: those of the paper.
 _DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
-#: Keys of [predict] that have the amplitudes of each motion.
-AMPLITUDES = {TRANSLATION: "amplitudes", ROTATION: "torsion_amplitudes", STRAINING: "strain_amplitudes"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -108,11 +100,13 @@ class Predicted:
 
     @property
     def contents(self) -> Contents:
-        found = prediction_contents(self.result, self.predictions, self.measured, self.notes)
-        found |= wide_contents(self.predictions if self.wide else ())
         places = [prediction.direction for prediction in self.predictions]
+        found = prediction_contents(self.result, self.predictions, self.measured, self.notes)
+        if self.wide:
+            found |= more_contents("wide", wide_table, places, self.predictions)
         found |= arms_contents(self.result.model, self.arms, places, self.result.name)
-        return found | resonance_contents(self.resonances)
+        shaken = [resonance.place for resonance in self.resonances]
+        return found | more_contents("resonance", shaken_table, shaken, self.resonances)
 
     @property
     def contents_beside(self) -> Contents:
@@ -152,7 +146,7 @@ class Predict:
         bodies = [(result.model.bushing, result.specimens)] if result else []
         bodies += [(campaign.bushing, campaign.specimens)] if campaign else []
         specimens = {specimen.name: specimen for _, some in bodies for specimen in some}
-        if names := self._settings(campaign).directions:
+        if names := wanted(self.asked, campaign).directions:
             return [place_named(name, specimens.values()) for name in names]
         return [*(_DIRECTIONS if bodies[0][0] or not specimens else ()), *specimens.values()]
 
@@ -177,20 +171,20 @@ class Predict:
                 expected="a model with the effect of temperature",
                 hint="fit tests at several temperatures with --effect temperature",
             )
-        settings, sweeps = self._settings(campaign), campaign.sweeps if campaign else ()
+        settings, sweeps = wanted(self.asked, campaign), campaign.sweeps if campaign else ()
         under = measured_session(result.model.bushing, (*campaign.loops, *sweeps) if campaign else ())
         known = [
             replace(each, under=own)
             for each, own in zip(sweep_data(sweeps), under[len(under) - len(sweeps) :], strict=True)
             if result.model.bushing or isinstance(each.direction, Specimen)
         ]
-        predictions = []
-        for place in self.places(result, campaign):
-            frequencies, amplitudes = default_grid(result, place, sweeps)
-            asked = getattr(settings, AMPLITUDES[place.motion]) or amplitudes
-            grid = settings.frequencies or frequencies, asked
-            beside = known if campaign else None
-            predictions.append(predict(result, place, *grid, sweeps=beside, temperature=self.temperature))
+        beside = known if campaign else None
+        predictions = [
+            predict(
+                result, place, *grid_at(settings, result, place, sweeps), sweeps=beside, temperature=self.temperature
+            )
+            for place in self.places(result, campaign)
+        ]
         resonances = [
             predict_resonance(
                 result, place, self.mass, self.base_acceleration, settings.frequencies, temperature=self.temperature
@@ -214,7 +208,3 @@ class Predict:
                 expected="a model whose stiffness depends on frequency, as by a springpot",
             )
         return found
-
-    def _settings(self, campaign: Campaign | None) -> PredictSettings:
-        given = {key: value for key, value in vars(self.asked).items() if value is not None}
-        return replace(campaign.predict if campaign else PredictSettings(), **given)

@@ -1,12 +1,8 @@
 """report: the page of a folder of results, of a comparison, or of a batch."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from bushfit.report.contents import Contents
+from bushfit.report.contents import Contents
 
 
 def report(folder: Path, base: str = "") -> Contents:

@@ -1,16 +1,16 @@
 """run: every fit of one campaign, what the model lacks, and the prediction from the model to use."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Required
+from typing import Any, Required
 
 from typing_extensions import TypedDict
 
+from bushfit.campaign.campaign import Campaign
 from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.errors import FitError
+from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import TwoStep, fit_two_step
 from bushfit.jobs.about import about, document_of
 from bushfit.jobs.diagnose import Diagnose, Diagnosed
@@ -18,13 +18,9 @@ from bushfit.jobs.fits import Fit, FitStatic, Fitted, contents_of_tests, tests_o
 from bushfit.jobs.predict import Predict, Predicted
 from bushfit.model.document import ModelFile
 from bushfit.model.model import FIVE
+from bushfit.model.result import Result
 from bushfit.report.artifacts import diagnosis_contents
 from bushfit.report.contents import Contents, Kinds
-
-if TYPE_CHECKING:
-    from bushfit.campaign.campaign import Campaign
-    from bushfit.fitting.data import Data
-    from bushfit.model.result import Result
 
 
 class RunDocument(TypedDict, total=False):

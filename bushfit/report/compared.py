@@ -8,22 +8,19 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
+from bushfit.comparison import ParameterContrast
+from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.model.file import require_schema
 from bushfit.report.compare_document import SCHEMA, ComparisonFile, Pair
 from bushfit.report.tables import numbers, required
 from bushfit.units import for_people, number, split_header, told
 from bushfit.validation import check_tables
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from bushfit.comparison import ParameterContrast
-    from bushfit.effects.contract import Array
 
 #: Digits of a parameter's value, and decimals of a difference at most.
 _DIGITS = 4
@@ -111,8 +108,6 @@ class SideBySide:
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """`parameters`, `differences` and, of families, `families`."""
-        import pandas as pd
-
         pairs = self.document["pairs"]
         rows = {"parameters": [_flat(pair, row) for pair in pairs for row in pair["parameters"]]}
         rows |= {"families": [*self._families()]} if self.document["families"] else {}
@@ -170,8 +165,6 @@ class SideBySide:
         return {pair["other"]: self._at(pair, place) for pair in self.document["pairs"]}
 
     def _at(self, pair: Pair, place: str) -> pd.DataFrame:
-        import pandas as pd
-
         columns = pair["places"].get(place, {})
         texts = [name for name, cells in columns.items() if isinstance(next(iter(cells), None), str)]
         sizes = {len(cells) for cells in columns.values()}

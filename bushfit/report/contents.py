@@ -8,19 +8,19 @@ from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any, Literal
 
 from bushfit.reading.tablefile import Form, ending, to_bytes
+from bushfit.report import plots
 from bushfit.report.folder import to_json
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    #: JSON documents by name.
-    Documents = Mapping[str, Mapping[str, Any]]
-    #: Tables by name.
-    Tables = Mapping[str, pd.DataFrame]
-    #: What makes the text of a page of documents and tables.
-    Page = Callable[[Documents, Tables], str]
-
+#: JSON documents by name.
+Documents = Mapping[str, Mapping[str, Any]]
+#: Tables by name.
+Tables = Mapping[str, "pd.DataFrame"]
+#: What makes the text of a page of documents and tables.
+Page = Callable[[Documents, Tables], str]
 #: Formats of a picture.
 Picture = Literal["png", "svg", "pdf"]
 
@@ -58,6 +58,11 @@ class Contents:
 
     def __or__(self, other: Contents) -> Contents:
         return Contents(*({**getattr(self, each.name), **getattr(other, each.name)} for each in fields(Contents)))
+
+    @classmethod
+    def shown(cls, name: str, table: Callable[[], pd.DataFrame], picture: Callable[[], Figure]) -> Contents:
+        """A table and a picture of one name."""
+        return cls(tables={name: table}, pictures={name: picture})
 
     def paged(self, name: Literal["report", "compare"] = "report") -> Contents:
         """The same with a page of what it holds: the report of a result, or the page of a comparison."""
@@ -105,7 +110,7 @@ class Formats:
         drawn = lru_cache(1)(lambda name: contents.pictures[name]())  # once for all forms, which follow each other
         for name, form in self._shown(contents.kinds):
             if form in self.picture_forms:
-                files[f"{name}.{form}"] = _picture(drawn(name), form)
+                files[f"{name}.{form}"] = plots.style.to_image(drawn(name), form)
             else:
                 files[f"{name}.{form}"] = to_bytes(name, tables[name](), self.table_form)
         return files | (pages_of(replace(contents, tables=tables)) if self.pages else {})
@@ -123,9 +128,3 @@ def pages_of(contents: Contents) -> dict[str, bytes]:
     tables = {name: make() for name, make in contents.tables.items()} if contents.pages else {}
     made = {name: page(contents.documents, tables) for name, page in contents.pages.items()}
     return {f"{name}.html": text.encode() for name, text in made.items()}
-
-
-def _picture(figure: Figure, form: str) -> bytes:
-    from bushfit.report.plots import to_image
-
-    return to_image(figure, form)

@@ -10,8 +10,6 @@ How `write_files` does it:
    leaves the decided folder, and the next run that writes there finishes the moves first.
 """
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import json

@@ -1,15 +1,11 @@
 """Parameters as people read them: digits that carry meaning, units in which they read them, intervals."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from bushfit.model.result import Result
 from bushfit.units import alike, for_people
-
-if TYPE_CHECKING:
-    from bushfit.model.result import Result
 
 #: A value below its least possible value times this is shown as resting there: logarithms tell no more apart.
 _AT_LEAST = 1.01

@@ -1,34 +1,23 @@
 """A plan as a sheet for who runs the rig, and as a picture."""
 
-from __future__ import annotations
-
 from collections import Counter
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from bushfit.campaign.schema import SimulatedLoop
 from bushfit.effects.contract import Array
 from bushfit.planning.contract import Plan, Test, operating_points
 from bushfit.planning.purpose import purposes
+from bushfit.report import plots
 from bushfit.report.contents import Contents
 from bushfit.units import number
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 
 def plan_contents(plan: Plan) -> Contents:
     """`plan`: the sheet as a table, and the picture."""
-
-    def picture() -> Figure:
-        from bushfit.report.plots import plan_figure
-
-        return plan_figure(plan)
-
-    return Contents({}, {"plan": partial(plan_sheet, plan)}, {"plan": picture})
+    return Contents.shown("plan", partial(plan_sheet, plan), lambda: plots.plan.plan_figure(plan))
 
 
 def plan_sheet(plan: Plan) -> pd.DataFrame:
@@ -36,8 +25,6 @@ def plan_sheet(plan: Plan) -> pd.DataFrame:
 
     Amplitudes count zero-to-peak. The force is what the model expects at most, so that a load cell can be chosen.
     """
-    import pandas as pd
-
     tests, reasons = plan.planned.tests, purposes(plan)
     counts, seen, rows = Counter(tests), Counter[Test](), []
     for order, (test, minutes) in enumerate(zip(tests, plan.planned.minutes, strict=True), start=1):

@@ -1,22 +1,16 @@
 """A model as tables for spreadsheets: its predictions, long and wide, its parameters, and where it comes from."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from bushfit import __version__
 from bushfit.export.contract import Exported, Order
 from bushfit.export.losses import NO_LOOPS
+from bushfit.model.result import Result
 from bushfit.reading.tablefile import to_csv, to_xlsx
 from bushfit.report.artifacts import place_names
 from bushfit.report.tables import prediction_table, wide_table
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from bushfit.model.result import Result
-
 
 #: Tables that belong to no place; they come last.
 _OF_ALL = ("parameters", "provenance")
@@ -48,8 +42,6 @@ def _tables(order: Order) -> dict[str, pd.DataFrame]:
 
 def parameters_table(result: Result) -> pd.DataFrame:
     """Every parameter in SI, with its standard error and 95 % interval where it has one."""
-    import pandas as pd
-
     model, rows = result.model, []
     for name, value in model.values.items():  # noqa: PD011  # no frame
         parameter, (low, high) = model.parameters[name], result.interval(name) or (None, None)
@@ -70,8 +62,6 @@ def parameters_table(result: Result) -> pd.DataFrame:
 
 def _provenance(order: Order) -> pd.DataFrame:
     """Where the tables come from, and what a user must know: a line each."""
-    import pandas as pd
-
     return pd.DataFrame(_said(order), columns=["what", "value"])
 
 

@@ -1,31 +1,24 @@
 """Tables for spreadsheets: units in every header, one row a point."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
+from bushfit.comparison import Comparison, Contrast
+from bushfit.diagnosis.record import Diagnosis
+from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
-from bushfit.geometry import ROTATION, STRAINING, TRANSLATION
+from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Display, Place
+from bushfit.model.arms import Arms
+from bushfit.model.model import Model
+from bushfit.prediction import PredictedResonance, Prediction
 from bushfit.reading.measurement import loss_factor
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from bushfit.comparison import Comparison, Contrast
-    from bushfit.diagnosis.record import Diagnosis
-    from bushfit.effects.contract import Array
-    from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
-    from bushfit.geometry import Display, Place
-    from bushfit.model.arms import Arms
-    from bushfit.model.model import Model
-    from bushfit.prediction import PredictedResonance, Prediction
-    from bushfit.reduction.resonance import Resonance
-    from bushfit.reduction.result import Reduction
-
+from bushfit.reduction.resonance import Resonance
+from bushfit.reduction.result import Reduction
 
 #: Headers of what was measured and of the model beside it, in the tables of loops and sweeps.
 _MEASURED = re.compile(
@@ -54,12 +47,34 @@ def words(place: Place) -> tuple[str, str, str]:
     return f"{strain} amplitude", stress, modulus
 
 
+def columns_of(place: Place) -> tuple[str, str, str]:
+    """Headers of amplitude, |K| and the force in the tables of a place."""
+    (length, _), (force, _), (stiffness, _) = place.display
+    moved, resisting, resisted = words(place)
+    return f"{moved} [{length}]", f"{resisted} [{stiffness}]", f"{resisting} [{force}]"
+
+
+def moved_of(place: Place) -> str:
+    """The header of displacement or rotation, or strain, in the tables of a place."""
+    moved = "strain" if place.motion is STRAINING else "displacement"
+    return f"{moved} [{place.display.displacement.name}]"
+
+
+def _amplitudes(place: Place, amplitude: Array) -> dict[str, Array]:
+    """The column of amplitudes [SI] at a place."""
+    return {columns_of(place)[0]: amplitude * place.display.displacement.factor}
+
+
+def _responses(place: Place, stiffness: Array, before: str = "") -> dict[str, Array]:
+    """The columns of |K| and loss factor of complex stiffnesses [SI] at a place; `before` begins their headers."""
+    magnitude = np.abs(stiffness) * place.display.stiffness.factor
+    return {f"{before}{columns_of(place)[1]}": magnitude, f"{before}loss factor [-]": loss_factor(stiffness)}
+
+
 def prediction_table(prediction: Prediction, display: Display | None = None) -> pd.DataFrame:
     """The table of `predict`: six columns, then low and high of the last four; where something is unresolved these four
     if it is the rig's; and where sweeps are known what they measured at each point. Its units are those of the place,
     or of `display`."""
-    import pandas as pd
-
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     moved, _, resisted = words(prediction.direction)
     force = f"{resisted} [{stiffness}]"
@@ -88,8 +103,6 @@ def wide_table(prediction: Prediction, display: Display | None = None) -> pd.Dat
 
     A point that the grid lacks is an empty cell.
     """
-    import pandas as pd
-
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     frequency, row = np.unique(prediction.frequency, return_inverse=True)
     amplitude, column = np.unique(prediction.amplitude, return_inverse=True)
@@ -108,17 +121,13 @@ def wide_table(prediction: Prediction, display: Display | None = None) -> pd.Dat
 
 def shaken_table(found: PredictedResonance) -> pd.DataFrame:
     """The table of a mass on a mount: transmissibility, deformation and stiffness over frequency."""
-    import pandas as pd
-
-    (length, length_factor), _, (stiffness, factor) = found.place.display
     table = pd.DataFrame(
         {
             "frequency [Hz]": found.frequency,
             "transmissibility [-]": np.abs(found.transmissibility),
             "phase [deg]": np.degrees(np.angle(found.transmissibility)),
-            f"amplitude [{length}]": found.amplitude * length_factor,
-            f"stiffness [{stiffness}]": np.abs(found.stiffness) * factor,
-            "loss factor [-]": loss_factor(found.stiffness),
+            **_amplitudes(found.place, found.amplitude),
+            **_responses(found.place, found.stiffness),
         }
     )
     if found.if_rigs:
@@ -130,8 +139,6 @@ def shaken_table(found: PredictedResonance) -> pd.DataFrame:
 def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> pd.DataFrame:
     """Maxwell arms, a row an arm, and before them the spring that stands beside: modulus, stiffness at each place,
     relaxation time."""
-    import pandas as pd
-
     from bushfit.model.arms import listed
 
     names, moduli, times = zip(*listed(model, arms), strict=True)
@@ -145,20 +152,19 @@ def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> p
 
 def loops_table(model: Model, data_sets: Sequence[LoopData]) -> pd.DataFrame:
     """Measured and modelled force of every loop, row by row (or by bin of phase where a loop is long)."""
-    import pandas as pd
 
     def rows(data_set: LoopData) -> pd.DataFrame:
-        (length, length_factor), (force, force_factor), _ = data_set.direction.display
-        drive, (_, resisting, _) = data_set.drive, words(data_set.direction)
-        moved = "displacement" if resisting == "force" else "strain"
+        place, drive = data_set.direction, data_set.drive
+        (_, length), (_, factor), _ = place.display
+        resisting = columns_of(place)[2]
         return pd.DataFrame(
             {
                 "loop": data_set.name,
-                "direction": str(data_set.direction),
+                "direction": str(place),
                 "time [s]": drive.phase / drive.frequency,
-                f"{moved} [{length}]": drive.displacement(drive.phase) * length_factor,
-                f"{resisting} [{force}]": drive.force * force_factor,
-                f"model {resisting} [{force}]": data_set.force(model) * force_factor,
+                moved_of(place): drive.displacement(drive.phase) * length,
+                resisting: drive.force * factor,
+                f"model {resisting}": data_set.force(model) * factor,
                 "residual [noise]": data_set.shown(model),
             }
         )
@@ -168,24 +174,19 @@ def loops_table(model: Model, data_sets: Sequence[LoopData]) -> pd.DataFrame:
 
 def sweeps_table(model: Model, data_sets: Sequence[SweepData]) -> pd.DataFrame:
     """Measured and modelled dynamic stiffness of every sweep, sorted by amplitude, repeat and frequency."""
-    import pandas as pd
 
     def rows(data_set: SweepData) -> pd.DataFrame:
-        (length, length_factor), _, (stiffness, factor) = data_set.direction.display
-        moved, _, resisted = words(data_set.direction)
-        modelled = data_set.stiffness(model)
+        place, modelled = data_set.direction, data_set.stiffness(model)
         gain, phase = np.split(data_set.shown(model), 2)
         return pd.DataFrame(
             {
                 "sweep": data_set.sweep.name,
-                "direction": str(data_set.direction),
+                "direction": str(place),
                 "frequency [Hz]": data_set.frequency,
-                f"{moved} [{length}]": data_set.amplitude * length_factor,
+                **_amplitudes(place, data_set.amplitude),
                 "repeat": data_set.repeat,
-                f"{resisted} [{stiffness}]": np.abs(data_set.measured) * factor,
-                "loss factor [-]": loss_factor(data_set.measured),
-                f"model {resisted} [{stiffness}]": np.abs(modelled) * factor,
-                "model loss factor [-]": loss_factor(modelled),
+                **_responses(place, data_set.measured),
+                **_responses(place, modelled, "model "),
                 "stiffness residual [noise]": gain,
                 "loss residual [noise]": phase,
                 "model over measured [-]": np.abs(modelled / data_set.measured),
@@ -208,7 +209,6 @@ def gap_table(
     `mended` are the tests that belong to the model after, where they are others: a row says where it was recorded.
     `result` is the model to use, `after` unless given, whose response stands beside what was measured.
     """
-    import pandas as pd
 
     def rows(data_set: DataSet, later: DataSet) -> pd.DataFrame:
         columns: dict[str, Any] = {"test": data_set.name, "kind": data_set.kind, "direction": str(data_set.direction)}
@@ -227,8 +227,6 @@ def gap_table(
 
 def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """Every effect of the library, judged: score, gain, BIC, held-out gap, parameters, and why it won or lost."""
-    import pandas as pd
-
     from bushfit.diagnosis.record import level_of
 
     rows = [
@@ -253,21 +251,17 @@ def contrast_table(found: Comparison, each: Contrast) -> pd.DataFrame:
 
     Stiffness in the units of its place; `sure` is what differs where the bands of all points hold at once.
     """
-    import pandas as pd
-
-    (length, length_factor), _, (unit, factor) = each.place.display
-    moved, _, resisted = words(each.place)
+    name, factor = columns_of(each.place)[1], each.place.display.stiffness.factor
     values: dict[str, Any] = {
         "frequency [Hz]": each.reference.frequency,
-        f"{moved} [{length}]": each.reference.amplitude * length_factor,
+        **_amplitudes(each.place, each.reference.amplitude),
     }
-    name = f"{resisted} [{unit}]"
     for who, side in (("reference", each.reference), ("other", each.other)):
         for what, band, scale in ((name, side.stiffness, factor), ("loss factor [-]", side.loss_factor, 1.0)):
             for end, of in _ends(band).items():
                 values[f"{who} {what}{end}"] = of * scale
     differences = (
-        (f"relative difference of {resisted} [-]", each.stiffness, np.expm1),
+        (f"relative difference of {words(each.place)[2]} [-]", each.stiffness, np.expm1),
         ("difference of loss factor [-]", each.loss_factor, np.asarray),
     )
     for what, band, shown in differences:
@@ -298,19 +292,17 @@ _OF_STEPS = {
 
 def reduced_table(reduction: Reduction) -> pd.DataFrame:
     """Raw histories reduced to a sweep: what the sweep reader takes, then what tells how good each point is."""
-    import pandas as pd
-
-    (length, length_factor), _, (stiffness, factor) = reduction.direction.display
-    steps = pd.DataFrame([vars(step) for step in reduction.steps])
-    magnitude, factors = factor * steps["stiffness"].abs(), loss_factor(steps["stiffness"].to_numpy())
+    place, steps = reduction.direction, pd.DataFrame([vars(step) for step in reduction.steps])
+    (length, length_factor), _, (stiffness, _) = place.display
+    responses = _responses(place, steps["stiffness"].to_numpy())
+    magnitude, factors = responses.values()
     frame = pd.DataFrame(
         {
             "frequency [Hz]": [float(f"{frequency:.5g}") for frequency in steps["nominal_frequency"]],
             f"amplitude [{length}]": [float(f"{length_factor * level:.5g}") for level in steps["level"]],
             f"amplitude reached [{length}]": steps["amplitude"] * length_factor,
             "repeat": steps["repeat"],
-            f"stiffness [{stiffness}]": magnitude,
-            "loss factor [-]": factors,
+            **responses,
             f"stiffness std error [{stiffness}]": steps["gain_error"] * magnitude,
             "loss factor std error [-]": steps["phase_error"] * (1.0 + factors**2),
             **{header: steps[key] for header, key in _OF_STEPS.items()},
@@ -322,15 +314,11 @@ def reduced_table(reduction: Reduction) -> pd.DataFrame:
 
 def resonance_table(found: Resonance) -> pd.DataFrame:
     """A resonance test reduced to a sweep: what the sweep reader takes, then what tells how each point came about."""
-    import pandas as pd
-
-    (length, length_factor), _, (stiffness, factor) = TRANSLATION.display
     return pd.DataFrame(
         {
             "frequency [Hz]": found.frequency,
-            f"amplitude [{length}]": found.amplitude * length_factor,
-            f"stiffness [{stiffness}]": np.abs(found.stiffness) * factor,
-            "loss factor [-]": loss_factor(found.stiffness),
+            **_amplitudes(Direction.AXIAL, found.amplitude),  # which translation it is makes no difference
+            **_responses(Direction.AXIAL, found.stiffness),
             "relative error [-]": found.relative_error,
             "transmissibility [-]": np.abs(found.transmissibility),
             "rows averaged": found.rows,

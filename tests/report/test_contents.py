@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from bushfit.reading.tablefile import Form
 from bushfit.report.contents import Contents, Formats, Picture
-from bushfit.report.plots import to_image
+from bushfit.report.plots.style import to_image
 
 BEGINS = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
 #: A text with markup, the end of a comment, what mathematics would be, and letters that the font lacks.

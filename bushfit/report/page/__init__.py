@@ -28,8 +28,7 @@ def report_page(documents: Documents, tables: Tables) -> str:
     Raises:
         ModelError: no model among the documents, or a spoiled one.
     """
-    from bushfit.report.page.readback import canonical
-    from bushfit.report.page.schema import checked
+    from bushfit.report.page.readback import canonical, checked
     from bushfit.report.page.story import story
 
     same = {name: canonical(table) for name, table in tables.items()}

@@ -1,7 +1,5 @@
 """The two pictures of a page: a chart of lines, bands and points, and maps of cells."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any

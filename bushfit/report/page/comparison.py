@@ -1,17 +1,17 @@
 """What the page of a comparison tells: what was compared, what differs, parameters and curves, what is left open."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from markupsafe import Markup
 
 from bushfit.geometry import Bushing
 from bushfit.model.file import read_document
+from bushfit.report.compare_document import ComparedEntry
 from bushfit.report.compared import FAMILY_HEADS, Heads, Panel, SideBySide, Sides, chance, parameter_cells, signed
 from bushfit.report.contents import Contents
 from bushfit.report.page.chart import DASHES, Rule, Series, chart, colors
@@ -20,11 +20,6 @@ from bushfit.report.page.gathered import thin
 from bushfit.report.page.story import MOST, conditions, corners, tube
 from bushfit.report.tables import numbers
 from bushfit.units import alike, number, split_header, told
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from bushfit.report.compare_document import ComparedEntry
 
 #: Curves of a page, and points of all of them, of which each has a value and a band: with these it stays below 500 kB.
 _MOST_CURVES, _MOST_POINTS = 300, 7000

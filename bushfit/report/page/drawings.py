@@ -1,17 +1,17 @@
 """The pictures of a result: each place's sweeps and loops beside the model, and what is left before and after."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from markupsafe import Markup
 
 from bushfit.effects.contract import Array
 from bushfit.geometry import Place
+from bushfit.model.document import TestTable
 from bushfit.model.result import Result
+from bushfit.report.contents import Tables
 from bushfit.report.page.chart import DASHES, Cells, Rule, Series, chart, colors, maps
 from bushfit.report.page.gathered import (
     MOST_LEVELS,
@@ -19,18 +19,14 @@ from bushfit.report.page.gathered import (
     LoopCurve,
     Sweeps,
     cells_at,
-    columns_of,
     gap_of,
     loops_at,
     places_of,
     sweeps_at,
     tests_of,
 )
+from bushfit.report.tables import columns_of
 from bushfit.units import number
-
-if TYPE_CHECKING:
-    from bushfit.model.document import TestTable
-    from bushfit.report.contents import Tables
 
 #: Points of sweeps, and rows of loops, of a whole page: with these it stays below 500 kB.
 _MOST_POINTS, _MOST_ROWS = 3200, 2400
@@ -38,6 +34,8 @@ _MOST_POINTS, _MOST_ROWS = 3200, 2400
 _FEWEST = 24
 #: Most places that are drawn: a page of more is no page.
 MOST_PLACES = 8
+#: Width of a point of a loop [pixels].
+_DOT = 2.6
 #: Amplitudes that were stepped over more than this ratio lie on a logarithmic axis; and frequencies over this one.
 _DECADES, LOG_FREQUENCIES = 3.0, 40.0
 
@@ -51,20 +49,27 @@ class Drawn:
     notes: Sequence[str]
 
 
+def _by_place(result: Result, tables: Tables, table: pd.DataFrame) -> Iterator[tuple[str, Place, pd.DataFrame]]:
+    """Name and rows of each place that has any."""
+    for name, place in places_of(result, tables).items():
+        rows = table[table["direction"] == str(place)]
+        if len(rows):
+            yield name, place, rows
+
+
 def tested_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) -> list[Drawn]:
     """Stiffness and loss factor of each place, measured and predicted."""
-    table, places = tests_of(tables, "sweep"), places_of(result, tables)
+    table = tests_of(tables, "sweep")
     if table is None:
         return []
     found: list[Drawn] = []
-    most = max(_FEWEST, _MOST_POINTS // (MOST_LEVELS * min(len(places), MOST_PLACES) or 1))
-    for name, place in places.items():
-        rows = table[table["direction"] == str(place)]
-        if len(rows) and len(found) < MOST_PLACES:
-            kinds = [sweeps for sweeps in sweeps_at(place, rows, tests, tables.get(name), most) if sweeps.curves]
-            pictures = [picture for sweeps in kinds for picture in _sweeps(sweeps)]
-            found += [Drawn(str(place), pictures, _notes(kinds, most))] if kinds else []
-    return found
+    most = max(_FEWEST, _MOST_POINTS // (MOST_LEVELS * min(len(places_of(result, tables)), MOST_PLACES) or 1))
+    for name, place, rows in _by_place(result, tables, table):
+        if kinds := [sweeps for sweeps in sweeps_at(place, rows, tests, tables.get(name), most) if sweeps.curves]:
+            found.append(
+                Drawn(str(place), [chart for sweeps in kinds for chart in _sweeps(sweeps)], _notes(kinds, most))
+            )
+    return found[:MOST_PLACES]
 
 
 def _notes(kinds: Sequence[Sweeps], most: int) -> list[str]:
@@ -132,56 +137,34 @@ def loop_panels(result: Result, tables: Tables, tests: Sequence[TestTable]) -> l
     found: list[Drawn] = []
     drawn = table.groupby("direction")["test"].nunique().clip(upper=MOST_LEVELS).nlargest(MOST_PLACES).sum()
     most = max(_FEWEST, _MOST_ROWS // max(1, int(drawn)))
-    for place in places_of(result, tables).values():
-        rows = table[table["direction"] == str(place)]
-        if len(rows) and len(found) < MOST_PLACES:
-            loops = loops_at(place, rows, tests, most)
-            if not loops:
-                continue
+    for _, place, rows in _by_place(result, tables, table):
+        if loops := loops_at(place, rows, tests, most):
             every = max(loop.every for loop in loops)
-            notes = [
-                "The last cycle of each loop. Points: measured"
-                + (f", one row in {every}" if every > 1 else "")
-                + ". Lines: model."
-            ]
+            rarely = f", one row in {every}" if every > 1 else ""
+            notes = [f"The last cycle of each loop. Points: measured{rarely}. Lines: model."]
             if left := rows["test"].nunique() - len(loops):
                 notes.append(f"{left} further loops are left out of the picture; loops.csv has all.")
             found.append(Drawn(str(place), _loops(place, loops), notes))
-    return found
+    return found[:MOST_PLACES]
 
 
 def _loops(place: Place, loops: Sequence[LoopCurve]) -> list[Markup]:
     """Hysteresis loops of a place, and what of them is left."""
     moved, resisting, _ = place.motion.words
-    labels = f"{moved} [{place.display.displacement.name}]", f"{resisting} [{place.display.force.name}]"
-    looks = list(zip(loops, colors(len(loops)), strict=True))
-    series = [
-        Series(loop.name, color, line=tuple(loop.rows[[0, 2]]), points=tuple(loop.rows[:2])) for loop, color in looks
-    ]
-    left = [Series(loop.name, color, points=(loop.rows[0], loop.rows[1] - loop.rows[2])) for loop, color in looks]
-    spans = "; ".join(
-        f"{loop.name}: measured {span_of(loop.rows[1])} {place.display.force.name}, model {span_of(loop.rows[2])}"
-        for loop in loops
-    )
-    off = "; ".join(
-        f"{each.name}: {span_of(each.points[1])} {place.display.force.name}" for each in left if each.points
-    )
+    unit = place.display.force.name
+    labels = f"{moved} [{place.display.displacement.name}]", f"{resisting} [{unit}]"
+    whole, left, spans, off = [], [], [], []
+    for loop, color in zip(loops, colors(len(loops)), strict=True):
+        x, measured, model = loop.rows
+        whole.append(Series(loop.name, color, line=(x, model), points=(x, measured)))
+        left.append(Series(loop.name, color, points=(x, measured - model)))
+        spans.append(f"{loop.name}: measured {span_of(measured)} {unit}, model {span_of(model)}")
+        off.append(f"{loop.name}: {span_of(measured - model)} {unit}")
+    said = f"{labels[1]} over {labels[0]}, measured and model; {'; '.join(spans)}"
+    less = f"{resisting}, measured less model, over {moved}; {'; '.join(off)}"
     return [
-        chart(
-            f"{place}: hysteresis",
-            labels,
-            series,
-            f"{labels[1]} over {labels[0]}, measured and model; {spans}",
-            dot=2.6,
-        ),
-        chart(
-            f"{place}: measured less model",
-            labels,
-            left,
-            f"{resisting}, measured less model, over {moved}; {off}",
-            dot=2.6,
-            rules=[Rule(0.0, "")],
-        ),
+        chart(f"{place}: hysteresis", labels, whole, said, dot=_DOT),
+        chart(f"{place}: measured less model", labels, left, less, dot=_DOT, rules=[Rule(0.0, "")]),
     ]
 
 

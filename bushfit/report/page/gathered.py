@@ -1,26 +1,21 @@
 """What is drawn, gathered from the tables of a result: sweeps by level, loops, and where model and tests differ."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from bushfit.effects.contract import Array
 from bushfit.geometry import Direction, Place
+from bushfit.model.document import TestTable
 from bushfit.model.result import Result
 from bushfit.report.artifacts import place_names
+from bushfit.report.contents import Tables
 from bushfit.report.page.chart import Cells
-from bushfit.report.tables import IF_RIGS, complete, numbers, required, spread, words
+from bushfit.report.tables import IF_RIGS, columns_of, complete, moved_of, numbers, required, spread
 from bushfit.units import split_header, told
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from bushfit.model.document import TestTable
-    from bushfit.report.contents import Tables
 
 #: How near a predicted level lies to the measured one that it stands for, relative.
 _SAME_LEVEL = 0.02
@@ -104,13 +99,6 @@ def gap_of(tables: Tables) -> pd.DataFrame | None:
     return None if gap is None else required(gap, "test", "kind", "direction")
 
 
-def columns_of(place: Place) -> tuple[str, str, str]:
-    """Headers of amplitude, |K| and the force in the tables of a place."""
-    (length, _), (force, _), (stiffness, _) = place.display
-    moved, resisting, resisted = words(place)
-    return f"{moved} [{length}]", f"{resisted} [{stiffness}]", f"{resisting} [{force}]"
-
-
 def sweeps_at(
     place: Place, rows: pd.DataFrame, tests: Sequence[TestTable], predicted: pd.DataFrame | None, most: int
 ) -> Iterator[Sweeps]:
@@ -175,7 +163,7 @@ def _predicted(
 def loops_at(place: Place, rows: pd.DataFrame, tests: Sequence[TestTable], most: int) -> list[LoopCurve]:
     """The loops of a place, at most eight, each with at most so many rows of its last cycle."""
     resisting, frequency = columns_of(place)[2], {test.test: test.frequency_Hz[0] for test in tests}
-    headers = _moved(place), resisting, f"model {resisting}"
+    headers = moved_of(place), resisting, f"model {resisting}"
     rows = complete(rows, "time [s]", *headers)
     names = list(dict.fromkeys(rows["test"]))
     curves = []
@@ -187,11 +175,6 @@ def loops_at(place: Place, rows: pd.DataFrame, tests: Sequence[TestTable], most:
         every = max(1, -(-last.shape[1] // most))
         curves.append(LoopCurve(name, last[:, ::every], every))
     return curves
-
-
-def _moved(place: Place) -> str:
-    """The header of displacement, rotation or strain in the tables of a place."""
-    return f"{place.motion.words[0]} [{place.display.displacement.name}]"
 
 
 def thin(count: int, most: int) -> slice:
@@ -208,7 +191,7 @@ def cells_at(place: Place, gap: pd.DataFrame, tests: Sequence[TestTable]) -> Ite
         for part in ("storage", "loss"):
             yield _map(part, rows, held if stepped else "test", x, ends)
     loops = mine[mine["kind"] == "loop"]
-    loops = complete(loops, "time [s]", "frequency [Hz]", _moved(place)) if len(loops) else loops
+    loops = complete(loops, "time [s]", "frequency [Hz]", moved_of(place)) if len(loops) else loops
     if len(loops):
         each = (loops[loops["test"] == test] for test in dict.fromkeys(loops["test"]))
         turned = np.concatenate([_phase(place, rows) for rows in each])
@@ -217,7 +200,7 @@ def cells_at(place: Place, gap: pd.DataFrame, tests: Sequence[TestTable]) -> Ite
 
 def _phase(place: Place, rows: pd.DataFrame) -> Array:
     """Phase of the rows of a loop after the upper turn of its motion, in cycles, (n,)."""
-    time, frequency, moved = numbers(rows, "time [s]", "frequency [Hz]", _moved(place))
+    time, frequency, moved = numbers(rows, "time [s]", "frequency [Hz]", moved_of(place))
     first = np.mean((moved - moved.mean()) * np.exp(-2j * np.pi * time * frequency))
     return (time * frequency + np.angle(first) / (2.0 * np.pi)) % 1.0
 

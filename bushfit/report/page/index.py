@@ -1,13 +1,11 @@
 """The page of a batch: what came of it, a control chart of each quantity, and a row a bushing to sort."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
@@ -16,15 +14,12 @@ from markupsafe import Markup
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.model.file import read_document, require_schema
-from bushfit.report.contents import Contents
+from bushfit.report.contents import Contents, Documents, Tables
 from bushfit.report.page import rendered
 from bushfit.report.page.chart import LIMIT, Rule, Series, chart
 from bushfit.report.page.readback import canonical, read_table
 from bushfit.units import for_people, number
 from bushfit.validation import Number, WholeNumber, check_tables
-
-if TYPE_CHECKING:
-    from bushfit.report.contents import Documents, Tables
 
 #: What "schema" of the document says.
 SCHEMA = "bushfit/batch/1"

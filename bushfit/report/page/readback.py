@@ -1,36 +1,90 @@
-"""Result folders read back: documents and tables by name, as they were before they were files."""
+"""Result folders read back: documents and tables by name, as they were before they were files.
+
+pydantic checks what a page reads of the documents, so that what is spoiled is one clear error.
+"""
 
 from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
+from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.errors import ModelError
-from bushfit.model.file import read_document
+from bushfit.model.document import CampaignTable
+from bushfit.model.file import from_document, read_document, require_schema
+from bushfit.model.result import Result
 from bushfit.reading.files import read_utf8, view_bytes
 from bushfit.reading.tablefile import in_a_line, undefused
 from bushfit.reading.workbook import read_sheets
 from bushfit.report.artifacts import place_names
-from bushfit.report.page.schema import MODELS, PLAIN, checked
+from bushfit.report.contents import Contents
 from bushfit.report.tables import TEXTS
-from bushfit.validation import LARGEST_NUMBER
+from bushfit.validation import LARGEST_NUMBER, check_tables
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from bushfit.report.contents import Contents
-
+#: Documents that hold a model, the one to use first.
+MODELS = ("model", "dynamic", "static")
+#: The plain fit, beside a model with what was added.
+PLAIN = "joint"
+#: What "schema" of a diagnosis says.
+DIAGNOSIS = "bushfit/diagnosis/2"
 #: Documents of a result.
 _DOCUMENTS = (*MODELS, PLAIN, "diagnosis")
 #: Tables of a result beside those of the predictions, which are named after places.
 _TABLES = ("loops", "sweeps", "gap", "candidates")
 #: Size of a table that is read back at most [bytes]: ten times that of a loop as it is written.
 _LARGEST = 500_000_000
+
+
+@dataclass(frozen=True)
+class _Model:
+    campaign: CampaignTable | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """All documents of a result: the model to use, the plain fit beside it, the campaign, and the diagnosis."""
+
+    result: Result
+    plain: Result | None
+    about: CampaignTable | None
+    diagnosis: DiagnosisFile | None
+    versions: Mapping[str, str]
+
+
+def checked(documents: Mapping[str, Mapping[str, Any]], files: Mapping[str, Path] | None = None) -> Checked:
+    """The documents by their names, checked; errors name the `files` that they were read from.
+
+    Raises:
+        ModelError: no model among them, or one that is spoiled.
+    """
+    at = files or {}
+    name = next((name for name in MODELS if name in documents), None)
+    if name is None:
+        raise ModelError("there is no model among the results", expected=" or ".join(f"{name}.json" for name in MODELS))
+    model, plain, diagnosis = documents[name], documents.get(PLAIN), documents.get("diagnosis")
+    result = from_document(model, at.get(name))
+    if diagnosis is not None:
+        hint = "bushfit diagnose writes it anew"
+        require_schema(diagnosis, at.get("diagnosis"), "a diagnosis", DIAGNOSIS, hint=hint)
+    provenance = model.get("provenance", {})
+    return Checked(
+        result,
+        from_document(plain, at.get(PLAIN)) if plain else None,
+        check_tables(model, at.get(name), _Model, kind=ModelError).campaign,
+        check_tables(diagnosis, at.get("diagnosis"), DiagnosisFile, kind=ModelError) if diagnosis is not None else None,
+        {"bushfit": str(provenance.get("bushfit", "")), **_texts(provenance.get("packages"))},
+    )
+
+
+def _texts(versions: object) -> dict[str, str]:
+    return {str(key): str(value) for key, value in versions.items()} if isinstance(versions, Mapping) else {}
 
 
 def has_model(folder: Path) -> bool:
@@ -69,7 +123,6 @@ def read_results(folder: Path) -> Contents:
 
 def canonical(table: pd.DataFrame) -> pd.DataFrame:
     """A table as its file would give it back: texts, and numbers of seven digits; nan where a cell is empty."""
-    import pandas as pd
 
     def column(name: str) -> object:
         values = table[name]
@@ -91,8 +144,6 @@ def read_table(folder: Path, name: str) -> pd.DataFrame | None:
     Raises:
         ModelError: a table that is not as bushfit writes it.
     """
-    import pandas as pd
-
     for ending, read in (("csv", _csv), ("xlsx", _workbook)):
         file = folder / f"{name}.{ending}"
         if not file.exists():
@@ -123,8 +174,6 @@ def _column(header: str, cells: pd.Series[str]) -> object:
 
 def _csv(file: Path) -> pd.DataFrame:
     """Cells of a CSV file as texts, with commas and points, or semicolons and decimal commas."""
-    import pandas as pd
-
     data = read_utf8(file, ModelError, largest=_LARGEST)
     mark = re.search("[,;]", data.partition(b"\n")[0].decode("utf-8-sig"))
     return pd.read_csv(
@@ -134,8 +183,6 @@ def _csv(file: Path) -> pd.DataFrame:
 
 def _workbook(file: Path) -> pd.DataFrame:
     """Cells of the first sheet of a workbook as texts."""
-    import pandas as pd
-
     first, *_ = read_sheets(view_bytes(file, ModelError, largest=_LARGEST), file, kind=ModelError)[1]
     header, *rows = first.content
     return pd.DataFrame([[str(cell) for cell in row] for row in rows if row], columns=[str(cell) for cell in header])

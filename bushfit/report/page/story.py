@@ -1,27 +1,22 @@
 """What a page tells of a result, in the order in which its reader asks: what was tested, the verdict, the numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
+from bushfit.diagnosis.document import BeforeAfter, EffectEntry
 from bushfit.geometry import Bushing, Place, Specimen
+from bushfit.model.document import TestTable
 from bushfit.model.result import Misfit, Result, Usable
+from bushfit.report.contents import Tables
 from bushfit.report.page.drawings import MOST_PLACES, gap_panels, loop_panels, tested_panels
-from bushfit.report.page.gathered import columns_of, places_of
-from bushfit.report.page.schema import Checked
+from bushfit.report.page.gathered import places_of
+from bushfit.report.page.readback import Checked
 from bushfit.report.parameters import interval_kind, parameter_rows
-from bushfit.report.tables import DISPLAYS, complete, spread
+from bushfit.report.tables import DISPLAYS, columns_of, complete, spread
 from bushfit.units import alike, for_people, number, told
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from bushfit.diagnosis.document import BeforeAfter, EffectEntry
-    from bushfit.model.document import TestTable
-    from bushfit.report.contents import Tables
 
 #: How a verdict is coloured: nothing to do, something to know, something to do.
 _TONES = {"consistent": "good", "named": "good", "unexplained": "bad"}

@@ -1,7 +1,5 @@
 """Maxwell arms over what they stand for, and how far they are off."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

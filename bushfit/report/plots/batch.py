@@ -1,7 +1,5 @@
 """The picture of a batch: the scatter of each quantity over its bushings, limits drawn, the ones out of them named."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass

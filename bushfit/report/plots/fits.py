@@ -1,7 +1,5 @@
 """A fit against its tests: sweeps and loops with the model over them, and what is left."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The gap between model and measurement before and after a diagnosis, in units of noise: maps and loops."""
 
-from __future__ import annotations
-
 import math
 import textwrap
 from collections.abc import Sequence

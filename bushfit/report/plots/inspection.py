@@ -1,7 +1,5 @@
 """Test files as they are: loops over displacement and time, sweeps over frequency, histories over time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a gap figure shows: how far measurement and model are apart, in units of noise."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, cast
 

@@ -1,7 +1,5 @@
 """Predictions over frequency and amplitude as in the paper's Figs. 7 to 9, with measured points laid over."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Raw stepped-sine histories and the sweep they were reduced to."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A resonance test and the sweep it was reduced to."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.figure import Figure
 

@@ -1,7 +1,5 @@
 """What all figures share: size, type, colours, legends, and the way to a file."""
 
-from __future__ import annotations
-
 import io
 import re
 import textwrap

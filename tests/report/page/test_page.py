@@ -136,6 +136,19 @@ def test_conditions_of_the_tests_are_told(root: Path, tmp_path: Path) -> None:
     assert "bushfit fit c.toml --direction axial --direction radial --effect inertia" in found
 
 
+def test_loops_in_torsion_are_drawn(root: Path, tmp_path: Path) -> None:
+    """Their tables count rotation in deg, under the header that every direction has."""
+    tests = '[[simulate.loops]]\ndirection = "torsion"\namplitude = "1 deg"\nfrequency = "0.1 Hz"\n'
+    text = (root / "configs/table_1.toml").read_text(encoding="utf-8")
+    (tmp_path / "turned.toml").write_text(text + tests, encoding="utf-8")
+    for command in (("simulate", "turned.toml", "-o", "tests"), ("fit-static", "tests/campaign.toml", "-o", "fit")):
+        done = call(tmp_path, *command, "-q", "--no-plots")
+        assert done.returncode == 0, done.stderr
+    done = call(tmp_path, "report", "fit")
+    assert done.returncode == 0, done.stderr
+    assert "rotation [deg]" in (tmp_path / "fit/report.html").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     ("title", "column"), [("radial: stiffness", "stiffness [N/mm]"), ("radial: loss factor", "loss factor [-]")]
 )

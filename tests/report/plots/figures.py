@@ -16,7 +16,7 @@ from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.prediction import Prediction, predict
-from bushfit.report.plots import fine_grid
+from bushfit.report.plots.prediction import fine_grid
 
 Swept = Callable[..., SweepData]
 Looped = Callable[..., LoopData]

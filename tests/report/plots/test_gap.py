@@ -17,7 +17,8 @@ from matplotlib.transforms import Bbox
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
-from bushfit.report.plots import gap_figure, to_image
+from bushfit.report.plots.gap import gap_figure
+from bushfit.report.plots.style import to_image
 
 Swept = Callable[..., SweepData]
 Looped = Callable[..., LoopData]

@@ -20,18 +20,14 @@ from bushfit.model.result import Result
 from bushfit.prediction import predict
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reduction.steps import Reduction, Step
-from bushfit.report.plots import (
-    fine_grid,
-    gap_figure,
-    inspection_figure,
-    loops_figure,
-    prediction_figure,
-    reduction_figure,
-    sweeps_figure,
-    to_image,
-)
 from bushfit.report.plots.batch import Panel, batch_figure
+from bushfit.report.plots.fits import loops_figure, sweeps_figure
+from bushfit.report.plots.gap import gap_figure
+from bushfit.report.plots.inspection import inspection_figure
 from bushfit.report.plots.misfit import map_rows
+from bushfit.report.plots.prediction import fine_grid, prediction_figure
+from bushfit.report.plots.reduction import reduction_figure
+from bushfit.report.plots.style import to_image
 
 Swept = Callable[..., SweepData]
 Looped = Callable[..., LoopData]

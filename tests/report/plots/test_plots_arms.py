@@ -7,7 +7,7 @@ from figures import labels, lines
 
 from bushfit.model.arms import model_arms
 from bushfit.model.model import Model
-from bushfit.report.plots import arms_figure
+from bushfit.report.plots.arms import arms_figure
 
 
 def test_arms_are_drawn_over_what_they_stand_for(paper_model: Model) -> None:

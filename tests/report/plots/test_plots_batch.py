@@ -7,8 +7,8 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from bushfit.report.plots import to_image
 from bushfit.report.plots.batch import Panel, batch_figure
+from bushfit.report.plots.style import to_image
 
 
 def panel(count: int) -> Panel:

@@ -8,7 +8,8 @@ from figures import FREQUENCIES, Looped, Swept, labels, legend, lines, points
 
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
-from bushfit.report.plots import loops_figure, sweeps_figure, to_image
+from bushfit.report.plots.fits import loops_figure, sweeps_figure
+from bushfit.report.plots.style import to_image
 
 
 def test_sweeps_have_a_row_a_direction_and_residuals(paper_model: Model, swept: Swept) -> None:

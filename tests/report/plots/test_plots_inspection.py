@@ -10,7 +10,8 @@ from rawfigures import colliding, labels, outside
 
 from bushfit.inspection.opening import inspect
 from bushfit.inspection.record import Inspected
-from bushfit.report.plots import inspection_figure, to_image
+from bushfit.report.plots.inspection import inspection_figure
+from bushfit.report.plots.style import to_image
 
 
 @pytest.fixture(scope="module")

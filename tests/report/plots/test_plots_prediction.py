@@ -16,7 +16,9 @@ from bushfit.model.result import Range, Result
 from bushfit.prediction import predict
 from bushfit.reading.measurement import Sweep
 from bushfit.report.artifacts import prediction_contents
-from bushfit.report.plots import loops_figure, prediction_figure, to_image
+from bushfit.report.plots.fits import loops_figure
+from bushfit.report.plots.prediction import prediction_figure
+from bushfit.report.plots.style import to_image
 
 
 def test_prediction_over_frequency_and_amplitude(paper_model: Model, swept: Swept) -> None:

@@ -11,7 +11,8 @@ from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.steps import reduce
-from bushfit.report.plots import reduction_figure, to_image
+from bushfit.report.plots.reduction import reduction_figure
+from bushfit.report.plots.style import to_image
 
 
 @pytest.mark.parametrize("direction", list(Direction))

@@ -11,8 +11,9 @@ from matplotlib.transforms import Bbox
 
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
-from bushfit.report.plots import loops_figure, prediction_figure, sweeps_figure, to_image
-from bushfit.report.plots.style import dress
+from bushfit.report.plots.fits import loops_figure, sweeps_figure
+from bushfit.report.plots.prediction import prediction_figure
+from bushfit.report.plots.style import dress, to_image
 
 
 def test_same_figure_same_bytes_and_no_trace_of_when_or_with_what(paper_model: Model, swept: Swept) -> None:
