@@ -26,7 +26,7 @@ from bushfit.planning.sensitivity import Grid, relative_slopes
 
 AXIAL, RADIAL = Direction.AXIAL, Direction.RADIAL
 BAND = (5.0, 20.0, 60.0, 150.0)
-NOISE = Noise(scatter=(4e-3, 6e-3), shared=(5e-3, 3e-3), level=(7e-3, 2e-3))
+NOISE = Noise(scatter=(4e-3, 6e-3), shared=(5e-3, 3e-3), level=(7e-3, 2e-3), rows_as_one=1.0)
 SWEEPS = (
     SimulatedSweep(AXIAL, (2e-4,), BAND),
     SimulatedSweep(RADIAL, (1e-4,), BAND[::3]),
