@@ -1,5 +1,6 @@
 """The plan: tests chosen for an aim, in their order, and the standard programme of as many hours beside them."""
 
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -60,13 +61,16 @@ def plan(known: Knowledge, wanted: Wanted) -> Plan:
     Raises:
         ModelError: no test is possible, none fits into the hours, or there are no rivals to be told apart.
     """
-    for share in _SHARES if wanted.aim == "rivals" else ():
-        fewer = replace(wanted, hours=share * wanted.hours)
-        with suppress(ModelError):  # too few hours for any test: more are tried
-            found = _Planner(known, fewer).plan()
-            if found.planned.apart is not None and found.planned.apart >= _SURELY * TOLD:
-                return found
-    return _Planner(known, wanted).plan()
+    found: dict[float, Plan] = {}
+
+    def told(share: float) -> bool:
+        with suppress(ModelError):  # too few hours for any test
+            found[share] = _Planner(known, replace(wanted, hours=share * wanted.hours)).plan()
+            return (found[share].planned.apart or 0.0) >= _SURELY * TOLD
+        return False
+
+    enough = bisect_left(_SHARES, True, key=told) if wanted.aim == "rivals" else len(_SHARES)
+    return found[_SHARES[enough]] if enough < len(_SHARES) else _Planner(known, wanted).plan()
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,15 +175,22 @@ class _Planner:
         return best
 
     def _with_repeats(self, counts: Array) -> Array:
-        """The runs with a sweep of each place made twice, that a drift shows, in place of what is least useful."""
+        """The runs with a test of each place made twice, that a drift shows as in the standard programme, in place of
+        what is least useful."""
         one, strict = np.eye(len(self.tests), dtype=int), self._criterion(_STRICT)
+        standard = self._drifting(self._counts(self.standard_runs)).noncentrality(self.standard_runs)
         for place in np.unique(self.budget.place[counts > 0]):
             mine = np.flatnonzero((counts > 0) & (self.budget.place == place))
             again = mine[self.budget.runs[mine] > 1]
-            if mine.size > 2 and counts[mine].max() < 2:
+            if mine.size > 2 and (counts[mine].max() < 2 or self._of_drift(counts) < standard):
                 few = again[np.argsort(self.budget.minutes[again])][:_REPEATED]
                 counts = min((self._fitting(counts + one[twice]) for twice in few), key=strict.together, default=counts)
         return counts
+
+    def _of_drift(self, counts: Array) -> float:
+        """Noncentrality of a drift by so many runs of each test, in their best order."""
+        drifting = self._drifting(counts)
+        return drifting.noncentrality(ordered(counts, self.budget.place, drifting))
 
     def _fitting(self, counts: Array) -> Array:
         """The runs that fit into the hours: of tests that are made once, the least useful are left out in turn."""
