@@ -5,8 +5,6 @@ Notes:
     the same with every part left out, unless it is the true one, or nearly equal to it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

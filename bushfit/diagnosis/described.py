@@ -1,7 +1,5 @@
 """What has no name, described: a smooth correction where it stands, and the power law that it is like."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -3,8 +3,6 @@
 Its JSON Schema is made of these types, and the type checker holds to them what `diagnosis.record` writes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal, NotRequired
 

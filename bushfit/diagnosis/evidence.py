@@ -1,7 +1,5 @@
 """A model fitted to all tests of a campaign, with the figures by which models are compared."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

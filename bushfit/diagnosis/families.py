@@ -1,7 +1,5 @@
 """Model families on one campaign: the paper's and others in place of its branches, fitted and held out alike."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass

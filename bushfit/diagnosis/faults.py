@@ -4,8 +4,6 @@ What a single place of the tests shows alone is no physics. Each suspect may dev
 takes off chi-square competes with the effects.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The fingerprint of what has no name: one power law of frequency and amplitude beside all parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache

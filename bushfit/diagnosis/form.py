@@ -7,8 +7,6 @@ Notes:
     square root of the rate in place of the rate.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

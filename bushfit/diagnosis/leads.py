@@ -6,8 +6,6 @@ Notes:
     What it finds is no name: with so much noise nearly every effect that helps is let pass.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence, fit

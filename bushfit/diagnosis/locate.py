@@ -1,7 +1,5 @@
 """Where model and measurement disagree: smooth misfit per line and part, ranked, and put into words."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Is the record mistaken? The best claims are refitted, and weighed against every effect and every fault."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace

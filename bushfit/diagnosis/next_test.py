@@ -1,7 +1,5 @@
 """The measurement that would decide: for a set of look-alikes, the menu's entry that parts them best per effort."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations

@@ -5,8 +5,6 @@ Notes:
     effect's sensitivity, less what the model's own parameters can absorb of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -39,9 +37,11 @@ class Proposal:
         model: the model with the effect in its best shape and at no amount; an amount that is fitted in its logarithm
             stands where the score suggests. One that replaces a branch stands where that branch suggests.
         score: what it would take off chi-square if everything were linear.
-        columns: its sensitivity, whitened, (1, n); of one that replaces a branch by each of its parameters, (k, n).
+        columns: its sensitivity, whitened, in each shape that was tried, (shapes, n); of one that replaces a branch by
+            each of its parameters, (k, n), which move together.
         sense: +1 where only positive amounts are physical, 0 where both signs are.
         visible: whether these tests could show the effect at all, beside the model's own parameters.
+        together: whether the columns move together, or one of them is chosen.
     """
 
     name: str
@@ -50,6 +50,7 @@ class Proposal:
     columns: Array
     sense: int
     visible: bool
+    together: bool = False
 
 
 def proposals(evidence: Evidence, excluded: Collection[str], held: Sequence[str]) -> list[Proposal]:
@@ -74,7 +75,7 @@ def proposals(evidence: Evidence, excluded: Collection[str], held: Sequence[str]
         shape = shapes[best] | ({qualified(effect, amount): suggested} if amount.log else {})
         model = evidence.model.with_effect(effect.name, shape)
         visible = sizes[first + best] > 0
-        found.append(Proposal(effect.name, model, float(scores[best]), columns[best, None], sense, visible))
+        found.append(Proposal(effect.name, model, float(scores[best]), columns, sense, visible))
     for effect in missing:
         if effect.replaces in evidence.model.effects:
             with suppress(FitError, ModelError):  # no response with this effect: no candidate
@@ -112,7 +113,7 @@ def _replacing(evidence: Evidence, effect: Effect, held: Sequence[str]) -> Propo
     fit = fit_from(model, evidence.data_sets, held, {})
     score = evidence.chi_square - fit.chi_square + fit.expected_fall
     columns = fit.jacobian[[fit.coordinates.names.index(name) for name in own]]
-    return Proposal(effect.name, model, max(score, 0.0), columns, 0, visible=True)
+    return Proposal(effect.name, model, max(score, 0.0), columns, 0, visible=True, together=True)
 
 
 def sensitivity(

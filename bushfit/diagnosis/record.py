@@ -1,7 +1,5 @@
 """What a diagnosis found, frozen, and as the document that diagnosis.json holds."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import cast

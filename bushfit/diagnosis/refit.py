@@ -3,8 +3,6 @@
 A refit that cannot come near the best is stopped before its end.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass

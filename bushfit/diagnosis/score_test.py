@@ -8,8 +8,6 @@ Notes:
     one small matrix product. The underlying draws depend on their number alone and are kept.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache

@@ -18,6 +18,7 @@ from bushfit.diagnosis.record import Settings
 from bushfit.diagnosis.refit import EXCLUDED, Candidate, can_reach, refits
 from bushfit.diagnosis.score_test import SENSITIVITY_LEFT, ScoreTest
 from bushfit.effects import effect_named, qualified
+from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.solve import Bounds
@@ -151,7 +152,7 @@ class Search:
         """Score every effect that the model lacks, and refit the best of those not known already.
 
         A model that lacks something large has bent its own parameters to make up for it: then the refits start from
-        the values read off the data, which is the shorter way.
+        those of a candidate that is known already, or from the values read off the data, which is the shorter way.
         """
         key = frozenset(added)
         if key not in self.rounds:
@@ -160,8 +161,9 @@ class Search:
             least = max(chance, _LEAST_SCORE * max((claim.score for claim in proposed), default=0.0))
             fitted = {candidate.name for candidate in known}
             best = [claim for claim in proposed[:_MOST_REFITTED] if claim.score > least and claim.name not in fitted]
-            read = self.start if not added and evidence.reduced > _BENT else {}
-            starts = {claim.name: self._found_earlier(key, claim.name) or read for claim in best}
+            near = known[0].evidence.model.values if known else {}
+            near = near or (self.start if not added and evidence.reduced > _BENT else {})
+            starts = {claim.name: self._found_earlier(key, claim.name) or near for claim in best}
             tried = refits(evidence, best, known, starts, self.held, self.bounds)
             self.rounds[key] = Round(evidence, proposed, tuple(self._with_limit(evidence, tried)))
         return self.rounds[key]
@@ -300,9 +302,13 @@ def critical_gain(evidence: Evidence, proposed: Sequence[Proposal]) -> float:
     if not proposed:
         return float("inf")
     columns = np.concatenate([proposal.columns for proposal in proposed])
-    groups = np.split(np.arange(len(columns)), np.cumsum([len(proposal.columns) for proposal in proposed])[:-1])
-    test = ScoreTest(evidence, columns, groups, SENSITIVITY_LEFT)
-    return test.largest_by_chance(CHANCE_LEVEL, [proposal.sense for proposal in proposed])
+    places = np.split(np.arange(len(columns)), np.cumsum([len(proposal.columns) for proposal in proposed])[:-1])
+    groups, senses = list[Array](), list[int]()
+    for proposal, own in zip(proposed, places, strict=True):
+        each = [own] if proposal.together else np.split(own, len(own))
+        groups += each
+        senses += [proposal.sense] * len(each)
+    return ScoreTest(evidence, columns, groups, SENSITIVITY_LEFT).largest_by_chance(CHANCE_LEVEL, senses)
 
 
 def footprint(before: Evidence, after: Evidence) -> float:

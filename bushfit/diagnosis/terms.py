@@ -1,8 +1,6 @@
 """Terms beside all parameters: what a stiffness that is added over frequency and motion does to the residuals, and
 whether it stands where it was not fitted."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property

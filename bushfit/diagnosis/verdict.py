@@ -1,7 +1,5 @@
 """From what the search found to a verdict, in the order in which a careful engineer doubts it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

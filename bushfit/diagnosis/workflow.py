@@ -14,7 +14,7 @@ from bushfit.diagnosis.faults import faults
 from bushfit.diagnosis.mistakes import mistaken
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.refit import can_reach
-from bushfit.diagnosis.search import CHANCE_LEVEL, Search, Step
+from bushfit.diagnosis.search import CHANCE_LEVEL, SAME, Search, Step
 from bushfit.diagnosis.verdict import consistent, is_consistent, judge
 from bushfit.effects import effect_named, qualified
 from bushfit.effects.mistakes import candidate_named, mistake_named
@@ -56,7 +56,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     data, begun, left = _without_wild(data, model, settings)
     searched, counted = _search(data, begun, model, settings), False
     for _ in range(_MOST_SEARCHES):
-        if searched.best is None or not (errors := _level_errors(searched.best, data)).matters:
+        if searched.best is None or not (errors := _errors_beside(searched, searched.best, data)).matters:
             break
         data, counted = data.with_level_errors(errors.error, errors.freedom), True
         searched = _search(data, _begin(data, model, settings), model, settings, searched.search)
@@ -101,6 +101,18 @@ def _search(
         return _Searched(search, search.base, (), best.evidence if best else search.base)
     final, steps = search.reconsider(*search.grow())
     return _Searched(search, final, steps, final)
+
+
+def _errors_beside(searched: _Searched, best: Evidence, data: Data) -> LevelErrors:
+    """Errors of each level beside the best that the library can do; in its place, where they do nearly as well alone.
+
+    Notes:
+        Effects were chosen among many, and each such choice gains 2 ln(candidates) by chance.
+    """
+    first, beside = searched.search.first, _level_errors(best, data)
+    alone, chosen = _level_errors(first.evidence, data), 2.0 * np.log(max(len(first.proposed), 1)) * len(searched.steps)
+    ahead = first.evidence.bic - best.bic + beside.gain - alone.gain
+    return alone if alone.matters and ahead < SAME + chosen else beside
 
 
 def _level_errors(evidence: Evidence, data: Data) -> LevelErrors:

@@ -34,11 +34,13 @@ class LevelErrors(NamedTuple):
     Args:
         error: standard deviation of gain and phase [rad].
         freedom: degrees of freedom behind it; 0 where it stands at the largest that a rig may have, and is known so.
-        matters: whether it is more than chance, beside what is counted already.
+        gain: what it takes off twice the negative logarithm of the likelihood, beside what is counted already.
+        matters: whether that is more than chance.
     """
 
     error: tuple[float, float]
     freedom: int
+    gain: float
     matters: bool
 
 
@@ -70,7 +72,7 @@ def level_errors(
         is Fisher's, in the space of the levels.
     """
     columns, which, before = _columns(data_sets)
-    nothing = LevelErrors(before, 0, matters=False)
+    nothing = LevelErrors(before, 0, 0.0, matters=False)
     if not columns.size:
         return nothing
     span, size, _ = np.linalg.svd(absorbed.T, full_matrices=False)
@@ -106,9 +108,10 @@ def level_errors(
     if freedoms.min(initial=np.inf) < 1.0:
         return nothing
     measured = any(sweep.noise.freedom for sweep in parted(data_sets)[1])
-    matters = at(np.zeros(2))[2] - least > (_MATTERS if measured else _MATTERS_UNREPEATED)
+    fall = at(np.zeros(2))[2] - least
+    matters = fall > (_MATTERS if measured else _MATTERS_UNREPEATED)
     gain, phase = np.sqrt(counted + added).tolist()
-    return LevelErrors((gain, phase), int(freedoms.min()) if freedoms.size else 0, matters)
+    return LevelErrors((gain, phase), int(freedoms.min()) if freedoms.size else 0, fall, matters)
 
 
 def _columns(data_sets: Sequence[DataSet]) -> tuple[Array, Array, tuple[float, float]]:
