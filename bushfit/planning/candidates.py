@@ -151,7 +151,7 @@ def _within(known: Knowledge, rig: RigSettings, test: Test) -> Test | None:
 def _bearable(known: Knowledge, rig: RigSettings, place: Place, frequency: Array, size: Array) -> Array:
     """Which operating points the rig and the rubber can do, (n,) bool."""
     strain = size * known.model.unit_strain(place)
-    fine = strain <= max((BEARABLE, *(known.strain or ())))
+    fine = strain <= max(BEARABLE, known.strain or 0.0)
     fine &= frequency <= (rig.max_frequency or np.inf) * _ROUNDING
     force = np.abs(known.model.stiffness(place, frequency, size)) * size
     if place.motion is TRANSLATION:

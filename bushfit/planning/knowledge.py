@@ -39,7 +39,7 @@ def of_result(result: Result, noise: Noise | None = None, source: str = "") -> K
     words = source or (
         "a fitted model" if fitted.names else "values given by hand, taken as right within a factor of 2.7"
     )
-    strain = result.measured.strain if result.measured else None
+    strain = result.measured.strain[1] if result.measured else None
     return Knowledge(model, names, matrix, words, noise or Noise(), strain=strain, specimens=result.specimens)
 
 
@@ -67,8 +67,7 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
 
     def known(evidence: Evidence) -> Knowledge:
         result = replace(result_of(evidence, data.bounds, ()), specimens=data.campaign.specimens)
-        strains = [each.amplitude * evidence.model.unit_strain(each.direction) for each in data_sets]
-        strain = min(map(np.min, strains)), max(map(np.max, strains))
+        strain = max(float(np.max(each.amplitude)) * model.unit_strain(each.direction) for each in data_sets)
         return replace(of_result(result, noise, source), strain=strain, tests=tuple(_tests(data)))
 
     if found is None or rivals is None:

@@ -277,7 +277,6 @@ class _Planner:
             tuple(self.tests[run] for run in runs),
             self.budget.minutes[list(runs)] + self.budget.setup * mounted,
             np.sqrt(np.diag(covariance)),
-            covariance,
             _alone(told.own[0] - self.views[0].prior),
             gain,
             phase / phase_per_loss,

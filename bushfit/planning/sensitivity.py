@@ -127,7 +127,7 @@ class Grid:
             new_sweep(model, place, points[:, 1], points[:, 0], (1.0, 1.0), (0.0, 0.0))
             for place, points in self._points.items()
         ]
-        under = Circumstances(strained=self.known.strain[1]) if self.known.strain else UNKNOWN
+        under = Circumstances(strained=self.known.strain) if self.known.strain else UNKNOWN
         return [*(replace(loop, under=under) for loop in loops), *(replace(sweep, under=under) for sweep in sweeps)]
 
     @cached_property
