@@ -15,7 +15,6 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.search import SAME
 from bushfit.diagnosis.terms import Terms
-from bushfit.effects import effect_named
 from bushfit.effects.contract import Array
 
 
@@ -26,12 +25,8 @@ def other_form(evidence: Evidence, names: Sequence[str], level: float) -> str | 
         evidence: a fitted model with these effects.
         level: probability with which noise alone bends none so far; to take a name back, the gain has to lie above
             that by as much as one candidate above another.
-
-    Notes:
-        What stands in place of a branch has no share of its own to bend, and is not asked.
     """
-    own = [name for name in names if not effect_named(name).replaces]
-    shapes = {name: columns for name in own if len(columns := _columns(evidence, name))}
+    shapes = {name: columns for name in names if len(columns := _columns(evidence, name))}
     if not shapes:
         return None
     ends = np.cumsum([len(columns) for columns in shapes.values()])

@@ -12,4 +12,4 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 def stress(p: Values, history: History) -> Array:
     """s = 2 mu c5 e^5 [Pa]."""
-    return 2.0 * p["mu"] * p["c5"] * history.value**5
+    return 2.0 * p["mu"] * p["c5"] * np.square(np.square(history.value)) * history.value

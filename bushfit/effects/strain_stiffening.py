@@ -12,4 +12,4 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 def stress(p: Values, history: History) -> Array:
     """s = 2 mu c3 e^3 [Pa]."""
-    return 2.0 * p["mu"] * p["c3"] * history.value**3
+    return 2.0 * p["mu"] * p["c3"] * np.square(history.value) * history.value  # a general power takes 20 times as long

@@ -155,7 +155,7 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
         for sweep, log_stiffness in [(sweep, _at_nominal(sweep)) for sweep in sweeps]
         for held in np.unique(sweep.held)
     }
-    slopes = {sweep.name: slope for sweep in sweeps if (slope := _slope(_of(sweep.name, lines)))}
+    slopes = _slopes(sweeps, lines)
     for key, line in lines.items():
         if key[0] in slopes and line.steps.size:
             exponent, at = slopes[key[0]]
@@ -216,13 +216,18 @@ def _at_nominal(sweep: Sweep) -> Array:
     return value - (reached - surface(sweep.amplitude)) @ solution
 
 
-def _of(name: str, lines: Mapping[LineKey, _Line]) -> list[_Line]:
-    """The lines of one sweep that were repeated."""
-    return [line for key, line in lines.items() if key[0] == name and line.steps.size]
+def _slopes(sweeps: Sequence[Sweep], lines: Mapping[LineKey, _Line]) -> dict[str, tuple[float, float]]:
+    """How the scatter of a rig goes with what is stepped, see `_slope`: one law for all sweeps that step the same."""
+    found = dict[str, tuple[float, float]]()
+    for stepped in {sweep.stepped for sweep in sweeps}:
+        alike = {sweep.name for sweep in sweeps if sweep.stepped == stepped}
+        if slope := _slope([line for key, line in lines.items() if key[0] in alike and line.steps.size]):
+            found |= dict.fromkeys(alike, slope)
+    return found
 
 
 def _slope(lines: Sequence[_Line]) -> tuple[float, float] | None:
-    """Exponent with which the scatter of a sweep's lines goes with what is stepped, and a middle step; None where
+    """Exponent with which the scatter of lines goes with what is stepped, and a middle step; None where
     repeats show no growth.
 
     Notes:

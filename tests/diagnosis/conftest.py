@@ -14,7 +14,7 @@ from bushfit.campaign.schema import SimulateSettings
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
-from bushfit.effects import BASE
+from bushfit.effects import BASE, effect_named
 from bushfit.fitting.data import Data
 from bushfit.fitting.starts import start_values
 from bushfit.model.model import Model
@@ -70,6 +70,8 @@ def fitted() -> Fitted:
         data = Data.of(campaign)
         data_sets = [*data.loops, *data.sweeps]
         start = start_values(campaign.bushing, data_sets, {})
-        return fit(Model.started(campaign.bushing, (*BASE, *effects), start), data_sets, (), {})
+        gone = {effect_named(name).replaces for name in effects}
+        kept = [name for name in BASE if name not in gone]
+        return fit(Model.started(campaign.bushing, (*kept, *effects), start), data_sets, (), {})
 
     return evidence

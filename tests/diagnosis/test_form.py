@@ -63,6 +63,7 @@ def test_true_effects_keep_their_names(measured: Measured, fitted: Fitted) -> No
         {"inertia": {"mass": 0.06}},
         {"interface_slip": {"force": 6.0}},
         {"strain_stiffening": {"c3": 20.0}},
+        {"sliders": {}},
     ]
     bent = []
     for number in range(TRUE):
@@ -71,7 +72,3 @@ def test_true_effects_keep_their_names(measured: Measured, fitted: Fitted) -> No
     ends = binomtest(sum(bent), TRUE).proportion_ci()
     print(f"true effects called bent: {sum(bent)} of {TRUE}, {100 * ends.low:.1f} to {100 * ends.high:.1f} %")
     assert sum(bent) <= 1
-
-
-def test_what_stands_in_place_of_a_branch_is_not_asked(measured: Measured, fitted: Fitted) -> None:
-    assert other_form(fitted(measured()), ["kraus"], CHANCE) is None
