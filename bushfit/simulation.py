@@ -162,8 +162,10 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
     planned = [test for kind in (clean.loops, clean.sweeps, clean.resonances) for test, _ in kind]
     under = planned_session(clean.truth.bushing, planned, plan.repeats)[len(clean.loops) :]
     named = zip(_names("sweep", [test for test, _ in clean.sweeps]), clean.sweeps, under, strict=False)
-    random = np.random.default_rng(plan.seed)
-    loops = tuple(_loop(test, force, number, plan, random) for number, (test, force) in enumerate(clean.loops, start=1))
+    random, gains = np.random.default_rng(plan.seed), dict[SimulatedLoop, float]()
+    loops = tuple(
+        _loop(test, force, number, plan, random, gains) for number, (test, force) in enumerate(clean.loops, start=1)
+    )
     sweeps = tuple(_sweep(clean.truth, test, k, name, plan, random, own) for name, (test, k), own in named)
     shaken = [each for each in clean.resonances for _ in range(plan.repeats)]
     resonances = tuple(
@@ -273,9 +275,19 @@ def _near(
     return lambda reached: ratio * truth.stiffness(place, frequency, reached, under=wanted)
 
 
-def _loop(test: SimulatedLoop, clean: rig.Record, number: int, plan: SimulateSettings, random: Generator) -> Loop:
+def _loop(
+    test: SimulatedLoop,
+    clean: rig.Record,
+    number: int,
+    plan: SimulateSettings,
+    random: Generator,
+    gains: dict[SimulatedLoop, float],
+) -> Loop:
+    """One record; `gains` has those of the loops before, which their repeats share, and takes that of this loop."""
     largest = max(amplitude for _, amplitude in test.parts)
-    gain = 1.0 + plan.level_gain_error * random.standard_normal() if plan.level_gain_error else 1.0
+    if test not in gains:
+        gains[test] = 1.0 + plan.level_gain_error * random.standard_normal() if plan.level_gain_error else 1.0
+    gain = gains[test]
     return Loop(
         f"loop_{test.direction}_{number}",
         test.direction,

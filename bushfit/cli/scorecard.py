@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -23,7 +24,9 @@ if TYPE_CHECKING:
 
 @command_called("scorecard")
 @with_options
-def command(campaigns: int, seed: int, jobs: int, family: str, keep: bool, options: Options) -> None:
+def command(
+    campaigns: int, seed: int, jobs: int, family: str, session: float | None, keep: bool, options: Options
+) -> None:
     """Judge `diagnose` on hidden campaigns of random bushings, and print how often it is right.
 
     The time-domain rig makes the data. Families: effects (every effect alone, pairs, none, and what the library lacks
@@ -54,12 +57,13 @@ def command(campaigns: int, seed: int, jobs: int, family: str, keep: bool, optio
         "families": list(chosen),
         "campaigns": campaigns,
         "seed": seed,
+        "session": session,
     }
     if folder and not (folder / LEDGER).exists():
         options.require_free(folder, ["scorecard.json"])
     with ledger(folder, asked, force=options.force) as (done, write):
         kept = folder / "campaigns" if folder and keep else None
-        outcomes = {name: _made(options, done, write, each, jobs, kept) for name, each in chosen.items()}
+        outcomes = {name: _made(options, done, write, each, jobs, kept, session) for name, each in chosen.items()}
     cards = {name: card(found, name) for name, found in outcomes.items()}
     purpose = "kept for shown cards" if seed >= CARD_SEEDS else "for working"
     for name, rows in cards.items():
@@ -91,6 +95,7 @@ def _made(
     chosen: list[Task],
     jobs: int,
     kept: Path | None,
+    session: float | None,
 ) -> list[Outcome]:
     """The outcomes of these tasks: those that stand, and the others made now and written down as they come."""
     from bushfit.scorecard.scorecard import run
@@ -103,7 +108,7 @@ def _made(
             write(outcome)
             progress.advance(bar)
 
-        made = {outcome.task: outcome for outcome in run(left, kept, jobs, note)}
+        made = {outcome.task: outcome for outcome in run(left, kept, jobs, note, session)}
     return [(made if task in made else done)[task] for task in chosen]
 
 
@@ -112,6 +117,8 @@ def _tell(options: Options, table: Mapping[str, Any], outcomes: list[Outcome]) -
     for truth, said in table.items():
         answers = "; ".join(f"{count} x {words}" for words, count in said.most_common())
         options.say(f"{truth}: {answers}")
+    for test, count in Counter(outcome.decides for outcome in outcomes if outcome.decides).most_common():
+        options.say(f"{count} x to be decided elsewhere: {test}")
     for outcome in outcomes:
         if outcome.error:
             options.say(f"failed: {outcome.task}: {outcome.error}")

@@ -14,6 +14,7 @@ from bushfit.fitting.data import Data
 from bushfit.jobs.about import about, asked, document_of
 from bushfit.model.model import Model
 from bushfit.model.result import Result
+from bushfit.planning.knowledge import look_alikes
 from bushfit.report.artifacts import diagnosis_contents
 from bushfit.report.contents import Contents, Kinds
 
@@ -77,7 +78,7 @@ class Diagnose:
 
 def with_plan(found: Diagnosis, path: Path) -> Diagnosis:
     """The diagnosis with the command that plans tests to tell look-alikes apart, where there are some."""
-    sets = [(named.name, *named.alternatives) for named in found.effects if named.alternatives and not named.test]
+    sets = look_alikes(found)
     if found.verdict != "ambiguous" or not sets or path.suffix != ".toml":
         return found
     command = f"bushfit plan {typed(Path(path.name))} --rivals {','.join(sets[0])}"

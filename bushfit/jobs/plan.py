@@ -20,7 +20,7 @@ from bushfit.planning.check import Check
 from bushfit.planning.contract import Aim, Knowledge, Plan, Points, Programme, Test, Wanted, motions
 from bushfit.planning.guess import guess
 from bushfit.planning.knowledge import of_campaign, of_result, rig_of
-from bushfit.planning.plan import FOUND, plan
+from bushfit.planning.plan import TOLD, plan
 from bushfit.report.contents import Contents, Kinds
 from bushfit.report.planned import plan_contents
 
@@ -88,7 +88,7 @@ class Planned:
         if planned.apart is None or standard.apart is None:
             return None
         effects = [rival.model.effects[-1] for rival in self.plan.knowledge.rivals]
-        return {"effects": effects, "planned": planned.apart, "standard": standard.apart, "enough": FOUND**2}
+        return {"effects": effects, "planned": planned.apart, "standard": standard.apart, "enough": TOLD}
 
     @property
     def contents(self) -> Contents:
@@ -116,7 +116,7 @@ class PlanTests:
         """The names of all that the outcome will hold."""
         return Kinds(("plan",), ("plan",), ("plan",))
 
-    def run(self, source: Campaign | Result, campaign: Campaign | None = None) -> Planned:
+    def run(self, source: Campaign | Result | Knowledge, campaign: Campaign | None = None) -> Planned:
         """After the tests of a campaign; or without tests by its [compound], or its model; or of a fitted model.
 
         Args:
@@ -146,7 +146,9 @@ class PlanTests:
         wanted = Wanted(self.aim, self.hours, rig, places, points, self.parameters or known.names)
         return Planned(plan(known, wanted))
 
-    def _known(self, source: Campaign | Result) -> Knowledge:
+    def _known(self, source: Campaign | Result | Knowledge) -> Knowledge:
+        if isinstance(source, Knowledge):
+            return source
         if isinstance(source, Result):
             return of_result(source)
         if source.loops or source.sweeps:

@@ -24,8 +24,10 @@ BEARABLE = 0.5
 _AMPLITUDES = 6
 #: Largest amplitude considered over the largest of the standard programme.
 _LARGER = 2.0
-#: Frequencies of the runs that are considered.
+#: Frequencies of the runs that are considered, evenly in their logarithm.
 _FREQUENCIES = 7
+#: Further ones over the highest: what masses, delays and resonances do shows there, in fewer points than a whole sweep.
+_NEAR_TOP = (0.7, 0.8, 0.9)
 #: Lowest frequency considered over the lowest of the standard programme.
 _LOWER = 0.2
 #: Highest frequency considered over the highest of the standard programme, where [rig] says that the rig can.
@@ -34,10 +36,21 @@ _FASTER = 2.0
 _LOOP_RATES = (0.1, 1.0)
 #: Cycles of these loops: few, and so many that the noise of the rows hardly counts.
 _LOOP_CYCLES = (3, 20)
-#: Which of the seven frequencies a run steps through: all, few, the ends, and either end more densely.
-_CHOICES = ((0, 1, 2, 3, 4, 5, 6), (0, 2, 4, 6), (0, 3, 6), (0, 6), (0, 1, 2), (4, 5, 6))
+#: Which of the ten frequencies a run steps through, from the lowest, the highest last: all of the seven, few, the ends,
+#: either end more densely, and those near the top with none, one or two of the lowest.
+_CHOICES = (
+    (0, 1, 2, 3, 4, 5, 9),
+    (0, 2, 4, 9),
+    (0, 3, 9),
+    (0, 9),
+    (0, 1, 2),
+    (4, 5, 9),
+    (6, 7, 8, 9),
+    (0, 7, 8, 9),
+    (0, 1, 6, 7, 8, 9),
+)
 #: Which of them a run holds that steps through all amplitudes.
-_HELD = (0, 2, 4, 6)
+_HELD = (0, 2, 4, 9)
 #: Largest stated force, motion or speed of a test over the limit of the rig: rounding.
 _ROUNDING = 1.0 + 1e-9
 
@@ -113,10 +126,10 @@ def _runs(known: Knowledge, rig: RigSettings, place: Place, sizes: Array, rates:
     """Sweeps and loops at one place over amplitudes [m or rad] and frequencies [Hz], and beyond."""
     amplitudes = [_rounded(x) for x in np.geomspace(sizes.min(), _LARGER * sizes.max(), _AMPLITUDES)]
     top = min(_FASTER * float(rates.max()), rig.max_frequency or float(rates.max()))
-    frequencies = [min(_rounded(f), top) for f in np.geomspace(_LOWER * rates.min(), top, _FREQUENCIES)]
-    runs: list[Test] = [
-        SimulatedSweep(place, (x,), tuple(frequencies[i] for i in chosen)) for x in amplitudes for chosen in _CHOICES
-    ]
+    even = np.geomspace(_LOWER * rates.min(), top, _FREQUENCIES)
+    frequencies = [min(_rounded(f), top) for f in (*even[:-1], *(share * top for share in _NEAR_TOP), top)]
+    steps = [tuple(sorted({frequencies[i] for i in chosen})) for chosen in _CHOICES]
+    runs: list[Test] = [SimulatedSweep(place, (x,), stepped) for x in amplitudes for stepped in steps]
     runs += [SimulatedSweep(place, tuple(amplitudes), (frequencies[i],), "amplitude") for i in _HELD]
     runs += [SimulatedLoop(place, x, f, n) for x in amplitudes for f in _LOOP_RATES for n in _LOOP_CYCLES]
     yield from (kept for run in runs if (kept := _within(known, rig, run)) is not None)
@@ -138,7 +151,7 @@ def _within(known: Knowledge, rig: RigSettings, test: Test) -> Test | None:
 def _bearable(known: Knowledge, rig: RigSettings, place: Place, frequency: Array, size: Array) -> Array:
     """Which operating points the rig and the rubber can do, (n,) bool."""
     strain = size * known.model.unit_strain(place)
-    fine = strain <= max((BEARABLE, *(known.strain or ())))
+    fine = strain <= max(BEARABLE, known.strain or 0.0)
     fine &= frequency <= (rig.max_frequency or np.inf) * _ROUNDING
     force = np.abs(known.model.stiffness(place, frequency, size)) * size
     if place.motion is TRANSLATION:

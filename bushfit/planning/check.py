@@ -24,8 +24,8 @@ from bushfit.planning.campaign import settings_of
 from bushfit.planning.contract import Plan
 from bushfit.simulation import Undisturbed, measure, undisturbed
 
-#: Of one campaign what was found less the truth, and its stated errors, (k,) each; None where no fit was possible.
-Found = tuple[Array, Array] | None
+#: Of one campaign what was found less the truth, (k,); None where no fit was possible.
+Found = Array | None
 #: Does work(seeds) for parts of the seeds, in some order, and gives the number and the result of each.
 Every = Callable[[Sequence[int], Callable[[Sequence[int]], list[Found]]], Iterable[tuple[int, Found]]]
 
@@ -38,19 +38,15 @@ class Check:
         names: of the parameters.
         predicted: by the plan, (k,).
         off: found less true values of each campaign, relative, (campaigns, k).
-        stated: what each fit says of its own error, (campaigns, k).
         failed: campaigns that could not be fitted.
         seed: of the first campaign; the others count on.
-        together: whether the tests made before were simulated too.
     """
 
     names: tuple[str, ...]
     predicted: Array
     off: Array
-    stated: Array
     failed: int
     seed: int
-    together: bool
 
     @property
     def found(self) -> Array:
@@ -84,15 +80,14 @@ def check(plan: Plan, count: int, seed: int, every: Every) -> Check:
     fitted = [row for _, row in sorted(found.items()) if row is not None]
     if not fitted:
         raise FitError("no simulated campaign of this plan could be fitted", found=f"{count} campaigns")
-    off, stated = (np.array(part) for part in zip(*fitted, strict=True))
     predicted = plan.planned.errors if known.tests else plan.planned.alone
-    return Check(known.names, predicted, off, stated, count - len(fitted), seed, bool(known.tests))
+    return Check(known.names, predicted, np.array(fitted), count - len(fitted), seed)
 
 
 def _several(
     clean: Undisturbed, settings: SimulateSettings, rig: RigSettings, names: Sequence[str], seeds: Sequence[int]
 ) -> list[Found]:
-    """Of each seed the parameters found less the true ones, and their stated errors, relative; None without a fit."""
+    """Of each seed the parameters found less the true ones, relative; None without a fit."""
     with threadpool_limits(1):
         return [_campaign(clean, replace(settings, seed=seed), rig, names) for seed in seeds]
 
@@ -107,6 +102,4 @@ def _campaign(clean: Undisturbed, settings: SimulateSettings, rig: RigSettings, 
     except FitError:
         return None
     coordinates, sizes = Coordinates.of(truth, names), relative_sizes(truth, names)
-    off = (coordinates.point(result.model.values) - coordinates.point(truth.values)) / sizes
-    stated = np.array([result.covariance.stderr(name) or np.nan for name in names])
-    return off, stated / coordinates.slopes(truth.values) / sizes
+    return (coordinates.point(result.model.values) - coordinates.point(truth.values)) / sizes

@@ -12,7 +12,8 @@ The numbers are those of the paper's bushing (natural rubber, phi_0 of 27 phr, T
 another compound: a filler network stiffens with phi^3.5, filler amplifies strain by X, and it amplifies spring and
 springpot alike, so that their ratio q stays.
 
-Sources: A. N. Gent, Rubber Chemistry and Technology 31 (1958) 896-906; E. Guth, J. Applied Physics 16 (1945) 20-25;
+Sources: A. N. Gent, Rubber Chemistry and Technology 31 (1958) 896-906, whose relation is quoted with 7.66, as here, or
+with 7.62336, which makes 0.5 % less; E. Guth, J. Applied Physics 16 (1945) 20-25;
 G. Heinrich, M. Klueppel, Advances in Polymer Science 160 (2002) 1-44, for phi^3.5; Garcia Tarrago et al. 2007, Table 1.
 
 Notes:
@@ -27,6 +28,7 @@ import numpy as np
 from bushfit.campaign.compound import Compound
 from bushfit.effects import BASE
 from bushfit.geometry import Bushing
+from bushfit.model.covariance import Z95
 from bushfit.model.model import FIVE, Model
 from bushfit.planning.contract import Knowledge
 from bushfit.units import number
@@ -105,11 +107,14 @@ def guess(bushing: Bushing, compound: Compound) -> Knowledge:
         ]
     )
     scaled = slopes * errors
+    covariance = scaled @ scaled.T
+    widths = zip(FIVE, np.exp(Z95 * np.sqrt(np.diag(covariance))).tolist(), strict=True)
     source = (
         f"a guess from {number(compound.hardness, 3)} Shore A and {number(compound.filler, 3)} phr of carbon black in "
-        f"{compound.rubber} rubber: Gent's relation for the modulus, the paper's compound for the rest"
+        f"{compound.rubber} rubber: Gent's relation for the modulus, the paper's compound for the rest; 95 % are taken "
+        f"to lie within factors of {', '.join(f'{number(factor, 2)} ({name})' for name, factor in widths)}"
     )
-    return Knowledge(Model(bushing, BASE, values), FIVE, scaled @ scaled.T, source)
+    return Knowledge(Model(bushing, BASE, values), FIVE, covariance, source)
 
 
 def _filled(filler: float, density: float) -> float:

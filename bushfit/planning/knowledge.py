@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
-from bushfit.diagnosis.evidence import fit, result_of
+from bushfit.diagnosis.evidence import Evidence, fit, result_of
 from bushfit.diagnosis.propose import proposals
+from bushfit.diagnosis.record import Diagnosis
 from bushfit.diagnosis.refit import refits
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import LIBRARY, twins_of
@@ -16,7 +17,7 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import parted
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.noise import ASSUMED_SHARED, of_class
-from bushfit.fitting.solve import Coordinates
+from bushfit.fitting.solve import Bounds, Coordinates
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.planning.contract import Knowledge, Noise, Test
@@ -38,14 +39,15 @@ def of_result(result: Result, noise: Noise | None = None, source: str = "") -> K
     words = source or (
         "a fitted model" if fitted.names else "values given by hand, taken as right within a factor of 2.7"
     )
-    strain = result.measured.strain if result.measured else None
+    strain = result.measured.strain[1] if result.measured else None
     return Knowledge(model, names, matrix, words, noise or Noise(), strain=strain, specimens=result.specimens)
 
 
 def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
     """What the tests of a campaign tell, fitted together; and of each rival effect, added to the model in turn.
 
-    The class of the rig counts as noise, stated or not, as it does in what is planned.
+    The class of the rig counts as noise, stated or not, as it does in what is planned. Beside rivals the model has
+    what a diagnosis is sure of, and the leaders of its other sets of look-alikes.
 
     Args:
         rivals: names of effects, of twins any; none for those that a diagnosis of these tests cannot tell apart, None
@@ -55,39 +57,24 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
         FitError: data that cannot support the fit.
         ModelError: effects that these tests could not show, or a diagnosis without rivals.
     """
-    named = None if rivals is None else tuple(rivals) or _alike(data)
-    names, noise = named and tuple(dict.fromkeys(twins_of(name)[0] for name in named)), noise_of(data)
+    found = None if rivals is None else diagnose(data)
+    noise = noise_of(data)
     data = Data.of(replace(data.campaign, rig=rig_of(data.campaign.rig, noise)))
     data_sets = [*data.loops, *data.sweeps]
     model = Model.started(data.campaign.bushing, data.effects, data.start(data_sets, {}))
     held = [name for name in model.parameters if name not in data.free(tuple(model.parameters))]
-    plain = fit(model, data_sets, held, data.bounds)
     source = f"the tests of {data.campaign.name}"
 
-    def known(result: Result) -> Knowledge:
-        return of_result(replace(result, specimens=data.campaign.specimens), noise, source)
+    def known(evidence: Evidence) -> Knowledge:
+        result = replace(result_of(evidence, data.bounds, ()), specimens=data.campaign.specimens)
+        strain = max(float(np.max(each.amplitude)) * model.unit_strain(each.direction) for each in data_sets)
+        return replace(of_result(result, noise, source), strain=strain, tests=tuple(_tests(data)))
 
-    if names is None:
-        return replace(known(result_of(plain, data.bounds, ())), tests=tuple(_tests(data)))
-    proposed = [proposal for proposal in proposals(plain, (), held) if proposal.name in names]
-    found = {candidate.name: candidate for candidate in refits(plain, proposed, [], {}, held, data.bounds)}
-    if unknown := [name for name in names if name not in found]:
-        raise ModelError(
-            "this is no rival in these tests",
-            place="--rivals",
-            found=", ".join(unknown),
-            expected="effects of the library that the model lacks, and the tests could show",
-            hint=None if unknown[0] in LIBRARY else did_you_mean(unknown[0], LIBRARY),
-        )
-    every = [known(result_of(found[name].evidence, data.bounds, ())) for name in names]
-    return replace(every[0], rivals=tuple(every), tests=tuple(_tests(data)))
-
-
-def _alike(data: Data) -> tuple[str, ...]:
-    """The effects that a diagnosis of these tests cannot tell apart."""
-    found = diagnose(data)
-    sets = [(named.name, *named.alternatives) for named in found.effects if named.alternatives and not named.test]
-    if not sets:
+    if found is None or rivals is None:
+        return known(fit(model, data_sets, held, data.bounds))
+    sets = look_alikes(found)
+    names = list(dict.fromkeys(twins_of(name)[0] for name in rivals or next(iter(sets), ())))
+    if not names:
         raise ModelError(
             "there are no rivals to be told apart",
             file=data.campaign.path,
@@ -95,7 +82,35 @@ def _alike(data: Data) -> tuple[str, ...]:
             expected="ambiguous",
             hint="name effects with --rivals, or plan for parameters or predictions",
         )
-    return sets[0]
+    sure = [name for name in found.result.model.effects if name not in model.effects]
+    leaders = [others[0] for others in sets if not {*names} & {*others}]
+    plain = fit(model, data_sets, held, data.bounds)
+    for name in (*sure, *leaders):
+        if name not in names:
+            plain = _each_added(plain, [name], held, data.bounds).get(name, plain)
+    rivalling = _each_added(plain, names, held, data.bounds)
+    if unknown := [name for name in names if name not in rivalling]:
+        raise ModelError(
+            "this is no rival in these tests",
+            place="--rivals",
+            found=", ".join(unknown),
+            expected="effects of the library that the model lacks, and the tests could show",
+            hint=None if unknown[0] in LIBRARY else did_you_mean(unknown[0], LIBRARY),
+        )
+    every = [known(rivalling[name]) for name in names]
+    return replace(every[0], rivals=tuple(every))
+
+
+def _each_added(plain: Evidence, names: Sequence[str], held: Sequence[str], bounds: Bounds) -> dict[str, Evidence]:
+    """The fit with each of these effects added in turn, by name; without those that the tests could not show."""
+    proposed = [proposal for proposal in proposals(plain, (), held) if proposal.name in names]
+    return {found.name: found.evidence for found in refits(plain, proposed, [], {}, held, bounds)}
+
+
+def look_alikes(found: Diagnosis) -> list[tuple[str, ...]]:
+    """The sets of effects that a diagnosis cannot tell apart; without mistakes and faults, which no plan tells."""
+    sets = ((named.name, *named.alternatives) for named in found.effects if named.alternatives and not named.test)
+    return [names for names in sets if not names[1].startswith("fault:")]
 
 
 def noise_of(data: Data) -> Noise:

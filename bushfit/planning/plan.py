@@ -1,12 +1,15 @@
 """The plan: tests chosen for an aim, in their order, and the standard programme of as many hours beside them."""
 
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from bushfit.campaign.schema import SimulatedLoop
+from bushfit.diagnosis.search import SAME
 from bushfit.effects import qualified
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
@@ -22,9 +25,18 @@ from bushfit.planning.sensitivity import Column, Grid, Told, relative_slopes
 from bushfit.reading.measurement import loss_factor
 from bushfit.units import number
 
+#: The 90 % quantile of the normal distribution.
+_NINE_OF_TEN = 1.2815515655446004
 #: Amount of an effect over its standard error that a test of one in twenty finds in nine of ten cases: the 97.5 % and
 #: the 90 % quantile of the normal distribution.
-FOUND = Z95 + 1.2815515655446004
+FOUND = Z95 + _NINE_OF_TEN
+#: Expected chi-square between rivals from which on `diagnose` tells them apart in nine of ten cases: of d it finds d
+#: with a standard deviation of 2 sqrt(d), and it takes those for one set that are within SAME.
+TOLD = (_NINE_OF_TEN + float(np.sqrt(_NINE_OF_TEN**2 + SAME))) ** 2
+#: Expected chi-square over that, from which on no more hours are planned; chosen: rivals may be smaller than they seem.
+_SURELY = 2.0
+#: Shares of the hours that are tried for rivals, before all of them.
+_SHARES = (0.125, 0.1875, 0.25, 0.375, 0.5)
 #: Weight of the logarithm of each lack of power, beside the logarithm of the variance that is wanted small; chosen.
 _PENALTY = 3.0
 #: The same where that leaves a lack.
@@ -33,7 +45,7 @@ _STRICT = 30.0
 _AS_WELL = 0.995
 #: Drift of the gain over a session whose harm is told.
 _DRIFT = 0.01
-#: Runs of a sweep at most: more than fit into any session.
+#: Runs of a test at most: more than fit into any session.
 _MOST_RUNS = 1000
 #: Tests of a place that are considered for its repeat, the quickest first; chosen for time.
 _REPEATED = 4
@@ -44,12 +56,21 @@ _LEAST = 1e-12
 
 
 def plan(known: Knowledge, wanted: Wanted) -> Plan:
-    """Tests for an aim within the hours and the limits of the rig.
+    """Tests for an aim within the hours and the limits of the rig; rivals in as few of the hours as tell them apart.
 
     Raises:
         ModelError: no test is possible, none fits into the hours, or there are no rivals to be told apart.
     """
-    return _Planner(known, wanted).plan()
+    found: dict[float, Plan] = {}
+
+    def told(share: float) -> bool:
+        with suppress(ModelError):  # too few hours for any test
+            found[share] = _Planner(known, replace(wanted, hours=share * wanted.hours)).plan()
+            return (found[share].planned.apart or 0.0) >= _SURELY * TOLD
+        return False
+
+    enough = bisect_left(_SHARES, True, key=told) if wanted.aim == "rivals" else len(_SHARES)
+    return found[_SHARES[enough]] if enough < len(_SHARES) else _Planner(known, wanted).plan()
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +138,7 @@ class _Planner:
             np.array([minutes(test, self.wanted.rig) for test in self.tests]),
             np.array([places.index(test.direction) for test in self.tests]),
             np.array([known.index(line) for line in lines]),
-            np.array([_most_runs(test) * (test.direction in self.wanted.places) for test in self.tests]),
+            np.array([_MOST_RUNS * (test.direction in self.wanted.places) for test in self.tests]),
             setup_minutes(self.wanted.rig),
             60.0 * self.wanted.hours,
         )
@@ -154,16 +175,23 @@ class _Planner:
         return best
 
     def _with_repeats(self, counts: Array) -> Array:
-        """The runs with a sweep of each place made twice, that a drift shows, in place of what is least useful."""
+        """The runs with a test of each place made twice, that a drift shows as in the standard programme, in place of
+        what is least useful."""
         one, strict = np.eye(len(self.tests), dtype=int), self._criterion(_STRICT)
+        standard = self._drifting(self._counts(self.standard_runs)).noncentrality(self.standard_runs)
         for place in np.unique(self.budget.place[counts > 0]):
             mine = np.flatnonzero((counts > 0) & (self.budget.place == place))
             again = mine[self.budget.runs[mine] > 1]
-            if mine.size > 2 and counts[mine].max() < 2:
+            if mine.size > 2 and (counts[mine].max() < 2 or self._of_drift(counts) < standard):
                 few = again[np.argsort(self.budget.minutes[again])][:_REPEATED]
                 made = [fits for twice in few if (fits := self._fitting(counts + one[twice])) is not None]
                 counts = min(made, key=strict.together, default=counts)
         return counts
+
+    def _of_drift(self, counts: Array) -> float:
+        """Noncentrality of a drift by so many runs of each test, in their best order."""
+        drifting = self._drifting(counts)
+        return drifting.noncentrality(ordered(counts, self.budget.place, drifting))
 
     def _fitting(self, counts: Array) -> Array | None:
         """The runs that fit into the hours: of tests that are made once, the least useful are left out in turn.
@@ -192,7 +220,7 @@ class _Planner:
         if not self.known.rivals:
             return self._pairs
         every = np.ones(len(self.tests), dtype=int)
-        told = distances([view.together(every) for view in self.views[1:]])[0, *self._pairs] >= FOUND**2
+        told = distances([view.together(every) for view in self.views[1:]])[0, *self._pairs] >= TOLD
         return self._pairs[:, told] if told.any() else self._pairs
 
     def _apart(self, counts: Array) -> float | None:
@@ -233,13 +261,10 @@ class _Planner:
         return np.where(seen, reached, 0.0)
 
     def _drifting(self, counts: Array) -> Drifting:
-        """What a drift does to so many runs of each test; of a loop each record then has a gain error of its own."""
+        """What a drift does to so many runs of each test."""
         view, k = self.views[0], len(self.known.names)
         own, seen = view.told.own, view.told.own[:, k, k]
-        loops = np.array([isinstance(test, SimulatedLoop) for test in self.tests])
-        share = 1.0 / (1.0 + loops * self.known.noise.level[0] ** 2 * seen)
-        seen, gain = seen * share, own[..., k : k + 1] * share[:, None, None]
-        one = Told(own * counts[:, None, None], gain, seen[:, None])  # by the gain of one run
+        one = Told(own * counts[:, None, None], own[..., k : k + 1], seen[:, None])  # by the gain of one run
         level = np.square(view.level[:, 0])
         root = np.linalg.cholesky(np.linalg.inv(view.together(counts).own[0]))
         pull = one.beside(view.level).cross[..., 0] @ root
@@ -259,7 +284,6 @@ class _Planner:
             tuple(self.tests[run] for run in runs),
             self.budget.minutes[list(runs)] + self.budget.setup * mounted,
             np.sqrt(np.diag(covariance)),
-            covariance,
             _alone(told.own[0] - self.views[0].prior),
             gain,
             phase / phase_per_loss,
@@ -301,22 +325,16 @@ class _Planner:
             if (one, other) not in tellable:
                 names = (self.known.rivals[place].model.effects[-1] for place in (one, other))
                 yield f"no test of this rig would tell {' from '.join(names)}: they are left out"
-        if planned.apart is not None and planned.apart < FOUND**2:
+        if planned.apart is not None and planned.apart < TOLD:
             yield (
                 f"the nearest rivals are {number(planned.apart, 2)} apart in expected chi-square, less than the "
-                f"{number(FOUND**2, 3)} that tell them in nine of ten cases"
+                f"{number(TOLD, 3)} that tell them in nine of ten cases"
             )
 
 
 def _found(noncentrality: float) -> float:
     """The smallest amount that is found, of a column with this noncentrality for a unit; inf where it is not seen."""
     return FOUND / float(np.sqrt(noncentrality)) if noncentrality > 0.0 else np.inf
-
-
-def _most_runs(test: Test) -> int:
-    """How often a test may be made: a loop once. More of it shares its gain error, which a fit takes for one of each
-    record."""
-    return 1 if isinstance(test, SimulatedLoop) else _MOST_RUNS
 
 
 def _line(test: Test) -> tuple[object, ...]:

@@ -9,7 +9,7 @@ Notes:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.propose import missing_effects, sensitivity
 from bushfit.effects import Effect
-from bushfit.effects.contract import Array
+from bushfit.effects.contract import UNKNOWN, Array, Circumstances
 from bushfit.fitting.data_sets import DataSet, new_loop, new_sweep, parted
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.noise import SweepNoise
@@ -117,7 +117,8 @@ class Grid:
 
     @cached_property
     def data_sets(self) -> list[DataSet]:
-        """A cycle of each loop, in units of its noise, and of each place one sweep of all points, in units of ln K."""
+        """A cycle of each loop, in units of its noise, and of each place one sweep of all points, in units of ln K;
+        after the largest strain so far."""
         model, noise = self.known.model, self.known.noise
         per_row = noise.force * float(np.sqrt(_ROWS * noise.rows_as_one / ROWS_PER_CYCLE))
         loops = [new_loop(model, *motion, per_row, rows=_ROWS) for motion in self._loops]
@@ -125,7 +126,8 @@ class Grid:
             new_sweep(model, place, points[:, 1], points[:, 0], (1.0, 1.0), (0.0, 0.0))
             for place, points in self._points.items()
         ]
-        return [*loops, *sweeps]
+        under = Circumstances(strained=self.known.strain) if self.known.strain else UNKNOWN
+        return [*(replace(loop, under=under) for loop in loops), *(replace(sweep, under=under) for sweep in sweeps)]
 
     @cached_property
     def _loops(self) -> list[tuple[Place, float, float]]:

@@ -50,7 +50,7 @@ def card(outcomes: Sequence[Outcome], family: Family) -> list[Row]:
     """Every target of a family, measured over the outcomes that did not fail."""
     good = [outcome for outcome in outcomes if not outcome.error]
     kinds = {kind: [outcome for outcome in good if outcome.task.kind == kind] for kind in KINDS[family]}
-    return [*_ROWS[family](good, *kinds.values()), *_times(good)]
+    return [*_ROWS[family](good, *kinds.values()), *_of_sessions(good), *_times(good)]
 
 
 def _of_effects(
@@ -174,6 +174,21 @@ _ROWS: dict[Family, Callable[..., list[Row]]] = {
     "outside": _of_outside,
     "library": _of_library,
 }
+
+
+def _of_sessions(good: Sequence[Outcome]) -> list[Row]:
+    """What planned sessions settled of what was left open; no rows where none was asked for."""
+    told = [outcome for outcome in good if outcome.settled]
+    if not told:
+        return []
+    made = [outcome for outcome in told if outcome.settled != "elsewhere"]
+    left = [outcome for outcome in told if outcome.verdict == "ambiguous"]
+    return [
+        _share("ambiguous, settled rightly by a session", [o.settled == "rightly" for o in made], ">= 80 %", 0.8, 1.0),
+        _share("  settled wrongly", [o.settled == "wrongly" for o in made], "", 0.0, 1.0),
+        _share("ambiguous, and no session would tell", [o.settled == "elsewhere" for o in left], "", 0.0, 1.0),
+        Row("level unresolved: a test without the bushing decides", str(len(told) - len(left)), len(told), "", None),
+    ]
 
 
 def _times(good: Sequence[Outcome]) -> list[Row]:

@@ -21,6 +21,7 @@ class Asked(TypedDict):
         families: of hidden campaigns.
         campaigns: how many of each family.
         seed: of everything random.
+        session: hours of the session that is planned, and simulated, where effects are left open; null for none.
     """
 
     schema: Literal["bushfit/scorecard/1"]
@@ -28,6 +29,7 @@ class Asked(TypedDict):
     families: list[str]
     campaigns: int
     seed: int
+    session: float | None
 
 
 class Scorecard(Asked):

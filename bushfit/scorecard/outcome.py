@@ -1,6 +1,7 @@
 """What a task of the score card is, and what the workflow said of it beside the truth."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 from bushfit.scorecard.hidden import Sealed
 
@@ -10,6 +11,9 @@ REFUSED = "refused"
 _LARGEST_SET = 3
 #: Verdicts under which every name stays in the model.
 _KEEPING = ("named", "partly")
+
+#: What came of the planned session: one true name for each set, a wrong name, no name; or the plan knows of no test.
+Settled = Literal["rightly", "wrongly", "open", "elsewhere"]
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,8 @@ class Outcome:
         twins: per set, the names that the same data give its members at other levels.
         before: gap on held-out data before, as `heldout`.
         again: in how many parts the name came out again, and of how many; None where it was not searched again.
+        settled: what came of the planned session, where effects of the library were left open and it was asked for.
+        decides: the test on the rig that is asked for, where the virtual rig can make none that decides.
     """
 
     task: Task
@@ -70,6 +76,21 @@ class Outcome:
     twins: tuple[tuple[str, ...], ...] = ()
     before: float | None = None
     again: tuple[int, int] | None = None
+    settled: Settled | None = None
+    decides: str = ""
+
+    @property
+    def left_open(self) -> bool:
+        """Whether look-alikes are left, or an effect whose level the rig has a twin of."""
+        return self.verdict == "ambiguous" or (self.verdict in _KEEPING and any(self.twins))
+
+    @property
+    def settles(self) -> Settled:
+        """Whether this diagnosis, made with further tests, leaves one true name of each set of look-alikes."""
+        if self.wrong_kept:
+            return "wrongly"
+        alone = all(len(members) == 1 for members in self.sets)
+        return "rightly" if self.verdict in _KEEPING and alone else "open"
 
     @property
     def truths(self) -> set[str]:

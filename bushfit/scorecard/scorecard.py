@@ -7,6 +7,7 @@ afterwards. The same seed makes the same card.
 import time
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,7 +16,7 @@ from pydantic import TypeAdapter
 from threadpoolctl import threadpool_limits
 
 from bushfit.batch import pool
-from bushfit.campaign.campaign import load_campaign
+from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.locate import largest_smooth_misfit
 from bushfit.diagnosis.record import Diagnosis, Settings
@@ -25,10 +26,11 @@ from bushfit.effects.mistakes import mistake_named
 from bushfit.errors import MeasurementError
 from bushfit.fitting.data import Data
 from bushfit.report.folder import write_files
-from bushfit.scorecard.families import campaign_of
+from bushfit.scorecard.families import RECIPES, campaign_of
 from bushfit.scorecard.hidden import Sealed
 from bushfit.scorecard.outcome import REFUSED, Outcome, Task
-from bushfit.simulation import to_files
+from bushfit.scorecard.settled import planned_session, with_session
+from bushfit.simulation import Simulated, to_files
 
 #: What of |K|, or of a parameter, is off where a mistake in the record matters.
 _MATTERS = 0.02
@@ -36,20 +38,27 @@ _MATTERS = 0.02
 _SEALED = TypeAdapter(Sealed)
 
 
-def run(chosen: Sequence[Task], kept: Path | None, jobs: int, progress: Callable[[Outcome], None]) -> list[Outcome]:
+def run(
+    chosen: Sequence[Task],
+    kept: Path | None,
+    jobs: int,
+    progress: Callable[[Outcome], None],
+    hours: float | None = None,
+) -> list[Outcome]:
     """Make, diagnose and judge every task, on several cores.
 
     Args:
         kept: folder in which campaigns and truths stay; none stay where it is None.
         progress: called in this process with each outcome, in the order in which they come.
+        hours: of the session that is planned where effects are left open; None for none.
 
     Notes:
         A campaign that takes its worker down time after time is a failure of its own row.
     """
     if jobs == 1:
-        return [_noted(work(task, kept), progress) for task in chosen]
+        return [_noted(work(task, kept, hours), progress) for task in chosen]
     done: dict[int, Outcome] = {}
-    for number, found in pool.run(chosen, partial(_in_worker, kept=kept), str, pool.LocalPool(jobs)):
+    for number, found in pool.run(chosen, partial(_in_worker, kept=kept, hours=hours), str, pool.LocalPool(jobs)):
         outcome = Outcome(chosen[number], None, "failed", error=found) if isinstance(found, str) else found
         done[number] = _noted(outcome, progress)
     return [done[number] for number in range(len(chosen))]
@@ -60,23 +69,24 @@ def _noted(outcome: Outcome, progress: Callable[[Outcome], None]) -> Outcome:
     return outcome
 
 
-def _in_worker(chosen: Sequence[Task], kept: Path | None) -> list[Outcome | str]:
+def _in_worker(chosen: Sequence[Task], kept: Path | None, hours: float | None) -> list[Outcome | str]:
     """A chunk of tasks, with linear algebra on one thread: cores are for campaigns."""
     with threadpool_limits(1):
-        return [work(task, kept) for task in chosen]
+        return [work(task, kept, hours) for task in chosen]
 
 
-def work(task: Task, kept: Path | None = None) -> Outcome:
+def work(task: Task, kept: Path | None = None, hours: float | None = None) -> Outcome:
     """One task: write the campaign, seal the truth apart, diagnose the files, open the truth.
 
     Args:
         kept: folder in which both stay; where it is None, they are gone afterwards.
+        hours: as of `run`.
     """
     with TemporaryDirectory() if kept is None else nullcontext(str(kept)) as folder:
-        return _worked(task, Path(folder))
+        return _worked(task, Path(folder), hours)
 
 
-def _worked(task: Task, folder: Path) -> Outcome:
+def _worked(task: Task, folder: Path, hours: float | None) -> Outcome:
     place = folder / f"{task.kind}_{task.seed}"
     sealed_file = folder / "sealed" / f"{task.kind}_{task.seed}.json"
     try:
@@ -90,13 +100,28 @@ def _worked(task: Task, folder: Path) -> Outcome:
         diagnosis = diagnose(data, None, Settings(without=task.without))
         seconds = time.process_time() - started
         truth = _SEALED.validate_json(sealed_file.read_bytes())
+        outcome = _outcome(task, truth, diagnosis, seconds)
+        return _settled(outcome, truth, data.campaign, simulated, diagnosis.next_test, hours) if hours else outcome
     except MeasurementError as refusal:
         if task.kind != "mistake":
             return _failed(task, refusal)
         return Outcome(task, sealed, REFUSED, matters=True)
     except Exception as wrong:  # one campaign that fails is one row of the card, and is shown there
         return _failed(task, wrong)
-    return _outcome(task, truth, diagnosis, seconds)
+
+
+def _settled(
+    outcome: Outcome, truth: Sealed, campaign: Campaign, hidden: Simulated, next_test: str, hours: float
+) -> Outcome:
+    """The outcome with what came of a planned session, where effects of the library were hidden and left open."""
+    task = outcome.task
+    if task.kind in RECIPES or task.kind == "mistake" or task.without:
+        return outcome
+    tests = planned_session(campaign, hours) if outcome.verdict == "ambiguous" else ()
+    if tests:
+        again = diagnose(Data.of(with_session(campaign, hidden, tests)))
+        return replace(outcome, settled=_outcome(task, truth, again, 0.0).settles)
+    return replace(outcome, settled="elsewhere", decides=next_test) if outcome.left_open else outcome
 
 
 def _failed(task: Task, wrong: Exception) -> Outcome:

@@ -2,30 +2,36 @@
 
 from dataclasses import replace
 from itertools import permutations, product
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from bushfit.campaign.campaign import load_campaign
 from bushfit.campaign.compound import Compound
-from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
+from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
+from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import SweepData, new_loop, new_sweep
 from bushfit.fitting.solve import residual, solve
 from bushfit.geometry import Bushing, Direction, Place
+from bushfit.jobs.plan import PlanTests
 from bushfit.model.model import Model
 from bushfit.planning.candidates import candidates, minutes
 from bushfit.planning.contract import Aim, Knowledge, Noise, Plan, Points, Test, Wanted, motions
 from bushfit.planning.criterion import Criterion, View, distances, shown
 from bushfit.planning.guess import guess
+from bushfit.planning.knowledge import of_campaign
 from bushfit.planning.order import Drifting, ordered
-from bushfit.planning.plan import FOUND, plan
+from bushfit.planning.plan import FOUND, TOLD, plan
 from bushfit.planning.search import Budget, chosen
 from bushfit.planning.sensitivity import Grid, relative_slopes
+from bushfit.simulation import PAPER_LOOPS, PAPER_SWEEPS, simulate
 
 AXIAL, RADIAL = Direction.AXIAL, Direction.RADIAL
 BAND = (5.0, 20.0, 60.0, 150.0)
-NOISE = Noise(scatter=(4e-3, 6e-3), shared=(5e-3, 3e-3), level=(7e-3, 2e-3))
+NOISE = Noise(scatter=(4e-3, 6e-3), shared=(5e-3, 3e-3), level=(7e-3, 2e-3), rows_as_one=1.0)
 SWEEPS = (
     SimulatedSweep(AXIAL, (2e-4,), BAND),
     SimulatedSweep(RADIAL, (1e-4,), BAND[::3]),
@@ -213,6 +219,36 @@ def test_a_plan_is_better_than_the_standard_programme_and_no_blinder(planned: Pl
     assert len(worst) > 20
     assert max(worst.values()) < 1.02
     assert planned.planned.drift < 0.3
+
+
+@pytest.mark.parametrize("hours", [2.5, 8.0])
+def test_a_plan_after_a_campaign_is_no_blinder(root: Path, hours: float) -> None:
+    """A practice campaign whose standard programme repeats a loop, which stops show best in."""
+    job = PlanTests("predictions", hours)
+    found = job.run(load_campaign(root / "data/practice/case_000/bushing.toml")).plan
+    mean = [float(np.sqrt(np.mean(np.square(each.stiffness)))) for each in (found.planned, found.standard)]
+    pairs = zip(found.planned.visible, found.standard.visible, strict=True)
+    worst = max(one.amount / other.amount for one, other in pairs)
+    print(f"stiffness {mean[0] / mean[1]:.2f}, worst effect {worst:.3f}", found.notes)
+    assert mean[0] < 0.8 * mean[1]
+    assert worst < 1.005
+    assert not found.notes
+
+
+def test_rivals_stand_beside_what_a_diagnosis_is_sure_of_and_take_few_hours(known: Knowledge) -> None:
+    """Simulated tests of a bushing with a plain inertia, and a damping that a lag of the record explains as well."""
+    model = known.model.with_effect("inertia", {"inertia.mass": 0.05}).with_effect("viscous", {"viscous.eta": 60.0})
+    settings = SimulateSettings(
+        seed=4, repeats=3, noise=0.004, force_noise=0.003, loops=PAPER_LOOPS, sweeps=PAPER_SWEEPS
+    )
+    campaign = replace(simulate(model, settings).campaign(), rig=RigSettings(max_frequency=300.0))
+    after = of_campaign(Data.of(campaign), ("viscous", "delay"))
+    assert [rival.model.effects[3:] for rival in after.rivals] == [("inertia", "viscous"), ("inertia", "delay")]
+    found = PlanTests("rivals", 8.0).run(after, campaign).plan
+    print(found.wanted.hours, found.planned.apart)
+    assert found.planned.apart is not None
+    assert found.planned.apart > 2.0 * TOLD
+    assert found.planned.hours <= found.wanted.hours < 8.0
 
 
 def test_a_session_begins_and_ends_with_one_test_in_each_direction(planned: Plan) -> None:

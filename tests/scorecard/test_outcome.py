@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -44,6 +45,27 @@ def test_a_level_that_stays_open_counts_as_told() -> None:
     twin = said("named", ("interface_slip",), truths=("guide",), kind="alone", twins=(("guide",),))
     assert twin.truth_in_sets
     assert not said("named", ("interface_slip",), truths=("guide",), kind="alone").truth_in_sets
+
+
+def test_what_a_session_settles() -> None:
+    """Rightly with one true name of each set, wrongly with another, else it stays open; the card counts them."""
+    was = said("ambiguous", ("delay", "viscous"), truths=("viscous",))
+    then = [
+        said("named", ("viscous",), truths=("viscous",)).settles,
+        said("partly", ("delay",), truths=("viscous",)).settles,
+        said("ambiguous", ("viscous", "delay"), truths=("viscous",)).settles,
+        said("unexplained", truths=("viscous",)).settles,
+    ]
+    assert then == ["rightly", "wrongly", "open", "open"]
+    twin = said("named", ("interface_slip",), truths=("guide",), twins=(("guide",),))
+    assert [each.left_open for each in (was, twin, said("named", ("delay",)))] == [True, True, False]
+    outcomes = [replace(was, settled=settled) for settled in (*then, "elsewhere")]
+    rows = {row.measure.strip(): row for row in card([*outcomes, replace(twin, settled="elsewhere")], "faults")}
+    assert rows["ambiguous, settled rightly by a session"].figure.startswith("25.0 %")
+    assert rows["settled wrongly"].over == 4
+    assert rows["ambiguous, and no session would tell"].figure.startswith("20.0 %")
+    assert rows["level unresolved: a test without the bushing decides"].figure == "1"
+    assert not any("session" in row.measure for row in card([was], "faults"))
 
 
 def test_a_target_is_met_once_the_interval_is_narrow_too() -> None:
