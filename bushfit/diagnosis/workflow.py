@@ -14,7 +14,7 @@ from bushfit.diagnosis.faults import faults
 from bushfit.diagnosis.mistakes import mistaken
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.refit import can_reach
-from bushfit.diagnosis.search import CHANCE_LEVEL, SAME, Search, Step
+from bushfit.diagnosis.search import CHANCE_LEVEL, Search, Step
 from bushfit.diagnosis.verdict import consistent, is_consistent, judge
 from bushfit.effects import effect_named, qualified
 from bushfit.effects.mistakes import candidate_named, mistake_named
@@ -104,15 +104,15 @@ def _search(
 
 
 def _errors_beside(searched: _Searched, best: Evidence, data: Data) -> LevelErrors:
-    """Errors of each level beside the best that the library can do; in its place, where they do nearly as well alone.
+    """Errors of each level beside the best that the library can do; in its place, where they do as well alone.
 
     Notes:
-        Effects were chosen among many, and each such choice gains 2 ln(candidates) by chance.
+        Effects were chosen among many, in many shapes, and each such choice gains 2 ln(shapes) by chance.
     """
     first, beside = searched.search.first, _level_errors(best, data)
-    alone, chosen = _level_errors(first.evidence, data), 2.0 * np.log(max(len(first.proposed), 1)) * len(searched.steps)
+    alone, shapes = _level_errors(first.evidence, data), sum(len(claim.columns) for claim in first.proposed)
     ahead = first.evidence.bic - best.bic + beside.gain - alone.gain
-    return alone if alone.matters and ahead < SAME + chosen else beside
+    return alone if alone.matters and ahead < 2.0 * np.log(max(shapes, 1)) * len(searched.steps) else beside
 
 
 def _level_errors(evidence: Evidence, data: Data) -> LevelErrors:
