@@ -51,9 +51,8 @@ def command(
     """Choose the tests that would tell most, within the hours and the limits of the rig.
 
     It starts from the tests of CAMPAIGN, from its [compound] where there are none, or from MODEL.json or a folder of
-    results. A [compound] is a guess: hardness = "61 Shore A", filler = "27 phr" and rubber = "natural", beside the
-    [bushing]. Effects that the model lacks show at least as well as in the standard programme, the paper's tests, of as
-    many hours. Rivals take as few of the hours as tell them apart.
+    results. A [compound] is a guess: hardness = "61 Shore A", filler = "27 phr", rubber = "natural". What the model
+    lacks shows at least as well as in the paper's tests of as many hours. Rivals take no more hours than they need.
 
     Writes plan.csv, a sheet for who runs the rig, plan.png, plan.json, and campaign.toml for `bushfit simulate`.
     """

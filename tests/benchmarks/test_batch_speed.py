@@ -61,7 +61,7 @@ def seconds(bushings: Path, count: int, jobs: int, folder: Path) -> float:
     rows, none = read_manifest(str(manifest(bushings, count)), Settings()).rows, Formats(False, False, False)
     plan = Plan("benchmark", rows, Orders(folder, (), none, resume=False), None, None, none)
     begin = time.perf_counter()
-    summary = run(plan, LocalPool(jobs), str)
+    summary = run(plan, LocalPool(jobs), str, lambda _: None)
     assert summary.status["done"] == count
     return time.perf_counter() - begin
 

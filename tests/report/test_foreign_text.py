@@ -17,7 +17,7 @@ from bushfit.jobs.compare import Compare
 from bushfit.jobs.fits import Fit
 from bushfit.jobs.predict import Predict
 from bushfit.report.contents import Contents, Formats
-from bushfit.report.plots import to_image
+from bushfit.report.plots.style import to_image
 
 #: A formula, mathematics that is none, and in names of files what clears the screen and turns a line around.
 NAME = r"=cmd|' /C calc'!A0 $\foo{x}$ _a_ <b>"
