@@ -88,13 +88,14 @@ def test_manifest_and_limits_are_valid_and_have_every_key(root: Path) -> None:
 def test_recipes_for_ci_are_valid_and_run_what_there_is(root: Path) -> None:
     github, gitlab = (yaml.safe_load(block) for block in blocks(root / "bushfit/batch/README.md", "yaml"))
     steps = [step["run"] for step in github["jobs"]["fit"]["steps"] if "run" in step]
-    batch = cli.get_command(click.Context(cli), "batch")
+    above = click.Context(cli, **cli.context_settings)
+    batch = cli.get_command(above, "batch")
     assert batch is not None
     for script in (steps, gitlab["bushings"]["script"]):
         (line,) = (line for line in script if line.startswith("bushfit "))
         _, name, *arguments = shlex.split(line)
         assert name == "batch"
-        batch.make_context("batch", arguments)
+        batch.make_context("batch", arguments, parent=above)
 
 
 def test_json_keys_of_a_model_are_listed(root: Path) -> None:

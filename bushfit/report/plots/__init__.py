@@ -7,10 +7,11 @@ Levels differ in colour (of scales that survive colour blindness and grey print)
 """
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from bushfit.report.plots import (  # noqa: F401  # noqa: F401
+    from bushfit.report.plots import (  # noqa: F401
         arms,
         batch,
         comparison,
@@ -27,6 +28,6 @@ if TYPE_CHECKING:
 
 def __getattr__(name: str) -> Any:
     """A file of this folder, imported now."""
-    if name.startswith("_"):
+    if name.startswith("_") or find_spec(f"{__name__}.{name}") is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return import_module(f"{__name__}.{name}")
