@@ -44,7 +44,7 @@ class EffectEntry(TypedDict):
         parameters: by name.
         evidence: why it was named, in words.
         alternatives: what these tests cannot tell it from.
-        richer: effects of which it is a limit, as far as these tests show.
+        richer: effects of which it is a special case, as far as these tests show.
     """
 
     name: str

@@ -56,14 +56,14 @@ def mistaken(search: Search, data: Data, fitted: Fitted) -> Diagnosis | None:
     if not closing:
         return None
     claimed = {one.mistake.name for one in closing[0].claim.each}
-    if effect and claimed & {*effect_named(effect.name).frees}:
-        rivals[effect.name] += 2.0 * SAME
+    free = (effect.name,) if effect and claimed & {*effect_named(effect.name).frees} else ()
+    rivals |= {name: rivals[name] + 2.0 * SAME for name in free}
     others = [name for name, bic in rivals.items() if bic < closing[0].bic + SAME]
     closing.sort(key=lambda one: len(one.claim.tests))
     if others or len(closing) > 1:
         told = _doubtful(search, data, closing, others)
     else:
-        told = _told(search, data, closing[0], [one for one in weighed if one is not closing[0]])
+        told = _told(search, data, closing[0], [one for one in weighed if one is not closing[0]], free)
     candidates = [*told.candidates, *_judged(search, data, weighed, closing)]
     return replace(told, candidates=tuple(sorted(candidates, key=lambda judged: -judged.score)))
 
@@ -86,12 +86,13 @@ def _closes(evidence: Evidence, search: Search) -> bool:
     return is_consistent(Search.begin(evidence, search.settings, search.start, search.held, search.bounds))
 
 
-def _named(data: Data, claim: Claim, evidence: str, alternatives: Sequence[str]) -> list[Named]:
+def _named(
+    data: Data, claim: Claim, evidence: str, alternatives: Sequence[str] = (), richer: Sequence[str] = ()
+) -> list[Named]:
     """An entry for each test of a claim."""
-    others = tuple(alternatives)
+    told = (evidence, tuple(alternatives), tuple(richer))
     return [
-        Named(one.mistake.name, evidence, others, (), one.test(data), one.words(data), one.corrections(data)[0])
-        for one in claim.each
+        Named(one.mistake.name, *told, one.test(data), one.words(data), one.corrections(data)[0]) for one in claim.each
     ]
 
 
@@ -99,8 +100,14 @@ def _gain(search: Search, one: Weighed) -> str:
     return f"takes {search.base.chi_square - one.evidence.chi_square:.0f} off chi-square without a parameter"
 
 
-def _told(search: Search, data: Data, one: Weighed, behind: Sequence[Weighed]) -> Diagnosis:
-    """The finding that names one mistake: the gap shrinks if it was made; the model stays as it was."""
+def _told(
+    search: Search, data: Data, one: Weighed, behind: Sequence[Weighed], richer: Sequence[str]
+) -> Diagnosis:
+    """The finding that names one mistake: the gap shrinks if it was made; the model stays as it was.
+
+    Args:
+        richer: effects whose free factor makes the claim at one value.
+    """
     evidence = _gain(search, one)
     if behind:
         next_best = f"{' + '.join(behind[0].claim.labels(data))}, {number(behind[0].bic - one.bic, 3)} behind by BIC"
@@ -108,7 +115,7 @@ def _told(search: Search, data: Data, one: Weighed, behind: Sequence[Weighed]) -
     command = " ".join(["bushfit diagnose CAMPAIGN", *(f"--adopt {name}" for name in one.claim.labels(data))])
     advice = f"if the records of the tests bear it out, {'; '.join(one.claim.corrections(data))} (or {command})"
     if_so = f"agree if {one.claim.words(data)}"
-    names = _named(data, one.claim, evidence, ())
+    names = _named(data, one.claim, evidence, richer=richer)
     diagnosis = finish(search, "named", f"these tests {if_so}", search.base, names, next_test=advice)
     warning = f"fitted to the tests as they are, which only {if_so}: {advice}"
     return replace(

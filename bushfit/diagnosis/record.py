@@ -69,7 +69,7 @@ class Named:
 
     Args:
         alternatives: effects these tests cannot tell from it.
-        richer: effects that contain it as a limit, and whose further parameters these tests do not show.
+        richer: effects of which it is a special case, and whose further freedom these tests do not show.
         test: of a mistake in the record, the test in which it was made; None of what is not made in a test.
         sentence: of a mistake, what would be so; else that of the effect.
         correction: of a mistake, what to write into the campaign.

@@ -95,6 +95,15 @@ def test_what_cannot_be_told_apart_is_ambiguous(measured: Measured) -> None:
     assert diagnosis.after is diagnosis.before
 
 
+def test_the_effect_of_which_a_mistake_is_one_value_is_said_with_it(measured: Measured) -> None:
+    """A clock at a tenth of its rate is a mistake that people make, and one value of loop_clock."""
+    truth = "ten_times_slower:loop_axial_1 ten_times_slower:loop_axial_2"
+    diagnosis = asked(MADE[truth](measured(None, SHARED)))
+    assert [(effect.label, effect.richer) for effect in diagnosis.effects] == [
+        (name, ("loop_clock",)) for name in truth.split()
+    ]
+
+
 def test_what_all_tests_share_is_not_seen_and_not_named(measured: Measured) -> None:
     """All forces in kgf are all moduli 9.81 times too small: the tests agree."""
     campaign = on_loops(lambda x: replace(x, force=x.force / 9.80665), 0, 1)(measured(None, SHARED))
