@@ -18,14 +18,35 @@ from bushfit.reading.measurement import Loop, Source, Sweep
 
 __all__ = ["DataSet", "LoopData", "SweepData", "loop_data", "parted", "sources", "sweep_data"]
 
+#: Relative difference of two loops' amplitudes, or frequencies, up to which one repeats the other; chosen: rigs come
+#: back to an amplitude within it.
+_SAME_LOOP = 0.02
+
 
 def loop_data(
     loops: Sequence[Loop], stated: RigSettings = UNSTATED, *, without_outliers: bool = False
 ) -> list[LoopData]:
-    """One data set per loop; rows that are outliers carry no weight where they are to be left out."""
+    """One data set per loop; rows that are outliers carry no weight where they are to be left out.
+
+    Notes:
+        The class of the rig is an error of the gain that all repeats of a loop share. Independent errors larger by the
+        root of their number leave the mean of the repeats, all that tells of the bushing, just as unsure.
+    """
     gain, _ = of_class(stated, (0.0, 0.0))
     drives = [drive_of(loop, without_outliers=without_outliers) for loop in loops]
-    return [LoopData(drive, gain_error=gain).weighted(np.array(drive.loop.weight)) for drive in drives]
+    errors = gain * np.sqrt(_repeats(drives))
+    return [
+        LoopData(drive, gain_error=float(error)).weighted(np.array(drive.loop.weight))
+        for drive, error in zip(drives, errors, strict=True)
+    ]
+
+
+def _repeats(drives: Sequence[Drive]) -> Array:
+    """How often each loop was made, itself counted, (n,)."""
+    at = np.log([(drive.amplitude, drive.frequency) for drive in drives]).reshape(-1, 2)
+    place = np.array([str(drive.loop.direction) for drive in drives])
+    near = np.all(np.abs(at[:, None] - at) <= _SAME_LOOP, axis=-1) & (place[:, None] == place)
+    return np.count_nonzero(near, axis=1)
 
 
 def sweep_data(

@@ -281,7 +281,8 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
     scale = np.sqrt(drive.weight[rows]) if binned else 1.0
     model, size = row_noise(off * scale, less_slow(phase, off)[0] * scale, cycles)
     if binned:
-        return replace(drive, row_noise=replace(model, size=max(size / found.force_noise, 1.0)))
+        breaks = () if drive.from_rest else tuple((np.flatnonzero(np.diff(turn)) + 1).tolist())
+        return replace(drive, row_noise=replace(model, size=max(size / found.force_noise, 1.0), breaks=breaks))
     if not model.order:
         return drive
     noise = drive.noise if drive.loop.noise is not None else max(size, FLOOR * drive.half_range)

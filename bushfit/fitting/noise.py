@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
-from scipy.special import chdtrc
+from scipy.special import chdtrc, fdtrc
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
@@ -34,11 +34,14 @@ _SMOOTH_DEGREE = 4
 #: only follow the slope over ln X.
 _SURFACE_DEGREES = (1, 3)
 #: Common steps of two repeats from which on their difference tells a variance and a mean.
-_FEWEST_STEPS = 3
+FEWEST_STEPS = 3
 #: Degrees of freedom from which on a line may have a scatter of its own: fewer tell it no better than within a quarter.
 _OWN_SCATTER = 10
 #: Probability by chance of a scatter that grows along what is stepped, below which it counts.
 _LEVEL_SCATTER_P = 1e-3
+#: The same from which on gain and phase have scatters of their own; chosen: with 5 of each, weights of their own cost a
+#: tenth of the accuracy.
+OWN_GAIN = 20
 #: Exponents of the variance along what is stepped at most, far beyond those of rigs.
 _STEEPEST = 6.0
 #: Differences from which on outliers are sought among them: of fewer, the median tells no scale.
@@ -263,9 +266,11 @@ def _pooled(lines: Mapping[LineKey, _Line], measured: Sequence[_Line]) -> tuple[
     few = [line for line in measured if told and line.freedom < _OWN_SCATTER]
     counted = [*alike, *few] if alike else measured
     freedoms = [line.freedom for line in counted]
-    pooled = np.average([line.variance for line in counted], axis=0, weights=freedoms)
+    pooled, freedom = np.average([line.variance for line in counted], axis=0, weights=freedoms), sum(freedoms)
+    if freedom < OWN_GAIN and fdtrc(freedom, freedom, pooled.max() / max(pooled.min(), FLOOR**2)) > _EQUAL_NOISE_P:
+        pooled = np.full(2, pooled.mean())
     if alike or not told:
-        return dict.fromkeys(lines, pooled), round(sum(freedoms))
+        return dict.fromkeys(lines, pooled), round(freedom)
     own = {key: line.variance if line.freedom >= _OWN_SCATTER else pooled for key, line in lines.items()}
     return own, round(min(line.freedom for line in told))
 
@@ -298,7 +303,7 @@ def _line(sweep: Sweep, log_stiffness: Array, held: float) -> _Line:
     table[row, column] = log_stiffness[chosen]
     differences = (one - other for one, other in combinations(table, 2))
     kept = [(difference, _usual(difference, np.log(steps))) for difference in differences]
-    pairs = [(difference[usual], steps[usual]) for difference, usual in kept if usual.sum() >= _FEWEST_STEPS]
+    pairs = [(difference[usual], steps[usual]) for difference, usual in kept if usual.sum() >= FEWEST_STEPS]
     if not pairs:
         return _about_smooth_curve(np.log(steps), np.nanmean(table, axis=0))
     scatter = [_parts(difference - difference.mean()) for difference, _ in pairs]

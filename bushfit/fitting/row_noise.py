@@ -51,6 +51,7 @@ class RowNoise:
         share: of the whitened rows' variance that is there; the rest is the floor under the spectrum.
         size: standard deviation of a row of unit weight over the noise of a recorded row, which is above 1 for bins
             of rows that depend on one another.
+        breaks: rows, but the first, that tell nothing of the row before them: there begin the means over other cycles.
     """
 
     filter: Array = field(default_factory=lambda: np.ones(1))
@@ -58,6 +59,7 @@ class RowNoise:
     error: Array | None = None
     share: float = 1.0
     size: float = 1.0
+    breaks: tuple[int, ...] = ()
 
     @property
     def order(self) -> int:
@@ -75,7 +77,9 @@ class RowNoise:
         told = counts.copy()
         for k in range(1, self.order + 1):
             told[k:] &= counts[:-k]
-        told[: self.order] = counts[: self.order].all()
+        for first in (0, *self.breaks):
+            begun = slice(first, first + self.order)
+            told[begun] = counts[begun].all()
         return told
 
     def whiten(self, rows: Array) -> Array:
@@ -83,7 +87,10 @@ class RowNoise:
         white = self.filter[0] * rows
         for k in range(1, self.order + 1):
             white[..., k:] += self.filter[k] * rows[..., :-k]
-        white[..., : self.order] = rows[..., : self.order] @ self.starts.T
+        for first in (0, *self.breaks):
+            begun = rows[..., first : first + self.order]
+            few = begun.shape[-1]
+            white[..., first : first + few] = begun @ self.starts[:few, :few].T
         return white
 
     def unsure(self, influence: Array) -> list[Array]:

@@ -1,6 +1,7 @@
 """The plan: tests chosen for an aim, in their order, and the standard programme of as many hours beside them."""
 
 from bisect import bisect_left
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -8,12 +9,13 @@ from functools import cached_property
 
 import numpy as np
 
-from bushfit.campaign.schema import SimulatedLoop
+from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.search import SAME
 from bushfit.effects import qualified
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.fitting.data_sets import new_sweep
+from bushfit.fitting.noise import FEWEST_STEPS, OWN_GAIN
 from bushfit.fitting.solve import residual
 from bushfit.model.covariance import Z95
 from bushfit.planning.candidates import candidates, minutes, setup_minutes, standard_tests
@@ -186,7 +188,26 @@ class _Planner:
                 few = again[np.argsort(self.budget.minutes[again])][:_REPEATED]
                 made = [fits for twice in few if (fits := self._fitting(counts + one[twice])) is not None]
                 counts = min(made, key=strict.together, default=counts)
+        return self._telling_noise(counts)
+
+    def _telling_noise(self, counts: Array) -> Array:
+        """The runs with further repeats of sweeps, until a fit can tell their scatter from what repeats differ by."""
+        one, strict = np.eye(len(self.tests), dtype=int), self._criterion(_STRICT)
+        while self._scatter_told(counts) < OWN_GAIN:
+            again = np.flatnonzero((counts > 0) & (counts < self.budget.runs))
+            made = [fits for test in again if (fits := self._fitting(counts + one[test])) is not None]
+            more = [runs for runs in made if self._scatter_told(runs) > self._scatter_told(counts)]
+            if not more:
+                break
+            counts = min(more, key=strict.together)
         return counts
+
+    def _scatter_told(self, counts: Array) -> int:
+        """Degrees of freedom of the scatter of sweeps that repeats tell, those before and so many runs of each test."""
+        runs = Counter(self.known.tests)
+        runs.update({test: int(n) for test, n in zip(self.tests, counts, strict=True) if n})
+        each = {test: len(test.steps) - 1 for test in runs if isinstance(test, SimulatedSweep)}
+        return sum(freedom * (runs[test] - 1) for test, freedom in each.items() if freedom + 1 >= FEWEST_STEPS)
 
     def _of_drift(self, counts: Array) -> float:
         """Noncentrality of a drift by so many runs of each test, in their best order."""
