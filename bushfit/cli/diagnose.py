@@ -142,7 +142,9 @@ def _tell_evidence(options: Options, effect: Mapping[str, Any]) -> None:
     console = options.console
     console.print(f"  [bold]why {effect['name']}:[/bold] {escape(effect['evidence'])}")
     if effect["richer"]:
-        console.print(f"    the simpler name; a special case of {', '.join(effect['richer'])}, which these tests do not show")
+        console.print(
+            f"    the simpler name; a special case of {', '.join(effect['richer'])}, which these tests do not show"
+        )
 
 
 def _tell_candidates(options: Options, diagnosis: Diagnosis) -> None:

@@ -100,9 +100,7 @@ def _gain(search: Search, one: Weighed) -> str:
     return f"takes {search.base.chi_square - one.evidence.chi_square:.0f} off chi-square without a parameter"
 
 
-def _told(
-    search: Search, data: Data, one: Weighed, behind: Sequence[Weighed], richer: Sequence[str]
-) -> Diagnosis:
+def _told(search: Search, data: Data, one: Weighed, behind: Sequence[Weighed], richer: Sequence[str]) -> Diagnosis:
     """The finding that names one mistake: the gap shrinks if it was made; the model stays as it was.
 
     Args:

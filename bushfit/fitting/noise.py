@@ -35,13 +35,11 @@ _SMOOTH_DEGREE = 4
 _SURFACE_DEGREES = (1, 3)
 #: Common steps of two repeats from which on their difference tells a variance and a mean.
 FEWEST_STEPS = 3
-#: Degrees of freedom from which on a line may have a scatter of its own: fewer tell it no better than within a quarter.
+#: Degrees of freedom from which on a line may have a scatter of its own, and phase another than gain: fewer tell it no
+#: better than within a quarter, and wrong weights cost a tenth of the accuracy.
 _OWN_SCATTER = 10
 #: Probability by chance of a scatter that grows along what is stepped, below which it counts.
 _LEVEL_SCATTER_P = 1e-3
-#: The same from which on gain and phase have scatters of their own; chosen: with 5 of each, weights of their own cost a
-#: tenth of the accuracy.
-OWN_GAIN = 20
 #: Exponents of the variance along what is stepped at most, far beyond those of rigs.
 _STEEPEST = 6.0
 #: Differences from which on outliers are sought among them: of fewer, the median tells no scale.
@@ -267,7 +265,7 @@ def _pooled(lines: Mapping[LineKey, _Line], measured: Sequence[_Line]) -> tuple[
     counted = [*alike, *few] if alike else measured
     freedoms = [line.freedom for line in counted]
     pooled, freedom = np.average([line.variance for line in counted], axis=0, weights=freedoms), sum(freedoms)
-    if freedom < OWN_GAIN and fdtrc(freedom, freedom, pooled.max() / max(pooled.min(), FLOOR**2)) > _EQUAL_NOISE_P:
+    if freedom < _OWN_SCATTER and fdtrc(freedom, freedom, pooled.max() / max(pooled.min(), FLOOR**2)) > _EQUAL_NOISE_P:
         pooled = np.full(2, pooled.mean())
     if alike or not told:
         return dict.fromkeys(lines, pooled), round(freedom)

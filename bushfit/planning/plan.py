@@ -15,7 +15,7 @@ from bushfit.effects import qualified
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.fitting.data_sets import new_sweep
-from bushfit.fitting.noise import FEWEST_STEPS, OWN_GAIN
+from bushfit.fitting.noise import FEWEST_STEPS
 from bushfit.fitting.solve import residual
 from bushfit.model.covariance import Z95
 from bushfit.planning.candidates import candidates, minutes, setup_minutes, standard_tests
@@ -49,6 +49,8 @@ _AS_WELL = 0.995
 _DRIFT = 0.01
 #: Runs of a test at most: more than fit into any session.
 _MOST_RUNS = 1000
+#: Degrees of freedom behind the scatter of sweeps at least; chosen: with five, errors are a tenth larger than planned.
+_SCATTER_TOLD = 20
 #: Tests of a place that are considered for its repeat, the quickest first; chosen for time.
 _REPEATED = 4
 #: Information, relative to the largest, below which tests alone leave a combination of parameters open.
@@ -193,7 +195,7 @@ class _Planner:
     def _telling_noise(self, counts: Array) -> Array:
         """The runs with further repeats of sweeps, until a fit can tell their scatter from what repeats differ by."""
         one, strict = np.eye(len(self.tests), dtype=int), self._criterion(_STRICT)
-        while self._scatter_told(counts) < OWN_GAIN:
+        while self._scatter_told(counts) < _SCATTER_TOLD:
             again = np.flatnonzero((counts > 0) & (counts < self.budget.runs))
             made = [fits for test in again if (fits := self._fitting(counts + one[test])) is not None]
             more = [runs for runs in made if self._scatter_told(runs) > self._scatter_told(counts)]
