@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import load_campaign
-from bushfit.campaign.schema import FitSettings, ParameterSetting
+from bushfit.campaign.schema import FitSettings, ParameterSetting, RigSettings
 from bushfit.errors import FitError
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
@@ -21,6 +21,16 @@ from bushfit.model.result import Outlier
 @pytest.fixture(scope="module")
 def measured(root: Path) -> Data:
     return Data.of(load_campaign(root / "configs/cmp_15961.toml"))
+
+
+def test_repeats_of_a_loop_share_the_error_of_its_gain(root: Path) -> None:
+    """So their mean is no surer of it than one of them: each counts as more unsure by the root of their number."""
+    campaign = replace(load_campaign(root / "configs/cmp_15961.toml"), rig=RigSettings(gain_error=5e-3))
+    (loop,) = campaign.loops
+    faster = replace(loop, name="faster", time=loop.time / 2.0)
+    again = [replace(loop, name=f"again_{number}", displacement=1.01 * loop.displacement) for number in range(3)]
+    found = Data.of(replace(campaign, loops=(loop, *again, faster))).loops
+    np.testing.assert_allclose([each.gain_error for each in found], [1e-2] * 4 + [5e-3])
 
 
 def test_axial_tests_are_used_unless_told(measured: Data) -> None:

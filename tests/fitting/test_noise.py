@@ -64,6 +64,21 @@ def test_scatter_of_gain_and_phase_need_not_be_alike(noisy_sweep: Callable[..., 
     np.testing.assert_allclose(scatter, [2e-3, 8e-3], rtol=0.05)
 
 
+@pytest.mark.parametrize(("loss", "alike"), [(5e-3, True), (2e-1, False)])
+def test_few_differences_share_one_scatter_unless_they_deny_it(
+    noisy_sweep: Callable[..., Sweep], loss: float, alike: bool
+) -> None:
+    """Two runs of eight points: seven differences part phase from gain where it scatters forty times as much."""
+    whole = noisy_sweep(3, 5e-3, repeats=2, loss=loss)
+    few = (whole.amplitude == AMPLITUDES[0]) & (whole.frequency < 80.0)
+    kept = {name: getattr(whole, name)[few] for name in ("frequency", "amplitude", "stiffness", "repeat")}
+    found = sweep_noise([replace(whole, **kept)])
+    assert found.scatter_freedom < 10
+    (scatter,) = found.random.values()
+    assert (scatter[0] == scatter[1]) is alike
+    assert scatter[1] == pytest.approx(loss, rel=0.7)
+
+
 def test_a_noisier_level_keeps_noise_of_its_own(noisy_sweep: Callable[..., Sweep]) -> None:
     quiet, loud = noisy_sweep(1, 1e-3), noisy_sweep(2, 2e-2)
     mixed = replace(quiet, stiffness=np.where(quiet.amplitude == 5e-4, loud.stiffness, quiet.stiffness))

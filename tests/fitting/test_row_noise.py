@@ -44,7 +44,7 @@ def cycles_of(loop: Loop, cycles: int, noise: np.ndarray) -> Loop:
     force = np.tile(loop.force[once], cycles)
     return replace(
         loop,
-        time=loop.time[: force.size],
+        time=(loop.time[1] - loop.time[0]) * np.arange(force.size),
         displacement=np.tile(loop.displacement[once], cycles),
         force=force + 3e-3 * np.ptp(force) / 2.0 * noise,
     )
@@ -125,6 +125,36 @@ def test_whitening_is_exact_from_the_first_row_on() -> None:
     shares = np.zeros((1, 200))
     shares[0, 50:60] = 0.1
     np.testing.assert_allclose(found.error_of_sums(shares), np.sqrt(covariance[50:60, 50:60].mean()), rtol=1e-3)
+
+
+def test_rows_of_other_cycles_are_whitened_anew() -> None:
+    """Means over other cycles tell nothing of one another: between them the correlation is none."""
+    from scipy.linalg import block_diag, toeplitz
+
+    lengths, r = (7, 5, 1, 8), 0.9
+    root = np.linalg.cholesky(block_diag(*(toeplitz(r ** np.arange(n)) for n in lengths)))
+    noise = RowNoise(np.array([1.0, -r]) / np.sqrt(1.0 - r**2), np.ones((1, 1)), breaks=(7, 12, 13))
+    white = noise.whiten(root.T)
+    np.testing.assert_allclose(white.T @ white, np.eye(sum(lengths)), atol=1e-12)
+    weight = np.ones(sum(lengths))
+    weight[[3, 11]] = 0.0
+    assert np.flatnonzero(~noise.told(weight)).tolist() == [3, 4, 11]
+
+
+def test_harmonics_of_a_long_loop_err_as_its_noise_says(rig: Rig, paper_model: Model) -> None:
+    """20 cycles are counted in means over groups of cycles; where these meet, no row tells of the one before."""
+    (clean,) = rig(paper_model).loops
+    without = drive_of(cycles_of(clean, 20, np.zeros(20_000))).force
+    off = []
+    for seed in range(60):
+        found = LoopData(drive_of(cycles_of(clean, 20, filtered(np.random.default_rng(seed), 20_000, 0.9))))
+        calm = replace(found, drive=replace(found.drive, force=without))
+        waves = found.contrasts()[[0, 1, 3, 5, 7, 9]]  # the mean and the cosines, largest where the groups meet
+        error = found.residual(paper_model) - calm.residual(paper_model)
+        off.append(waves @ error / np.linalg.norm(waves, axis=1))
+    rms = float(np.sqrt(np.mean(np.square(off))))
+    print(f"mean and cosines off by {rms:.2f} standard errors, root mean square of {np.size(off)}")
+    assert 0.93 < rms < 1.1
 
 
 def test_noise_that_a_filter_took_away_has_a_floor() -> None:

@@ -1,5 +1,6 @@
 """A plan against what is worked out another way: full covariances, every choice there is, and fits."""
 
+from collections import Counter
 from dataclasses import replace
 from itertools import permutations, product
 from pathlib import Path
@@ -219,6 +220,15 @@ def test_a_plan_is_better_than_the_standard_programme_and_no_blinder(planned: Pl
     assert len(worst) > 20
     assert max(worst.values()) < 1.02
     assert planned.planned.drift < 0.3
+
+
+@pytest.mark.parametrize("hours", [1.3, 2.5])
+def test_repeats_tell_the_noise(root: Path, hours: float) -> None:
+    found = PlanTests("predictions", hours).run(load_campaign(root / "configs/new_bushing.toml")).plan
+    runs = Counter(test for test in found.planned.tests if isinstance(test, SimulatedSweep))
+    told = sum((count - 1) * (len(test.steps) - 1) for test, count in runs.items() if len(test.steps) > 2)
+    print(f"{told} differences tell the scatter from point to point")
+    assert told >= 20
 
 
 @pytest.mark.parametrize("hours", [2.5, 8.0])
