@@ -18,7 +18,7 @@ from bushfit.effects.mistakes import MISTAKES, SEPARATOR, labelled, mistake_name
 from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_set import DataSet
-from bushfit.fitting.data_sets import SweepData, loop_data
+from bushfit.fitting.data_sets import SweepData, loop_data, with_gain_errors
 from bushfit.geometry import Bushing, Place
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
@@ -86,7 +86,7 @@ class Claim:
                 loops[place] = loop_data([test], data.campaign.rig, without_outliers=data.robust)[0]
             elif isinstance(test, Sweep):
                 sweeps[place - count] = test
-        data = replace(data, loops=tuple(loops))
+        data = replace(data, loops=tuple(with_gain_errors(loops, data.campaign.rig)))
         if any(place >= count for place in self.tests):
             data = data.with_sweeps(sweeps)
         return data.in_session()

@@ -11,10 +11,10 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.holdout import hold_out
 from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.record import Diagnosis, Judged, Named
-from bushfit.diagnosis.refit import EXCLUDED
+from bushfit.diagnosis.refit import EXCLUDED, Candidate
 from bushfit.diagnosis.search import SAME, Search
 from bushfit.diagnosis.verdict import finish, is_consistent, worst_fault
-from bushfit.effects import effect_named
+from bushfit.effects import effect_named, qualified
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data import Data
 from bushfit.units import number
@@ -55,8 +55,7 @@ def mistaken(search: Search, data: Data, fitted: Fitted) -> Diagnosis | None:
     closing = [one for one in weighed if one.bic < weighed[0].bic + SAME and _closes(one.evidence, search)]
     if not closing:
         return None
-    claimed = {one.mistake.name for one in closing[0].claim.each}
-    free = (effect.name,) if effect and claimed & {*effect_named(effect.name).frees} else ()
+    free = (effect.name,) if effect and _frees(effect, closing[0].claim) else ()
     rivals |= {name: rivals[name] + 2.0 * SAME for name in free}
     others = [name for name, bic in rivals.items() if bic < closing[0].bic + SAME]
     closing.sort(key=lambda one: len(one.claim.tests))
@@ -66,6 +65,16 @@ def mistaken(search: Search, data: Data, fitted: Fitted) -> Diagnosis | None:
         told = _told(search, data, closing[0], [one for one in weighed if one is not closing[0]], free)
     candidates = [*told.candidates, *_judged(search, data, weighed, closing)]
     return replace(told, candidates=tuple(sorted(candidates, key=lambda judged: -judged.score)))
+
+
+def _frees(effect: Candidate, claim: Claim) -> bool:
+    """Whether one value of the effect's amount makes the claim: it acts in all tests of the claim, and in no other."""
+    record, model = effect_named(effect.name), effect.evidence.model
+    if claim.mistake.name not in record.frees:
+        return False
+    without = model.with_values({qualified(record, record.amount): record.amount.neutral or 0.0})
+    moved = [each.residual(model) - each.residual(without) for each in effect.evidence.data_sets]
+    return {place for place, change in enumerate(moved) if change.any()} == {*claim.tests}
 
 
 def _weighed(search: Search, data: Data, fitted: Fitted, goal: float) -> list[Weighed]:

@@ -26,27 +26,23 @@ _SAME_LOOP = 0.02
 def loop_data(
     loops: Sequence[Loop], stated: RigSettings = UNSTATED, *, without_outliers: bool = False
 ) -> list[LoopData]:
-    """One data set per loop; rows that are outliers carry no weight where they are to be left out.
+    """One data set per loop; rows that are outliers carry no weight where they are to be left out."""
+    drives = [drive_of(loop, without_outliers=without_outliers) for loop in loops]
+    return with_gain_errors([LoopData(drive).weighted(np.array(drive.loop.weight)) for drive in drives], stated)
+
+
+def with_gain_errors(loops: Sequence[LoopData], stated: RigSettings) -> list[LoopData]:
+    """The same loops with the error of their gain that the class of the rig states.
 
     Notes:
-        The class of the rig is an error of the gain that all repeats of a loop share. Independent errors larger by the
-        root of their number leave the mean of the repeats, all that tells of the bushing, just as unsure.
+        All repeats of a loop share it. Independent errors larger by the root of their number leave the mean of the
+        repeats, all that tells of the bushing, just as unsure.
     """
-    gain, _ = of_class(stated, (0.0, 0.0))
-    drives = [drive_of(loop, without_outliers=without_outliers) for loop in loops]
-    errors = gain * np.sqrt(_repeats(drives))
-    return [
-        LoopData(drive, gain_error=float(error)).weighted(np.array(drive.loop.weight))
-        for drive, error in zip(drives, errors, strict=True)
-    ]
-
-
-def _repeats(drives: Sequence[Drive]) -> Array:
-    """How often each loop was made, itself counted, (n,)."""
-    at = np.log([(drive.amplitude, drive.frequency) for drive in drives]).reshape(-1, 2)
-    place = np.array([str(drive.loop.direction) for drive in drives])
-    near = np.all(np.abs(at[:, None] - at) <= _SAME_LOOP, axis=-1) & (place[:, None] == place)
-    return np.count_nonzero(near, axis=1)
+    at = np.log([(loop.drive.amplitude, loop.drive.frequency) for loop in loops]).reshape(-1, 2)
+    place = np.array([str(loop.direction) for loop in loops])
+    repeats = np.all(np.abs(at[:, None] - at) <= _SAME_LOOP, axis=-1) & (place[:, None] == place)
+    errors = of_class(stated, (0.0, 0.0))[0] * np.sqrt(np.count_nonzero(repeats, axis=1))
+    return [replace(loop, gain_error=error) for loop, error in zip(loops, errors.tolist(), strict=True)]
 
 
 def sweep_data(

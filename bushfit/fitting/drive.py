@@ -280,6 +280,10 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
         off = np.interp(phase, phase[weight > 0.0], off[weight > 0.0])
     scale = np.sqrt(drive.weight[rows]) if binned else 1.0
     model, size = row_noise(off * scale, less_slow(phase, off)[0] * scale, cycles)
+    if binned and model.order:
+        drive = replace(drive, weight=_evened(drive.weight, turn))
+        scale = np.sqrt(drive.weight[rows])
+        model, size = row_noise(off * scale, less_slow(phase, off)[0] * scale, cycles)
     if binned:
         breaks = () if drive.from_rest else tuple((np.flatnonzero(np.diff(turn)) + 1).tolist())
         return replace(drive, row_noise=replace(model, size=max(size / found.force_noise, 1.0), breaks=breaks))
@@ -287,6 +291,15 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
         return drive
     noise = drive.noise if drive.loop.noise is not None else max(size, FLOOR * drive.half_range)
     return replace(drive, noise=noise, row_noise=model)
+
+
+def _evened(weight: Array, turn: Array) -> Array:
+    """Of bins of rows that depend on one another one weight for each turn: a row more or less in a bin tells nothing
+    more, and a filter would take the step between their weights for information."""
+    held = weight > 0.0
+    count = np.bincount(turn[held], minlength=turn.max() + 1)
+    mean = np.bincount(turn[held], weight[held], minlength=count.size) / np.maximum(count, 1)
+    return np.where(held, mean[turn], 0.0)
 
 
 def _without(values: Array, rows: Array) -> Array:

@@ -256,7 +256,10 @@ def _slope(lines: Sequence[_Line]) -> tuple[float, float] | None:
 
 
 def _pooled(lines: Mapping[LineKey, _Line], measured: Sequence[_Line]) -> tuple[dict[LineKey, Array], int]:
-    """Variance of gain and phase of each line, (2,), one for all where they agree, and its degrees of freedom."""
+    """Variance of gain and phase of each line, (2,), one for all where they agree, and its degrees of freedom.
+
+    Of few degrees of freedom gain and phase have one, unless they deny it.
+    """
     if not measured:
         return {key: line.variance for key, line in lines.items()}, round(min(line.freedom for line in lines.values()))
     told = [line for line in measured if line.freedom >= _OWN_SCATTER]
@@ -265,7 +268,8 @@ def _pooled(lines: Mapping[LineKey, _Line], measured: Sequence[_Line]) -> tuple[
     counted = [*alike, *few] if alike else measured
     freedoms = [line.freedom for line in counted]
     pooled, freedom = np.average([line.variance for line in counted], axis=0, weights=freedoms), sum(freedoms)
-    if freedom < _OWN_SCATTER and fdtrc(freedom, freedom, pooled.max() / max(pooled.min(), FLOOR**2)) > _EQUAL_NOISE_P:
+    unequal = 2.0 * fdtrc(freedom, freedom, pooled.max() / max(pooled.min(), FLOOR**2)) < _EQUAL_NOISE_P
+    if freedom < _OWN_SCATTER and not unequal:
         pooled = np.full(2, pooled.mean())
     if alike or not told:
         return dict.fromkeys(lines, pooled), round(freedom)

@@ -17,6 +17,7 @@ from bushfit.errors import ModelError
 from bushfit.fitting.data_sets import new_sweep
 from bushfit.fitting.noise import FEWEST_STEPS
 from bushfit.fitting.solve import residual
+from bushfit.geometry import Place, Specimen
 from bushfit.model.covariance import Z95
 from bushfit.planning.candidates import candidates, minutes, setup_minutes, standard_tests
 from bushfit.planning.contract import Knowledge, Plan, Programme, Test, Visible, Wanted
@@ -50,7 +51,9 @@ _DRIFT = 0.01
 #: Runs of a test at most: more than fit into any session.
 _MOST_RUNS = 1000
 #: Degrees of freedom behind the scatter of sweeps at least; chosen: with five, errors are a tenth larger than planned.
-_SCATTER_TOLD = 20
+_SCATTER_TOLD = 10
+#: What the logarithm of the variance that is wanted small may rise for that: a twentieth of the error.
+_LITTLE = 0.1
 #: Tests of a place that are considered for its repeat, the quickest first; chosen for time.
 _REPEATED = 4
 #: Information, relative to the largest, below which tests alone leave a combination of parameters open.
@@ -193,23 +196,34 @@ class _Planner:
         return self._telling_noise(counts)
 
     def _telling_noise(self, counts: Array) -> Array:
-        """The runs with further repeats of sweeps, until a fit can tell their scatter from what repeats differ by."""
+        """The runs with further repeats of sweeps, until a fit can tell their scatter from what repeats differ by, as
+        far as that costs next to nothing of the aim."""
         one, strict = np.eye(len(self.tests), dtype=int), self._criterion(_STRICT)
-        while self._scatter_told(counts) < _SCATTER_TOLD:
-            again = np.flatnonzero((counts > 0) & (counts < self.budget.runs))
+        most, told = strict.together(counts) + _LITTLE, self._scatter_told(counts)
+        while told < _SCATTER_TOLD:
+            again = [place for place in np.flatnonzero(counts) if _differences(self.tests[place])]
             made = [fits for test in again if (fits := self._fitting(counts + one[test])) is not None]
-            more = [runs for runs in made if self._scatter_told(runs) > self._scatter_told(counts)]
+            more = [runs for runs in made if self._scatter_told(runs) > told and strict.together(runs) <= most]
             if not more:
                 break
             counts = min(more, key=strict.together)
+            told = self._scatter_told(counts)
         return counts
 
     def _scatter_told(self, counts: Array) -> int:
-        """Degrees of freedom of the scatter of sweeps that repeats tell, those before and so many runs of each test."""
+        """Degrees of freedom of the scatter of sweeps that repeats tell, those before and so many runs of each test.
+
+        Of several rigs, the bushing's and each specimen's, the fewest.
+        """
         runs = Counter(self.known.tests)
         runs.update({test: int(n) for test, n in zip(self.tests, counts, strict=True) if n})
-        each = {test: len(test.steps) - 1 for test in runs if isinstance(test, SimulatedSweep)}
-        return sum(freedom * (runs[test] - 1) for test, freedom in each.items() if freedom + 1 >= FEWEST_STEPS)
+        told = Counter[Place | None]()
+        for test, times in runs.items():
+            if isinstance(test, SimulatedSweep):
+                told[test.direction if isinstance(test.direction, Specimen) else None] += _differences(test) * (
+                    times - 1
+                )
+        return min(told.values(), default=0)
 
     def _of_drift(self, counts: Array) -> float:
         """Noncentrality of a drift by so many runs of each test, in their best order."""
@@ -358,6 +372,12 @@ class _Planner:
 def _found(noncentrality: float) -> float:
     """The smallest amount that is found, of a column with this noncentrality for a unit; inf where it is not seen."""
     return FOUND / float(np.sqrt(noncentrality)) if noncentrality > 0.0 else np.inf
+
+
+def _differences(test: Test) -> int:
+    """Degrees of freedom of the scatter that a repeat of a test tells."""
+    steps = len(test.steps) if isinstance(test, SimulatedSweep) else 0
+    return steps - 1 if steps >= FEWEST_STEPS else 0
 
 
 def _line(test: Test) -> tuple[object, ...]:

@@ -11,8 +11,11 @@ from asking import INERTIA, asked, said
 from rigged import SHARED, Diagnosed, Measured
 
 from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import RigSettings
+from bushfit.diagnosis.claims import adopted
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.errors import ModelError
+from bushfit.fitting.data import Data
 from bushfit.geometry import Bushing, Direction
 from bushfit.reading.measurement import Loop, Sweep
 
@@ -102,6 +105,18 @@ def test_the_effect_of_which_a_mistake_is_one_value_is_said_with_it(measured: Me
     assert [(effect.label, effect.richer) for effect in diagnosis.effects] == [
         (name, ("loop_clock",)) for name in truth.split()
     ]
+    one = asked(on_loops(lambda x: replace(x, time=x.time / 10), 1)(measured(None, SHARED)))
+    assert [(effect.label, effect.richer) for effect in one.effects] == [("ten_times_slower:loop_axial_2", ())]
+
+
+def test_mended_repeats_still_share_the_error_of_their_gain(measured: Measured) -> None:
+    campaign = replace(measured(None, SHARED), rig=RigSettings(gain_error=5e-3))
+    again = replace(campaign.loops[0], name="again")
+    campaign = replace(campaign, loops=(*campaign.loops, again))
+    wrong = on_loops(lambda x: replace(x, time=x.time / 10), 2)(campaign)
+    mended, _ = adopted(Data.of(wrong), ["ten_times_slower:again"])
+    right = Data.of(campaign)
+    assert [loop.gain_error for loop in mended.loops] == [loop.gain_error for loop in right.loops]
 
 
 def test_what_all_tests_share_is_not_seen_and_not_named(measured: Measured) -> None:
