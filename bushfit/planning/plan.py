@@ -220,9 +220,8 @@ class _Planner:
         told = Counter[Place | None]()
         for test, times in runs.items():
             if isinstance(test, SimulatedSweep):
-                told[test.direction if isinstance(test.direction, Specimen) else None] += _differences(test) * (
-                    times - 1
-                )
+                rig = test.direction if isinstance(test.direction, Specimen) else None
+                told[rig] += _differences(test) * (times - 1)
         return min(told.values(), default=0)
 
     def _of_drift(self, counts: Array) -> float:
