@@ -32,9 +32,10 @@ class Again:
 def searched_again(search: Search, final: Evidence, steps: Sequence[Step], held: HoldOut) -> list[Again]:
     """The search made anew without each part that was held out, with the same noise, and what comes of it.
 
-    It adds as many effects as were named and looks for no more: what a part less brings beside them is not asked. Of
-    several effects another name without one part is enough to take them back, and ends it. The search goes step by
-    step and may miss what fits the rest best: where what was named does, it came again.
+    It adds as many effects as were named and looks for no more: what a part less brings beside them is not asked. Each
+    candidate starts where all the tests left it. Where the same effects are added, they came again; else their rivals
+    are tried first. Of several effects another name without one part is enough to take them back, and ends it. The
+    search goes step by step and may miss what fits the rest best: where what was named does, it came again.
     """
     named, told = {step.name for step in steps}, {part.part for part in held.parts}
     known = {name for step in steps for name in (step.name, *(each.name for each in (*step.rivals, *step.richer)))}
@@ -44,8 +45,12 @@ def searched_again(search: Search, final: Evidence, steps: Sequence[Step], held:
             continue
         try:
             rest = fit(search.base.model, part.rest(search.base.data_sets), search.held, search.bounds)
-            anew = Search.begin(rest, settings, search.start, search.held, search.bounds)
-            other, again = anew.reconsider(*anew.grow())
+            anew = Search.begin(rest, settings, search.start, search.held, search.bounds, search)
+            grown, added = anew.grow()
+            if {*added} == named:
+                found.append(Again(part.name, True, ()))
+                continue
+            other, again = anew.reconsider(grown, added)
             sets = [{step.name, *(rival.name for rival in (*step.rivals, *step.richer))} for step in again]
             every = all(any(name in members for members in sets) for name in named)
             every = every or fit(final.model, rest.data_sets, search.held, search.bounds).bic < other.bic - SAME

@@ -24,7 +24,7 @@ _MOST_FALL = 4.0
 #: Evaluations of the model before which no refit is stopped.
 _FIRST_EVALUATIONS = 4
 #: Evaluations of the model that the best refit may take: where it stops short, the next effect makes up for it.
-_TO_ITS_END = 200
+_TO_ITS_END = 100
 #: Evaluations before which a refit goes on where its proposal claimed to come near the best.
 _CLAIM_HOLDS = 12
 

@@ -74,25 +74,22 @@ class History:
     @cached_property
     def turning(self) -> Turning:
         """The pieces of each motion between its turning points, in the order in which friction follows them."""
-        count = self.value.shape[-1]
+        count, at = self.value.shape[-1], np.arange(self.value.shape[-1])
         if self.periodic:
-            top = np.argmax(self.value, axis=-1)[..., None]
-            path = np.take_along_axis(self.value, (top + np.arange(count + 1)) % count, axis=-1)
-            place = (np.arange(count) - top) % count
+            top = _shared(np.argmax(self.value, axis=-1)[..., None])
+            path = _taken(self.value, (top + np.arange(count + 1)) % count)
+            place = (at - top) % count
         else:
             path = np.concatenate([np.zeros_like(self.value[..., :1]), self.value], axis=-1)
-            place = np.broadcast_to(np.arange(1, count + 1), self.value.shape)
-        turned = reversals(path)
+            place = np.minimum(at + 1, count - 1)
+        turned = _shared(reversals(path))
         passed = np.cumsum(turned, axis=-1)
         ends = np.full((*turned.shape[:-1], int(passed[..., -1].max()) + 2), count)
         ends[..., 0] = 0
         *rows, samples = np.nonzero(turned)
         ends[*rows, passed[turned]] = samples
-        levels = np.take_along_axis(path, ends, axis=-1)
-        piece = np.take_along_axis(passed, np.minimum(place, count - 1), axis=-1)
-        travel = self.value - np.take_along_axis(levels, piece, axis=-1)
-        first = piece.reshape(-1, count)[0]
-        return Turning(np.diff(levels), travel, first if np.all(piece == first) else piece)
+        levels, piece = _taken(path, ends), _taken(passed, place)
+        return Turning(np.diff(levels), self.value - _taken(levels, piece), _shared(piece))
 
     @cached_property
     def rate(self) -> Array:
@@ -161,10 +158,22 @@ class Turning:
 
     def at_samples(self, of_pieces: Array) -> Array:
         """What holds for each piece, (..., k), at the samples on it, (..., n)."""
-        if self.piece.ndim == 1:
-            return of_pieces.take(self.piece, axis=-1)
-        piece = np.broadcast_to(self.piece, (*of_pieces.shape[:-1], self.piece.shape[-1]))
-        return np.take_along_axis(of_pieces, piece, axis=-1)
+        return _taken(of_pieces, self.piece)
+
+
+def _shared(rows: Array) -> Array:
+    """The one row, (n,), where all of them, (..., n), are the same; else all."""
+    first = rows.reshape(-1, rows.shape[-1])[0]
+    return first if np.all(rows == first) else rows
+
+
+def _taken(values: Array, at: Array) -> Array:
+    """Of each row of the values, (..., n), those at the places, (m,) or a row of them for each."""
+    if at.ndim == 1:
+        return values.take(at, axis=-1)
+    shape = np.broadcast_shapes(values.shape[:-1], at.shape[:-1])
+    each, places = (np.broadcast_to(of, (*shape, of.shape[-1])) for of in (values, at))
+    return np.take_along_axis(each, places, axis=-1)
 
 
 def reversals(value: Array) -> Array:

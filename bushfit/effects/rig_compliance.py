@@ -11,20 +11,21 @@ from bushfit.errors import ModelError
 
 #: The iterations stop when what is missing of the motion is less than this, relative to the imposed motion: rounding.
 TOLERANCE = 1e-14
-#: The same of a history, before a last step that counts as linear and leaves a hundredth of it.
+#: The same of a history, before a last step that counts as linear and leaves a hundredth of it; chosen: differences of
+#: a millionth then give derivatives good to a hundred-thousandth.
 _LAST = 1e-12
 #: Most rounds of an iteration: chosen, many more than a rig takes that is stiffer than the bushing.
 ROUNDS = 60
 #: What may be missing of the motion when all rounds are used up, relative to the imposed motion: less than any test
 #: resolves.
 _UNSETTLED = 1e-3
-#: Rounds after which a solution is no good start of the next, and K is measured anew; chosen: twice the usual.
+#: Rounds after which K was poor, and is measured anew for the next solution; chosen: twice the usual.
 _MANY_ROUNDS = 16
 #: Largest motion of the bushing that an iteration may try, relative to the imposed motion.
 _LARGEST_MOTION = 2.0
 #: Rounds before the last two from which the next is foreseen; chosen: three take a third of the rounds, more no less.
 _REMEMBERED = 3
-#: Share of the largest eigenvalue below which two of them teach the same: what rounding leaves.
+#: Share of all their squares that is added to each, so that two that teach the same do no harm: above rounding.
 _SAME_DIRECTION = 1e-12
 #: The name of its solutions.
 _NAME = "compliance"
@@ -82,8 +83,10 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     length = count if history.periodic else next_fast_len(2 * count, real=True)
     beneath = solved.setdefault(_BENEATH, {})
     rigid, reached = solved.pop(_NAME, (None, imposed))
-    if rigid is None or reached.shape not in (imposed.shape[-1:], imposed.shape):
-        rigid, reached = _pulse_stiffness(below, history, length), imposed
+    if reached.shape not in (imposed.shape[-1:], imposed.shape):
+        rigid, reached = None, imposed
+    if rigid is None:
+        rigid = _pulse_stiffness(below, history, length)
     yielding = 1.0 / (1.0 + compliance * rigid)
     size = np.max(np.abs(imposed), axis=-1, keepdims=True)
     felt = below(history.with_value(reached, beneath))
@@ -93,11 +96,9 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         off = np.max(np.abs(missing), axis=-1, keepdims=True)
         turned = yielding * np.fft.rfft(missing, n=length)
         if np.all(off <= _LAST * size):
-            if number < _MANY_ROUNDS:
-                many = imposed.ndim > 1  # else of many models on one motion the last is kept
-                solved[_NAME] = tuple(
-                    each if many else each.reshape(-1, each.shape[-1])[-1] for each in (rigid, reached)
-                )
+            many = imposed.ndim > 1  # else of many models on one motion the last is kept
+            kept = [each if many else each.reshape(-1, each.shape[-1])[-1] for each in (rigid, reached)]
+            solved[_NAME] = (kept[0] if number < _MANY_ROUNDS else None, kept[1])
             return felt + np.fft.irfft(rigid * turned, n=length)[..., :count]
         pace, last = np.where(off < last, pace, 0.5 * pace), off
         change = np.fft.irfft(turned, n=length)[..., :count]
@@ -119,10 +120,11 @@ def _foreseen(past: Sequence[Sequence[Array]]) -> Array:
     """What the last rounds, motions and changes (..., n), teach of the next change (D. G. Anderson, J. ACM 12 (1965)
     547): the combination of their differences that takes most off it."""
     motions, changes = (np.stack(each, axis=-2) for each in zip(*past, strict=True))
-    moved, changed = np.diff(motions, axis=-2), np.diff(changes, axis=-2)
-    normal = changed @ np.swapaxes(changed, -1, -2)
-    weights = np.linalg.pinv(normal, rcond=_SAME_DIRECTION, hermitian=True) @ (changed @ changes[..., -1, :, None])
-    return np.squeeze(np.swapaxes(weights, -1, -2) @ (moved + changed), axis=-2)
+    moved, changed = (each[..., 1:, :] - each[..., :-1, :] for each in (motions, changes))
+    normal = changed @ changed.mT
+    little = _SAME_DIRECTION * np.einsum("...ii->...", normal)[..., None, None] + np.finfo(float).tiny
+    weights = np.linalg.solve(normal + little * np.eye(len(past) - 1), changed @ changes[..., -1, :, None])
+    return np.squeeze(weights.mT @ (moved + changed), axis=-2)
 
 
 def _pulse_stiffness(below: ForceBelow, history: History, length: int) -> Array:
