@@ -75,13 +75,14 @@ class Knowledge:
     Args:
         model: the likeliest values.
         names: of its k parameters that the tests are to tell.
-        covariance: of their relative changes, (k, k), from what is known now.
+        covariance: of their relative changes and those of the bounded, (k + b, k + b), from what is known now.
         noise: of the rig.
         source: where all this comes from, in words.
         rivals: what is known if another model is the right one, this one's model first; none where there is no doubt.
         strain: largest equivalent strain amplitude measured so far; None where nothing was.
         specimens: bodies of the compound that can be tested in place of the bushing.
         tests: of the campaign so far.
+        bounded: its b parameters at rest on a bound, off which noise takes a fit half of the times; in typical sizes.
     """
 
     model: Model
@@ -93,11 +94,12 @@ class Knowledge:
     strain: float | None = None
     specimens: tuple[Specimen, ...] = ()
     tests: tuple[Test, ...] = ()
+    bounded: tuple[str, ...] = ()
 
     @property
     def errors(self) -> Array:
         """Standard error of each parameter's relative change, (k,)."""
-        return np.sqrt(np.diag(self.covariance))
+        return np.sqrt(np.diag(self.covariance))[: len(self.names)]
 
 
 @dataclass(frozen=True, eq=False)

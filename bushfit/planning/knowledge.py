@@ -14,14 +14,14 @@ from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import LIBRARY, twins_of
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import parted
+from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.noise import ASSUMED_SHARED, of_class
 from bushfit.fitting.solve import Bounds, Coordinates
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.planning.contract import Knowledge, Noise, Test
-from bushfit.planning.sensitivity import ROWS_PER_CYCLE
+from bushfit.planning.sensitivity import ROWS_PER_CYCLE, relative_slopes
 
 #: Standard error of the relative change of a parameter that is given without one; chosen: a value given by hand is
 #: right within a factor of 2.7.
@@ -68,7 +68,8 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
     def known(evidence: Evidence) -> Knowledge:
         result = replace(result_of(evidence, data.bounds, ()), specimens=data.campaign.specimens)
         strain = max(float(np.max(each.amplitude)) * model.unit_strain(each.direction) for each in data_sets)
-        return replace(of_result(result, noise, source), strain=strain, tests=tuple(_tests(data)))
+        told = replace(of_result(result, noise, source), strain=strain, tests=tuple(_tests(data)))
+        return _with_bounded(told, tuple(evidence.solution.at_bound), data_sets)
 
     if found is None or rivals is None:
         return known(fit(model, data_sets, held, data.bounds))
@@ -99,6 +100,19 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
         )
     every = [known(rivalling[name]) for name in names]
     return replace(every[0], rivals=tuple(every))
+
+
+def _with_bounded(known: Knowledge, bounded: tuple[str, ...], data_sets: Sequence[DataSet]) -> Knowledge:
+    """What the tests tell where parameters at rest on a bound count as free; what noise is more than was counted is
+    told by the errors of the others, with those held."""
+    free = replace(known, bounded=bounded)
+    slopes, k = relative_slopes(free, data_sets), len(known.names)
+    told = slopes @ slopes.T
+    answer = -np.linalg.solve(told[:k, :k], told[:k, k:])
+    excess = float(np.mean(np.diag(known.covariance @ told[:k, :k])))
+    own = excess * np.linalg.inv(told[k:, k:] + told[k:, :k] @ answer)
+    shared = answer @ own
+    return replace(free, covariance=np.block([[known.covariance + shared @ answer.T, shared], [shared.T, own]]))
 
 
 def _each_added(plain: Evidence, names: Sequence[str], held: Sequence[str], bounds: Bounds) -> dict[str, Evidence]:

@@ -115,16 +115,16 @@ class _Planner:
 
     def _view(self, known: Knowledge, further: Array) -> View:
         told = self.grid.told(relative_slopes(known, self.grid.data_sets), further)
-        return View(told, np.linalg.inv(known.covariance), self.grid.level)
+        return View(told, np.linalg.inv(known.covariance), self.grid.level, len(known.bounded))
 
     @cached_property
     def slopes(self) -> Array:
-        """Gain and phase of the stiffness at the points wanted by relative change of the parameters, (k, 2, n)."""
+        """Gain and phase of the stiffness at the points wanted by change of the parameters, (k + b, 2, n)."""
         sweeps = [
             new_sweep(self.known.model, points.place, points.frequency, points.amplitude, (1.0, 1.0), (0.0, 0.0))
             for points in self.wanted.points
         ]
-        each = [relative_slopes(self.known, [sweep]).reshape(len(self.known.names), 2, -1) for sweep in sweeps]
+        each = [np.stack(np.split(relative_slopes(self.known, [sweep]), 2, axis=-1), axis=1) for sweep in sweeps]
         return np.concatenate(each, axis=-1)
 
     @cached_property
@@ -134,7 +134,7 @@ class _Planner:
             return None
         if self.wanted.aim == "predictions":
             return np.asarray(np.einsum("kcn,lcn->kl", self.slopes, self.slopes) / self.slopes.shape[-1])
-        return np.diag(np.isin(self.known.names, self.wanted.parameters).astype(float))
+        return np.diag(np.isin((*self.known.names, *self.known.bounded), self.wanted.parameters).astype(float))
 
     @cached_property
     def budget(self) -> Budget:
@@ -271,8 +271,7 @@ class _Planner:
 
     def _lacking(self, counts: Array) -> list[str]:
         """Effects that so many runs of each test show less well than the standard programme."""
-        told = self.views[0].together(counts)
-        reached = shown(told, np.linalg.inv(told.own))[0]
+        reached = shown(self.views[0].together(counts))[0]
         short = np.sqrt(reached) < _AS_WELL * np.sqrt(self.least)
         return list(dict.fromkeys(self.columns[i].effect.name for i in np.flatnonzero(short)))
 
@@ -291,14 +290,13 @@ class _Planner:
     @cached_property
     def least(self) -> Array:
         """Noncentrality of each effect that the standard programme can show, 0 of others, (e,)."""
-        told = self.views[0].together(self._counts(self.standard_runs))
-        reached = shown(told, np.linalg.inv(told.own))[0]
+        reached = shown(self.views[0].together(self._counts(self.standard_runs)))[0]
         seen = [column.reach * np.sqrt(size) >= FOUND for column, size in zip(self.columns, reached, strict=True)]
         return np.where(seen, reached, 0.0)
 
     def _drifting(self, counts: Array) -> Drifting:
         """What a drift does to so many runs of each test."""
-        view, k = self.views[0], len(self.known.names)
+        view, k = self.views[0], len(self.known.names) + len(self.known.bounded)
         own, seen = view.told.own, view.told.own[:, k, k]
         one = Told(own * counts[:, None, None], own[..., k : k + 1], seen[:, None])  # by the gain of one run
         level = np.square(view.level[:, 0])
@@ -309,23 +307,23 @@ class _Planner:
     def _programme(self, runs: Sequence[int]) -> Programme:
         """What runs in their order tell."""
         counts = self._counts(runs)
-        told, phase_per_loss = self.views[0].together(counts), 1.0 / (1.0 + np.square(self._loss_factor))
-        covariance = np.linalg.inv(told.own[0])
-        gain, phase = np.sqrt(np.einsum("kcn,kl,lcn->cn", self.slopes, covariance, self.slopes))
-        drifting = self._drifting(counts)
+        view, phase_per_loss, k = self.views[0], 1.0 / (1.0 + np.square(self._loss_factor)), len(self.known.names)
+        told, drifting = view.together(counts), self._drifting(counts)
+        off, covariance = view.off(told)[0], np.linalg.inv(told.own[0])
+        gain, phase = np.sqrt(np.einsum("kcn,kl,lcn->cn", self.slopes, off, self.slopes))
         moved = np.linalg.cholesky(covariance) @ drifting.shift(runs) / np.sqrt(np.diag(covariance))
         places = self.budget.place[list(runs)]
         mounted = np.diff(places, prepend=-1) != 0
         return Programme(
             tuple(self.tests[run] for run in runs),
             self.budget.minutes[list(runs)] + self.budget.setup * mounted,
-            np.sqrt(np.diag(covariance)),
-            _alone(told.own[0] - self.views[0].prior),
+            np.sqrt(np.diag(off))[:k],
+            _alone(told.own[0] - view.prior)[:k],
             gain,
             phase / phase_per_loss,
             self._apart(counts),
-            tuple(self._visible(shown(told, covariance[None])[0], drifting.noncentrality(runs))),
-            _DRIFT * float(np.abs(moved).max()),
+            tuple(self._visible(shown(told)[0], drifting.noncentrality(runs))),
+            _DRIFT * float(np.abs(moved[:k]).max()),
         )
 
     @cached_property
@@ -349,6 +347,11 @@ class _Planner:
 
     def _notes(self, planned: Programme, counts: Array) -> Iterator[str]:
         """What a user must know."""
+        if self.known.bounded:
+            yield (
+                f"{' and '.join(self.known.bounded)} came to rest on a bound: the errors of the others count that noise"
+                " takes it off there half of the times"
+            )
         if planned.hours < self.wanted.hours - float(self.budget.minutes.max() + self.budget.setup) / 60.0:
             yield (
                 f"{number(planned.hours, 2)} of {number(self.wanted.hours, 3)} h are planned: no further run would "

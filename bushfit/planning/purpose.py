@@ -20,13 +20,13 @@ def purposes(plan: Plan) -> dict[Test, str]:
     grid = Grid(known, tuple(counts))
     slopes = relative_slopes(known, grid.data_sets)
     told = grid.told(slopes, np.empty((0, slopes.shape[-1])))
-    view = View(told, np.linalg.inv(known.covariance), grid.level)
+    view = View(told, np.linalg.inv(known.covariance), grid.level, len(known.bounded))
     runs = np.array(list(counts.values()))
-    whole = _errors(view, runs)
+    whole = _errors(view, runs)[: len(known.names)]
     rest = "tells the rivals apart" if plan.wanted.aim == "rivals" else "shows effects that the model lacks"
     found = {}
     for place, test in enumerate(counts):
-        growth = _errors(view, np.where(np.arange(runs.size) == place, 0, runs)) / whole
+        growth = _errors(view, np.where(np.arange(runs.size) == place, 0, runs))[: whole.size] / whole
         worst = int(np.argmax(growth))
         lost = 100.0 * float(growth[worst] - 1.0)
         told_by_it = f"{known.names[worst]}: error {number(lost, 2)} % larger without it"
@@ -36,4 +36,4 @@ def purposes(plan: Plan) -> dict[Test, str]:
 
 def _errors(view: View, runs: Array) -> Array:
     """Standard error of each parameter's relative change, after so many runs of each test."""
-    return np.sqrt(np.diag(np.linalg.inv(view.together(runs).own[0])))
+    return np.sqrt(np.diag(view.off(view.together(runs))[0]))

@@ -21,7 +21,7 @@ from bushfit.effects.contract import UNKNOWN, Array, Circumstances
 from bushfit.fitting.data_sets import DataSet, new_loop, new_sweep, parted
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.noise import SweepNoise
-from bushfit.fitting.solve import jacobian, residual
+from bushfit.fitting.solve import Coordinates, jacobian, residual
 from bushfit.fitting.whitening import Whitening
 from bushfit.geometry import Place
 from bushfit.planning.contract import Knowledge, Noise, Test
@@ -190,8 +190,12 @@ class Grid:
 
 
 def relative_slopes(known: Knowledge, data_sets: Sequence[DataSet]) -> Array:
-    """Derivatives of whitened residuals by relative change of each parameter, (k, n)."""
-    return jacobian(known.model, data_sets, known.names) * relative_sizes(known.model, known.names)[:, None]
+    """Derivatives of whitened residuals by relative change of each parameter, of the bounded by typical size, (k + b,
+    n)."""
+    model, bounded = known.model, Coordinates.of(known.model, known.bounded)
+    typical = np.array([parameter.typical for parameter in bounded.parameters]) / bounded.slopes(model.values)
+    sizes = np.concatenate((relative_sizes(model, known.names), typical))
+    return jacobian(model, data_sets, (*known.names, *known.bounded)) * sizes[:, None]
 
 
 def _points_of(test: SimulatedSweep) -> Array:
