@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bushfit.diagnosis.bands import in_bands
 from bushfit.diagnosis.claims import adopted
 from bushfit.diagnosis.evidence import Evidence, fit_from
 from bushfit.diagnosis.faults import faults
@@ -54,6 +55,9 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     mended = [name for name in settings.adopt if mistake_named(name)]
     data, said = adopted(data, mended)
     data, begun, left = _without_wild(data, model, settings)
+    data, in_means = in_bands(data)
+    if in_means:
+        begun = _begin(data, model, settings)
     searched, counted = _search(data, begun, model, settings), False
     for _ in range(_MOST_SEARCHES):
         if searched.best is None or not (errors := _errors_beside(searched, searched.best, data)).matters:
@@ -64,7 +68,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     shared = [_level_words(data, found)] if counted else _class_words(data)
     of_loops = outliers_at(found.result.model, data.loops)
     outliers = (*told(of_loops, robust=data.robust), *told(left, robust=True))
-    notes = (*said, *found.notes, *shared, *outliers)
+    notes = (*said, *in_means, *found.notes, *shared, *outliers)
     warnings = (*said, *found.result.warnings, *outliers)
     result = replace(found.result, outliers=(*of_loops, *left), warnings=warnings, specimens=data.campaign.specimens)
     return replace(found, notes=notes, result=result)

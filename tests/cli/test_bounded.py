@@ -62,8 +62,9 @@ def test_300_mb_of_zeros_behind_a_table(folder: Path) -> None:
     assert_refused(bounded(folder, "fit", "campaign.toml", "-o", "x"), "this is not text", "found: byte 0x00")
 
 
-def test_12_000_points_a_run(folder: Path) -> None:
-    """What grew with the square of the points of a run took 1.2 GB for each matrix."""
+@pytest.fixture
+def long_runs(folder: Path) -> Path:
+    """Two runs of 12,000 points: what grew with the square of them took 1.2 GB for each matrix."""
     rng = np.random.default_rng(1)
     frequency, level = np.tile(np.linspace(1.0, 200.0, 12_000), 2), np.repeat([0.1, 0.2], 12_000)
     reached = level * np.exp(0.001 * rng.standard_normal(level.size))
@@ -71,6 +72,16 @@ def test_12_000_points_a_run(folder: Path) -> None:
     columns = (frequency, reached, stiffness, 0.1 + 0.002 * rng.standard_normal(level.size))
     rows = [",".join(f"{value:.6g}" for value in row) for row in zip(*columns, strict=True)]
     (folder / "sweep.csv").write_text("\n".join([FILES["sweep.csv"].partition("\n")[0], *rows]))
-    done = bounded(folder, "fit-dynamic", "campaign.toml", "--static", "model.json", "-o", "x", "--no-plots")
+    return folder
+
+
+def test_a_fit_to_runs_of_12_000_points(long_runs: Path) -> None:
+    done = bounded(long_runs, "fit-dynamic", "campaign.toml", "--static", "model.json", "-o", "x", "--no-plots")
     assert done.returncode == 0, done.stderr
-    assert json.loads((folder / "x" / "dynamic.json").read_text())["fit"]["points"] == 2 * 12_000
+    assert json.loads((long_runs / "x" / "dynamic.json").read_text())["fit"]["points"] == 2 * 12_000
+
+
+def test_a_diagnosis_of_runs_of_12_000_points(long_runs: Path) -> None:
+    done = bounded(long_runs, "diagnose", "campaign.toml", "-o", "x", "--no-plots")
+    assert done.returncode == 0, done.stderr
+    assert "24000 points are diagnosed as 400 means over narrow bands" in done.stderr

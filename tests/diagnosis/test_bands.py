@@ -1,0 +1,117 @@
+"""Long sweeps count in means over narrow bands: as sharp as their points, and as honest."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bushfit.campaign.campaign import Campaign
+from bushfit.diagnosis.bands import in_bands
+from bushfit.diagnosis.workflow import diagnose
+from bushfit.effects.contract import Array
+from bushfit.fitting.data import Data
+from bushfit.geometry import Bushing, Direction
+from bushfit.model.model import FIVE, Model
+from bushfit.reading.measurement import Sweep
+
+PAPER = Model.started(
+    Bushing("paper's", 0.010, 0.018, 0.034),
+    ("elastic", "springpot", "friction"),
+    dict(zip(FIVE, (1.09e6, 0.2e6, 0.24, 14.6e3, 0.013), strict=True)),
+)
+LEVELS = (1e-4, 2e-4, 5e-4)
+POINTS = 900
+SCATTER = 0.01
+
+
+def swept(model: Model, points: int = POINTS, repeats: int = 2, seed: int = 3) -> Sweep:
+    """A swept sine of `points` at each level and repeat: the closed form and white noise, not the rig, which would
+    take hours for so many points."""
+    rng = np.random.default_rng(seed)
+    frequency = np.tile(np.geomspace(5.0, 150.0, points), len(LEVELS) * repeats)
+    amplitude = np.repeat(LEVELS, points * repeats)
+    noise = SCATTER * (rng.standard_normal(frequency.size) + 1j * rng.standard_normal(frequency.size))
+    stiffness = (model.stiffness(Direction.AXIAL, frequency, amplitude) * (1.0 + noise)).astype(complex)
+    repeat = np.tile(np.repeat(np.arange(1, repeats + 1), points), len(LEVELS))
+    return Sweep("swept", Direction.AXIAL, frequency, amplitude, stiffness, repeat)
+
+
+def data_of(*sweeps: Sweep) -> Data:
+    return Data.of(Campaign("long", Path("long.toml"), PAPER.bushing, sweeps=sweeps))
+
+
+def off(sweep: Sweep) -> Array:
+    return np.asarray(np.log(sweep.stiffness / PAPER.stiffness(Direction.AXIAL, sweep.frequency, sweep.amplitude)))
+
+
+def test_a_campaign_without_long_runs_is_as_it_was() -> None:
+    data = data_of(swept(PAPER, points=100))
+    assert in_bands(data) == (data, ())
+
+
+def test_means_are_as_sharp_as_their_points() -> None:
+    """Scatter of 900 points in 200 bands falls with the root of 4.5, and so does the noise that is estimated."""
+    (sweep,), said = in_bands(data_of(swept(PAPER)))[0].sweeps, in_bands(data_of(swept(PAPER)))[1]
+    assert said == ("swept: 5400 points are diagnosed as 1200 means over narrow bands",)
+    expected = SCATTER / np.sqrt(POINTS / 200)
+    print(f"{np.std(off(sweep.sweep).real):.5f}, {sweep.relative_noise:.5f}, expected {expected:.5f}")
+    assert np.std(off(sweep.sweep).real) == pytest.approx(expected, rel=0.1)
+    assert sweep.relative_noise == pytest.approx(expected, rel=0.1)
+    assert abs(np.mean(off(sweep.sweep))) < 4.0 * expected / np.sqrt(1200)
+    assert set(sweep.sweep.amplitude) == set(LEVELS)
+
+
+def test_repeats_share_their_bands_and_rows_keep_their_turn() -> None:
+    sweep = in_bands(data_of(swept(PAPER)))[0].sweeps[0].sweep
+    for level in LEVELS:
+        one, other = (sweep.frequency[(sweep.amplitude == level) & (sweep.repeat == number)] for number in (1, 2))
+        np.testing.assert_allclose(one, other, rtol=1e-12)
+    by_turn = np.lexsort((sweep.frequency, sweep.repeat, sweep.amplitude))
+    np.testing.assert_array_equal(by_turn, np.arange(sweep.frequency.size))
+
+
+def test_short_runs_beside_long_ones_stay_points_and_rows_without_weight_are_left_out() -> None:
+    short = replace(swept(PAPER, points=30), name="short")
+    data = data_of(swept(PAPER), short)
+    wild = data.sweeps[0].without(np.arange(7))
+    banded, said = in_bands(replace(data, sweeps=(wild, data.sweeps[1])))
+    assert len(said) == 1
+    assert banded.sweeps[1].sweep is short
+    lowest = banded.sweeps[0].sweep.frequency[0]
+    assert lowest > in_bands(data)[0].sweeps[0].sweep.frequency[0]  # the mean of what is left of the band
+
+
+@pytest.mark.parametrize("stated", ["campaign", "file"])
+def test_stated_noise_falls_with_the_points_of_a_band(stated: str) -> None:
+    sweep = swept(PAPER, repeats=1)
+    if stated == "campaign":
+        sweep = replace(sweep, noise=SCATTER)
+    else:
+        sweep = replace(sweep, relative_error=np.full(sweep.frequency.size, SCATTER))
+    banded = in_bands(data_of(sweep))[0].sweeps[0]
+    assert banded.relative_noise == pytest.approx(SCATTER / np.sqrt(POINTS / 200), rel=0.02)
+
+
+def test_runs_over_amplitudes_keep_their_frequency() -> None:
+    amplitude, frequency = np.tile(np.geomspace(1e-5, 1e-3, 600), 2), np.repeat([10.0, 100.0], 600)
+    stiffness = PAPER.stiffness(Direction.AXIAL, frequency, amplitude)
+    banded = in_bands(data_of(Sweep("a", Direction.AXIAL, frequency, amplitude, stiffness, stepped="amplitude")))[0]
+    sweep = banded.sweeps[0].sweep
+    assert sweep.frequency.tolist() == [10.0] * 200 + [100.0] * 200
+    assert np.abs(off(sweep)).max() < 1e-3  # a mean of logarithms over a hundredth of a decade
+
+
+def test_a_hidden_lag_is_named_in_a_long_sweep_and_the_means_are_told() -> None:
+    lagging = PAPER.with_effect("delay", {"delay.tau": 2e-4})
+    found = diagnose(data_of(swept(lagging)))
+    assert [effect.name for effect in found.effects] == ["delay"]
+    assert any("means over narrow bands" in note for note in found.notes)
+    low, high = found.result.interval("delay.tau") or (0.0, 0.0)
+    assert low < 2e-4 < high
+
+
+def test_a_clean_long_sweep_is_consistent() -> None:
+    """Eight seeds; the noise is white and of the fit's own kind, which proves half."""
+    verdicts = [diagnose(data_of(swept(PAPER, seed=seed))).verdict for seed in range(8)]
+    assert verdicts == ["consistent"] * 8
