@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bushfit.diagnosis.bands import in_bands
 from bushfit.diagnosis.claims import adopted
+from bushfit.diagnosis.condense import condensed
 from bushfit.diagnosis.evidence import Evidence, fit_from
 from bushfit.diagnosis.faults import faults
 from bushfit.diagnosis.mistakes import mistaken
@@ -55,8 +55,8 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     mended = [name for name in settings.adopt if mistake_named(name)]
     data, said = adopted(data, mended)
     data, begun, left = _without_wild(data, model, settings)
-    data, in_means = in_bands(data)
-    if in_means:
+    data, fewer = condensed(data)
+    if fewer:
         begun = _begin(data, model, settings)
     searched, counted = _search(data, begun, model, settings), False
     for _ in range(_MOST_SEARCHES):
@@ -68,7 +68,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     shared = [_level_words(data, found)] if counted else _class_words(data)
     of_loops = outliers_at(found.result.model, data.loops)
     outliers = (*told(of_loops, robust=data.robust), *told(left, robust=True))
-    notes = (*said, *in_means, *found.notes, *shared, *outliers)
+    notes = (*said, *fewer, *found.notes, *shared, *outliers)
     warnings = (*said, *found.result.warnings, *outliers)
     result = replace(found.result, outliers=(*of_loops, *left), warnings=warnings, specimens=data.campaign.specimens)
     return replace(found, notes=notes, result=result)

@@ -1,4 +1,5 @@
-"""Long sweeps in means over narrow bands: a diagnosis asks for every point of a campaign thousands of times."""
+"""Long sweeps in means over narrow bands, and of very many levels some: a diagnosis asks for every point of a campaign
+thousands of times, and for every level as often."""
 
 from dataclasses import replace
 
@@ -13,29 +14,33 @@ from bushfit.reading.measurement import Sweep
 _LONG = 400
 #: Bands of a long run; chosen: a smooth stiffness changes by less than noise within one.
 _BANDS = 200
+#: Lines of a sweep, levels mostly, that are looked at; chosen for time: each is searched without.
+_MOST_LINES = 40
 
 
-def in_bands(data: Data) -> tuple[Data, tuple[str, ...]]:
-    """The same tests with long runs of sweeps in means over narrow bands, and a sentence on each sweep that has some.
+def condensed(data: Data) -> tuple[Data, tuple[str, ...]]:
+    """The same tests with long runs of sweeps in means over narrow bands, of very many lines some, evenly spread; and a
+    sentence on each sweep that this changes.
 
     The noise is that of the means, estimated anew. Rows without weight are left out.
     """
-    means = [_means(data_set) for data_set in data.sweeps]
-    if not any(data_set.sweep is not mean for data_set, mean in zip(data.sweeps, means, strict=True)):
+    told = [_told(data_set) for data_set in data.sweeps]
+    said = tuple(f"{data_set.name}: {words}" for data_set, (_, words) in zip(data.sweeps, told, strict=True) if words)
+    if not said:
         return data, ()
     campaign = data.campaign
-    made = tuple(sweep_data(means, campaign.fit.residuals, campaign.rig))
-    said = tuple(
-        f"{mean.name}: {data_set.frequency.size} points are diagnosed as {mean.frequency.size} means over narrow bands"
-        for data_set, mean in zip(data.sweeps, means, strict=True)
-        if data_set.sweep is not mean
-    )
+    made = tuple(sweep_data([sweep for sweep, _ in told], campaign.fit.residuals, campaign.rig))
     return replace(data, sweeps=made).in_session(), said
 
 
-def _means(data_set: SweepData) -> Sweep:
-    """A sweep with its long runs in means over bands that all runs of a line share; as it is where it has none."""
-    sweep, rows = data_set.sweep, data_set.order[data_set.weights > 0.0]
+def _told(data_set: SweepData) -> tuple[Sweep, str]:
+    """What of a sweep is diagnosed, and in words how; "" where it is the sweep as it is."""
+    sweep, rows, words = data_set.sweep, data_set.order[data_set.weights > 0.0], ""
+    lines = np.unique(sweep.held)
+    if lines.size > _MOST_LINES:
+        some = lines[np.linspace(0, lines.size - 1, _MOST_LINES).round().astype(int)]
+        rows = rows[np.isin(sweep.held[rows], some)]
+        words = f"{some.size} of its {lines.size} runs at one level, or frequency, are diagnosed, evenly spread"
     held, step, repeat = sweep.held[rows], sweep.step[rows], sweep.repeat[rows]
     band = np.arange(rows.size)  # each of its own
     for line in np.unique(held):
@@ -43,9 +48,17 @@ def _means(data_set: SweepData) -> Sweep:
         if np.unique(repeat[mine], return_counts=True)[1].max() > _LONG:
             edges = np.quantile(step[mine], np.linspace(0.0, 1.0, _BANDS + 1)[1:-1])
             band[mine] = -1 - np.searchsorted(edges, step[mine])
-    if np.all(band >= 0):
-        return sweep
-    keys = np.stack((held, repeat.astype(float), band.astype(float)))
+    if np.all(band >= 0) and not words:
+        return sweep, ""
+    means = _means(sweep, rows, np.stack((held, repeat.astype(float), band.astype(float))))
+    if means.frequency.size < rows.size:
+        counted = f"{rows.size} points are diagnosed as {means.frequency.size} means over narrow bands"
+        words = "; ".join(filter(None, (words, counted)))
+    return means, words
+
+
+def _means(sweep: Sweep, rows: Array, keys: Array) -> Sweep:
+    """The means of some rows of a sweep, of one each of all rows with the same key, (keys, rows)."""
     _, first, place, counts = np.unique(keys, axis=1, return_index=True, return_inverse=True, return_counts=True)
     turn = np.argsort(np.bincount(place, rows) / counts)  # as they were measured
 

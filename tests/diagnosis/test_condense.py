@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.diagnosis.bands import in_bands
+from bushfit.diagnosis.condense import condensed
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects.contract import Array
 from bushfit.fitting.data import Data
@@ -47,12 +47,12 @@ def off(sweep: Sweep) -> Array:
 
 def test_a_campaign_without_long_runs_is_as_it_was() -> None:
     data = data_of(swept(PAPER, points=100))
-    assert in_bands(data) == (data, ())
+    assert condensed(data) == (data, ())
 
 
 def test_means_are_as_sharp_as_their_points() -> None:
     """Scatter of 900 points in 200 bands falls with the root of 4.5, and so does the noise that is estimated."""
-    (sweep,), said = in_bands(data_of(swept(PAPER)))[0].sweeps, in_bands(data_of(swept(PAPER)))[1]
+    (sweep,), said = condensed(data_of(swept(PAPER)))[0].sweeps, condensed(data_of(swept(PAPER)))[1]
     assert said == ("swept: 5400 points are diagnosed as 1200 means over narrow bands",)
     expected = SCATTER / np.sqrt(POINTS / 200)
     print(f"{np.std(off(sweep.sweep).real):.5f}, {sweep.relative_noise:.5f}, expected {expected:.5f}")
@@ -63,7 +63,7 @@ def test_means_are_as_sharp_as_their_points() -> None:
 
 
 def test_repeats_share_their_bands_and_rows_keep_their_turn() -> None:
-    sweep = in_bands(data_of(swept(PAPER)))[0].sweeps[0].sweep
+    sweep = condensed(data_of(swept(PAPER)))[0].sweeps[0].sweep
     for level in LEVELS:
         one, other = (sweep.frequency[(sweep.amplitude == level) & (sweep.repeat == number)] for number in (1, 2))
         np.testing.assert_allclose(one, other, rtol=1e-12)
@@ -75,11 +75,22 @@ def test_short_runs_beside_long_ones_stay_points_and_rows_without_weight_are_lef
     short = replace(swept(PAPER, points=30), name="short")
     data = data_of(swept(PAPER), short)
     wild = data.sweeps[0].without(np.arange(7))
-    banded, said = in_bands(replace(data, sweeps=(wild, data.sweeps[1])))
+    banded, said = condensed(replace(data, sweeps=(wild, data.sweeps[1])))
     assert len(said) == 1
     assert banded.sweeps[1].sweep is short
     lowest = banded.sweeps[0].sweep.frequency[0]
-    assert lowest > in_bands(data)[0].sweeps[0].sweep.frequency[0]  # the mean of what is left of the band
+    assert lowest > condensed(data)[0].sweeps[0].sweep.frequency[0]  # the mean of what is left of the band
+
+
+def test_of_very_many_levels_some_are_diagnosed() -> None:
+    amplitude, frequency = np.repeat(np.geomspace(1e-5, 1e-3, 300), 4), np.tile([5.0, 20.0, 60.0, 150.0], 300)
+    stiffness = PAPER.stiffness(Direction.AXIAL, frequency, amplitude)
+    banded, said = condensed(data_of(Sweep("grid", Direction.AXIAL, frequency, amplitude, stiffness)))
+    sweep = banded.sweeps[0].sweep
+    assert said == ("grid: 40 of its 300 runs at one level, or frequency, are diagnosed, evenly spread",)
+    assert sweep.frequency.size == 160
+    assert {sweep.amplitude.min(), sweep.amplitude.max()} == {amplitude.min(), amplitude.max()}
+    assert np.abs(off(sweep)).max() < 1e-12
 
 
 @pytest.mark.parametrize("stated", ["campaign", "file"])
@@ -89,14 +100,14 @@ def test_stated_noise_falls_with_the_points_of_a_band(stated: str) -> None:
         sweep = replace(sweep, noise=SCATTER)
     else:
         sweep = replace(sweep, relative_error=np.full(sweep.frequency.size, SCATTER))
-    banded = in_bands(data_of(sweep))[0].sweeps[0]
+    banded = condensed(data_of(sweep))[0].sweeps[0]
     assert banded.relative_noise == pytest.approx(SCATTER / np.sqrt(POINTS / 200), rel=0.02)
 
 
 def test_runs_over_amplitudes_keep_their_frequency() -> None:
     amplitude, frequency = np.tile(np.geomspace(1e-5, 1e-3, 600), 2), np.repeat([10.0, 100.0], 600)
     stiffness = PAPER.stiffness(Direction.AXIAL, frequency, amplitude)
-    banded = in_bands(data_of(Sweep("a", Direction.AXIAL, frequency, amplitude, stiffness, stepped="amplitude")))[0]
+    banded = condensed(data_of(Sweep("a", Direction.AXIAL, frequency, amplitude, stiffness, stepped="amplitude")))[0]
     sweep = banded.sweeps[0].sweep
     assert sweep.frequency.tolist() == [10.0] * 200 + [100.0] * 200
     assert np.abs(off(sweep)).max() < 1e-3  # a mean of logarithms over a hundredth of a decade
