@@ -15,6 +15,10 @@ TOLERANCE = 1e-14
 _LAST = 1e-12
 #: Most rounds of an iteration: chosen, many more than a rig takes that is stiffer than the bushing.
 ROUNDS = 60
+#: Share of the least that was missing so far, below which a round brought the motion nearer.
+_NEARER = 0.9
+#: Rounds in a row that bring it no nearer after which it stays as it is; chosen: halved steps need fewer.
+_IDLE = 8
 #: What may be missing of the motion when all rounds are used up, relative to the imposed motion: less than any test
 #: resolves.
 _UNSETTLED = 1e-3
@@ -90,6 +94,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     size = np.max(np.abs(imposed), axis=-1, keepdims=True)
     felt = below(history.with_value(reached, beneath))
     last, pace, past = np.inf * size, np.ones_like(size), list[Sequence[Array]]()
+    best, idle = last, 0
     for number in range(ROUNDS):
         missing = imposed - reached - compliance * felt
         off = np.max(np.abs(missing), axis=-1, keepdims=True)
@@ -99,6 +104,10 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
             kept = [each if many else each.reshape(-1, each.shape[-1])[-1] for each in (rigid, reached)]
             solved[_NAME] = (kept[0] if number < _MANY_ROUNDS else None, kept[1])
             return felt + np.fft.irfft(rigid * turned, n=length)[..., :count]
+        idle = 0 if np.any((off < _NEARER * best) & (off > _LAST * size)) else idle + 1
+        if idle == _IDLE:
+            break
+        best = np.minimum(best, off)
         pace, last = np.where(off < last, pace, 0.5 * pace), off
         change = np.fft.irfft(turned, n=length)[..., :count]
         past = [*past[-_REMEMBERED:], np.broadcast_arrays(reached, change)]
