@@ -22,22 +22,26 @@ def condensed(data: Data) -> tuple[Data, tuple[str, ...]]:
     """The same tests with long runs of sweeps in means over narrow bands, of very many lines some, evenly spread; and a
     sentence on each sweep that this changes.
 
-    The noise is that of the means, estimated anew. Rows without weight are left out.
+    The noise is that of the means, estimated anew. Rows without weight are in no mean.
     """
     told = [_told(data_set) for data_set in data.sweeps]
     said = tuple(f"{data_set.name}: {words}" for data_set, (_, words) in zip(data.sweeps, told, strict=True) if words)
     if not said:
         return data, ()
     campaign = data.campaign
-    made = tuple(sweep_data([sweep for sweep, _ in told], campaign.fit.residuals, campaign.rig))
-    return replace(data, sweeps=made).in_session(), said
+    made = sweep_data([sweep for sweep, _ in told], campaign.fit.residuals, campaign.rig)
+    sweeps = tuple(
+        new if words else new.without(np.flatnonzero(old.weights == 0.0))
+        for new, old, (_, words) in zip(made, data.sweeps, told, strict=True)
+    )
+    return replace(data, sweeps=sweeps).in_session(), said
 
 
 def _told(data_set: SweepData) -> tuple[Sweep, str]:
     """What of a sweep is diagnosed, and in words how; "" where it is the sweep as it is."""
     sweep, rows, words = data_set.sweep, data_set.order[data_set.weights > 0.0], ""
     lines = np.unique(sweep.held)
-    if lines.size > _MOST_LINES:
+    if rows.size and lines.size > _MOST_LINES:
         some = lines[np.linspace(0, lines.size - 1, _MOST_LINES).round().astype(int)]
         rows = rows[np.isin(sweep.held[rows], some)]
         words = f"{some.size} of its {lines.size} runs at one level, or frequency, are diagnosed, evenly spread"

@@ -71,15 +71,17 @@ def test_repeats_share_their_bands_and_rows_keep_their_turn() -> None:
     np.testing.assert_array_equal(by_turn, np.arange(sweep.frequency.size))
 
 
-def test_short_runs_beside_long_ones_stay_points_and_rows_without_weight_are_left_out() -> None:
-    short = replace(swept(PAPER, points=30), name="short")
-    data = data_of(swept(PAPER), short)
-    wild = data.sweeps[0].without(np.arange(7))
-    banded, said = condensed(replace(data, sweeps=(wild, data.sweeps[1])))
+def test_short_runs_beside_long_ones_stay_points_and_rows_without_weight_count_nowhere() -> None:
+    data = data_of(swept(PAPER), replace(swept(PAPER, points=30), name="short"), replace(swept(PAPER), name="off"))
+    long, short, off = data.sweeps
+    wild = long.without(np.arange(7)), short.without(np.array([3])), off.without(np.arange(5400))
+    banded, said = condensed(replace(data, sweeps=wild))
     assert len(said) == 1
-    assert banded.sweeps[1].sweep is short
     lowest = banded.sweeps[0].sweep.frequency[0]
     assert lowest > condensed(data)[0].sweeps[0].sweep.frequency[0]  # the mean of what is left of the band
+    assert banded.sweeps[1].sweep is short.sweep
+    assert np.flatnonzero(banded.sweeps[1].weights == 0.0).tolist() == [3]
+    assert not banded.sweeps[2].weights.any()
 
 
 def test_of_very_many_levels_some_are_diagnosed() -> None:
