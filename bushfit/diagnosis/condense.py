@@ -1,13 +1,17 @@
 """Long sweeps in means over narrow bands, and of very many levels some: a diagnosis asks for every point of a campaign
 thousands of times, and for every level as often."""
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from bushfit.effects.contract import Array
+from bushfit.campaign.schema import RigSettings
+from bushfit.effects.contract import Array, Circumstances
 from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import SweepData, sweep_data
+from bushfit.fitting.data_sets import SweepData
+from bushfit.fitting.noise import LineKey, SweepNoise, sweep_noise
 from bushfit.reading.measurement import Sweep
 
 #: Points of a run from which it counts as long; chosen for time: stepped sines have tens, a swept sine thousands.
@@ -18,67 +22,135 @@ _BANDS = 200
 _MOST_LINES = 40
 
 
+class _Means(NamedTuple):
+    """What of a sweep is diagnosed.
+
+    Args:
+        under: what its points were measured under, the rows that are left out among those before.
+        shares: of each line in means, the mean share of a row's variance that is left.
+        words: how it was made.
+    """
+
+    sweep: Sweep
+    under: Circumstances
+    shares: Mapping[LineKey, float]
+    words: str
+
+
 def condensed(data: Data) -> tuple[Data, tuple[str, ...]]:
     """The same tests with long runs of sweeps in means over narrow bands, of very many lines some, evenly spread; and a
     sentence on each sweep that this changes.
 
-    The noise is that of the means, estimated anew. Rows without weight are in no mean.
+    Rows without weight are in no mean. The noise from point to point of a line in means is theirs, estimated anew; what
+    runs share stays as it was.
     """
-    told = [_told(data_set) for data_set in data.sweeps]
-    said = tuple(f"{data_set.name}: {words}" for data_set, (_, words) in zip(data.sweeps, told, strict=True) if words)
-    if not said:
+    made = {data_set: means for data_set in data.sweeps if (means := _told(data_set))}
+    if not made:
         return data, ()
-    campaign = data.campaign
-    made = sweep_data([sweep for sweep, _ in told], campaign.fit.residuals, campaign.rig)
-    sweeps = tuple(
-        new if words else new.without(np.flatnonzero(old.weights == 0.0))
-        for new, old, (_, words) in zip(made, data.sweeps, told, strict=True)
-    )
-    return replace(data, sweeps=sweeps).in_session(), said
+    rig = data.campaign.rig
+    noises = {
+        id(noise): _noise(noise, [means for data_set, means in made.items() if data_set.noise is noise], rig)
+        for noise in (data_set.noise for data_set in data.sweeps)
+    }
+    sweeps = []
+    for data_set in data.sweeps:
+        noise, means = noises[id(data_set.noise)], made.get(data_set)
+        if means:
+            weight = np.full(means.sweep.frequency.size, data_set.sweep.weight)
+            sweeps.append(replace(data_set, sweep=means.sweep, noise=noise, weight=weight, under=means.under))
+        else:
+            sweeps.append(replace(data_set, noise=noise))
+    return replace(data, sweeps=tuple(sweeps)), tuple(f"{each.sweep.name}: {each.words}" for each in made.values())
 
 
-def _told(data_set: SweepData) -> tuple[Sweep, str]:
-    """What of a sweep is diagnosed, and in words how; "" where it is the sweep as it is."""
+def _noise(before: SweepNoise, made: Sequence[_Means], rig: RigSettings) -> SweepNoise:
+    """The noise of the sweeps of a rig with some of them in means; a stated one falls with the rows of each."""
+    if not made:
+        return before
+    anew, random = sweep_noise([means.sweep for means in made], rig), dict(before.random)
+    slopes = {name: slope for name, slope in before.slopes.items() if name not in {each.sweep.name for each in made}}
+    for means in made:
+        for key, share in means.shares.items():
+            gain, phase = np.sqrt(share) * np.array(before.random[key])
+            random[key] = anew.random[key] if means.sweep.noise is None else (float(gain), float(phase))
+    freedom = min(before.scatter_freedom, anew.scatter_freedom)
+    return replace(before, random=random, slopes={**slopes, **anew.slopes}, scatter_freedom=freedom)
+
+
+def _told(data_set: SweepData) -> _Means | None:
+    """What of a sweep is diagnosed; None where it is the sweep as it is."""
     sweep, rows, words = data_set.sweep, data_set.order[data_set.weights > 0.0], ""
-    lines = np.unique(sweep.held)
-    if rows.size and lines.size > _MOST_LINES:
+    lines = np.unique(sweep.held[rows])
+    if lines.size > _MOST_LINES:
         some = lines[np.linspace(0, lines.size - 1, _MOST_LINES).round().astype(int)]
         rows = rows[np.isin(sweep.held[rows], some)]
         words = f"{some.size} of its {lines.size} runs at one level, or frequency, are diagnosed, evenly spread"
-    held, step, repeat = sweep.held[rows], sweep.step[rows], sweep.repeat[rows]
-    band = np.arange(rows.size)  # each of its own
-    for line in np.unique(held):
+    held, repeat = sweep.held[rows], sweep.repeat[rows]
+    step = sweep.step[rows] if sweep.stepped else rows  # where neither is held, in the turn they were measured
+    band, long = np.arange(rows.size), list[float]()  # each of its own
+    for line in np.unique(held).tolist():
         mine = held == line
         if np.unique(repeat[mine], return_counts=True)[1].max() > _LONG:
             edges = np.quantile(step[mine], np.linspace(0.0, 1.0, _BANDS + 1)[1:-1])
             band[mine] = -1 - np.searchsorted(edges, step[mine])
-    if np.all(band >= 0) and not words:
-        return sweep, ""
-    means = _means(sweep, rows, np.stack((held, repeat.astype(float), band.astype(float))))
+            long.append(line)
+    if not long and not words:
+        return None
+    groups = _Groups.of(rows, np.stack((held, repeat.astype(float), band.astype(float))))
+    means = groups.sweep(sweep)
     if means.frequency.size < rows.size:
         counted = f"{rows.size} points are diagnosed as {means.frequency.size} means over narrow bands"
         words = "; ".join(filter(None, (words, counted)))
-    return means, words
+    shares = {(sweep.name, line): float(np.mean(1.0 / groups.counts[means.held == line])) for line in long}
+    under = data_set.under
+    known = (under.temperature, under.turn, under.strained, under.left, under.rested)
+    return _Means(means, Circumstances(*map(groups.mean, known)), shares, words)
 
 
-def _means(sweep: Sweep, rows: Array, keys: Array) -> Sweep:
-    """The means of some rows of a sweep, of one each of all rows with the same key, (keys, rows)."""
-    _, first, place, counts = np.unique(keys, axis=1, return_index=True, return_inverse=True, return_counts=True)
-    turn = np.argsort(np.bincount(place, rows) / counts)  # as they were measured
+@dataclass(frozen=True, eq=False)
+class _Groups:
+    """Rows of a sweep that are taken together, in the turn in which they were measured.
 
-    def mean(values: Array) -> Array:
-        return (np.bincount(place, values[rows]) / counts)[turn]
+    Args:
+        rows: of the sweep, (n,).
+        place: number of the group of each, (n,).
+        lead: one row of each group, (g,).
+        counts: rows of each group, (g,).
+    """
 
-    logs, lead = np.log(sweep.stiffness), rows[first[turn]]
-    error = None if sweep.relative_error is None else np.sqrt(mean(np.square(sweep.relative_error)) / counts[turn])
-    return replace(
-        sweep,
-        frequency=sweep.frequency[lead] if sweep.stepped == "amplitude" else mean(sweep.frequency),
-        amplitude=sweep.amplitude[lead] if sweep.stepped == "frequency" else mean(sweep.amplitude),
-        stiffness=np.exp(mean(logs.real) + 1j * mean(logs.imag)),
-        repeat=sweep.repeat[lead],
-        noise=None if sweep.noise is None else sweep.noise * float(np.sqrt(np.mean(1.0 / counts))),
-        reached=None if sweep.reached is None else mean(sweep.reached),
-        relative_error=error,
-        temperature=mean(sweep.temperature) if isinstance(sweep.temperature, np.ndarray) else sweep.temperature,
-    )
+    rows: Array
+    place: Array
+    lead: Array
+    counts: Array
+
+    @classmethod
+    def of(cls, rows: Array, keys: Array) -> "_Groups":
+        """Those with the same key, (keys, n)."""
+        _, first, place, counts = np.unique(keys, axis=1, return_index=True, return_inverse=True, return_counts=True)
+        turn = np.argsort(np.bincount(place, rows) / counts, kind="stable")
+        return cls(rows, np.argsort(turn)[place], rows[first[turn]], counts[turn])
+
+    def mean(self, values: Array | float | None) -> Array | float | None:
+        """Of what there is for each row of the sweep; a number, or None, is for all."""
+        return self._mean(values) if isinstance(values, np.ndarray) else values
+
+    def _mean(self, values: Array) -> Array:
+        return np.bincount(self.place, values[self.rows]) / self.counts
+
+    def _middle(self, values: Array) -> Array:
+        """The geometric mean, as stiffness goes with logarithms; a row of its own to the last digit."""
+        return np.where(self.counts > 1, np.exp(self._mean(np.log(values))), values[self.lead])
+
+    def sweep(self, sweep: Sweep) -> Sweep:
+        """The sweep of the means."""
+        phase, error = np.angle(sweep.stiffness), sweep.relative_error
+        return replace(
+            sweep,
+            frequency=sweep.frequency[self.lead] if sweep.stepped == "amplitude" else self._middle(sweep.frequency),
+            amplitude=sweep.amplitude[self.lead] if sweep.stepped == "frequency" else self._middle(sweep.amplitude),
+            stiffness=self._middle(np.abs(sweep.stiffness)) * np.exp(1j * self._mean(phase)),
+            repeat=sweep.repeat[self.lead],
+            reached=None if sweep.reached is None else self._middle(sweep.reached),
+            relative_error=None if error is None else np.sqrt(self._mean(np.square(error)) / self.counts),
+            temperature=self.mean(sweep.temperature),
+        )

@@ -17,7 +17,7 @@ _LAST = 1e-12
 ROUNDS = 60
 #: Share of the least that was missing so far, below which a round brought the motion nearer.
 _NEARER = 0.9
-#: Rounds in a row that bring it no nearer after which it stays as it is; chosen: halved steps need fewer.
+#: Rounds in a row that bring it no nearer than that, after which it stays as it is; chosen: halved steps need fewer.
 _IDLE = 8
 #: What may be missing of the motion when all rounds are used up, relative to the imposed motion: less than any test
 #: resolves.
@@ -107,7 +107,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         idle = 0 if np.any((off < _NEARER * best) & (off > _LAST * size)) else idle + 1
         if idle == _IDLE:
             break
-        best = np.minimum(best, off)
+        best = np.where(off < _NEARER * best, off, best)
         pace, last = np.where(off < last, pace, 0.5 * pace), off
         change = np.fft.irfft(turned, n=length)[..., :count]
         past = [*past[-_REMEMBERED:], np.broadcast_arrays(reached, change)]

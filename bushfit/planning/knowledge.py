@@ -26,6 +26,8 @@ from bushfit.planning.sensitivity import ROWS_PER_CYCLE, relative_slopes
 #: Standard error of the relative change of a parameter that is given without one; chosen: a value given by hand is
 #: right within a factor of 2.7.
 _BY_HAND = 0.5
+#: Share of a bounded parameter's slopes that the others have to leave for the tests to tell it: above rounding.
+_SEEN = 1e-6
 
 
 def of_result(result: Result, noise: Noise | None = None, source: str = "") -> Knowledge:
@@ -69,7 +71,8 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
         result = replace(result_of(evidence, data.bounds, ()), specimens=data.campaign.specimens)
         strain = max(float(np.max(each.amplitude)) * model.unit_strain(each.direction) for each in data_sets)
         told = replace(of_result(result, noise, source), strain=strain, tests=tuple(_tests(data)))
-        return _with_bounded(told, tuple(evidence.solution.at_bound), data_sets)
+        bounded = tuple(evidence.solution.at_bound)
+        return _with_bounded(told, bounded, data_sets) if bounded else told
 
     if found is None or rivals is None:
         return known(fit(model, data_sets, held, data.bounds))
@@ -103,16 +106,24 @@ def of_campaign(data: Data, rivals: Sequence[str] | None = None) -> Knowledge:
 
 
 def _with_bounded(known: Knowledge, bounded: tuple[str, ...], data_sets: Sequence[DataSet]) -> Knowledge:
-    """What the tests tell where parameters at rest on a bound count as free; what noise is more than was counted is
-    told by the errors of the others, with those held."""
-    free = replace(known, bounded=bounded)
-    slopes, k = relative_slopes(free, data_sets), len(known.names)
-    told = slopes @ slopes.T
-    answer = -np.linalg.solve(told[:k, :k], told[:k, k:])
-    excess = float(np.mean(np.diag(known.covariance @ told[:k, :k])))
-    own = excess * np.linalg.inv(told[k:, k:] + told[k:, :k] @ answer)
-    shared = answer @ own
-    return replace(free, covariance=np.block([[known.covariance + shared @ answer.T, shared], [shared.T, own]]))
+    """What the tests tell where parameters at rest on a bound count as free, but those of which they tell nothing; what
+    noise is more than was counted is told by the errors of the others, with those held."""
+    k = len(known.names)
+    slopes = relative_slopes(replace(known, bounded=bounded), data_sets)
+    own, others = slopes[:k], slopes[k:]
+    answer = -np.linalg.lstsq(own.T, others.T)[0]
+    beside = others + answer.T @ own
+    seen = np.linalg.norm(beside, axis=1) > _SEEN * np.linalg.norm(others, axis=1)
+    if not seen.any():
+        return known
+    told = np.einsum("kn,ln->kl", own, own)
+    live = np.diag(told) > 0.0
+    excess = float(np.mean(np.diag(known.covariance @ told)[live])) if live.any() else 1.0
+    answer, beside = answer[:, seen], beside[seen]
+    alone = excess * np.linalg.inv(beside @ beside.T)
+    shared = answer @ alone
+    covariance = np.block([[known.covariance + shared @ answer.T, shared], [shared.T, alone]])
+    return replace(known, bounded=tuple(np.array(bounded)[seen].tolist()), covariance=covariance)
 
 
 def _each_added(plain: Evidence, names: Sequence[str], held: Sequence[str], bounds: Bounds) -> dict[str, Evidence]:

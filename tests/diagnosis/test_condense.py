@@ -1,6 +1,6 @@
 """Long sweeps count in means over narrow bands: as sharp as their points, and as honest."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +39,19 @@ def swept(model: Model, points: int = POINTS, repeats: int = 2, seed: int = 3) -
 
 def data_of(*sweeps: Sweep) -> Data:
     return Data.of(Campaign("long", Path("long.toml"), PAPER.bushing, sweeps=sweeps))
+
+
+def _some(sweep: Sweep, chosen: Array) -> Sweep:
+    columns = (sweep.frequency[chosen], sweep.amplitude[chosen], sweep.stiffness[chosen], sweep.repeat[chosen])
+    return Sweep(sweep.name, sweep.direction, *columns)
+
+
+def _joined(*sweeps: Sweep) -> Sweep:
+    frequency, amplitude, stiffness, repeat = (
+        np.concatenate([getattr(each, name) for each in sweeps])
+        for name in ("frequency", "amplitude", "stiffness", "repeat")
+    )
+    return Sweep(sweeps[0].name, sweeps[0].direction, frequency, amplitude, stiffness, repeat)
 
 
 def off(sweep: Sweep) -> Array:
@@ -104,6 +117,74 @@ def test_stated_noise_falls_with_the_points_of_a_band(stated: str) -> None:
         sweep = replace(sweep, relative_error=np.full(sweep.frequency.size, SCATTER))
     banded = condensed(data_of(sweep))[0].sweeps[0]
     assert banded.relative_noise == pytest.approx(SCATTER / np.sqrt(POINTS / 200), rel=0.02)
+
+
+def test_lines_keep_their_own_noise_beside_means() -> None:
+    """A short level in a long sweep, and a short sweep beside one: 1 % stays 1 %, stated or found."""
+    few = swept(PAPER, points=30, repeats=1, seed=5)
+    top = few.amplitude == LEVELS[2]
+    whole = swept(PAPER)
+    mixed = _joined(_some(whole, whole.amplitude < LEVELS[2]), _some(few, top))
+    in_means = SCATTER / np.sqrt(POINTS / 200)
+    for stated in (None, SCATTER):
+        data = data_of(replace(mixed, noise=stated), replace(few, name="short", noise=stated))
+        long, short = condensed(data)[0].sweeps
+        found = {key: gain for key, (gain, _) in long.noise.random.items()}
+        assert long.noise is short.noise
+        assert found["swept", LEVELS[0]] == pytest.approx(in_means, rel=0.15)
+        assert found["swept", LEVELS[2]] == pytest.approx(SCATTER, rel=0.25)
+        assert found["short", LEVELS[0]] == pytest.approx(SCATTER, rel=0.25)
+
+
+def test_a_short_sweep_beside_a_long_one_raises_no_alarm() -> None:
+    verdicts = [
+        diagnose(data_of(swept(PAPER, seed=seed), replace(swept(PAPER, 30, 1, 100 + seed), name="short"))).verdict
+        for seed in range(6)
+    ]
+    assert verdicts == ["consistent"] * 6
+
+
+def test_what_the_rubber_had_seen_before_is_not_forgotten() -> None:
+    """Rows of levels that are not looked at were measured all the same."""
+    levels = np.random.default_rng(1).permutation(np.geomspace(1e-5, 1e-3, 300))
+    amplitude, frequency = np.repeat(levels, 4), np.tile([5.0, 20.0, 60.0, 150.0], 300)
+    stiffness = PAPER.stiffness(Direction.AXIAL, frequency, amplitude)
+    data = data_of(Sweep("grid", Direction.AXIAL, frequency, amplitude, stiffness))
+    before, after = data.sweeps[0], condensed(data)[0].sweeps[0]
+    for point in range(0, 160, 7):
+        row = np.flatnonzero((amplitude == after.sweep.amplitude[point]) & (frequency == after.sweep.frequency[point]))
+        assert astuple(after.under.at(point)) == astuple(before.under.at(int(row[0])))
+
+
+@pytest.mark.parametrize("low", [0.5, 5.0])
+def test_means_of_an_evenly_stepped_sweep_lie_on_the_curve(low: float) -> None:
+    """Without noise: evenly in frequency the first bands are wide in its logarithm."""
+    frequency = np.linspace(low, 200.0, 6000)
+    amplitude = np.full(6000, 2e-4)
+    stiffness = PAPER.stiffness(Direction.AXIAL, frequency, amplitude)
+    sweep = condensed(data_of(Sweep("even", Direction.AXIAL, frequency, amplitude, stiffness)))[0].sweeps[0].sweep
+    assert np.abs(off(sweep)).max() < 2e-3
+    assert np.abs(np.mean(off(sweep))) < 2e-5
+
+
+def test_up_and_down_through_a_resonance_is_taken_in_turn() -> None:
+    """Where neither is held, points at one frequency may have amplitudes far apart."""
+    up = np.geomspace(5.0, 60.0, 450)
+    amplitude = 1e-4 * np.concatenate(
+        (1.0 + 9.0 / (1.0 + (up - 25.0) ** 2), 1.0 + 9.0 / (1.0 + (up[::-1] - 18.0) ** 2))
+    )
+    frequency = np.concatenate((up, up[::-1]))
+    stiffness = PAPER.stiffness(Direction.AXIAL, frequency, amplitude)
+    data = data_of(Sweep("up and down", Direction.AXIAL, frequency, amplitude, stiffness, stepped=None))
+    assert np.abs(off(condensed(data)[0].sweeps[0].sweep)).max() < 2e-3
+
+
+def test_levels_without_weight_are_no_levels() -> None:
+    amplitude, frequency = np.repeat(np.geomspace(1e-5, 1e-3, 80), 4), np.tile([5.0, 20.0, 60.0, 150.0], 80)
+    stiffness = PAPER.stiffness(Direction.AXIAL, frequency, amplitude)
+    data = data_of(Sweep("grid", Direction.AXIAL, frequency, amplitude, stiffness))
+    few = replace(data, sweeps=(data.sweeps[0].without(np.flatnonzero(np.arange(320) // 4 % 16)),))
+    assert condensed(few) == (few, ())
 
 
 def test_runs_over_amplitudes_keep_their_frequency() -> None:

@@ -77,6 +77,17 @@ def test_a_plan_beside_a_bound_counts_it_and_says_so(measured: Knowledge) -> Non
     assert not any("mu" in words for words in purposes(counted).values())
 
 
+@pytest.mark.parametrize("effect", ["temperature", "force_saturation"])
+def test_a_parameter_that_the_tests_do_not_see_stops_no_plan(data: Data, effect: str) -> None:
+    """Tests at one temperature, and a force that saturates nowhere."""
+    campaign = replace(data.campaign, fit=replace(data.campaign.fit, effects=(effect,)))
+    known = of_campaign(Data.of(campaign))
+    points = (Points(AXIAL, np.array([20.0, 100.0]), np.array([2e-4, 2e-4])),)
+    planned = plan(known, Wanted("predictions", 2.0, RigSettings(), (AXIAL,), points, known.names)).planned
+    assert np.all(np.isfinite(known.covariance))
+    assert np.all(np.isfinite(planned.stiffness))
+
+
 def test_a_guess_has_nothing_on_a_bound() -> None:
     known = guess(PAPER, Compound(61.0, 27.0))
     assert known.bounded == ()
