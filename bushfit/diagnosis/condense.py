@@ -17,7 +17,7 @@ from bushfit.reading.measurement import Sweep
 #: Points of a run from which it counts as long; chosen for time: stepped sines have tens, a swept sine thousands.
 _LONG = 400
 #: Bands of a long run; chosen: a smooth stiffness changes by less than noise within one.
-_BANDS = 200
+_BANDS = 100
 #: Lines of a sweep, levels mostly, that are looked at; chosen for time: each is searched without.
 _MOST_LINES = 40
 

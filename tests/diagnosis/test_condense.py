@@ -64,14 +64,14 @@ def test_a_campaign_without_long_runs_is_as_it_was() -> None:
 
 
 def test_means_are_as_sharp_as_their_points() -> None:
-    """Scatter of 900 points in 200 bands falls with the root of 4.5, and so does the noise that is estimated."""
+    """Scatter of 900 points in 100 bands falls with the root of 9, and so does the noise that is estimated."""
     (sweep,), said = condensed(data_of(swept(PAPER)))[0].sweeps, condensed(data_of(swept(PAPER)))[1]
-    assert said == ("swept: 5400 points are diagnosed as 1200 means over narrow bands",)
-    expected = SCATTER / np.sqrt(POINTS / 200)
+    assert said == ("swept: 5400 points are diagnosed as 600 means over narrow bands",)
+    expected = SCATTER / np.sqrt(POINTS / 100)
     print(f"{np.std(off(sweep.sweep).real):.5f}, {sweep.relative_noise:.5f}, expected {expected:.5f}")
     assert np.std(off(sweep.sweep).real) == pytest.approx(expected, rel=0.1)
     assert sweep.relative_noise == pytest.approx(expected, rel=0.1)
-    assert abs(np.mean(off(sweep.sweep))) < 4.0 * expected / np.sqrt(1200)
+    assert abs(np.mean(off(sweep.sweep))) < 4.0 * expected / np.sqrt(600)
     assert set(sweep.sweep.amplitude) == set(LEVELS)
 
 
@@ -116,7 +116,7 @@ def test_stated_noise_falls_with_the_points_of_a_band(stated: str) -> None:
     else:
         sweep = replace(sweep, relative_error=np.full(sweep.frequency.size, SCATTER))
     banded = condensed(data_of(sweep))[0].sweeps[0]
-    assert banded.relative_noise == pytest.approx(SCATTER / np.sqrt(POINTS / 200), rel=0.02)
+    assert banded.relative_noise == pytest.approx(SCATTER / np.sqrt(POINTS / 100), rel=0.02)
 
 
 def test_lines_keep_their_own_noise_beside_means() -> None:
@@ -125,7 +125,7 @@ def test_lines_keep_their_own_noise_beside_means() -> None:
     top = few.amplitude == LEVELS[2]
     whole = swept(PAPER)
     mixed = _joined(_some(whole, whole.amplitude < LEVELS[2]), _some(few, top))
-    in_means = SCATTER / np.sqrt(POINTS / 200)
+    in_means = SCATTER / np.sqrt(POINTS / 100)
     for stated in (None, SCATTER):
         data = data_of(replace(mixed, noise=stated), replace(few, name="short", noise=stated))
         long, short = condensed(data)[0].sweeps
@@ -192,7 +192,7 @@ def test_runs_over_amplitudes_keep_their_frequency() -> None:
     stiffness = PAPER.stiffness(Direction.AXIAL, frequency, amplitude)
     banded = condensed(data_of(Sweep("a", Direction.AXIAL, frequency, amplitude, stiffness, stepped="amplitude")))[0]
     sweep = banded.sweeps[0].sweep
-    assert sweep.frequency.tolist() == [10.0] * 200 + [100.0] * 200
+    assert sweep.frequency.tolist() == [10.0] * 100 + [100.0] * 100
     assert np.abs(off(sweep)).max() < 1e-3  # a mean of logarithms over a hundredth of a decade
 
 
