@@ -48,6 +48,15 @@ def test_an_ideal_rig_measures_the_closed_form(clean: Undisturbed, paper_model: 
     assert np.ptp(loop.displacement) / 2.0 == pytest.approx(1e-3, rel=1e-5)
 
 
+def test_a_loop_has_forgotten_where_it_began_however_small_it_is(paper_model: Model) -> None:
+    """At a tenth of eps_half forty cycles from rest leave a mean force of half a per cent of the amplitude."""
+    small = SimulatedLoop(Direction.AXIAL, 2e-5, 1.0, cycles=1)
+    (loop,) = measure(undisturbed(paper_model, SimulateSettings(loops=(small,), sweeps=(SWEEP,))), PLAN).loops
+    force = loop.force[:-1]
+    print(f"mean over half the range: {2.0 * np.mean(force) / np.ptp(force):.1e}")
+    assert abs(np.mean(force)) < 2e-4 * np.ptp(force)
+
+
 def test_every_repeat_measures_every_point(clean: Undisturbed) -> None:
     (sweep,) = measure(clean, replace(PLAN, repeats=3)).sweeps
     points = {*zip(sweep.amplitude, sweep.repeat, sweep.frequency, strict=True)}
