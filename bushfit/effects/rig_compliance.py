@@ -17,7 +17,7 @@ _LAST = 1e-12
 ROUNDS = 60
 #: Share of the least that was missing so far, below which a round brought the motion nearer.
 _NEARER = 0.9
-#: Rounds in a row that bring it no nearer than that, after which it stays as it is; chosen: a slow approach needs twelve.
+#: Rounds in a row that bring it no nearer, after which it stays as it is; chosen: a slow approach needs twelve.
 _IDLE = 20
 #: What may be missing of the motion when all rounds are used up, relative to the imposed motion: less than any test
 #: resolves.
