@@ -22,7 +22,7 @@ from bushfit.campaign.noise import filtered_noise, of_levels, reached_over_asked
 from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulatedTest, SimulateSettings
 from bushfit.campaign.session import planned_session
 from bushfit.campaign.written import body_lines, table_lines
-from bushfit.effects import Level
+from bushfit.effects import Level, friction
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances
 from bushfit.errors import CampaignError, typed
 from bushfit.geometry import Direction, Place, Specimen
@@ -205,17 +205,12 @@ def _clean_loop(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.
 
 
 def _run_in(truth: Model, test: SimulatedLoop) -> int:
-    """Cycles until friction has forgotten where it began.
-
-    Notes: a stroke from one turning point to the next keeps 1 - (2 x/(1 + y + 2 x))^2 of a mean stress, with x and y of
-    `effects.friction.harmonic_shape`: at a tenth of eps_half a cycle of two keeps 95 %.
-    """
+    """Cycles until friction forgets where it began; at a tenth of eps_half a cycle keeps 95 % of a mean stress."""
     if "eps_half" not in truth.values:
         return _RUN_IN_CYCLES[0]
-    x = test.amplitude * truth.unit_strain(test.direction) / truth.values["eps_half"]
-    y = 2.0 * x / (np.sqrt(x * (x + 6.0) + 1.0) + x + 1.0)
-    forgotten = -2.0 * np.log1p(-np.square(2.0 * x / (1.0 + y + 2.0 * x)))  # per cycle
-    return int(np.clip(np.ceil(np.log(1.0 / _KEPT) / max(forgotten, np.finfo(float).tiny)), *_RUN_IN_CYCLES))
+    strain = np.array(test.amplitude * truth.unit_strain(test.direction))
+    each = np.maximum(friction.forgotten(strain / truth.values["eps_half"]), np.finfo(float).tiny)
+    return int(np.clip(np.ceil(-np.log(_KEPT) / each), *_RUN_IN_CYCLES))
 
 
 def _clean_programme(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.Record:

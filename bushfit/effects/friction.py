@@ -92,6 +92,15 @@ def _roots(x: Array) -> tuple[Array, Array, Array, Array, Array]:
     return s, big, p, np.sqrt(p * (p + twice)), twice / p
 
 
+def forgotten(x: Array) -> Array:
+    """Natural logarithm by which a cycle of the strain amplitude x = e0/eps_half lowers a mean stress.
+
+    Notes: a stroke from one turning point to the next keeps 1 - (z/(1 + z))^2 of it, with z of `harmonic_shape`.
+    """
+    z = _roots(x)[-1]
+    return -2.0 * np.log1p(-np.square(z / (1.0 + z)))
+
+
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
     """(A + iB)/(2 e0) of the steady loop of strain amplitude e0 [Pa]."""
     return p["sigma_fmax"] / p["eps_half"] * harmonic_shape(strain / p["eps_half"])

@@ -116,7 +116,7 @@ def _with_bounded(known: Knowledge, bounded: tuple[str, ...], data_sets: Sequenc
     seen = np.linalg.norm(beside, axis=1) > _SEEN * np.linalg.norm(others, axis=1)
     if not seen.any():
         return known
-    told = np.einsum("kn,ln->kl", own, own)
+    told = own @ own.T
     live = np.diag(told) > 0.0
     excess = float(np.mean(np.diag(known.covariance @ told)[live])) if live.any() else 1.0
     answer, beside = answer[:, seen], beside[seen]
