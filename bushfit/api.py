@@ -202,8 +202,8 @@ def simulate(
         BushfitError: no model, or files that stand there.
     """
     from bushfit.campaign.campaign import model_of
-    from bushfit.simulation import simulate as measured
-    from bushfit.simulation import to_files
+    from bushfit.simulation.files import to_files
+    from bushfit.simulation.measured import simulate as measured
 
     if isinstance(source, Campaign):
         truth, plan = model_of(source), source.simulate or SimulateSettings()

@@ -17,7 +17,8 @@ from bushfit.geometry import Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
-from bushfit.simulation import Undisturbed, measure, undisturbed
+from bushfit.simulation.measured import measure
+from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
 AXIAL = Direction.AXIAL
 GRID = (np.array([1.0, 5.0, 35.0, 155.0]), np.array([1e-4, 5e-4]))

@@ -29,7 +29,8 @@ from bushfit.cli import cli
 from bushfit.geometry import Direction
 from bushfit.reading.loops import read_loop
 from bushfit.reading.sweeps import read_sweep
-from bushfit.simulation import simulate, to_files
+from bushfit.simulation.files import to_files
+from bushfit.simulation.measured import simulate
 
 
 def blocks(page: Path, language: str) -> list[str]:

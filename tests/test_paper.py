@@ -15,7 +15,8 @@ from bushfit.campaign.campaign import Campaign, load_campaign, model_of
 from bushfit.campaign.schema import SimulateSettings
 from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_two_step
-from bushfit.simulation import measure, undisturbed
+from bushfit.simulation.measured import measure
+from bushfit.simulation.undisturbed import undisturbed
 
 #: Draws of noise; simulated data.
 SEEDS = 20

@@ -21,7 +21,8 @@ from bushfit.model.result import Range, Result, carried
 from bushfit.prediction import predict, predict_resonance
 from bushfit.reading.measurement import Sweep
 from bushfit.report.tables import prediction_table, shaken_table
-from bushfit.simulation import measure, undisturbed
+from bushfit.simulation.measured import measure
+from bushfit.simulation.undisturbed import undisturbed
 from bushfit.units import CELSIUS
 
 #: A grid, not in order [Hz] and [m].

@@ -32,7 +32,8 @@ def command(source: Path, effects: tuple[str, ...], options: Options, **settings
     Writes campaign.toml, the tables it names, and truth.json, the model behind them.
     """
     from bushfit.model.file import to_document
-    from bushfit.simulation import simulate, to_files
+    from bushfit.simulation.files import to_files
+    from bushfit.simulation.measured import simulate
 
     truth, plan = _task(source)
     plan = _with_options(plan, settings)

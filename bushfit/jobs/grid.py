@@ -14,8 +14,8 @@ from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Place,
 from bushfit.model.result import Result
 from bushfit.reading.measurement import Sweep
 from bushfit.reading.runs import nominal
-from bushfit.simulation import PAPER_AMPLITUDES as PAPER_AMPLITUDES
-from bushfit.simulation import PAPER_FREQUENCIES as PAPER_FREQUENCIES
+from bushfit.simulation.undisturbed import PAPER_AMPLITUDES as PAPER_AMPLITUDES
+from bushfit.simulation.undisturbed import PAPER_FREQUENCIES as PAPER_FREQUENCIES
 
 #: Amplitudes of each kind of motion where none were measured: those of torsion [rad], which the paper did not measure,
 #: and of the material's strain [1] are chosen so that strains are like the paper's.

@@ -45,6 +45,7 @@ def record(
     *,
     cycles: int,
     run_in: int = 0,
+    swell: tuple[int, float] = (0, 1.0),
     steps_per_cycle: int = STEPS_PER_CYCLE,
     waveform: str = "sine",
     kind: Kind = "sweep",
@@ -54,16 +55,20 @@ def record(
 
     Args:
         frequency, amplitude: [Hz], and zero-to-peak [m or rad].
+        swell: so many cycles of the run-in, its first, swell to so many times the amplitude and die out again (a Hann
+            window): friction then forgets where it began, and the springpot sees no step.
         steps_per_cycle: the springpot's error falls in proportion: its Gruenwald-Letnikov sum is of first order.
         waveform: sine or triangle.
         kind: whether a loop or a sweep is recorded; only effects of the instrument tell them apart.
         under: what the test is made under, numbers.
     """
-    index = np.arange((run_in + cycles) * steps_per_cycle + 1)
-    motion = amplitude * wave(waveform, index / steps_per_cycle)
+    phase = np.arange((run_in + cycles) * steps_per_cycle + 1) / steps_per_cycle
+    motion = amplitude * wave(waveform, phase)
+    if swell[0]:
+        motion *= 1.0 + (swell[1] - 1.0) * np.sin(np.pi * np.minimum(phase / swell[0], 1.0)) ** 2
     whole = imposed(model, direction, motion, 1.0 / (frequency * steps_per_cycle), frequency, kind=kind, under=under)
     kept = slice(run_in * steps_per_cycle, None)
-    return Record(whole.time[kept] - whole.time[kept][0], whole.displacement[kept], whole.force[kept])
+    return Record(whole.time[kept] - whole.time[kept][0], whole.displacement[kept].copy(), whole.force[kept].copy())
 
 
 def imposed(

@@ -10,7 +10,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.geometry import ROTATION, TRANSLATION, Direction, Place
 from bushfit.planning.contract import Knowledge, Test, Wanted
-from bushfit.simulation import PAPER_LOOPS, PAPER_SWEEPS
+from bushfit.simulation.undisturbed import PAPER_LOOPS, PAPER_SWEEPS
 
 #: Time of a sweep's point where the rig states none [s]; chosen: some cycles to settle, and some to average.
 POINT_SECONDS = 30.0

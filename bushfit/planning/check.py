@@ -22,7 +22,8 @@ from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.solve import Coordinates
 from bushfit.planning.campaign import settings_of
 from bushfit.planning.contract import Plan
-from bushfit.simulation import Undisturbed, measure, undisturbed
+from bushfit.simulation.measured import measure
+from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
 #: Of one campaign what was found less the truth, (k,); None where no fit was possible.
 Found = Array | None

@@ -12,7 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.scorecard.hidden import FORCE_NOISE, NOISE
 from bushfit.scorecard.recipe import Bench, Recipe
-from bushfit.simulation import Simulated
+from bushfit.simulation.measured import Simulated
 
 #: Amplitudes of a strain sweep.
 _STEPS = 12

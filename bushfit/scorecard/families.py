@@ -18,7 +18,7 @@ from bushfit.scorecard.mistaken import mistaken_campaign
 from bushfit.scorecard.outcome import Task
 from bushfit.scorecard.outside import OUTSIDE_LAWS
 from bushfit.scorecard.recipe import Recipe, cooked
-from bushfit.simulation import Simulated
+from bushfit.simulation.measured import Simulated
 
 #: What is hidden in the campaigns of a card.
 Family = Literal["effects", "mistakes", "amplitude_sweeps", "awkward", "faults", "outside", "library"]

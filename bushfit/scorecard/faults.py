@@ -12,7 +12,7 @@ from bushfit.geometry import Direction
 from bushfit.reading.measurement import Sweep
 from bushfit.scorecard.awkward import each_loop, each_sweep, wild
 from bushfit.scorecard.recipe import MIDDLE, Around, Bench, Recipe
-from bushfit.simulation import Simulated
+from bushfit.simulation.measured import Simulated
 
 #: Times the largest amplitude at which a bushing is preloaded.
 _PRELOAD = 3.0

@@ -23,7 +23,8 @@ from bushfit.fitting.data_sets import DataSet
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.simulation import PAPER_FREQUENCIES, Simulated, measure, undisturbed
+from bushfit.simulation.measured import Simulated, measure
+from bushfit.simulation.undisturbed import PAPER_FREQUENCIES, undisturbed
 
 #: Effects of the family `effects`, in turn: those of its first card, so that a seed makes the same card ever after.
 FIRST = (

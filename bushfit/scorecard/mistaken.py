@@ -14,7 +14,7 @@ from bushfit.effects.mistakes import MISTAKES, labelled
 from bushfit.geometry import ROTATION, Direction, Place
 from bushfit.reading.measurement import Complex, Floats, Loop, Sweep
 from bushfit.scorecard.hidden import Sealed, hidden_campaign
-from bushfit.simulation import Simulated
+from bushfit.simulation.measured import Simulated
 
 
 def _with_loss(stiffness: Complex, loss: Floats) -> Complex:

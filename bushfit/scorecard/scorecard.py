@@ -30,7 +30,8 @@ from bushfit.scorecard.families import RECIPES, campaign_of
 from bushfit.scorecard.hidden import Sealed
 from bushfit.scorecard.outcome import REFUSED, Outcome, Task
 from bushfit.scorecard.settled import planned_session, with_session
-from bushfit.simulation import Simulated, to_files
+from bushfit.simulation.files import to_files
+from bushfit.simulation.measured import Simulated
 
 #: What of |K|, or of a parameter, is off where a mistake in the record matters.
 _MATTERS = 0.02

@@ -9,7 +9,7 @@ from bushfit.jobs.plan import PlanTests
 from bushfit.planning.campaign import settings_of
 from bushfit.planning.contract import Noise, Test
 from bushfit.planning.plan import TOLD
-from bushfit.simulation import Simulated, simulate
+from bushfit.simulation.measured import Simulated, simulate
 
 #: Highest frequency of the rig that makes the session, over that of the tests so far: what `diagnose` asks for at most.
 _FASTER = 2.0

@@ -26,7 +26,8 @@ from bushfit.batch.work import Orders
 from bushfit.campaign.schema import SimulateSettings
 from bushfit.model.model import Model
 from bushfit.report.contents import Formats
-from bushfit.simulation import simulate, to_files
+from bushfit.simulation.files import to_files
+from bushfit.simulation.measured import simulate
 
 _PROGRAM = str(Path(sys.executable).with_name("bushfit"))
 _KINDS = 8

@@ -11,7 +11,8 @@ from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSetti
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Sweep
-from bushfit.simulation import measure, undisturbed
+from bushfit.simulation.measured import measure
+from bushfit.simulation.undisturbed import undisturbed
 
 FREQUENCIES = tuple(float(f) for f in range(5, 156, 15))
 AMPLITUDES = (5e-5, 1e-4, 2e-4, 5e-4)

@@ -18,7 +18,8 @@ from bushfit.effects import BASE, effect_named
 from bushfit.fitting.data import Data
 from bushfit.fitting.starts import start_values
 from bushfit.model.model import Model
-from bushfit.simulation import Undisturbed, measure, undisturbed
+from bushfit.simulation.measured import measure
+from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
 
 @pytest.fixture(scope="session")

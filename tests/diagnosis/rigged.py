@@ -17,7 +17,7 @@ from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.model.rig import Record
 from bushfit.reading.measurement import Sweep
-from bushfit.simulation import Undisturbed
+from bushfit.simulation.undisturbed import Undisturbed
 
 BOTH = [Direction.AXIAL, Direction.RADIAL]
 FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))

@@ -16,7 +16,7 @@ from bushfit.fitting.procedures import fit_joint
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.scorecard.hidden import hidden_campaign, hideable
-from bushfit.simulation import measure
+from bushfit.simulation.measured import measure
 
 #: The rig steps a compliant mount in time with many more steps than any other.
 SLOW = {name for name in hideable() if "compliance" in name}

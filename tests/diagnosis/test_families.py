@@ -14,7 +14,8 @@ from bushfit.effects import BASE
 from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
 from bushfit.model.model import Model
-from bushfit.simulation import measure, undisturbed
+from bushfit.simulation.measured import measure
+from bushfit.simulation.undisturbed import undisturbed
 
 TRUTHS: dict[str, dict[str, float]] = {
     "kraus": {"delta": 6e5, "r": 0.15, "e_c": 8e-3, "n": 0.5},

@@ -18,7 +18,8 @@ from bushfit.diagnosis.workflow import diagnose
 from bushfit.fitting.data import Data
 from bushfit.model import rig
 from bushfit.model.model import Model
-from bushfit.simulation import Undisturbed, measure, undisturbed
+from bushfit.simulation.measured import measure
+from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
 #: Time steps in a cycle of the rig.
 STEPS = 1024

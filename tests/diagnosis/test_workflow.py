@@ -36,7 +36,8 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
-from bushfit.simulation import measure, undisturbed
+from bushfit.simulation.measured import measure
+from bushfit.simulation.undisturbed import undisturbed
 
 
 @pytest.mark.parametrize("plan", [PLAN, SHARED], ids=["independent", "shared"])

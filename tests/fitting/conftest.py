@@ -10,7 +10,8 @@ import pytest
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulateSettings
 from bushfit.model.model import Model
-from bushfit.simulation import Undisturbed, measure, undisturbed
+from bushfit.simulation.measured import measure
+from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
 #: The noise of data/cmp_15961: 0.5 % a sweep point, 0.3 % of a loop's force, three repeats.
 PAPER_NOISE = SimulateSettings(repeats=3, noise=5e-3, force_noise=3e-3, displacement_noise=2e-4)

@@ -24,7 +24,7 @@ from bushfit.model import rig
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.programme import programme
-from bushfit.simulation import simulate
+from bushfit.simulation.measured import simulate
 
 STEP = 0.01
 NOISE = SimulateSettings(seed=2, force_noise=3e-3, displacement_noise=2e-4)

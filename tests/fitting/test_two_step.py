@@ -10,7 +10,7 @@ from bushfit.fitting.data import Data
 from bushfit.fitting.procedures import fit_two_step
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
-from bushfit.simulation import simulate
+from bushfit.simulation.measured import simulate
 
 
 @pytest.mark.parametrize(

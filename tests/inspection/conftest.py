@@ -7,7 +7,8 @@ from looking import plan
 
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.simulation import Undisturbed, measure, undisturbed
+from bushfit.simulation.measured import measure
+from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
 
 @pytest.fixture(scope="module")

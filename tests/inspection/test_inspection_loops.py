@@ -18,7 +18,8 @@ from bushfit.model.model import Model
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop
 from bushfit.reading.names import Said
-from bushfit.simulation import measure, undisturbed
+from bushfit.simulation.measured import measure
+from bushfit.simulation.undisturbed import undisturbed
 
 
 def test_a_loop_is_described(loop: Loop, tmp_path: Path) -> None:

@@ -18,7 +18,8 @@ from bushfit.inspection.opening import inspect
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.rawtable import raw_loop_table, raw_sweep_table
-from bushfit.simulation import Undisturbed, measure, simulate
+from bushfit.simulation.measured import measure, simulate
+from bushfit.simulation.undisturbed import Undisturbed
 
 
 @pytest.mark.parametrize("rig", NOISE)

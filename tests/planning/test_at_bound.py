@@ -18,7 +18,7 @@ from bushfit.planning.knowledge import noise_of, of_campaign, rig_of
 from bushfit.planning.plan import plan
 from bushfit.planning.purpose import purposes
 from bushfit.planning.sensitivity import Told, relative_slopes
-from bushfit.simulation import simulate
+from bushfit.simulation.measured import simulate
 
 AXIAL = Direction.AXIAL
 PAPER = Bushing("paper's", 0.010, 0.018, 0.034)

@@ -28,7 +28,8 @@ from bushfit.planning.order import Drifting, ordered
 from bushfit.planning.plan import FOUND, TOLD, plan
 from bushfit.planning.search import Budget, chosen
 from bushfit.planning.sensitivity import Grid, relative_slopes
-from bushfit.simulation import PAPER_LOOPS, PAPER_SWEEPS, simulate
+from bushfit.simulation.measured import simulate
+from bushfit.simulation.undisturbed import PAPER_LOOPS, PAPER_SWEEPS
 
 AXIAL, RADIAL = Direction.AXIAL, Direction.RADIAL
 BAND = (5.0, 20.0, 60.0, 150.0)

@@ -13,7 +13,7 @@ from bushfit.scorecard.faults import FAULTS, band
 from bushfit.scorecard.outcome import Task
 from bushfit.scorecard.outside import LAWS, OUTSIDE_LAWS
 from bushfit.scorecard.recipe import Recipe, cooked
-from bushfit.simulation import Simulated
+from bushfit.simulation.measured import Simulated
 
 SEED = 4
 

@@ -1,0 +1,175 @@
+"""What a rig with noise writes, as a campaign: noise from point to point, and errors that a run or a level shares.
+
+A run is what was recorded in one go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.naming import folder_name
+from bushfit.campaign.noise import filtered_noise, of_levels, reached_over_asked, with_noise
+from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulatedTest, SimulateSettings
+from bushfit.campaign.session import planned_session
+from bushfit.effects.contract import Array, Circumstances
+from bushfit.geometry import Specimen
+from bushfit.model import rig
+from bushfit.model.model import Model
+from bushfit.model.result import Result
+from bushfit.reading.measurement import Loop, Source, Sweep
+from bushfit.reading.resonance import ResonanceTest
+from bushfit.reading.runs import runs_of
+from bushfit.reduction.programme import programme
+from bushfit.reduction.resonance import reduce_resonance
+from bushfit.simulation.undisturbed import Undisturbed, near, undisturbed
+
+if TYPE_CHECKING:
+    from numpy.random import Generator
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """A simulated campaign: the true model, the plan, and what the rig wrote.
+
+    `resonances` has the mass [kg] and the record of each resonance test; `specimens`, those that were tested.
+    """
+
+    truth: Model
+    plan: SimulateSettings
+    loops: tuple[Loop, ...]
+    sweeps: tuple[Sweep, ...]
+    resonances: tuple[tuple[float, ResonanceTest], ...] = ()
+    specimens: tuple[Specimen, ...] = ()
+
+    @property
+    def result(self) -> Result:
+        """The truth as a result."""
+        said = "simulated: the values a rig simulation was given, not a fit"
+        return Result(self.truth, warnings=(said,), specimens=self.specimens)
+
+    def campaign(self) -> Campaign:
+        """The measurements as a campaign in memory, without the truth; resonance tests are reduced to sweeps."""
+        reduced = tuple(reduce_resonance(test, mass).sweep for mass, test in self.resonances)
+        bushing, name = self.truth.bushing, self.result.name
+        loops = tuple(part for loop in self.loops for part in programme(loop))
+        return Campaign(name, Path(name), bushing, loops, self.sweeps + reduced, specimens=self.specimens)
+
+
+def simulate(truth: Model, plan: SimulateSettings) -> Simulated:
+    """Put a model on the virtual rig and measure it as planned; the same seed gives the same data.
+
+    The model has the effects of the rig too; a plan that names no tests has those of the paper.
+    """
+    return measure(undisturbed(truth, plan), plan)
+
+
+def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
+    """What the rig writes with the plan's noise, repeats and seed; quick, so that many seeds can be drawn.
+
+    Notes:
+        Where a sweep does not reach its amplitudes, the stiffness is that at the amplitude reached (see `near`), and
+        where it depends on the order of the tests, that at each point's turn: the plan's loops come first.
+    """
+    planned = [test for kind in (clean.loops, clean.sweeps, clean.resonances) for test, _ in kind]
+    under = planned_session(clean.truth.bushing, planned, plan.repeats)[len(clean.loops) :]
+    named = zip(_names("sweep", [test for test, _ in clean.sweeps]), clean.sweeps, under, strict=False)
+    random, gains = np.random.default_rng(plan.seed), dict[SimulatedLoop, float]()
+    loops = tuple(
+        _loop(test, force, number, plan, random, gains) for number, (test, force) in enumerate(clean.loops, start=1)
+    )
+    sweeps = tuple(_sweep(clean.truth, test, k, name, plan, random, own) for name, (test, k), own in named)
+    shaken = [each for each in clean.resonances for _ in range(plan.repeats)]
+    resonances = tuple(
+        (test.mass, _resonance(test, ratio, name, plan, random))
+        for name, (test, ratio) in zip(_names("resonance", [t for t, _ in shaken]), shaken, strict=True)
+    )
+    specimens = dict.fromkeys(test.direction for test in planned if isinstance(test.direction, Specimen))
+    return Simulated(clean.truth, plan, loops, sweeps, resonances, tuple(specimens))
+
+
+def _names(kind: str, tests: Sequence[SimulatedTest]) -> list[str]:
+    """A name for each test that is that of its file: by what was tested, with a number where several tests have one."""
+    stems = [f"{kind}_{folder_name(str(test.direction))}" for test in tests]
+    return [stem if stems.count(stem) == 1 else f"{stem}_{place}" for place, stem in enumerate(stems, start=1)]
+
+
+def _loop(
+    test: SimulatedLoop,
+    clean: rig.Record,
+    number: int,
+    plan: SimulateSettings,
+    random: Generator,
+    gains: dict[SimulatedLoop, float],
+) -> Loop:
+    """One record; `gains` has those of the loops before, which their repeats share, and takes that of this loop."""
+    largest = max(amplitude for _, amplitude in test.parts)
+    if test not in gains:
+        gains[test] = 1.0 + plan.level_gain_error * random.standard_normal() if plan.level_gain_error else 1.0
+    gain = gains[test]
+    return Loop(
+        f"loop_{test.direction}_{number}",
+        test.direction,
+        clean.time,
+        clean.displacement + plan.displacement_noise * largest * random.standard_normal(clean.time.size),
+        gain * clean.force
+        + plan.force_noise * np.ptp(clean.force) / 2.0 * filtered_noise(clean.time.size, plan, random),
+        temperature=test.temperature,
+    )
+
+
+def _sweep(
+    truth: Model,
+    test: SimulatedSweep,
+    clean: Array,
+    name: str,
+    plan: SimulateSettings,
+    random: Generator,
+    under: Circumstances,
+) -> Sweep:
+    """All repeats of a sweep; where the amplitude is stepped, with the levels that a reader finds in those reached."""
+    plan = replace(plan, repeats=test.repeats or plan.repeats)
+    shape = (len(test.held), plan.repeats, len(test.steps))
+    frequency, level = (np.broadcast_to(values[:, None], shape).ravel() for values in test.points)
+    repeat = np.broadcast_to(np.arange(1, plan.repeats + 1)[:, None], shape).ravel()
+    stiffness, reached = np.broadcast_to(clean[:, None], shape), None
+    if test.reached:
+        reached = level * reached_over_asked(test, plan, random)
+    if test.reached or truth.knows_circumstances:
+        planned = frequency, level, stiffness.ravel(), Circumstances(test.temperature)
+        nearby = near(truth, test.direction, *planned, under)
+        stiffness = nearby(level if reached is None else reached).reshape(shape)
+    stiffness = stiffness * of_levels(len(test.held), plan, random)
+    measured = np.stack([with_noise(stiffness[:, number], plan, random) for number in range(plan.repeats)], axis=1)
+    if test.stepped == "amplitude" and reached is not None:
+        level = runs_of(frequency, reached, repeat).amplitude
+    return Sweep(
+        name,
+        test.direction,
+        frequency,
+        level,
+        measured.ravel(),
+        repeat,
+        reached=reached,
+        stepped=test.stepped,
+        temperature=test.temperature,
+    )
+
+
+def _resonance(
+    test: SimulatedResonance, clean: Array, name: str, plan: SimulateSettings, random: Generator
+) -> ResonanceTest:
+    """One run, with the gain and phase of its two accelerometers."""
+    return ResonanceTest(
+        name,
+        test.direction,
+        np.array(test.frequencies),
+        with_noise(clean[None], plan, random)[0],
+        np.full(clean.shape, test.base_acceleration),
+        Source(Path(f"{name}.csv"), ""),
+    )
