@@ -45,7 +45,7 @@ def searched_again(search: Search, final: Evidence, steps: Sequence[Step], held:
             continue
         try:
             rest = fit(search.base.model, part.rest(search.base.data_sets), search.held, search.bounds)
-            anew = Search.begin(rest, settings, search.start, search.held, search.bounds, search)
+            anew = Search.begin(rest, settings, search.start, search.held, search.bounds, search, narrowed=True)
             grown, added = anew.grow()
             if {*added} == named:
                 found.append(Again(part.name, True, ()))

@@ -27,6 +27,9 @@ _FIRST_EVALUATIONS = 4
 _TO_ITS_END = 100
 #: Evaluations before which a refit goes on where its proposal claimed to come near the best.
 _CLAIM_HOLDS = 12
+#: Evaluations after which a refit is asked how far it came since, and the share of what it is still behind that it has
+#: to have come; chosen: at less it would take forty more.
+_PACE, _LEAST_PACE = 6, 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,14 +71,23 @@ def refits(
             fits[proposal.name] = fit_from(proposal.model.with_values(known_to_it), evidence.data_sets, held, limits)
     claimed = {proposal.name: evidence.chi_square - proposal.score for proposal in proposed}
     least = min((candidate.evidence.chi_square for candidate in known), default=np.inf)
-    running = list(fits)
+    running, rounds, before = list(fits), 0, dict[str, float]()
     while running:
         for name in running:
             fits[name] = fits[name].stepped()
         least = min(least, *(fits[name].chi_square for name in running))
-        running = [name for name in running if can_reach(fits[name], least + EXCLUDED, claimed[name])]
-    if fits:
-        first = min(fits, key=lambda name: fits[name].chi_square)
+        goal, rounds = least + EXCLUDED, rounds + 1
+        running = [name for name in running if can_reach(fits[name], goal, claimed[name])]
+        if rounds % _PACE == 0:
+            behind = {name: fits[name].chi_square - goal for name in running}
+            running = [
+                name
+                for name in running
+                if before.get(name, np.inf) - fits[name].chi_square > _LEAST_PACE * behind[name]
+            ]
+            before = {name: fits[name].chi_square for name in running}
+    first = min(fits, key=lambda name: fits[name].chi_square, default="")
+    if first and fits[first].chi_square < least + EXCLUDED:
         fits[first] = fits[first].finished(_TO_ITS_END)
     ends = {name: Evidence(fit.solution, evidence.data_sets) for name, fit in fits.items()}
     refitted = [

@@ -41,6 +41,8 @@ _BENT = 1.5
 #: Candidates that are refitted in each round at most, the best scores first; chosen for time: the truth ranks third
 #: at worst on the score card, and look-alikes of it up to the seventh.
 _MOST_REFITTED = 8
+#: Of these, the best so many by score are refitted whatever an earlier search said of them.
+_ALWAYS_REFITTED = 3
 #: Share of the best score that a candidate needs to be refitted.
 _LEAST_SCORE = 0.1
 #: Share of what chance makes that its score has to reach: a refit may gain more than its score, but not so much more.
@@ -74,16 +76,13 @@ class Round:
     Args:
         proposed: every effect that the model lacks, the best score first.
         tried: the most promising refitted with all parameters, the best by BIC first.
+        critical: the gain that noise alone exceeds with probability 1 - CHANCE_LEVEL.
     """
 
     evidence: Evidence
     proposed: tuple[Proposal, ...]
     tried: tuple[Candidate, ...]
-
-    @cached_property
-    def critical(self) -> float:
-        """The gain that noise alone exceeds with probability 1 - CHANCE_LEVEL."""
-        return critical_gain(self.evidence, self.proposed)
+    critical: float
 
     @property
     def best(self) -> Candidate | None:
@@ -114,6 +113,7 @@ class Search:
         held, bounds: parameters the campaign holds, and limits it sets.
         rounds: per set of added effects the refitted model and what every effect says of it.
         earlier: a search on much the same tests, from whose refits this one's start; None without.
+        narrowed: whether what fell far behind in that search is refitted only where its score is among the best.
     """
 
     settings: Settings
@@ -122,6 +122,7 @@ class Search:
     bounds: Bounds
     rounds: dict[frozenset[str], Round] = field(default_factory=dict)
     earlier: Search | None = None
+    narrowed: bool = False
 
     @classmethod
     def begin(
@@ -132,9 +133,11 @@ class Search:
         held: Sequence[str],
         bounds: Bounds,
         earlier: Search | None = None,
+        *,
+        narrowed: bool = False,
     ) -> Search:
         """A search that has scored every effect of the library once, and refitted the best."""
-        search = cls(settings, start, tuple(held), bounds, earlier=earlier)
+        search = cls(settings, start, tuple(held), bounds, earlier=earlier, narrowed=narrowed)
         search._round(base, ())
         return search
 
@@ -157,15 +160,17 @@ class Search:
         key = frozenset(added)
         if key not in self.rounds:
             proposed = tuple(proposals(evidence, (*self.settings.without, *added), self.held))
-            chance = _LEAST_CHANCE * critical_gain(evidence, proposed)
-            least = max(chance, _LEAST_SCORE * max((claim.score for claim in proposed), default=0.0))
-            fitted = {candidate.name for candidate in known}
-            best = [claim for claim in proposed[:_MOST_REFITTED] if claim.score > least and claim.name not in fitted]
+            critical = critical_gain(evidence, proposed)
+            least = max(_LEAST_CHANCE * critical, _LEAST_SCORE * proposed[0].score) if proposed else 0.0
+            passed_over = {*(candidate.name for candidate in known), *self._left_earlier(key, proposed)}
+            best = [
+                claim for claim in proposed[:_MOST_REFITTED] if claim.score > least and claim.name not in passed_over
+            ]
             read: Mapping[str, float] = self.start if not added and evidence.reduced > _BENT else {}
             near = known[0].evidence.model.values if known else read
             starts = {claim.name: self._found_earlier(key, claim.name) or near for claim in best}
             tried = refits(evidence, best, known, starts, self.held, self.bounds)
-            self.rounds[key] = Round(evidence, proposed, tuple(self._with_limit(evidence, tried)))
+            self.rounds[key] = Round(evidence, proposed, tuple(self._with_limit(evidence, tried)), critical)
         return self.rounds[key]
 
     def _with_limit(self, evidence: Evidence, tried: Sequence[Candidate]) -> Sequence[Candidate]:
@@ -187,6 +192,13 @@ class Search:
             both = [*(candidate for candidate in tried if candidate.name != name), found]
             return sorted(both, key=lambda candidate: candidate.evidence.bic)
         return tried
+
+    def _left_earlier(self, added: frozenset[str], proposed: Sequence[Proposal]) -> set[str]:
+        """Candidates that the earlier search left far behind beside the same effects, and whose score is not among the
+        best."""
+        before = self.earlier.rounds.get(added) if self.earlier and self.narrowed else None
+        left = {each.name for each in before.tried if each.left} if before else set()
+        return left - {claim.name for claim in proposed[:_ALWAYS_REFITTED]}
 
     def _found_earlier(self, added: frozenset[str], name: str) -> Mapping[str, float]:
         """Values at which the earlier search left a candidate beside the same effects; none where it met a bound, as
