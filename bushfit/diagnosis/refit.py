@@ -25,6 +25,8 @@ _MOST_FALL = 4.0
 _FIRST_EVALUATIONS = 4
 #: Evaluations of the model that the best refit may take: where it stops short, the next effect makes up for it.
 _TO_ITS_END = 100
+#: Share of what a fit is above the noise that `_PACE` evaluations have to take off it; chosen: less decides nothing.
+_HARDLY = 1e-3
 #: Evaluations before which a refit goes on where its proposal claimed to come near the best.
 _CLAIM_HOLDS = 12
 #: Evaluations after which a refit is asked how far it came since, and the share of what it is still behind that it has
@@ -88,13 +90,23 @@ def refits(
             before = {name: fits[name].chi_square for name in running}
     first = min(fits, key=lambda name: fits[name].chi_square, default="")
     if first and fits[first].chi_square < least + EXCLUDED:
-        fits[first] = fits[first].finished(_TO_ITS_END)
+        fits[first] = near_its_end(fits[first], _TO_ITS_END)
     ends = {name: Evidence(fit.solution, evidence.data_sets) for name, fit in fits.items()}
     refitted = [
         Candidate(name, end, evidence.chi_square - end.chi_square, left=not _ended(fits[name]))
         for name, end in ends.items()
     ]
     return sorted([*known, *refitted], key=lambda candidate: candidate.evidence.bic)
+
+
+def near_its_end(fit: Descent, evaluations: int = EVALUATIONS) -> Descent:
+    """The fit at its end, after so many evaluations, or where it is far above the noise and hardly comes down."""
+    while fit.chi_square > fit.residual.size:
+        before, far = fit.chi_square, fit.chi_square - fit.residual.size
+        fit = fit.finished(min(fit.evaluations + _PACE, evaluations))
+        if fit.converged or fit.evaluations >= evaluations or before - fit.chi_square < _HARDLY * far:
+            return fit
+    return fit.finished(evaluations)
 
 
 def can_reach(fit: Descent, goal: float, claimed: float = np.inf) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from bushfit.diagnosis.evidence import Evidence, fit, fit_from
 from bushfit.diagnosis.propose import Proposal, proposals
 from bushfit.diagnosis.record import Settings
-from bushfit.diagnosis.refit import EXCLUDED, Candidate, can_reach, refits
+from bushfit.diagnosis.refit import EXCLUDED, Candidate, can_reach, near_its_end, refits
 from bushfit.diagnosis.score_test import SENSITIVITY_LEFT, ScoreTest
 from bushfit.effects import effect_named, qualified
 from bushfit.effects.contract import Array
@@ -289,7 +289,8 @@ class Search:
         for other in others:
             model = model.with_effect(other)
         start = {parameter: value for parameter, value in current.model.values.items() if parameter in model.values}
-        reduced = fit(model.with_values(start), current.data_sets, self.held, self.bounds)
+        descent = near_its_end(fit_from(model.with_values(start), current.data_sets, self.held, self.bounds))
+        reduced = Evidence(descent.solution, current.data_sets)
         return self._round(reduced, others, [_added(name, current, reduced)])
 
     def _distance(self, clean: Sequence[DataSet], rival: Candidate) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -55,9 +56,10 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     mended = [name for name in settings.adopt if mistake_named(name)]
     data, said = adopted(data, mended)
     data, begun, left = _without_wild(data, model, settings)
-    data, fewer = condensed(data)
+    whole, (data, fewer) = data, condensed(data)
     if fewer:
         begun = _begin(data, model, settings)
+        fewer += _means_left_out(whole, data, begun.outliers)
     searched, counted = _search(data, begun, model, settings), False
     for _ in range(_MOST_SEARCHES):
         if searched.best is None or not (errors := _errors_beside(searched, searched.best, data)).matters:
@@ -150,6 +152,14 @@ def _class_words(data: Data) -> list[str]:
         return []
     shared = class_words(data.campaign.rig)
     return [f"nothing was repeated at three points or more: errors shared by a run are the rig's class, {shared}"]
+
+
+def _means_left_out(whole: Data, fewer: Data, outliers: Sequence[Outlier]) -> tuple[str, ...]:
+    """A sentence on each sweep of whose means a robust fit left some out."""
+    pairs = zip(whole.sweeps, fewer.sweeps, strict=True)
+    means = {after.name for before, after in pairs if after.size < before.size}
+    counts = Counter(outlier.test for outlier in outliers if outlier.test in means)
+    return tuple(f"{name}: {count} of these means left out, farther off than noise" for name, count in counts.items())
 
 
 def _without_wild(data: Data, model: Model | None, settings: Settings) -> tuple[Data, _Begun, tuple[Outlier, ...]]:

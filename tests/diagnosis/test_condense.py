@@ -209,3 +209,16 @@ def test_a_clean_long_sweep_is_consistent() -> None:
     """Eight seeds; the noise is white and of the fit's own kind, which proves half."""
     verdicts = [diagnose(data_of(swept(PAPER, seed=seed))).verdict for seed in range(8)]
     assert verdicts == ["consistent"] * 8
+
+
+def test_means_that_a_robust_fit_leaves_out_are_told() -> None:
+    """Rows of two bands 2.5 standard deviations off are no outliers; the mean of one is."""
+    sweep = swept(PAPER)
+    band = (sweep.frequency > 40.0) & (sweep.frequency < 43.0) & (sweep.amplitude == LEVELS[1]) & (sweep.repeat == 1)
+    assert np.count_nonzero(band) == 19
+    off_there = replace(sweep, stiffness=np.where(band, 1.0 + 2.5 * SCATTER, 1.0) * sweep.stiffness)
+    data = data_of(off_there)
+    robust = Data.of(replace(data.campaign, fit=replace(data.campaign.fit, loss="soft_l1")))
+    (told,) = [note for note in diagnose(robust).notes if "means left out" in note]
+    assert told == "swept: 1 of these means left out, farther off than noise"
+    assert not any("means left out" in note for note in diagnose(data).notes)
