@@ -29,8 +29,8 @@ _TO_ITS_END = 100
 _HARDLY = 1e-3
 #: Evaluations before which a refit goes on where its proposal claimed to come near the best.
 _CLAIM_HOLDS = 12
-#: Evaluations after which a refit is asked how far it came since, and the share of what it is still behind that it has
-#: to have come; chosen: at less it would take forty more.
+#: Evaluations after which a refit whose proposal claimed less is asked how far it came since, and the share of what it
+#: is still behind that it has to have come; chosen: at less it would take forty more.
 _PACE, _LEAST_PACE = 6, 0.15
 
 
@@ -81,12 +81,9 @@ def refits(
         goal, rounds = least + EXCLUDED, rounds + 1
         running = [name for name in running if can_reach(fits[name], goal, claimed[name])]
         if rounds % _PACE == 0:
-            behind = {name: fits[name].chi_square - goal for name in running}
-            running = [
-                name
-                for name in running
-                if before.get(name, np.inf) - fits[name].chi_square > _LEAST_PACE * behind[name]
-            ]
+            came = {name: before.get(name, np.inf) - fits[name].chi_square for name in running}
+            least_pace = {name: _LEAST_PACE * (fits[name].chi_square - goal) for name in running}
+            running = [name for name in running if came[name] > least_pace[name] or claimed[name] < goal]
             before = {name: fits[name].chi_square for name in running}
     first = min(fits, key=lambda name: fits[name].chi_square, default="")
     if first and fits[first].chi_square < least + EXCLUDED:
