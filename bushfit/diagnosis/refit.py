@@ -73,27 +73,39 @@ def refits(
             fits[proposal.name] = fit_from(proposal.model.with_values(known_to_it), evidence.data_sets, held, limits)
     claimed = {proposal.name: evidence.chi_square - proposal.score for proposal in proposed}
     least = min((candidate.evidence.chi_square for candidate in known), default=np.inf)
-    running, rounds, before = list(fits), 0, dict[str, float]()
-    while running:
-        for name in running:
-            fits[name] = fits[name].stepped()
-        least = min(least, *(fits[name].chi_square for name in running))
-        goal, rounds = least + EXCLUDED, rounds + 1
-        running = [name for name in running if can_reach(fits[name], goal, claimed[name])]
-        if rounds % _PACE == 0:
-            came = {name: before.get(name, np.inf) - fits[name].chi_square for name in running}
-            least_pace = {name: _LEAST_PACE * (fits[name].chi_square - goal) for name in running}
-            running = [name for name in running if came[name] > least_pace[name] or claimed[name] < goal]
-            before = {name: fits[name].chi_square for name in running}
+    fits = _raced(fits, claimed, least)
+    left = {name for name in fits if not _ended(fits[name])}
     first = min(fits, key=lambda name: fits[name].chi_square, default="")
     if first and fits[first].chi_square < least + EXCLUDED:
         fits[first] = near_its_end(fits[first], _TO_ITS_END)
-    ends = {name: Evidence(fit.solution, evidence.data_sets) for name, fit in fits.items()}
+        left -= {first}
     refitted = [
-        Candidate(name, end, evidence.chi_square - end.chi_square, left=not _ended(fits[name]))
-        for name, end in ends.items()
+        Candidate(name, Evidence(fit.solution, evidence.data_sets), evidence.chi_square - fit.chi_square, name in left)
+        for name, fit in fits.items()
     ]
     return sorted([*known, *refitted], key=lambda candidate: candidate.evidence.bic)
+
+
+def _raced(fits: Mapping[str, Descent], claimed: Mapping[str, float], least: float) -> dict[str, Descent]:
+    """All fits step by step, until each has ended, or cannot come near the best or a chi-square that is known.
+
+    Args:
+        claimed: the chi-square that each proposal promised.
+        least: of what is known.
+    """
+    fits, running, before, rounds = {**fits}, [*fits], dict[str, float](), 0
+    while running:
+        for name in running:
+            fits[name] = fits[name].stepped()
+        least, rounds = min(least, *(fits[name].chi_square for name in running)), rounds + 1
+        goal = least + EXCLUDED
+        running = [name for name in running if can_reach(fits[name], goal, claimed[name])]
+        if rounds % _PACE == 0:
+            came = {name: before.get(name, np.inf) - fits[name].chi_square for name in running}
+            behind = {name: fits[name].chi_square - goal for name in running}
+            running = [name for name in running if came[name] > _LEAST_PACE * behind[name] or claimed[name] < goal]
+            before = {name: fits[name].chi_square for name in running}
+    return fits
 
 
 def near_its_end(fit: Descent, evaluations: int = EVALUATIONS) -> Descent:
