@@ -9,7 +9,7 @@ Notes:
 import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence, fit
-from bushfit.diagnosis.search import SAME, Round, Search
+from bushfit.diagnosis.search import Search
 from bushfit.errors import FitError, ModelError
 from bushfit.units import number
 
@@ -32,21 +32,15 @@ def leads(search: Search) -> str:
     try:
         begun = _weighed(search)
         anew = Search.begin(begun, search.settings, search.start, search.held, search.bounds)
-        final, added = anew.grow()
+        final, steps = anew.reconsider(*anew.grow())
     except (FitError, ModelError):  # a model of which these tests tell nothing
         return ""
     before, after = plain_misfit(begun), plain_misfit(final)
-    if not added or after > _LEFT * before:
+    if not steps or after > _LEFT * before:
         return ""
-    sets = " and ".join(" or ".join(_alike(anew.rounds[frozenset(added[:number])])) for number in range(len(added)))
+    sets = " and ".join(" or ".join((step.name, *(rival.name for rival in step.rivals))) for step in steps)
     sizes = f"{number(100.0 * before, 2)} to {number(100.0 * after, 2)} %"
     return f"; no more than leads, every test weighed by what is missed of it: {sets} bring the model from {sizes} off"
-
-
-def _alike(round_: Round) -> list[str]:
-    """The best candidate of a round of the search, and those that are the same by BIC."""
-    best = round_.best.evidence.bic if round_.best else np.inf
-    return [candidate.name for candidate in round_.tried if candidate.evidence.bic - best < SAME]
 
 
 def plain_misfit(evidence: Evidence) -> float:
