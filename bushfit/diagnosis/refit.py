@@ -73,7 +73,7 @@ def refits(
             fits[proposal.name] = fit_from(proposal.model.with_values(known_to_it), evidence.data_sets, held, limits)
     claimed = {proposal.name: evidence.chi_square - proposal.score for proposal in proposed}
     least = min((candidate.evidence.chi_square for candidate in known), default=np.inf)
-    fits = _raced(fits, claimed, least)
+    fits = raced(fits, claimed, least)
     left = {name for name in fits if not _ended(fits[name])}
     first = min(fits, key=lambda name: fits[name].chi_square, default="")
     if first and fits[first].chi_square < least + EXCLUDED:
@@ -86,7 +86,7 @@ def refits(
     return sorted([*known, *refitted], key=lambda candidate: candidate.evidence.bic)
 
 
-def _raced(fits: Mapping[str, Descent], claimed: Mapping[str, float], least: float) -> dict[str, Descent]:
+def raced(fits: Mapping[str, Descent], claimed: Mapping[str, float], least: float) -> dict[str, Descent]:
     """All fits step by step, until each has ended, or cannot come near the best or a chi-square that is known.
 
     Args:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
+from typing import cast
+
+import numpy as np
 import pytest
 from rigged import SHARED, Fitted, Measured
 
 from bushfit.diagnosis.evidence import EVALUATIONS, Evidence, fit
 from bushfit.diagnosis.propose import Proposal, proposals
-from bushfit.diagnosis.refit import EXCLUDED, Candidate, refits
+from bushfit.diagnosis.refit import EXCLUDED, Candidate, near_its_end, raced, refits
+from bushfit.effects.contract import Array
+from bushfit.fitting.descent import Descent
 
 INERTIA = {"inertia": {"mass": 0.06}}
 
@@ -54,3 +60,41 @@ def test_without_proposals_there_is_only_what_is_known(plain: Evidence) -> None:
     known = Candidate("inertia", plain, 0.0)
     assert refits(plain, [], [known], {}, (), {}) == [known]
     assert refits(plain, [], [], {}, (), {}) == []
+
+
+@dataclass(frozen=True)
+class Falling:
+    """A fit that comes down by the same at each evaluation, and promises to come down by any amount."""
+
+    chi_square: float
+    by: float
+    evaluations: int = 1
+    converged: bool = False
+    expected_fall: float = 1e9
+    residual: Array = field(default_factory=lambda: np.zeros(100))
+
+    def stepped(self) -> Falling:
+        return replace(self, chi_square=max(self.chi_square - self.by, 0.0), evaluations=self.evaluations + 1)
+
+    def finished(self, evaluations: int) -> Falling:
+        here = self
+        while here.evaluations < evaluations:
+            here = here.stepped()
+        return here
+
+
+def test_a_refit_that_hardly_comes_nearer_is_left_but_where_it_claimed_to_come_near() -> None:
+    """Ten thousand behind, by one an evaluation; chosen by hand, as no campaign shows it alone."""
+    slow, quick = Falling(11_000.0, 1.0), Falling(11_000.0, 250.0)
+    fits = {name: cast(Descent, each) for name, each in (("slow", slow), ("quick", quick), ("claims", slow))}
+    ends = raced(fits, {"slow": 9000.0, "quick": 9000.0, "claims": 900.0}, 1000.0)
+    evaluations = {name: each.evaluations for name, each in ends.items()}
+    assert evaluations["slow"] < 20
+    assert evaluations["quick"] == EVALUATIONS
+    assert evaluations["claims"] == EVALUATIONS
+
+
+def test_a_fit_far_above_the_noise_that_hardly_comes_down_is_at_its_end() -> None:
+    far, near = cast(Descent, Falling(100_000.0, 1.0)), cast(Descent, Falling(110.0, 0.1))
+    assert near_its_end(far).evaluations < 10
+    assert near_its_end(near).evaluations == EVALUATIONS

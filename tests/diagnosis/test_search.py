@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 from asking import INERTIA, TWO, asked, names
-from rigged import SHARED, Diagnosed, Measured
+from rigged import SHARED, Diagnosed, Fitted, Measured
 
+from bushfit.diagnosis.record import Settings
+from bushfit.diagnosis.search import Search
 from bushfit.effects import BASE, LIBRARY
 
 
@@ -87,3 +89,20 @@ def test_chance_alone_names_nothing_however_small_a_gap_counts(measured: Measure
     diagnosis = asked(measured({}, SHARED, seed), tolerance=0.0)
     assert max(judged.score for judged in diagnosis.candidates) > 1.0
     assert diagnosis.effects == ()
+
+
+def test_a_search_made_again_passes_over_what_fell_far_behind(measured: Measured, fitted: Fitted) -> None:
+    plain = fitted(measured(INERTIA, SHARED))
+    given = plain, Settings(), plain.model.values, (), {}
+    whole = Search.begin(*given)
+    again = Search.begin(*given, whole, narrowed=True)
+    foremost = {claim.name for claim in whole.first.proposed[:3]}
+    behind = {candidate.name for candidate in whole.first.tried if candidate.left} - foremost
+    assert behind
+    refitted = {candidate.name for candidate in whole.first.tried}
+    assert {candidate.name for candidate in again.first.tried} == refitted - behind
+    best, same = whole.first.best, again.first.best
+    assert best
+    assert same
+    assert same.name == best.name == "inertia"
+    assert same.evidence.chi_square == pytest.approx(best.evidence.chi_square, abs=0.05)
