@@ -33,9 +33,10 @@ def searched_again(search: Search, final: Evidence, steps: Sequence[Step], held:
     """The search made anew without each part that was held out, with the same noise, and what comes of it.
 
     It adds as many effects as were named and looks for no more: what a part less brings beside them is not asked. Each
-    candidate starts where all the tests left it. Where the same effects are added, they came again; else their rivals
-    are tried first. Of several effects another name without one part is enough to take them back, and ends it. The
-    search goes step by step and may miss what fits the rest best: where what was named does, it came again.
+    candidate starts where all the tests left it, and one that they left far behind is refitted only where its score
+    without the part is near or among the best. Where the same effects are added, they came again; else their rivals are
+    tried first. Of several effects another name without one part is enough to take them back, and ends it. The search
+    goes step by step and may miss what fits the rest best: where what was named does, it came again.
     """
     named, told = {step.name for step in steps}, {part.part for part in held.parts}
     known = {name for step in steps for name in (step.name, *(each.name for each in (*step.rivals, *step.richer)))}

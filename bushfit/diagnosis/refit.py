@@ -1,6 +1,6 @@
 """Candidate refits: the best proposals fitted together with all parameters of the model, side by side.
 
-A refit that cannot come near the best is stopped before its end.
+A refit that cannot come near the best, or comes nearer too slowly, is stopped before its end.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,12 +25,12 @@ _MOST_FALL = 4.0
 _FIRST_EVALUATIONS = 4
 #: Evaluations of the model that the best refit may take: where it stops short, the next effect makes up for it.
 _TO_ITS_END = 100
-#: Share of what a fit is above the noise that `_PACE` evaluations have to take off it; chosen: less decides nothing.
+#: Share of what a fit is above its floor that `_PACE` evaluations have to take off it; chosen: less decides nothing.
 _HARDLY = 1e-3
 #: Evaluations before which a refit goes on where its proposal claimed to come near the best.
 _CLAIM_HOLDS = 12
-#: Evaluations after which a refit whose proposal claimed less is asked how far it came since, and the share of what it
-#: is still behind that it has to have come; chosen: at less it would take forty more.
+#: Every so many evaluations a refit whose proposal claimed less is asked how far it came since the last time; and the
+#: share of what it is still behind that it has to have come; chosen: at less it would take forty more.
 _PACE, _LEAST_PACE = 6, 0.15
 
 
@@ -57,6 +57,8 @@ def refits(
 ) -> list[Candidate]:
     """Fit proposals until they converge or cannot come near the best; with the candidates known already, best first.
 
+    The best is then taken to its end, where it is not far behind one that is known.
+
     Args:
         evidence, proposed: the fitted model without the effects, and the effects to fit.
         known: candidates that need no fit.
@@ -77,8 +79,7 @@ def refits(
     left = {name for name in fits if not _ended(fits[name])}
     first = min(fits, key=lambda name: fits[name].chi_square, default="")
     if first and fits[first].chi_square < least + EXCLUDED:
-        fits[first] = near_its_end(fits[first], _TO_ITS_END)
-        left -= {first}
+        fits[first] = near_its_end(fits[first], evidence.residual.size, _TO_ITS_END)
     refitted = [
         Candidate(name, Evidence(fit.solution, evidence.data_sets), evidence.chi_square - fit.chi_square, name in left)
         for name, fit in fits.items()
@@ -87,7 +88,8 @@ def refits(
 
 
 def raced(fits: Mapping[str, Descent], claimed: Mapping[str, float], least: float) -> dict[str, Descent]:
-    """All fits step by step, until each has ended, or cannot come near the best or a chi-square that is known.
+    """All fits step by step, until each has ended, or cannot come near the best or a chi-square that is known, or comes
+    nearer too slowly though it never claimed to come near.
 
     Args:
         claimed: the chi-square that each proposal promised.
@@ -108,12 +110,13 @@ def raced(fits: Mapping[str, Descent], claimed: Mapping[str, float], least: floa
     return fits
 
 
-def near_its_end(fit: Descent, evaluations: int = EVALUATIONS) -> Descent:
-    """The fit at its end, after so many evaluations, or where it is far above the noise and hardly comes down."""
-    while fit.chi_square > fit.residual.size:
-        before, far = fit.chi_square, fit.chi_square - fit.residual.size
+def near_its_end(fit: Descent, floor: float, evaluations: int = EVALUATIONS) -> Descent:
+    """The fit at its end, after so many evaluations, or where it hardly comes down though it is still above a floor of
+    chi-square: what is left to come is then next to nothing of what it is off."""
+    while fit.chi_square > floor and not fit.converged and fit.evaluations < evaluations:
+        before = fit.chi_square
         fit = fit.finished(min(fit.evaluations + _PACE, evaluations))
-        if fit.converged or fit.evaluations >= evaluations or before - fit.chi_square < _HARDLY * far:
+        if 0.0 < before - fit.chi_square < _HARDLY * (before - floor):
             return fit
     return fit.finished(evaluations)
 

@@ -113,7 +113,7 @@ class Search:
         held, bounds: parameters the campaign holds, and limits it sets.
         rounds: per set of added effects the refitted model and what every effect says of it.
         earlier: a search on much the same tests, from whose refits this one's start; None without.
-        narrowed: whether what fell far behind in that search is refitted only where its score is among the best.
+        narrowed: whether what fell far behind in that search is refitted only where its score is near the best.
     """
 
     settings: Settings
@@ -194,11 +194,12 @@ class Search:
         return tried
 
     def _left_earlier(self, added: frozenset[str], proposed: Sequence[Proposal]) -> set[str]:
-        """Candidates that the earlier search left far behind beside the same effects, and whose score is not among the
-        best."""
+        """Candidates that the earlier search left far behind beside the same effects, and whose score is far behind,
+        too."""
         before = self.earlier.rounds.get(added) if self.earlier and self.narrowed else None
         left = {each.name for each in before.tried if each.left} if before else set()
-        return left - {claim.name for claim in proposed[:_ALWAYS_REFITTED]}
+        near = [claim for claim in proposed if claim.score > proposed[0].score - EXCLUDED]
+        return left - {claim.name for claim in (*near, *proposed[:_ALWAYS_REFITTED])}
 
     def _found_earlier(self, added: frozenset[str], name: str) -> Mapping[str, float]:
         """Values at which the earlier search left a candidate beside the same effects; none where it met a bound, as
@@ -289,8 +290,8 @@ class Search:
         for other in others:
             model = model.with_effect(other)
         start = {parameter: value for parameter, value in current.model.values.items() if parameter in model.values}
-        descent = near_its_end(fit_from(model.with_values(start), current.data_sets, self.held, self.bounds))
-        reduced = Evidence(descent.solution, current.data_sets)
+        descent = fit_from(model.with_values(start), current.data_sets, self.held, self.bounds)
+        reduced = Evidence(near_its_end(descent, current.chi_square).solution, current.data_sets)
         return self._round(reduced, others, [_added(name, current, reduced)])
 
     def _distance(self, clean: Sequence[DataSet], rival: Candidate) -> float:

@@ -59,13 +59,14 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     whole, (data, fewer) = data, condensed(data)
     if fewer:
         begun = _begin(data, model, settings)
-        fewer += _means_left_out(whole, data, begun.outliers)
     searched, counted = _search(data, begun, model, settings), False
     for _ in range(_MOST_SEARCHES):
         if searched.best is None or not (errors := _errors_beside(searched, searched.best, data)).matters:
             break
         data, counted = data.with_level_errors(errors.error, errors.freedom), True
-        searched = _search(data, _begin(data, model, settings), model, settings, searched.search)
+        begun = _begin(data, model, settings)
+        searched = _search(data, begun, model, settings, searched.search)
+    fewer += _left_out_of_fewer(whole, data, begun.outliers)
     found = searched.told or judge(searched.search, searched.final, searched.steps)
     shared = [_level_words(data, found)] if counted else _class_words(data)
     of_loops = outliers_at(found.result.model, data.loops)
@@ -154,12 +155,12 @@ def _class_words(data: Data) -> list[str]:
     return [f"nothing was repeated at three points or more: errors shared by a run are the rig's class, {shared}"]
 
 
-def _means_left_out(whole: Data, fewer: Data, outliers: Sequence[Outlier]) -> tuple[str, ...]:
-    """A sentence on each sweep of whose means a robust fit left some out."""
+def _left_out_of_fewer(whole: Data, fewer: Data, outliers: Sequence[Outlier]) -> tuple[str, ...]:
+    """A sentence on each sweep that was condensed and of whose points a robust fit then left some out."""
     pairs = zip(whole.sweeps, fewer.sweeps, strict=True)
-    means = {after.name for before, after in pairs if after.size < before.size}
-    counts = Counter(outlier.test for outlier in outliers if outlier.test in means)
-    return tuple(f"{name}: {count} of these means left out, farther off than noise" for name, count in counts.items())
+    changed = {after.name for before, after in pairs if after.size < before.size}
+    counts = Counter(outlier.test for outlier in outliers if outlier.test in changed)
+    return tuple(f"{name}: {count} of these points left out, farther off than noise" for name, count in counts.items())
 
 
 def _without_wild(data: Data, model: Model | None, settings: Settings) -> tuple[Data, _Begun, tuple[Outlier, ...]]:

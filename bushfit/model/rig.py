@@ -55,19 +55,21 @@ def record(
 
     Args:
         frequency, amplitude: [Hz], and zero-to-peak [m or rad].
-        swell: so many cycles of the run-in, its first, swell to so many times the amplitude and die out again (a Hann
-            window): friction then forgets where it began, and the springpot sees no step.
+        swell: so many cycles before these swell to so many times the amplitude and die out again (a Hann window):
+            friction then forgets where it began, and the springpot sees no step. Not for models whose parameters
+            follow the amplitude, which is that of the whole motion.
         steps_per_cycle: the springpot's error falls in proportion: its Gruenwald-Letnikov sum is of first order.
         waveform: sine or triangle.
         kind: whether a loop or a sweep is recorded; only effects of the instrument tell them apart.
         under: what the test is made under, numbers.
     """
-    phase = np.arange((run_in + cycles) * steps_per_cycle + 1) / steps_per_cycle
+    before = swell[0] + run_in
+    phase = np.arange((before + cycles) * steps_per_cycle + 1) / steps_per_cycle
     motion = amplitude * wave(waveform, phase)
     if swell[0]:
         motion *= 1.0 + (swell[1] - 1.0) * np.sin(np.pi * np.minimum(phase / swell[0], 1.0)) ** 2
     whole = imposed(model, direction, motion, 1.0 / (frequency * steps_per_cycle), frequency, kind=kind, under=under)
-    kept = slice(run_in * steps_per_cycle, None)
+    kept = slice(before * steps_per_cycle, None)
     return Record(whole.time[kept] - whole.time[kept][0], whole.displacement[kept].copy(), whole.force[kept].copy())
 
 

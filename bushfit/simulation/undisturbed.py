@@ -13,7 +13,7 @@ import numpy as np
 
 from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulateSettings
 from bushfit.campaign.session import planned_session
-from bushfit.effects import Level, friction
+from bushfit.effects import Level, Modifier, friction
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances
 from bushfit.errors import CampaignError
 from bushfit.geometry import Direction, Place
@@ -37,12 +37,14 @@ _ROWS_PER_CYCLE = 1000
 _STEPS_PER_ROW = 2
 #: Time steps of a programme at most: they take seconds, and a gigabyte.
 _MOST_STEPS = 10_000_000
-#: Cycles before a loop is recorded, so that it has settled; none where an effect's settling is what there is to see.
-_RUN_IN_CYCLES = 40
+#: Cycles before a loop is recorded, so that it has settled, at least and at most; none where an effect's settling is
+#: what there is to see.
+_LEAST_RUN_IN, _MOST_RUN_IN = 40, 300
 #: Share of the mean stress from the start that friction may keep when a loop is recorded: chosen, no test sees it.
 _KEPT = 1e-3
 #: Cycles before these in which the motion swells and dies out, and its largest strain amplitude over eps_half, where
-#: friction would take longer than both to forget its start: chosen, of a mean force it then keeps next to nothing.
+#: friction would take longer than both to forget its start: chosen, of a mean force it then keeps next to nothing. Not
+#: where parameters follow the amplitude, which is that of the whole motion.
 _SWELL_CYCLES, _SWELL_TO = 100, 0.3
 
 
@@ -94,12 +96,13 @@ def _clean_loop(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.
     """The record of a loop or a programme without noise, `_ROWS_PER_CYCLE` rows a cycle of its highest frequency."""
     if len(test.parts) > 1:
         return _clean_programme(truth, test, under)
-    run_in, swell = _run_in(truth, test)
+    ((frequency, amplitude),) = test.parts
+    run_in, swell = _run_in(truth, test.direction, amplitude)
     measured = rig.record(
         truth,
         test.direction,
-        test.frequency,
-        test.amplitude,
+        frequency,
+        amplitude,
         cycles=test.cycles,
         run_in=run_in,
         swell=swell,
@@ -111,20 +114,21 @@ def _clean_loop(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.
     return _thinned(measured)
 
 
-def _run_in(truth: Model, test: SimulatedLoop) -> tuple[int, tuple[int, float]]:
-    """Cycles until friction forgets where it began, and among them those in which a small motion swells, and how far.
+def _run_in(truth: Model, place: Place, amplitude: float) -> tuple[int, tuple[int, float]]:
+    """Cycles until friction forgets where it began; before them those in which a small motion swells, and how far.
 
     At a tenth of eps_half a cycle keeps 95 % of a mean stress, at a hundredth 99.96 %: thousands of cycles.
     """
     if any(effect.settles for effect in truth.records):
         return 0, (0, 1.0)
     if "eps_half" not in truth.values:
-        return _RUN_IN_CYCLES, (0, 1.0)
-    strain = np.array(test.amplitude * truth.unit_strain(test.direction) / truth.values["eps_half"])
+        return _LEAST_RUN_IN, (0, 1.0)
+    strain = np.array(amplitude * truth.unit_strain(place) / truth.values["eps_half"])
     cycles = -np.log(_KEPT) / np.maximum(friction.forgotten(strain), np.finfo(float).tiny)
-    if cycles > _RUN_IN_CYCLES + _SWELL_CYCLES:
-        return _RUN_IN_CYCLES + _SWELL_CYCLES, (_SWELL_CYCLES, float(_SWELL_TO / strain))
-    return max(_RUN_IN_CYCLES, int(np.ceil(cycles))), (0, 1.0)
+    follows = any(isinstance(effect, Modifier) for effect in truth.records)
+    if cycles > _LEAST_RUN_IN + _SWELL_CYCLES and not follows:
+        return _LEAST_RUN_IN, (_SWELL_CYCLES, float(_SWELL_TO / strain))
+    return int(np.clip(np.ceil(cycles), _LEAST_RUN_IN, _MOST_RUN_IN)), (0, 1.0)
 
 
 def _clean_programme(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.Record:

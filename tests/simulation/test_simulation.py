@@ -11,7 +11,7 @@ import pytest
 
 from bushfit.campaign.campaign import Campaign, load_campaign, model_of
 from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulateSettings
-from bushfit.effects import BASE
+from bushfit.effects import BASE, LIBRARY, effect_named, qualified
 from bushfit.errors import CampaignError, ModelError
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import loop_data, sources
@@ -60,6 +60,31 @@ def test_a_loop_has_forgotten_where_it_began_however_small_it_is(paper_model: Mo
     print(f"{strain / paper_model.values['eps_half']:.2g} eps_half: mean {2.0 * np.mean(force) / np.ptp(force):.1e}")
     assert abs(np.mean(force)) < 1e-5 * np.ptp(force)
     assert np.ptp(loop.displacement) == pytest.approx(2.0 * amplitude, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "name", [name for name, effect in LIBRARY.items() if not (effect.harmonic_only or effect.settles or name in BASE)]
+)
+def test_a_small_loop_is_that_of_the_closed_form_with_any_effect(paper_model: Model, name: str) -> None:
+    """What went before a loop is gone from it: the rig's first harmonic is the closed form's, within its own error."""
+    model = paper_model.with_effect(name)
+    effect = effect_named(name)
+    if not effect.replaces:
+        model = model.with_values({qualified(effect, effect.amount): effect.amount.sized(0.1)})
+    small = SimulatedLoop(Direction.AXIAL, 2e-6, 1.0, cycles=1)
+    ((_, record),) = undisturbed(model, SimulateSettings(loops=(small,))).loops
+    closed = model.stiffness(Direction.AXIAL, 1.0, 2e-6, kind="loop")
+    print(f"{name:28} {abs(rig.lock_in(record, 1.0) / closed - 1.0):.1e}")
+    assert rig.lock_in(record, 1.0) == pytest.approx(closed, rel=5e-4)
+
+
+def test_a_programme_of_one_part_is_a_loop(paper_model: Model) -> None:
+    loop, programme = (
+        SimulatedLoop(Direction.AXIAL, 1e-4, 1.0, cycles=1),
+        SimulatedLoop(Direction.AXIAL, cycles=1, frequencies=(1.0,), amplitudes=(1e-4,)),
+    )
+    one, other = (undisturbed(paper_model, SimulateSettings(loops=(each,))).loops[0][1] for each in (loop, programme))
+    np.testing.assert_array_equal(one.force, other.force)
 
 
 def test_every_repeat_measures_every_point(clean: Undisturbed) -> None:
