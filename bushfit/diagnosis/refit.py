@@ -25,7 +25,8 @@ _MOST_FALL = 4.0
 _FIRST_EVALUATIONS = 4
 #: Evaluations of the model that the best refit may take: where it stops short, the next effect makes up for it.
 _TO_ITS_END = 100
-#: Share of what a fit is above its floor that `_PACE` evaluations have to take off it; chosen: less decides nothing.
+#: Share of what the best refit is above the noise that `_PACE` evaluations have to take off it; chosen: less decides
+#: nothing.
 _HARDLY = 1e-3
 #: Evaluations before which a refit goes on where its proposal claimed to come near the best.
 _CLAIM_HOLDS = 12
@@ -79,7 +80,7 @@ def refits(
     left = {name for name in fits if not _ended(fits[name])}
     first = min(fits, key=lambda name: fits[name].chi_square, default="")
     if first and fits[first].chi_square < least + EXCLUDED:
-        fits[first] = near_its_end(fits[first], evidence.residual.size, _TO_ITS_END)
+        fits[first] = near_its_end(fits[first], evidence.residual.size, _HARDLY, _TO_ITS_END)
     refitted = [
         Candidate(name, Evidence(fit.solution, evidence.data_sets), evidence.chi_square - fit.chi_square, name in left)
         for name, fit in fits.items()
@@ -110,13 +111,13 @@ def raced(fits: Mapping[str, Descent], claimed: Mapping[str, float], least: floa
     return fits
 
 
-def near_its_end(fit: Descent, floor: float, evaluations: int = EVALUATIONS) -> Descent:
-    """The fit at its end, after so many evaluations, or where it hardly comes down though it is still above a floor of
-    chi-square: what is left to come is then next to nothing of what it is off."""
+def near_its_end(fit: Descent, floor: float, share: float, evaluations: int = EVALUATIONS) -> Descent:
+    """The fit at its end, after so many evaluations, or where it hardly comes down: by less than a share of what it is
+    above a floor of chi-square."""
     while fit.chi_square > floor and not fit.converged and fit.evaluations < evaluations:
         before = fit.chi_square
         fit = fit.finished(min(fit.evaluations + _PACE, evaluations))
-        if 0.0 < before - fit.chi_square < _HARDLY * (before - floor):
+        if 0.0 < before - fit.chi_square < share * (before - floor):
             return fit
     return fit.finished(evaluations)
 

@@ -45,6 +45,8 @@ _MOST_REFITTED = 8
 _ALWAYS_REFITTED = 3
 #: Share of the best score that a candidate needs to be refitted.
 _LEAST_SCORE = 0.1
+#: Share of what an effect takes off chi-square within which that is known well enough to judge what is in its place.
+_GAIN_KNOWN = 0.01
 #: Share of what chance makes that its score has to reach: a refit may gain more than its score, but not so much more.
 _LEAST_CHANCE = 0.3
 
@@ -291,7 +293,7 @@ class Search:
             model = model.with_effect(other)
         start = {parameter: value for parameter, value in current.model.values.items() if parameter in model.values}
         descent = fit_from(model.with_values(start), current.data_sets, self.held, self.bounds)
-        reduced = Evidence(near_its_end(descent, current.chi_square).solution, current.data_sets)
+        reduced = Evidence(near_its_end(descent, current.chi_square, _GAIN_KNOWN).solution, current.data_sets)
         return self._round(reduced, others, [_added(name, current, reduced)])
 
     def _distance(self, clean: Sequence[DataSet], rival: Candidate) -> float:
