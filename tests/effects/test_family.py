@@ -336,10 +336,15 @@ def stacked(models: list[Model]) -> Mapping[str, np.ndarray]:
     return {name: np.array([[model.values[name]] for model in models]) for name in models[0].parameters}
 
 
-def test_a_stack_of_values_equals_one_after_the_other(effect: Effect, rng: np.random.Generator) -> None:
+@pytest.mark.parametrize("beside", [(), ("loop_clock",)], ids=["alone", "in another time each"])
+def test_a_stack_of_values_equals_one_after_the_other(
+    effect: Effect, beside: tuple[str, ...], rng: np.random.Generator
+) -> None:
     plain = random_model(rng)
     direction, _, amplitude = operating_point(plain, rng)
     model = sized(plain, effect.name, direction, amplitude, rng)
+    for other in {*beside} - {effect.name}:
+        model = sized(model, other, direction, amplitude, rng)
     models = [
         model.with_values({name: value * rng.uniform(0.9, 1.1) for name, value in model.values.items()})
         for _ in range(3)
