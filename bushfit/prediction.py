@@ -23,7 +23,7 @@ from bushfit.geometry import TRANSLATION, Place
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.model.sensitivity import stiffness_jacobian
+from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.reading.runs import nominal
 from bushfit.reduction.resonance import response
 from bushfit.units import number
@@ -139,15 +139,9 @@ def _predicted(
 ) -> Prediction:
     """The prediction of one model at operating points, each (n,), with the uncertainty of the fit."""
     under = Circumstances(temperature)
-    stiffness = model.stiffness(direction, frequency, amplitude, under=under)
     names = [name for name in result.covariance.names if name in model.values]
     covariance = result.covariance.restricted(names)
-    slopes = (
-        stiffness_jacobian(model, direction, frequency, amplitude, names, under=under)
-        if names
-        else np.zeros((0, *stiffness.shape))
-    )
-
+    stiffness, slopes = stiffness_and_slopes(model, direction, frequency, amplitude, names, under=under)
     open_to, beyond = _open_to(model, direction, frequency, amplitude, stiffness)
     count, slopes = len(names), np.concatenate((slopes, open_to))
 

@@ -14,7 +14,7 @@ from bushfit.fitting.data_sets import DataSet, SweepData
 from bushfit.fitting.solve import Solution
 from bushfit.model.model import Model
 from bushfit.model.result import Misfit, Usable
-from bushfit.model.sensitivity import stiffness_jacobian
+from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.reading.measurement import loss_factor
 
 #: A part without which some parameter's variance would grow by more than this factor is not held out: what is left does
@@ -217,9 +217,8 @@ def _slopes(solution: Solution, data_set: DataSet) -> Array:
     """Derivatives of ln K by coordinate at the operating points, (k, n)."""
     model, names = solution.model, solution.coordinates.names
     test = data_set.direction, data_set.frequency, data_set.amplitude
-    kind, under = data_set.kind, data_set.circumstances
-    slopes = stiffness_jacobian(model, *test, names, kind, under) / model.stiffness(*test, kind=kind, under=under)
-    return slopes * solution.coordinates.slopes(model.values)[:, None]
+    stiffness, slopes = stiffness_and_slopes(model, *test, names, data_set.kind, data_set.circumstances)
+    return slopes / stiffness * solution.coordinates.slopes(model.values)[:, None]
 
 
 def _runs(data_set: DataSet) -> Iterator[_Run]:

@@ -285,6 +285,11 @@ def kept(answer: Callable[..., Array]) -> Callable[..., Array]:
     return asked
 
 
+def keep(data_set: DataSet, answer: str, model: Model, found: Array) -> None:
+    """Let a data set know an answer to a model that came with another one; `answer` is a method that is `kept`."""
+    data_set.__dict__[f"_last_{answer}"] = model, (), found
+
+
 def shown_amplitude(direction: Place, amplitude: float) -> str:
     """An amplitude [m or rad] as engineers read it: "0.1 mm"."""
     unit, factor = direction.display.displacement

@@ -94,7 +94,8 @@ class Descent:
         low, high = low + inside, high - inside
         point = np.clip(point, low, high)
         model = model.with_values(coordinates.values(point))
-        misfit, slopes = residual(model, data_sets), jacobian(model, data_sets, names)
+        slopes = jacobian(model, data_sets, names)
+        misfit = residual(model, data_sets)  # which mostly came with the derivatives
         if not np.all(np.isfinite(misfit)) or not np.all(np.isfinite(slopes)):
             raise no_finite_response(model)
         return cls(model, data_sets, coordinates, low, high, point, misfit, slopes)
@@ -132,12 +133,12 @@ class Descent:
         try:
             model = self.model.with_values(self.coordinates.values(point))
             with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-                reached = residual(model, self.data_sets)
+                # what is left of a last step is too short for the derivatives to change
+                slopes = self.jacobian if converged else jacobian(model, self.data_sets, self.coordinates.names)
+                reached = residual(model, self.data_sets)  # which mostly came with the derivatives
                 fall = self.chi_square - float(reached @ reached)
                 if not fall > _LEAST_GAIN_RATIO * expected:
                     return cautious
-                # what is left of a last step is too short for the derivatives to change
-                slopes = self.jacobian if converged else jacobian(model, self.data_sets, self.coordinates.names)
         except ModelError:  # no response there
             return cautious
         if not np.all(np.isfinite(slopes)):

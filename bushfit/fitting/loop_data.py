@@ -9,11 +9,11 @@ import numpy as np
 
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.effects.history import History
-from bushfit.fitting.data_set import DataSet, Suspect, kept
+from bushfit.fitting.data_set import DataSet, Suspect, keep, kept
 from bushfit.fitting.drive import Drive
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
-from bushfit.model.sensitivity import force_jacobian, stiffness_jacobian
+from bushfit.model.sensitivity import force_and_slopes, stiffness_and_slopes
 from bushfit.reading.measurement import Loop
 
 #: Harmonics of a loop that count as smooth misfit: beyond the fifth, physics makes next to nothing.
@@ -86,7 +86,12 @@ class LoopData(DataSet):
     @kept
     def force(self, model: Model, values: Values | None = None) -> Array:
         """Model force at the rows [N or N m], (..., n)."""
-        force = model.force(self.direction, self._history(model), kind="loop", values=values, under=self.under)
+        return self._at_rows(
+            model.force(self.direction, self._history(model), kind="loop", values=values, under=self.under)
+        )
+
+    def _at_rows(self, force: Array) -> Array:
+        """The force over the motion, (..., samples), at the rows, (..., n)."""
         return self.drive.at_rows(self.drive.from_datum(force)) + (self.drive.datum or 0.0)
 
     def residual(self, model: Model, values: Values | None = None) -> Array:
@@ -94,7 +99,8 @@ class LoopData(DataSet):
 
     @kept
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        slopes = force_jacobian(model, self.direction, self._history(model), names, self.under)
+        force, slopes = force_and_slopes(model, self.direction, self._history(model), names, self.under)
+        keep(self, "force", model, self._at_rows(force))
         return self._whitened(self.drive.at_rows(self.drive.from_datum(slopes)) * self._per_noise)
 
     def moved(self, change: Array, model: Model, beside: Array | float = 0.0) -> Array:
@@ -107,8 +113,8 @@ class LoopData(DataSet):
         slopes = self.jacobian(model, names)
         if as_share:
             test = self.direction, self.frequency, self.amplitude
-            share = added / model.stiffness(*test, kind="loop", under=self.under)
-            slopes = slopes + self.moved(share * stiffness_jacobian(model, *test, names, "loop", self.under), model)
+            stiffness, of_stiffness = stiffness_and_slopes(model, *test, names, "loop", self.under)
+            slopes = slopes + self.moved(added / stiffness * of_stiffness, model)
         return slopes
 
     def _history(self, model: Model) -> History:

@@ -11,14 +11,14 @@ from scipy.linalg import block_diag
 
 from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
-from bushfit.fitting.data_set import DataSet, Freedoms, Suspect, kept, shown_amplitude
+from bushfit.fitting.data_set import DataSet, Freedoms, Suspect, keep, kept, shown_amplitude
 from bushfit.fitting.noise import FLOOR, SweepNoise, unit
 from bushfit.fitting.outliers import outlying_points
 from bushfit.fitting.whitening import Whitening
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
-from bushfit.model.sensitivity import stiffness_jacobian
+from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.reading.measurement import Stepped, Sweep
 
 #: Degree, in the logarithm of what is stepped, of the Legendre polynomials that count as smooth misfit.
@@ -248,9 +248,11 @@ class SweepData(DataSet):
         return self.moved(self._slopes(model, names), model)
 
     def _slopes(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the stiffness at the points by fit coordinate, (len(names), n)."""
+        """Derivatives of the stiffness at the points by fit coordinate, (len(names), n); the stiffness is kept."""
         frequency, amplitude, under, place = self._asked(model)
-        return stiffness_jacobian(model, self.direction, frequency, amplitude, names, under=under)[:, place]
+        stiffness, slopes = stiffness_and_slopes(model, self.direction, frequency, amplitude, names, under=under)
+        keep(self, "stiffness", model, stiffness[place])
+        return slopes[:, place]
 
     def residual_with(self, added: Array, model: Model) -> Array:
         return self.whiten(self._off(self.stiffness(model) + added))

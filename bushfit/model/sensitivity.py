@@ -27,7 +27,7 @@ _RELATIVE_STEP = 1e-6
 Face = Callable[[Branch], tuple[Callable[..., Array], Callable[..., dict[str, Array]] | None]]
 
 
-def stiffness_jacobian(
+def stiffness_and_slopes(
     model: Model,
     direction: Place,
     frequency: Array,
@@ -35,33 +35,34 @@ def stiffness_jacobian(
     names: Sequence[str],
     kind: Kind = "sweep",
     under: Circumstances = UNKNOWN,
-) -> Array:
-    """Derivatives of the complex dynamic stiffness by parameters: (k, n) [N/m or N m/rad per unit of the parameter].
+) -> tuple[Array, Array]:
+    """The complex dynamic stiffness, (n,) [N/m or N m/rad], and its derivatives by parameters, (k, n) [per unit].
 
     Frequencies are in Hz, amplitudes zero-to-peak in m or rad, (n,) each.
     """
+    respond = partial(model.stiffness, direction, frequency, amplitude, kind=kind, under=under)
     if not model.only_branches:
-        respond = partial(model.stiffness, direction, frequency, amplitude, kind=kind, under=under)
         return differences(model, names, lambda values: respond(values=values))
     omega = 2.0 * np.pi * frequency
     strain = amplitude * model.unit_strain(direction)
     total = np.zeros((len(names), frequency.size), dtype=complex)
     _add(total, model, names, lambda branch: (branch.modulus, branch.modulus_sensitivities), (omega, strain))
-    return model.stiffness_per_modulus(direction) * total
+    return respond(), model.stiffness_per_modulus(direction) * total
 
 
-def force_jacobian(
+def force_and_slopes(
     model: Model, direction: Place, displacement: History, names: Sequence[str], under: Circumstances = UNKNOWN
-) -> Array:
-    """Derivatives of a loop's force by parameters along a history of displacement: (k, n) [N or N m per unit]."""
+) -> tuple[Array, Array]:
+    """The force of a loop along a history of displacement, (n,) [N or N m], and its derivatives by parameters, (k, n)
+    [per unit]."""
+    respond = partial(model.force, direction, displacement, kind="loop", under=under)
     if not model.only_branches:
-        respond = partial(model.force, direction, displacement, kind="loop", under=under)
         return differences(model, names, lambda values: respond(values=values))
     per_displacement = model.unit_strain(direction)
     test = (displacement.scaled(per_displacement),)
     total = np.zeros((len(names), displacement.value.shape[-1]))
     _add(total, model, names, lambda branch: (branch.stress, branch.stress_sensitivities), test)
-    return model.stiffness_per_modulus(direction) / (2.0 * per_displacement) * total
+    return respond(), model.stiffness_per_modulus(direction) / (2.0 * per_displacement) * total
 
 
 def _add(total: Array, model: Model, names: Sequence[str], face: Face, test: tuple[object, ...]) -> None:
@@ -81,13 +82,13 @@ def _add(total: Array, model: Model, names: Sequence[str], face: Face, test: tup
             known = sensitivities(seen_by(branch, model.values, model.values), *test)
             slopes = {name: known[short] for short, name in own.items() if name in row}
         else:
-            slopes = dict(zip(moved, differences(model, moved, partial(response, branch)), strict=True))
+            slopes = dict(zip(moved, differences(model, moved, partial(response, branch))[1], strict=True))
         for name, slope in slopes.items():
             total[row[name]] += slope
 
 
-def differences(model: Model, names: Sequence[str], respond: Callable[[Values], Array]) -> Array:
-    """Derivatives of any response by parameters, as one-sided differences away from the bounds: (k, n).
+def differences(model: Model, names: Sequence[str], respond: Callable[[Values], Array]) -> tuple[Array, Array]:
+    """Any response, (n,), and its derivatives by parameters, as one-sided differences away from the bounds, (k, n).
 
     `respond` gives the response, (..., n), for values with leading axes; it is called once.
     """
@@ -100,7 +101,7 @@ def differences(model: Model, names: Sequence[str], respond: Callable[[Values], 
         stacked[name], steps[i] = column, column[i] - model.values[name]
     moved = respond(cast(Values, stacked))
     moved = np.broadcast_to(moved, (count + 1, moved.shape[-1]))
-    return (moved[:count] - moved[count]) / steps
+    return moved[count], (moved[:count] - moved[count]) / steps
 
 
 def _step(parameter: Parameter, value: float) -> float:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from bushfit.effects import BASE, History
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import FIVE, Model
-from bushfit.model.sensitivity import differences, force_jacobian, stiffness_jacobian
+from bushfit.model.sensitivity import differences, force_and_slopes, stiffness_and_slopes
 
 FREQUENCY = np.array([0.1, 5.0, 55.0, 155.0])
 AMPLITUDE = np.array([1e-3, 1e-4, 2e-4, 5e-4])
@@ -42,7 +42,7 @@ models = st.builds(
 @given(models, st.sampled_from(list(Direction)))
 def test_stiffness_slopes(model: Model, direction: Direction) -> None:
     amplitude = AMPLITUDE * (100.0 if direction.is_rotation else 1.0)
-    found = stiffness_jacobian(model, direction, FREQUENCY, amplitude, FIVE)
+    _, found = stiffness_and_slopes(model, direction, FREQUENCY, amplitude, FIVE)
     scale = np.abs(model.stiffness(direction, FREQUENCY, amplitude))
     for row, name in zip(found, FIVE, strict=True):
         expected = richardson(model, name, lambda m: m.stiffness(direction, FREQUENCY, amplitude))
@@ -53,7 +53,7 @@ def test_stiffness_slopes(model: Model, direction: Direction) -> None:
 def test_force_slopes_on_a_steady_loop(paper_model: Model, direction: Direction) -> None:
     cycle = 1e-3 * np.sin(2.0 * np.pi * np.arange(256) / 256)
     history = History.steady(cycle, 0.1)
-    found = force_jacobian(paper_model, direction, history, FIVE)
+    _, found = force_and_slopes(paper_model, direction, history, FIVE)
     peak = np.max(np.abs(paper_model.force(direction, history)))
     for row, name in zip(found, FIVE, strict=True):
         expected = richardson(paper_model, name, lambda m: m.force(direction, history))
@@ -65,7 +65,7 @@ def test_force_slopes_on_a_steady_loop(paper_model: Model, direction: Direction)
 def test_force_slopes_from_rest(paper_model: Model) -> None:
     motion = 1e-3 * np.sin(2.0 * np.pi * np.arange(600) / 256)
     history = History(motion, 10.0 / 256, periodic=False, frequency=0.1)
-    found = force_jacobian(paper_model, "axial", history, FIVE)
+    _, found = force_and_slopes(paper_model, "axial", history, FIVE)
     for row, name in zip(found, FIVE, strict=True):
         expected = richardson(paper_model, name, lambda m: m.force("axial", history))
         assert np.max(np.abs(row - expected)) * paper_model.values[name] < 1e-5 * 460.0
@@ -75,15 +75,15 @@ def test_analytic_derivatives_are_used_and_agree_with_the_differences(
     paper_model: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     at = ("axial", FREQUENCY, AMPLITUDE)
-    by_differences = differences(paper_model, FIVE, lambda values: paper_model.stiffness(*at, values=values))
+    _, by_differences = differences(paper_model, FIVE, lambda values: paper_model.stiffness(*at, values=values))
     monkeypatch.setattr("bushfit.model.sensitivity.differences", None)
-    analytic = stiffness_jacobian(paper_model, *at, FIVE)
+    _, analytic = stiffness_and_slopes(paper_model, *at, FIVE)
     np.testing.assert_allclose(analytic, by_differences, rtol=1e-5, atol=1e-5 * np.abs(analytic).max(axis=1).min())
 
 
 def test_names_choose_rows_in_their_order(paper_model: Model) -> None:
-    every = stiffness_jacobian(paper_model, "axial", FREQUENCY, AMPLITUDE, FIVE)
-    some = stiffness_jacobian(paper_model, "axial", FREQUENCY, AMPLITUDE, ("eps_half", "mu"))
+    _, every = stiffness_and_slopes(paper_model, "axial", FREQUENCY, AMPLITUDE, FIVE)
+    _, some = stiffness_and_slopes(paper_model, "axial", FREQUENCY, AMPLITUDE, ("eps_half", "mu"))
     assert np.array_equal(some, every[[4, 0]])
 
 
@@ -91,8 +91,8 @@ def test_one_sided_at_a_bound(paper_model: Model) -> None:
     """alpha = 1 may not be exceeded; the neutral mass 0 may be left both ways or one."""
     edge = paper_model.with_values({"alpha": 1.0})
     at = ("axial", FREQUENCY, AMPLITUDE)
-    found = differences(edge, ["alpha"], lambda values: edge.stiffness(*at, values=values))
-    np.testing.assert_allclose(found, stiffness_jacobian(edge, *at, ["alpha"]), rtol=1e-4)
+    _, found = differences(edge, ["alpha"], lambda values: edge.stiffness(*at, values=values))
+    np.testing.assert_allclose(found, stiffness_and_slopes(edge, *at, ["alpha"])[1], rtol=1e-4)
     heavy = paper_model.with_effect("inertia")
-    slope = stiffness_jacobian(heavy, *at, ["inertia.mass"])[0]
+    slope = stiffness_and_slopes(heavy, *at, ["inertia.mass"])[1][0]
     np.testing.assert_allclose(slope, -((2.0 * np.pi * FREQUENCY) ** 2), rtol=1e-6, atol=1e-2)
