@@ -53,6 +53,7 @@ def refits(
     proposed: Sequence[Proposal],
     known: Sequence[Candidate],
     starts: Mapping[str, Mapping[str, float]],
+    near: Mapping[str, float],
     held: Sequence[str],
     bounds: Bounds,
 ) -> list[Candidate]:
@@ -63,17 +64,20 @@ def refits(
     Args:
         evidence, proposed: the fitted model without the effects, and the effects to fit.
         known: candidates that need no fit.
-        starts: by name of a proposal values to start from, where not its own.
+        starts: by name of a proposal values to start from.
+        near: values of the model to start from for all others, where that promises more than the proposal's own.
         held, bounds: parameters that do not move, and limits inside the parameters' own.
     """
     fits: dict[str, Descent] = {}
     for proposal in proposed:
         limits = {**_within_stroke(evidence.data_sets, proposal.name), **bounds}
         with suppress(FitError, ModelError):  # no response with this effect: no candidate
-            known_to_it = {
-                name: value for name, value in starts.get(proposal.name, {}).items() if name in proposal.model.values
-            }
-            fits[proposal.name] = fit_from(proposal.model.with_values(known_to_it), evidence.data_sets, held, limits)
+            start = starts.get(proposal.name) or near
+            fit = _begun(proposal, start, evidence.data_sets, held, limits)
+            promised = evidence.chi_square - proposal.score
+            if start is near and near and fit.chi_square - fit.expected_fall > promised:
+                fit = _begun(proposal, {}, evidence.data_sets, held, limits)
+            fits[proposal.name] = fit
     claimed = {proposal.name: evidence.chi_square - proposal.score for proposal in proposed}
     least = min((candidate.evidence.chi_square for candidate in known), default=np.inf)
     fits = raced(fits, claimed, least)
@@ -86,6 +90,14 @@ def refits(
         for name, fit in fits.items()
     ]
     return sorted([*known, *refitted], key=lambda candidate: candidate.evidence.bic)
+
+
+def _begun(
+    proposal: Proposal, start: Mapping[str, float], data_sets: Sequence[DataSet], held: Sequence[str], limits: Bounds
+) -> Descent:
+    """A refit before its first step, at values to start from as far as its model has them."""
+    known = {name: value for name, value in start.items() if name in proposal.model.values}
+    return fit_from(proposal.model.with_values(known), data_sets, held, limits)
 
 
 def raced(fits: Mapping[str, Descent], claimed: Mapping[str, float], least: float) -> dict[str, Descent]:

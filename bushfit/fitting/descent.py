@@ -6,6 +6,11 @@ Notes:
     Levenberg-Marquardt, damped as Nielsen does (Damping parameter in Marquardt's method, IMM-REP-1999-05, Lyngby
     1999), with bounds: what a step would carry beyond one stays there, and the others go on without it.
 
+    Parameters that trade off make chi-square a narrow valley with a bend, in which straight steps creep. So a step that
+    goes on as the last one went follows the bend which the derivatives showed over that one: geodesic acceleration
+    (M. K. Transtrum, J. P. Sethna, arXiv:1201.5885, 2012), at no evaluation more. On campaigns with gaps that no effect
+    closes, fits that took more than twelve evaluations take less than half as many.
+
     Why a second optimiser: on the 300 campaigns of the score card of seed 11, 99 % of the diagnoses take less than
     1.4 s of processor time. With lmfit in its place they take 1.6 to 2.6 s, by its method and its starts, and 1 to 3
     verdicts change.
@@ -44,6 +49,11 @@ _LONGEST_STEP = 2.0
 _LEAST_GAIN_RATIO = 1e-4
 #: Least eigenvalue of the scaled curvature that counts, relative to the largest: below it is the derivatives' rounding.
 _LEAST_CURVATURE = 1e-10
+#: Cosine between a step and the last one, in units of noise, from which it goes on as that one went: chosen.
+_SAME_WAY = 0.8
+#: Share of a step's length that its bend may have, both in units of noise; further on the way bends otherwise: of steps
+#: above it nearly all fail.
+_MOST_BENT = 0.1
 #: A step that is expected to lower chi-square by less is the last, in units of the misfit's variance: a tenth of a
 #: standard error.
 _LEAST_FALL = 0.01
@@ -66,6 +76,7 @@ class Descent:
         jacobian: its derivatives by coordinate, (k, n).
         damping: of the next step, relative to the curvature.
         growth: factor on the damping should that step fail.
+        last: the step that led here, (k,), and the second derivative of the residuals along it, (n,); None at first.
     """
 
     model: Model
@@ -80,6 +91,7 @@ class Descent:
     converged: bool = False
     damping: float = _FIRST_DAMPING
     growth: float = _FIRST_GROWTH
+    last: tuple[Array, Array] | None = None
 
     @classmethod
     def start(cls, model: Model, data_sets: Sequence[DataSet], names: Sequence[str], bounds: Bounds) -> "Descent":
@@ -121,10 +133,14 @@ class Descent:
         """The fit one evaluation on: at a lower chi-square with less damping, or where it was with more."""
         damping = self.damping
         step, expected = self._step(damping)
-        while expected < 0.0:  # so far out between the bounds that only caution leads down
+        bend = self._bend(step, damping)
+        # so far out between the bounds, or on a way that bends so much, that only caution leads down
+        while expected < 0.0 or self._length(bend) > _MOST_BENT * self._length(step):
             damping *= 2.0
             step, expected = self._step(damping)
-        point = np.clip(self.point + step, self.low, self.high)
+            bend = self._bend(step, damping)
+        point = np.clip(self.point + step + bend, *self._reach)
+        taken = point - self.point
         variance = max(self.chi_square / self.residual.size, 1.0)
         evaluations, converged = self.evaluations + 1, expected < _LEAST_FALL * variance
         cautious = replace(
@@ -153,6 +169,7 @@ class Descent:
             converged=converged,
             damping=damping * max(_LEAST_DAMPING_RATIO, 1.0 - (2.0 * fall / expected - 1.0) ** 3),
             growth=_FIRST_GROWTH,
+            last=(taken, taken @ (slopes - self.jacobian)),
         )
 
     def finished(self, evaluations: int) -> "Descent":
@@ -186,10 +203,7 @@ class Descent:
         outward = ((self.point <= self.low) & (slope >= 0.0)) | ((self.point >= self.high) & (slope <= 0.0))
         free, step = (size > _LEAST_SENSITIVITY) & ~outward, np.zeros_like(slope)
         while free.any():
-            scale = np.sqrt(size[free])
-            own = damped[np.ix_(free, free)] / np.outer(scale, scale)
-            pull = slope[free] + damped[np.ix_(free, ~free)] @ step[~free]
-            step[free] = -np.linalg.lstsq(own, pull / scale, rcond=_LEAST_CURVATURE)[0] / scale
+            step[free] = -_solved(damped, slope + damped[:, ~free] @ step[~free], free)
             aim = self.point + step
             beyond = free & ((aim < low) | (aim > high))
             if not beyond.any():
@@ -197,3 +211,29 @@ class Descent:
             step[beyond] = (np.clip(aim, low, high) - self.point)[beyond]
             free &= ~beyond
         return step, float(-(2.0 * slope + curvature @ step) @ step)
+
+    def _bend(self, step: Array, damping: float) -> Array:
+        """What a damped step is to be bent by to follow the valley, (k,); 0 where the last one led another way."""
+        if self.last is None:
+            return np.zeros_like(step)
+        before, second = self.last
+        curvature, _ = self._normal
+        size = np.diag(curvature)
+        lengths = self._length(step), self._length(before)
+        if step @ (size * before) <= _SAME_WAY * lengths[0] * lengths[1]:
+            return np.zeros_like(step)
+        free, bend = (size > _LEAST_SENSITIVITY) & (step != 0.0), np.zeros_like(step)
+        pull = self.jacobian @ second * (lengths[0] / lengths[1]) ** 2
+        bend[free] = -0.5 * _solved(curvature + np.diag(damping * size), pull, free)
+        return bend
+
+    def _length(self, step: Array) -> float:
+        """Length of a step in units of noise, each parameter by itself."""
+        return float(np.sqrt(np.diag(self._normal[0]) @ np.square(step)))
+
+
+def _solved(curvature: Array, pull: Array, free: Array) -> Array:
+    """The free parameters at which a curvature, (k, k), meets a pull, (k,), none along what rounding decides."""
+    scale = np.sqrt(np.diag(curvature)[free])
+    own = curvature[np.ix_(free, free)] / np.outer(scale, scale)
+    return np.linalg.lstsq(own, pull[free] / scale, rcond=_LEAST_CURVATURE)[0] / scale
