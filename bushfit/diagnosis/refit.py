@@ -53,9 +53,9 @@ def refits(
     proposed: Sequence[Proposal],
     known: Sequence[Candidate],
     starts: Mapping[str, Mapping[str, float]],
-    near: Mapping[str, float],
     held: Sequence[str],
     bounds: Bounds,
+    near: Mapping[str, float] | None = None,
 ) -> list[Candidate]:
     """Fit proposals until they converge or cannot come near the best; with the candidates known already, best first.
 
@@ -65,17 +65,17 @@ def refits(
         evidence, proposed: the fitted model without the effects, and the effects to fit.
         known: candidates that need no fit.
         starts: by name of a proposal values to start from.
-        near: values of the model to start from for all others, where that promises more than the proposal's own.
         held, bounds: parameters that do not move, and limits inside the parameters' own.
+        near: values of the model to start from for all others, where that promises more than the proposal's own.
     """
     fits: dict[str, Descent] = {}
     for proposal in proposed:
         limits = {**_within_stroke(evidence.data_sets, proposal.name), **bounds}
         with suppress(FitError, ModelError):  # no response with this effect: no candidate
-            start = starts.get(proposal.name) or near
+            start = starts.get(proposal.name) or near or {}
             fit = _begun(proposal, start, evidence.data_sets, held, limits)
             promised = evidence.chi_square - proposal.score
-            if start is near and near and fit.chi_square - fit.expected_fall > promised:
+            if start is near and fit.chi_square - fit.expected_fall > promised:
                 fit = _begun(proposal, {}, evidence.data_sets, held, limits)
             fits[proposal.name] = fit
     claimed = {proposal.name: evidence.chi_square - proposal.score for proposal in proposed}

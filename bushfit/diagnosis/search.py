@@ -156,9 +156,8 @@ class Search:
     def _round(self, evidence: Evidence, added: Sequence[str], known: Sequence[Candidate] = ()) -> Round:
         """Score every effect that the model lacks, and refit the best of those not known already.
 
-        A model that lacks something large has bent its own parameters to make up for it: then the refits may start
-        from those of a candidate that is known already, or from the values read off the data, where that is the shorter
-        way.
+        A model that lacks something large has bent its own parameters to make up for it: then the refits start from
+        the values read off the data, or from those of a candidate that is known already, where that is the shorter way.
         """
         key = frozenset(added)
         if key not in self.rounds:
@@ -170,9 +169,9 @@ class Search:
                 claim for claim in proposed[:_MOST_REFITTED] if claim.score > least and claim.name not in passed_over
             ]
             read: Mapping[str, float] = self.start if not added and evidence.reduced > _BENT else {}
-            near = known[0].evidence.model.values if known else read
-            starts = {claim.name: self._found_earlier(key, claim.name) for claim in best}
-            tried = refits(evidence, best, known, starts, near, self.held, self.bounds)
+            starts = {claim.name: self._found_earlier(key, claim.name) or read for claim in best}
+            near = known[0].evidence.model.values if known else None
+            tried = refits(evidence, best, known, starts, self.held, self.bounds, near)
             self.rounds[key] = Round(evidence, proposed, tuple(self._with_limit(evidence, tried)), critical)
         return self.rounds[key]
 
