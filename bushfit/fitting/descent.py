@@ -51,8 +51,8 @@ _LEAST_GAIN_RATIO = 1e-4
 _LEAST_CURVATURE = 1e-10
 #: Cosine between a step and the last one, in units of noise, from which it goes on as that one went: chosen.
 _SAME_WAY = 0.8
-#: Share of a step's length that its bend may have, both in units of noise; chosen: further on the way bends otherwise, and
-#: nearly all steps fail.
+#: Share of a step's length that its bend may have, both in units of noise; chosen: further on the way bends otherwise,
+#: and nearly all steps fail.
 _MOST_BENT = 0.2
 #: A step that is expected to lower chi-square by less is the last, in units of the misfit's variance: a tenth of a
 #: standard error.
