@@ -58,10 +58,12 @@ class ScoreTest:
     @cached_property
     def _roots(self) -> list[Array]:
         """Per pattern a matrix that makes its columns orthonormal, those all but absorbed dropped, (k, r)."""
-        gram = self._left @ self._left.T
-        roots = []
+        squares, roots = np.einsum("ij,ij->i", self._left, self._left), []
         for group in self.groups:
-            size, vectors = np.linalg.eigh(gram[np.ix_(group, group)])
+            if group.size == 1:
+                size, vectors = squares[group], np.ones((1, 1))
+            else:
+                size, vectors = np.linalg.eigh(self._left[group] @ self._left[group].T)
             kept = size > self.least**2
             roots.append(vectors[:, kept] / np.sqrt(size[kept]))
         return roots
