@@ -47,6 +47,8 @@ _ALWAYS_REFITTED = 3
 _LEAST_SCORE = 0.1
 #: Share of what an effect takes off chi-square within which that is known well enough to judge what is in its place.
 _GAIN_KNOWN = 0.01
+#: Threshold of the first round, so many times which a gain is beyond that of any other: chosen; they differ by a third.
+_SURELY = 1.5
 #: Share of what chance makes that its score has to reach: a refit may gain more than its score, but not so much more.
 _LEAST_CHANCE = 0.3
 
@@ -57,18 +59,39 @@ class Step:
 
     Args:
         gain: chi-square that it takes off, all others refitted without it.
-        critical: the gain that noise alone would make in its place.
         rivals: candidates in its place that these tests cannot tell from it.
         richer: candidates that contain it as a limit.
-        tried: best refit of every candidate in its place.
+        place: the model without it, and every candidate in its place.
     """
 
     name: str
     gain: float
-    critical: float
     rivals: tuple[Candidate, ...]
     richer: tuple[Candidate, ...]
-    tried: tuple[Candidate, ...]
+    place: Round
+
+    @property
+    def critical(self) -> float:
+        """The gain that noise alone would make in its place."""
+        return self.place.critical
+
+    @property
+    def tried(self) -> tuple[Candidate, ...]:
+        """Best refit of every candidate in its place."""
+        return self.place.tried
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """A fitted model, and every effect that it lacks with what that promises, the best score first."""
+
+    evidence: Evidence
+    proposed: tuple[Proposal, ...]
+
+    @cached_property
+    def critical(self) -> float:
+        """The gain that noise alone exceeds with probability 1 - CHANCE_LEVEL."""
+        return critical_gain(self.evidence, self.proposed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,15 +99,28 @@ class Round:
     """A fitted model, what every missing effect promises it, and the best of these refitted.
 
     Args:
-        proposed: every effect that the model lacks, the best score first.
         tried: the most promising refitted with all parameters, the best by BIC first.
-        critical: the gain that noise alone exceeds with probability 1 - CHANCE_LEVEL.
+        first: the scores of the first round, whose threshold is much the same: tests and candidates are.
     """
 
-    evidence: Evidence
-    proposed: tuple[Proposal, ...]
+    scored: Scored
     tried: tuple[Candidate, ...]
-    critical: float
+    first: Scored
+
+    @property
+    def evidence(self) -> Evidence:
+        """The fitted model."""
+        return self.scored.evidence
+
+    @property
+    def proposed(self) -> tuple[Proposal, ...]:
+        """Every effect that the model lacks, the best score first."""
+        return self.scored.proposed
+
+    @property
+    def critical(self) -> float:
+        """The gain that noise alone exceeds with probability 1 - CHANCE_LEVEL."""
+        return self.scored.critical
 
     @property
     def best(self) -> Candidate | None:
@@ -103,7 +139,9 @@ class Round:
 
     def is_real(self, candidate: Candidate) -> bool:
         """Whether a candidate is more than chance and more than its price."""
-        return self.evidence.bic - candidate.evidence.bic > SAME and candidate.gain > self.critical
+        if self.evidence.bic - candidate.evidence.bic <= SAME:
+            return False
+        return candidate.gain > _SURELY * self.first.critical or candidate.gain > self.critical
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,8 +200,9 @@ class Search:
         key = frozenset(added)
         if key not in self.rounds:
             proposed = tuple(proposals(evidence, (*self.settings.without, *added), self.held))
-            critical = critical_gain(evidence, proposed)
-            least = max(_LEAST_CHANCE * critical, _LEAST_SCORE * proposed[0].score) if proposed else 0.0
+            scored = Scored(evidence, proposed)
+            first = self.first.scored if self.rounds else scored
+            least = max(_LEAST_CHANCE * first.critical, _LEAST_SCORE * proposed[0].score) if proposed else 0.0
             passed_over = {*(candidate.name for candidate in known), *self._left_earlier(key, proposed)}
             best = [
                 claim for claim in proposed[:_MOST_REFITTED] if claim.score > least and claim.name not in passed_over
@@ -172,7 +211,7 @@ class Search:
             starts = {claim.name: self._found_earlier(key, claim.name) or read for claim in best}
             near = known[0].evidence.model.values if known else None
             tried = refits(evidence, best, known, starts, self.held, self.bounds, near)
-            self.rounds[key] = Round(evidence, proposed, tuple(self._with_limit(evidence, tried)), critical)
+            self.rounds[key] = Round(scored, tuple(self._with_limit(evidence, tried)), first)
         return self.rounds[key]
 
     def _with_limit(self, evidence: Evidence, tried: Sequence[Candidate]) -> Sequence[Candidate]:
@@ -282,7 +321,7 @@ class Search:
             elif alike:
                 rivals.append(rival)
         gain = _added(name, current, place.evidence).gain
-        return Step(name, gain, place.critical, tuple(rivals), tuple(richer), place.tried)
+        return Step(name, gain, tuple(rivals), tuple(richer), place)
 
     def _place(self, current: Evidence, name: str, others: Sequence[str]) -> Round:
         """The model without an added effect, refitted, and its candidates, of which that effect is one; each once."""
