@@ -76,6 +76,9 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
     if beyond := _at_bound(final, steps):
         words = f"{_closing(names)} the gap only with {beyond} at the edge of what is possible"
         return unexplained(search, words, steps)
+    remainder = find_remainder(search, final, _BESIDE_A_NAME)
+    if remainder and not remainder.fault and largest_smooth_misfit(final) > search.settings.tolerance:
+        return unexplained(search, remainder.words, steps)  # whatever held-out tests would say
     held = hold_out(base, final, search.bounds)
     if not held.passed:
         words = f"{_closing(names)} the gap only where fitted, so the name is taken back"
@@ -85,8 +88,7 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
     if bent := _bent(final, steps):
         words = f"these tests show {bent} with another dependence on frequency and amplitude than its law has"
         return unexplained(search, words, steps)
-    remainder = find_remainder(search, final, _BESIDE_A_NAME)
-    if remainder and not _is_little(search, final, remainder, held):
+    if remainder and not _is_little(remainder, held):
         return unexplained(search, remainder.words, steps, fault=remainder.fault)
     again = searched_again(search, final, steps, held)
     counted = (sum(each.came_again for each in again), len(again)) if again else None
@@ -115,13 +117,10 @@ def _bent(final: Evidence, steps: Sequence[Step]) -> str | None:
     return bent if every else None
 
 
-def _is_little(search: Search, final: Evidence, remainder: Remainder, held: HoldOut) -> bool:
-    """Whether a name may stand beside what remains: it is within the tolerance, or a fault that no physics makes."""
-    if held.after is None or held.after > _PARTLY:
-        return False
-    if remainder.fault:
-        return remainder.fault.suspect.kind in _NO_PHYSICS
-    return largest_smooth_misfit(final) <= search.settings.tolerance
+def _is_little(remainder: Remainder, held: HoldOut) -> bool:
+    """Whether a name may stand beside what remains, within the tolerance or a fault that no physics makes."""
+    little = held.after is not None and held.after <= _PARTLY
+    return little and (remainder.fault is None or remainder.fault.suspect.kind in _NO_PHYSICS)
 
 
 def unexplained(
