@@ -56,6 +56,18 @@ def test_what_is_known_is_not_fitted_again(plain: Evidence, proposed: list[Propo
     assert {candidate.name for candidate in again} == {candidate.name for candidate in everyone}
 
 
+def test_it_starts_from_values_that_promise_more_than_its_own(plain: Evidence, proposed: list[Proposal]) -> None:
+    """Values of the true model are a shorter way, values far from everything none."""
+    claims = [claim for claim in proposed if claim.name == "inertia"]
+    (own,) = refits(plain, claims, [], {}, (), {})
+    (near,) = refits(plain, claims, [], {}, (), {}, {**own.evidence.model.values})
+    (far,) = refits(plain, claims, [], {}, (), {}, {name: 3.0 * value for name, value in plain.model.values.items()})
+    taken = [found.evidence.solution.evaluations for found in (near, own, far)]
+    print(f"evaluations from near, from its own values, and with values far off at hand: {taken}")
+    assert taken[0] < taken[1] == taken[2]
+    assert own.evidence.chi_square == pytest.approx(near.evidence.chi_square, abs=0.05)
+
+
 def test_without_proposals_there_is_only_what_is_known(plain: Evidence) -> None:
     known = Candidate("inertia", plain, 0.0)
     assert refits(plain, [], [known], {}, (), {}) == [known]
