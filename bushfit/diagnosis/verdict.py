@@ -77,7 +77,8 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
         words = f"{_closing(names)} the gap only with {beyond} at the edge of what is possible"
         return unexplained(search, words, steps)
     remainder = find_remainder(search, final, _BESIDE_A_NAME)
-    if remainder and not remainder.fault and largest_smooth_misfit(final) > search.settings.tolerance:
+    gross = remainder and not remainder.fault and largest_smooth_misfit(final) > search.settings.tolerance
+    if remainder and gross and find_remainder(search, base):
         return unexplained(search, remainder.words, steps)  # whatever held-out tests would say
     held = hold_out(base, final, search.bounds)
     if not held.passed:
@@ -88,7 +89,7 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
     if bent := _bent(final, steps):
         words = f"these tests show {bent} with another dependence on frequency and amplitude than its law has"
         return unexplained(search, words, steps)
-    if remainder and not _is_little(remainder, held):
+    if remainder and (gross or not _is_little(remainder, held)):
         return unexplained(search, remainder.words, steps, fault=remainder.fault)
     again = searched_again(search, final, steps, held)
     counted = (sum(each.came_again for each in again), len(again)) if again else None

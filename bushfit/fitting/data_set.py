@@ -288,6 +288,7 @@ def kept(answer: Callable[..., Array]) -> Callable[..., Array]:
 def keep(data_set: DataSet, answer: str, model: Model, found: Array) -> None:
     """Let a data set know an answer to a model that came with another one; `answer` is a method that is `kept`."""
     data_set.__dict__[f"_last_{answer}"] = model, (), found
+    found.flags.writeable = False
 
 
 def shown_amplitude(direction: Place, amplitude: float) -> str:

@@ -8,8 +8,8 @@ Notes:
 
     Parameters that trade off make chi-square a narrow valley with a bend, in which straight steps creep. So a step that
     goes on as the last one went follows the bend which the derivatives showed over that one: geodesic acceleration
-    (M. K. Transtrum, J. P. Sethna, arXiv:1201.5885, 2012), at no evaluation more. On campaigns with gaps that no effect
-    closes, fits that took more than twelve evaluations take less than half as many.
+    (M. K. Transtrum, J. P. Sethna, arXiv:1201.5885, 2012), at no evaluation more. On four campaigns with gaps that no
+    effect closes, it took 4 to 29 % off all evaluations of the diagnosis.
 
     Why a second optimiser: on the 300 campaigns of the score card of seed 11, 99 % of the diagnoses take less than
     1.4 s of processor time. With lmfit in its place they take 1.6 to 2.6 s, by its method and its starts, and 1 to 3
@@ -133,6 +133,8 @@ class Descent:
         """The fit one evaluation on: at a lower chi-square with less damping, or where it was with more."""
         damping = self.damping
         step, expected = self._step(damping)
+        variance = max(self.chi_square / self.residual.size, 1.0)
+        evaluations, converged = self.evaluations + 1, 0.0 <= expected < _LEAST_FALL * variance
         bend = self._bend(step, damping)
         # so far out between the bounds, or on a way that bends so much, that only caution leads down
         while expected < 0.0 or self._length(bend) > _MOST_BENT * self._length(step):
@@ -141,8 +143,6 @@ class Descent:
             bend = self._bend(step, damping)
         point = np.clip(self.point + step + bend, *self._reach)
         taken = point - self.point
-        variance = max(self.chi_square / self.residual.size, 1.0)
-        evaluations, converged = self.evaluations + 1, expected < _LEAST_FALL * variance
         cautious = replace(
             self, evaluations=evaluations, converged=converged, damping=damping * self.growth, growth=2.0 * self.growth
         )
@@ -153,7 +153,7 @@ class Descent:
                 slopes = self.jacobian if converged else jacobian(model, self.data_sets, self.coordinates.names)
                 reached = residual(model, self.data_sets)  # which mostly came with the derivatives
                 fall = self.chi_square - float(reached @ reached)
-                if not fall > _LEAST_GAIN_RATIO * expected:
+                if expected <= 0.0 or not fall > _LEAST_GAIN_RATIO * expected:
                     return cautious
         except ModelError:  # no response there
             return cautious
