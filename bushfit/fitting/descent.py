@@ -146,15 +146,19 @@ class Descent:
         cautious = replace(
             self, evaluations=evaluations, converged=converged, damping=damping * self.growth, growth=2.0 * self.growth
         )
+        names = self.coordinates.names
         try:
             model = self.model.with_values(self.coordinates.values(point))
             with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-                # what is left of a last step is too short for the derivatives to change
-                slopes = self.jacobian if converged else jacobian(model, self.data_sets, self.coordinates.names)
-                reached = residual(model, self.data_sets)  # which mostly came with the derivatives
+                # derivatives bring the response along; after a step that failed the response is asked for alone first,
+                # and what is left of a last step is too short for them to change
+                slopes = None if converged or self.growth > _FIRST_GROWTH else jacobian(model, self.data_sets, names)
+                reached = residual(model, self.data_sets)
                 fall = self.chi_square - float(reached @ reached)
                 if expected <= 0.0 or not fall > _LEAST_GAIN_RATIO * expected:
                     return cautious
+                if slopes is None:
+                    slopes = self.jacobian if converged else jacobian(model, self.data_sets, names)
         except ModelError:  # no response there
             return cautious
         if not np.all(np.isfinite(slopes)):
