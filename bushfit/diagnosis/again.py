@@ -51,7 +51,8 @@ def searched_again(search: Search, final: Evidence, steps: Sequence[Step], held:
             if {*added} == named:
                 found.append(Again(part.name, True, ()))
                 continue
-            other, again = anew.reconsider(grown, added)
+            other, instead = anew.exchange(grown, added)
+            again = anew.steps(other, instead)
             sets = [{step.name, *(rival.name for rival in (*step.rivals, *step.richer))} for step in again]
             every = all(any(name in members for members in sets) for name in named)
             every = every or fit(final.model, rest.data_sets, search.held, search.bounds).bic < other.bic - SAME

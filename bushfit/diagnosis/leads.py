@@ -32,7 +32,8 @@ def leads(search: Search) -> str:
     try:
         begun = _weighed(search)
         anew = Search.begin(begun, search.settings, search.start, search.held, search.bounds)
-        final, steps = anew.reconsider(*anew.grow())
+        final, added = anew.exchange(*anew.grow())
+        steps = anew.steps(final, added)
     except (FitError, ModelError):  # a model of which these tests tell nothing
         return ""
     before, after = plain_misfit(begun), plain_misfit(final)

@@ -70,16 +70,6 @@ class Step:
     richer: tuple[Candidate, ...]
     place: Round
 
-    @property
-    def critical(self) -> float:
-        """The gain that noise alone would make in its place."""
-        return self.place.critical
-
-    @property
-    def tried(self) -> tuple[Candidate, ...]:
-        """Best refit of every candidate in its place."""
-        return self.place.tried
-
 
 @dataclass(frozen=True, eq=False)
 class Scored:
@@ -276,39 +266,42 @@ class Search:
         effect = effect_named(best.name)
         return None if qualified(effect, effect.amount) in best.evidence.solution.at_bound else best
 
-    def reconsider(self, current: Evidence, added: Sequence[str]) -> tuple[Evidence, list[Step]]:
+    def exchange(self, current: Evidence, added: Sequence[str]) -> tuple[Evidence, list[str]]:
         """Try every added effect's rivals in its place, and dropping it; swap where that is better."""
-        names, swaps = list(added), 0
-        steps: list[Step] = []
-        while len(steps) < len(names):
-            name = names[len(steps)]
+        names, settled, swaps = list(added), 0, 0
+        while settled < len(names):
+            name = names[settled]
             others = [other for other in names if other != name]
             place = self._place(current, name, others)
             best = place.best
             may_swap = swaps < _MOST_SWAPS and not any(effect_named(other).after == name for other in others)
             if may_swap and best and best.name != name and best.evidence.bic < current.bic - _LEAST_IMPROVEMENT:
-                names[len(steps)], current = best.name, best.evidence
+                names[settled], current = best.name, best.evidence
             elif may_swap and others and not self._counts(name, current, place):
                 names, current = others, place.evidence
             else:
-                steps.append(self._step(name, current, place))
+                settled += 1
                 continue
-            steps, swaps = [], swaps + 1
-        return current, steps
+            settled, swaps = 0, swaps + 1
+        return current, names
+
+    def steps(self, current: Evidence, added: Sequence[str]) -> list[Step]:
+        """Every added effect with what came near it in its place."""
+        return [self._step(name, current, [other for other in added if other != name]) for name in added]
 
     def _counts(self, name: str, current: Evidence, place: Round) -> bool:
         """Whether an added effect, beside all that were added since, is still real and large enough to matter."""
         kept = _added(name, current, place.evidence)
         return place.is_real(kept) and footprint(place.evidence, current) > self.settings.tolerance
 
-    def _step(self, name: str, current: Evidence, place: Round) -> Step:
+    def _step(self, name: str, current: Evidence, others: Sequence[str]) -> Step:
         """Sort an effect's rivals: those these tests cannot tell from it, and those that contain it.
 
         A rival is the same within SAME by BIC, or nearer than APART to the model's own noise-free prediction. A richer
         one that meets this prediction contains the model: then the simpler name stands. So it does where the rival is
         the same effect in one direction alone.
         """
-        rivals, richer = [], []
+        place, rivals, richer = self._place(current, name, others), [], []
         clean = [data_set.noise_free(current.model) for data_set in current.data_sets]
         for rival in place.tried:
             if rival.name == name or rival.evidence.chi_square - current.chi_square > EXCLUDED:

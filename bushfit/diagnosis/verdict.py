@@ -55,10 +55,10 @@ class Remainder:
     fault: Fault | None
 
 
-def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
+def judge(search: Search, final: Evidence, added: Sequence[str]) -> Diagnosis:
     """Doubt the finding: a fault instead, look-alikes, held-out data, what remains, the same name found again."""
     base = search.base
-    if not steps:
+    if not added:
         trace = search.trace()
         remainder = find_remainder(search, trace.evidence if trace else base)
         if remainder is None:
@@ -69,42 +69,44 @@ def judge(search: Search, final: Evidence, steps: Sequence[Step]) -> Diagnosis:
     if fault and fault.worth > worth + SAME:
         return unexplained(search, _fault_words(fault), fault=fault)
     if fault and fault.worth > worth - SAME:
-        leaders = [replace(_named(step), alternatives=(f"fault: {fault.suspect.words}",)) for step in steps]
-        words = f"{' and '.join(step.name for step in steps)}, or a fault of the measurement: {fault.suspect.words}"
+        either = (f"fault: {fault.suspect.words}",)
+        leaders = [replace(_named(step), alternatives=either) for step in search.steps(final, added)]
+        words = f"{_all(added)}, or a fault of the measurement: {fault.suspect.words}"
         return finish(search, "ambiguous", f"these tests cannot tell {words}", base, leaders, fault=fault)
-    names = [_named(step) for step in steps]
-    if beyond := _at_bound(final, steps):
-        words = f"{_closing(names)} the gap only with {beyond} at the edge of what is possible"
-        return unexplained(search, words, steps)
+    if beyond := _at_bound(final, added):
+        words = f"{_closing(added)} the gap only with {beyond} at the edge of what is possible"
+        return unexplained(search, words, added)
     remainder = find_remainder(search, final, _BESIDE_A_NAME)
     gross = remainder and not remainder.fault and largest_smooth_misfit(final) > search.settings.tolerance
     if remainder and gross and find_remainder(search, base):
-        return unexplained(search, remainder.words, steps)  # whatever held-out tests would say
+        return unexplained(search, remainder.words, added)  # whatever held-out tests would say
     held = hold_out(base, final, search.bounds)
     if not held.passed:
-        words = f"{_closing(names)} the gap only where fitted, so the name is taken back"
+        words = f"{_closing(added)} the gap only where fitted, so the name is taken back"
         if find_remainder(search, base):
-            return unexplained(search, words, steps)
+            return unexplained(search, words, added)
         return finish(search, "consistent", f"{_NOTHING}; {words}", base, ())
+    steps = search.steps(final, added)
     if bent := _bent(final, steps):
         words = f"these tests show {bent} with another dependence on frequency and amplitude than its law has"
-        return unexplained(search, words, steps)
+        return unexplained(search, words, added)
     if remainder and (gross or not _is_little(remainder, held)):
-        return unexplained(search, remainder.words, steps, fault=remainder.fault)
+        return unexplained(search, remainder.words, added, fault=remainder.fault)
+    names = [_named(step) for step in steps]
     again = searched_again(search, final, steps, held)
     counted = (sum(each.came_again for each in again), len(again)) if again else None
     others = sorted({other for each in again for other in each.others})
     if sum(bool(each.others) for each in again) >= (_ELSEWHERE if len(steps) == 1 else 1):
-        return _another_name(search, steps, names, others, counted)
+        return _another_name(search, names, others, counted)
     if any(step.rivals for step in steps):
         return _ambiguous(search, final, steps, names, counted)
     if counted and counted[0] <= _STANDS * counted[1]:
-        words = f"without a part of the tests {' and '.join(step.name for step in steps)} seldom comes out again"
-        return unexplained(search, words, steps, again=counted)
+        words = f"without a part of the tests {_all(added)} seldom comes out again"
+        return unexplained(search, words, added, again=counted)
     untested = _untested(held, steps)
-    if untested and any(step.gain < step.critical + SAME for step in steps):
-        return unexplained(search, f"{_closing(names)} the gap by little{untested}", steps, again=counted)
-    words = f"{_closing(names)} {'part of the gap; ' + remainder.words if remainder else 'the gap'}{untested}"
+    if untested and any(step.gain < step.place.critical + SAME for step in steps):
+        return unexplained(search, f"{_closing(added)} the gap by little{untested}", added, again=counted)
+    words = f"{_closing(added)} {'part of the gap; ' + remainder.words if remainder else 'the gap'}{untested}"
     verdict: Verdict = "partly" if remainder else "named"
     fault = remainder.fault if remainder else None
     return finish(search, verdict, words, final, names, fault=fault, held=held, again=counted)
@@ -127,7 +129,7 @@ def _is_little(remainder: Remainder, held: HoldOut) -> bool:
 def unexplained(
     search: Search,
     words: str,
-    steps: Sequence[Step] = (),
+    added: Sequence[str] = (),
     *,
     fault: Fault | None = None,
     again: tuple[int, int] | None = None,
@@ -137,8 +139,8 @@ def unexplained(
     Where it cannot, the model stays as it was.
     """
     lead = leads(search)
-    if steps and not lead:
-        lead = f"; no more than a lead: {' and '.join(step.name for step in steps)}"
+    if added and not lead:
+        lead = f"; no more than a lead: {_all(added)}"
     alone = fault and fault.suspect.kind != "frequency" and _share_beside(search.base, fault) < _BESIDE_A_FAULT
     alone = alone or not search.settings.max_effects  # then nothing is to be added, without a name either
     start, held, bounds = search.start, search.held, search.bounds
@@ -164,16 +166,16 @@ def _share_beside(evidence: Evidence, fault: Fault) -> float:
 
 def _another_name(
     search: Search,
-    steps: Sequence[Step],
     names: Sequence[Named],
     others: Sequence[str],
     again: tuple[int, int] | None,
 ) -> Diagnosis:
     """The finding where another name comes out without some part: a set of look-alikes, or no name."""
-    words = f"without some of the tests {' or '.join(others)} comes out in place of {_all(names)}"
+    added = [name.name for name in names]
+    words = f"without some of the tests {' or '.join(others)} comes out in place of {_all(added)}"
     alternatives = tuple(dict.fromkeys((*names[0].alternatives, *others)))
-    if len(steps) > 1 or len(alternatives) >= _LARGEST_SET:
-        return unexplained(search, words, steps, again=again)
+    if len(names) > 1 or len(alternatives) >= _LARGEST_SET:
+        return unexplained(search, words, added, again=again)
     doubtful = [replace(names[0], alternatives=alternatives)]
     return finish(search, "ambiguous", words, search.base, doubtful, again=again)
 
@@ -191,9 +193,9 @@ def _untested(held: HoldOut, steps: Sequence[Step]) -> str:
     )
 
 
-def _at_bound(final: Evidence, steps: Sequence[Step]) -> str | None:
+def _at_bound(final: Evidence, added: Sequence[str]) -> str | None:
     """The amount of an added effect that came to rest on a bound: what is missing is then another thing."""
-    amounts = {qualified(effect, effect.amount) for effect in map(effect_named, (step.name for step in steps))}
+    amounts = {qualified(effect, effect.amount) for effect in map(effect_named, added)}
     return next((name for name in final.solution.at_bound if name in amounts), None)
 
 
@@ -264,19 +266,20 @@ def _fault_words(fault: Fault) -> str:
     return f"{fault.suspect.words} stands out from all other tests: measure it again before looking for physics"
 
 
-def _closing(names: Sequence[Named]) -> str:
-    return f"{_all(names)} {'closes' if len(names) == 1 else 'close'}"
+def _closing(added: Sequence[str]) -> str:
+    return f"{_all(added)} {'closes' if len(added) == 1 else 'close'}"
 
 
-def _all(names: Sequence[Named]) -> str:
-    return " and ".join(named.name for named in names)
+def _all(added: Sequence[str]) -> str:
+    return " and ".join(added)
 
 
 def _named(step: Step) -> Named:
     """The effect of a step, with its gain and how far the next best is behind in words."""
     words = f"takes {step.gain:.0f} off chi-square"
-    if step.tried and step.tried[0].name == step.name:
-        others, bic = [rival for rival in step.tried[1:] if not rival.left], step.tried[0].evidence.bic
+    tried = step.place.tried
+    if tried and tried[0].name == step.name:
+        others, bic = [rival for rival in tried[1:] if not rival.left], tried[0].evidence.bic
         behind = [f"next best {rival.name}, {rival.evidence.bic - bic:.0f} behind by BIC" for rival in others]
         words += "; " + (behind[0] if behind else "no other comes near")
     alternatives, richer = (tuple(rival.name for rival in rivals) for rivals in (step.rivals, step.richer))

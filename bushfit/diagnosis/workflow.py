@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from bushfit.diagnosis.faults import faults
 from bushfit.diagnosis.mistakes import mistaken
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.refit import can_reach
-from bushfit.diagnosis.search import CHANCE_LEVEL, Search, Step
+from bushfit.diagnosis.search import CHANCE_LEVEL, Search
 from bushfit.diagnosis.verdict import consistent, is_consistent, judge
 from bushfit.effects import effect_named, qualified
 from bushfit.effects.mistakes import candidate_named, mistake_named
@@ -61,13 +62,16 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
         begun = _begin(data, model, settings)
     searched, counted = _search(data, begun, model, settings), False
     for _ in range(_MOST_SEARCHES):
-        if searched.best is None or not (errors := _errors_beside(searched, searched.best, data)).matters:
+        errors = _errors_beside(searched, data)
+        if errors is None and searched.exchanged is not searched:
+            errors = _errors_beside(searched.exchanged, data)
+        if errors is None:
             break
         data, counted = data.with_level_errors(errors.error, errors.freedom), True
         begun = _begin(data, model, settings)
         searched = _search(data, begun, model, settings, searched.search)
     fewer += _left_out_of_fewer(whole, data, begun.outliers)
-    found = searched.told or judge(searched.search, searched.final, searched.steps)
+    found = searched.finding
     shared = [_level_words(data, found)] if counted else _class_words(data)
     of_loops = outliers_at(found.result.model, data.loops)
     outliers = (*told(of_loops, robust=data.robust), *told(left, robust=True))
@@ -77,20 +81,36 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     return replace(found, notes=notes, result=result)
 
 
-class _Searched(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Searched:
     """What the search made of tests whose noise is known.
 
     Args:
-        final, steps: the model that it ended with, and what it added.
         best: the best that the library can do with these tests; None where nothing is missing.
-        told: the finding, where nothing is missing or a mistake in the record explains the gap.
+        added: the effects that it added; none where nothing is missing or a mistake in the record explains the gap.
+        told: the finding in that case.
     """
 
     search: Search
-    final: Evidence
-    steps: Sequence[Step] = ()
-    best: Evidence | None = None
+    best: Evidence | None
+    added: Sequence[str] = ()
     told: Diagnosis | None = None
+
+    @cached_property
+    def exchanged(self) -> _Searched:
+        """The same with each added effect exchanged for its rivals where that is better."""
+        if not self.added or self.best is None:
+            return self
+        best, added = self.search.exchange(self.best, self.added)
+        return self if best is self.best else replace(self, best=best, added=added)
+
+    @property
+    def finding(self) -> Diagnosis:
+        """The verdict, once the noise is settled."""
+        if self.told:
+            return self.told
+        last = self.exchanged
+        return judge(last.search, last.best if last.best and last.added else last.search.base, last.added)
 
 
 def _search(
@@ -99,27 +119,31 @@ def _search(
     """Look for effects and mistakes in tests whose noise is known."""
     search = Search.begin(begun.evidence, settings, begun.start, begun.held, data.bounds, earlier)
     if is_consistent(search):
-        return _Searched(search, search.base, told=consistent(search))
+        return _Searched(search, None, told=consistent(search))
     told_wrong = mistaken(search, data, lambda mended, goal: _begin(mended, model, settings, goal).evidence)
     if told_wrong:
-        return _Searched(search, search.base, (), told_wrong.after, told_wrong)
+        return _Searched(search, told_wrong.after, told=told_wrong)
     if not search.matters:
         best = search.first.best
-        return _Searched(search, search.base, (), best.evidence if best else search.base)
-    final, steps = search.reconsider(*search.grow())
-    return _Searched(search, final, steps, final)
+        return _Searched(search, best.evidence if best else search.base)
+    return _Searched(search, *search.grow())
 
 
-def _errors_beside(searched: _Searched, best: Evidence, data: Data) -> LevelErrors:
-    """Errors of each level beside the best that the library can do; in its place, where they do as well alone.
+def _errors_beside(searched: _Searched, data: Data) -> LevelErrors | None:
+    """Errors of each level beside the best that the library can do, where they matter; in its place, where they do as
+    well alone.
 
     Notes:
         Effects were chosen among many, in many shapes, and each such choice gains 2 ln(shapes) by chance.
     """
-    first, beside = searched.search.first, _level_errors(best, data)
-    alone, shapes = _level_errors(first.evidence, data), sum(len(claim.columns) for claim in first.proposed)
+    first, best = searched.search.first, searched.best
+    if best is None:
+        return None
+    beside, alone = _level_errors(best, data), _level_errors(first.evidence, data)
+    shapes = sum(len(claim.columns) for claim in first.proposed)
     ahead = first.evidence.bic - best.bic + beside.gain - alone.gain
-    return alone if alone.matters and ahead < 2.0 * np.log(max(shapes, 1)) * len(searched.steps) else beside
+    found = alone if alone.matters and ahead < 2.0 * np.log(max(shapes, 1)) * len(searched.added) else beside
+    return found if found.matters else None
 
 
 def _level_errors(evidence: Evidence, data: Data) -> LevelErrors:

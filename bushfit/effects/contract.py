@@ -45,12 +45,12 @@ class StiffnessBelow:
 
     Args:
         stiffness: (omega [rad/s], amplitude [m or rad]) -> complex dynamic stiffness.
-        cycle: (omega, one steady cycle of motion per operating point, (..., n, samples)) -> force of the
-            same shape, for the layers that bend the waveform.
+        cycle: (omega, one steady cycle of motion per operating point, (..., n, samples), which of the test's operating
+            points these are, as an index) -> force of the same shape, for the layers that bend the waveform.
     """
 
     stiffness: Callable[[Array, Array], Array]
-    cycle: Callable[[Array, Array], Array]
+    cycle: Callable[[Array, Array, Any], Array]
 
     def __call__(self, omega: Array, amplitude: Array) -> Array:
         return self.stiffness(omega, amplitude)

@@ -6,15 +6,7 @@ Slow loops have a range of their own, and are cut flat for all to see where that
 import numpy as np
 
 from bushfit.effects.clearance import FIRST, SAMPLES
-from bushfit.effects.contract import (
-    UNKNOWN,
-    Array,
-    ForceBelow,
-    History,
-    Setting,
-    StiffnessBelow,
-    Values,
-)
+from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
 
 #: Amplitude of the force's first harmonic, over the level, below which no waveform of rubber reaches it; chosen.
@@ -36,12 +28,12 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     level, wave = np.asarray(p["level"])[..., None], np.exp(2j * np.pi * np.arange(SAMPLES) / SAMPLES)
     motion = np.broadcast_to(amplitude, inside.shape)[..., None]
     first = np.abs(inside) * amplitude
-    above = (first > _NEAR * p["level"]) | (setting.under is not UNKNOWN)  # where each point has its own circumstances
+    above = first > _NEAR * p["level"]
     near = above.any(axis=tuple(range(above.ndim - 1)))
     if not near.any():
         return inside
     sine = dead_zone((inside[..., None] * motion * wave)[..., near, :].real, level)
-    beyond = dead_zone(below.cycle(omega[..., near], motion[..., near, :] * wave.real), level)
+    beyond = dead_zone(below.cycle(omega[..., near], motion[..., near, :] * wave.real, near), level)
     rest = np.zeros(np.broadcast_shapes(first.shape, np.shape(p["level"])), dtype=complex)
     rest[..., near] = (beyond - sine) @ FIRST
     return inside - p["share"] * (inside * first_harmonic(first, p["level"]) + rest / np.maximum(amplitude, _TINY))

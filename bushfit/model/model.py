@@ -299,8 +299,8 @@ class Model:
         }
 
         def below(count: int) -> StiffnessBelow:
-            def cycle(omega: Array, motion: Array) -> Array:
-                cycles = replace(setting, under=setting.under.at((..., None)))
+            def cycle(omega: Array, motion: Array, points: Any) -> Array:
+                cycles = replace(setting, under=setting.under.at(points).at((..., None)))
                 force = self._stack_force(cycles, per_sample, [layer for group in groups[:count] for layer in group])
                 return force(History.steady(motion, cast(float, omega[..., None] / (2.0 * np.pi))))
 
