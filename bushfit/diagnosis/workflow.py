@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -62,10 +61,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
         begun = _begin(data, model, settings)
     searched, counted = _search(data, begun, model, settings), False
     for _ in range(_MOST_SEARCHES):
-        errors = _errors_beside(searched, data)
-        if errors is None and searched.exchanged is not searched:
-            errors = _errors_beside(searched.exchanged, data)
-        if errors is None:
+        if (errors := _errors_beside(searched, data)) is None:
             break
         data, counted = data.with_level_errors(errors.error, errors.freedom), True
         begun = _begin(data, model, settings)
@@ -81,8 +77,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     return replace(found, notes=notes, result=result)
 
 
-@dataclass(frozen=True, eq=False)
-class _Searched:
+class _Searched(NamedTuple):
     """What the search made of tests whose noise is known.
 
     Args:
@@ -96,21 +91,12 @@ class _Searched:
     added: Sequence[str] = ()
     told: Diagnosis | None = None
 
-    @cached_property
-    def exchanged(self) -> _Searched:
-        """The same with each added effect exchanged for its rivals where that is better."""
-        if not self.added or self.best is None:
-            return self
-        best, added = self.search.exchange(self.best, self.added)
-        return self if best is self.best else replace(self, best=best, added=added)
-
     @property
     def finding(self) -> Diagnosis:
         """The verdict, once the noise is settled."""
         if self.told:
             return self.told
-        last = self.exchanged
-        return judge(last.search, last.best if last.best and last.added else last.search.base, last.added)
+        return judge(self.search, self.best if self.best and self.added else self.search.base, self.added)
 
 
 def _search(
@@ -126,7 +112,7 @@ def _search(
     if not search.matters:
         best = search.first.best
         return _Searched(search, best.evidence if best else search.base)
-    return _Searched(search, *search.grow())
+    return _Searched(search, *search.exchange(*search.grow()))
 
 
 def _errors_beside(searched: _Searched, data: Data) -> LevelErrors | None:
