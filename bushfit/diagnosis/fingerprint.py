@@ -27,8 +27,12 @@ _LEAST = np.array([-np.inf, -np.inf, -4.0, -4.0])
 _MOST = -_LEAST
 #: How far inside the bounds a fit starts, relative to the room between them.
 _INSIDE = 1e-6
-#: Evaluations of the model in one fit at most.
-_EVALUATIONS = 120
+#: Evaluations of the model in one fit at most, and before a measure that fits far worse than the best is left.
+_EVALUATIONS, _FIRST_EVALUATIONS = 120, 60
+#: Chi-square by which it fits far worse, in units of the misfit's variance: then nothing of it is told.
+_FAR = 60.0
+#: A fit ends where chi-square falls by less, in units of the misfit's variance: a tenth of a standard error.
+_LEAST_FALL = 0.01
 #: Reduced chi-square beyond which a gap has bent the parameters too far for a fit to start from them.
 _BENT = 1.5
 #: Points of a normal distribution from which the quantiles of a mixture of some are taken.
@@ -132,10 +136,14 @@ def fingerprint(
     """
     begun = evidence if evidence.reduced < _BENT else _at(evidence, start)
     terms = [Terms(begun, measure) for measure in _IN_WORDS]
-    fits = [_refitted(each, bounds, *powers) for each in terms if each.sensible for powers in _starts(each)]
+    sensible = [each for each in terms if each.sensible]
+    fits = [_refitted(each, bounds, powers, _FIRST_EVALUATIONS) for each in sensible for powers in _starts(each)]
     if not fits:
         return None
-    by_measure = {fit.measure: fit for fit in sorted(fits, key=lambda fit: -fit.after.chi_square)}
+    nearest = min((fit.after for fit in fits), key=lambda after: after.chi_square)
+    goal = nearest.chi_square + _FAR * max(nearest.reduced, 1.0)
+    fits = [fit.to_its_end(bounds) if fit.after.chi_square < goal else fit for fit in fits]
+    by_measure = {fit.terms.measure: fit for fit in sorted(fits, key=lambda fit: -fit.after.chi_square)}
     best, *others = sorted(by_measure.values(), key=lambda fit: fit.after.chi_square)
     left = ScoreTest(best.after, smooth, [np.arange(len(smooth))], PATTERN_LEFT)
     held = _held_out(evidence, best.after)
@@ -175,17 +183,32 @@ def _starts(terms: Terms) -> Sequence[tuple[float, float]]:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """The term refitted with all parameters: its size, phase [rad] and powers, and their errors, (4,) each."""
+    """The term refitted with all parameters: its size, phase [rad] and powers, and their errors, (4,) each.
 
-    measure: Measure
+    Args:
+        begun: the powers from which it was fitted.
+        point: where the fit ended, the parameters' coordinates and those of the term, (k + 4,).
+    """
+
+    terms: Terms
+    begun: tuple[float, float]
+    point: Array
     middle: Array
     value: Array
     error: Array
     after: Evidence
 
+    def to_its_end(self, bounds: Bounds) -> "_Fit":
+        """The same fit, taken up again where it was stopped before its end."""
+        if not self.after.solution.stopped:
+            return self
+        return _refitted(self.terms, bounds, self.begun, _EVALUATIONS - _FIRST_EVALUATIONS, self.point)
 
-def _refitted(terms: Terms, bounds: Bounds, p: float, q: float) -> _Fit:
-    """The term and all parameters refitted together from these powers.
+
+def _refitted(
+    terms: Terms, bounds: Bounds, powers: tuple[float, float], evaluations: int, point: Array | None = None
+) -> _Fit:
+    """The term and all parameters refitted together from these powers, or from a point on the way from them.
 
     A term in shares of the stiffness multiplies that of the model without it.
     """
@@ -193,36 +216,38 @@ def _refitted(terms: Terms, bounds: Bounds, p: float, q: float) -> _Fit:
 
     base, data_sets = terms.evidence.solution, terms.evidence.data_sets
     coordinates = base.coordinates
-    middle = terms.centre(np.exp((terms.points - terms.points.mean(axis=0)) @ (p, q)))
+    middle = terms.centre(np.exp((terms.points - terms.points.mean(axis=0)) @ powers))
     about, (low, high) = terms.points - middle, coordinate_bounds(coordinates, bounds)
     changes = np.ptp(about, axis=0) > 0.0
     scale = float(np.mean(np.abs(terms.unit(base.model)) ** -1 * np.abs(terms.stiffness)))
 
     @lru_cache(maxsize=2)
-    def at(point: tuple[float, ...]) -> tuple[Model, Array, Array]:
-        model = base.model.with_values(coordinates.values(np.array(point[:-4])))
-        shape = scale * np.exp(about @ point[-2:])
-        value = (point[-4] + 1j * point[-3]) * shape
+    def at(where: tuple[float, ...]) -> tuple[Model, Array, Array]:
+        model = base.model.with_values(coordinates.values(np.array(where[:-4])))
+        shape = scale * np.exp(about @ where[-2:])
+        value = (where[-4] + 1j * where[-3]) * shape
         return model, value, np.stack((shape, 1j * shape, *(value * (about * changes).T)))
 
-    def misfit(point: Array) -> Array:
-        model, value, _ = at(tuple(point.tolist()))
+    def misfit(where: Array) -> Array:
+        model, value, _ = at(tuple(where.tolist()))
         return terms.residual(value, model)
 
-    def slopes(point: Array) -> Array:
-        model, value, own = at(tuple(point.tolist()))
+    def slopes(where: Array) -> Array:
+        model, value, own = at(tuple(where.tolist()))
         return np.concatenate((terms.jacobian(value, model, coordinates.names), terms.columns(own, model, value))).T
 
     ends = np.append(low, _LEAST), np.append(high, _MOST)
-    start = np.append(coordinates.point(base.model.values), (0.0, 0.0, p, q))
-    linear = slopes(start)[:, :-2]
-    start[-4:-2] = -np.linalg.lstsq(linear, base.residual, rcond=None)[0][-2:]
+    start = point
+    if start is None:
+        start = np.append(coordinates.point(base.model.values), (0.0, 0.0, *powers))
+        linear = slopes(start)[:, :-2]
+        start[-4:-2] = -np.linalg.lstsq(linear, base.residual, rcond=None)[0][-2:]
     room = _INSIDE * np.minimum(ends[1] - ends[0], 1.0)
     inside = np.clip(start, ends[0] + room, ends[1] - room)
-    found = least_squares(misfit, inside, slopes, ends, x_scale="jac", max_nfev=_EVALUATIONS)
-    solution = Solution(
-        at(tuple(found.x.tolist()))[0], coordinates, found.fun, slopes(found.x).T, int(found.nfev), {}, stopped=False
-    )
+    least = _LEAST_FALL / base.residual.size
+    found = least_squares(misfit, inside, slopes, ends, ftol=least, x_scale="jac", max_nfev=evaluations)
+    model, stopped = at(tuple(found.x.tolist()))[0], found.status == 0
+    solution = Solution(model, coordinates, found.fun, slopes(found.x).T, int(found.nfev), {}, stopped)
     after = Evidence(solution, data_sets)
     a, b, p, q = found.x[-4:]
     size = float(np.hypot(a, b))
@@ -232,7 +257,7 @@ def _refitted(terms: Terms, bounds: Bounds, p: float, q: float) -> _Fit:
     error = np.sqrt(np.diag(covariance))
     error[2:][~changes] = np.inf
     value = np.array([size, np.arctan2(b, a), p, q])
-    return _Fit(terms.measure, middle, value * [scale, 1, 1, 1], error * [scale, 1, 1, 1], after)
+    return _Fit(terms, powers, found.x, middle, value * [scale, 1, 1, 1], error * [scale, 1, 1, 1], after)
 
 
 def _covariance(rows: Array) -> Array:
@@ -252,10 +277,10 @@ def _read(best: _Fit, others: Sequence[_Fit], held: HoldOut, *, is_all: bool) ->
     scales = np.array([1.0, np.degrees(1.0), 1.0, 1.0])
     ends = [_interval(*each, weights) for each in zip((values * scales).T, (errors * scales).T, strict=True)]
     size, phase, p, q = [(float(value), *pair) for value, pair in zip(best.value * scales, ends, strict=True)]
-    alike = tuple(fit.measure for fit, off in zip(others, apart, strict=True) if off < SAME)
+    alike = tuple(fit.terms.measure for fit, off in zip(others, apart, strict=True) if off < SAME)
     middle = float(np.exp(best.middle[0])), float(np.exp(best.middle[1]))
     is_power_law = is_all and halves(held)
-    return Fingerprint(best.measure, alike, size, phase, p, q, middle, best.after, held, is_power_law)
+    return Fingerprint(best.terms.measure, alike, size, phase, p, q, middle, best.after, held, is_power_law)
 
 
 def _interval(values: Array, errors: Array, weights: Array) -> tuple[float, float]:
