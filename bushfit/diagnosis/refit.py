@@ -34,9 +34,12 @@ _TO_ITS_END = 100
 _HARDLY = 1e-3
 #: Evaluations before which a refit goes on where its proposal claimed to come near the best.
 _CLAIM_HOLDS = 12
-#: Every so many evaluations a refit whose proposal claimed less is asked how far it came since the last time; and the
-#: share of what it is still behind that it has to have come; chosen: at less it would take forty more.
+#: Every so many evaluations a refit is asked how far it came since the last time; and the share of what it is still
+#: behind that it has to have come, where its proposal claimed less; chosen: at less it would take forty more.
 _PACE, _LEAST_PACE = 6, 0.15
+#: Of the pace of one that came near, so many times which has to bring it to the best before its evaluations are used
+#: up; chosen: one that creeps along a bent valley may come to a better stretch.
+_SPEEDS_UP = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +83,9 @@ def refits(
     claimed = {proposal.name: evidence.chi_square - proposal.score for proposal in proposed}
     least = min((candidate.evidence.chi_square for candidate in known), default=np.inf)
     fits = raced(fits, claimed, least)
-    left = {name for name in fits if not _ended(fits[name])}
     first = min(fits, key=lambda name: fits[name].chi_square, default="")
+    nearest = min(least, *(fit.chi_square for fit in fits.values())) if fits else least
+    left = {name for name, fit in fits.items() if not _ended(fit) and fit.chi_square > nearest + EXCLUDED}
     if first and fits[first].chi_square < least + EXCLUDED:
         fits[first] = near_its_end(fits[first], evidence.residual.size, _HARDLY, _TO_ITS_END)
     refitted = [
@@ -116,7 +120,7 @@ def _begun(
 
 def raced(fits: Mapping[str, Descent], claimed: Mapping[str, float], least: float) -> dict[str, Descent]:
     """All fits step by step, until each has ended, or cannot come near the best or a chi-square that is known, or comes
-    nearer too slowly though it never claimed to come near.
+    nearer too slowly though it never claimed to come near, or came near and is too slow to come nearest.
 
     Args:
         claimed: the chi-square that each proposal promised.
@@ -131,10 +135,17 @@ def raced(fits: Mapping[str, Descent], claimed: Mapping[str, float], least: floa
         running = [name for name in running if can_reach(fits[name], goal, claimed[name])]
         if rounds % _PACE == 0:
             came = {name: before.get(name, np.inf) - fits[name].chi_square for name in running}
-            behind = {name: fits[name].chi_square - goal for name in running}
-            running = [name for name in running if came[name] > _LEAST_PACE * behind[name] or claimed[name] < goal]
+            running = [name for name in running if _keeps_pace(fits[name], came[name], least, claimed[name])]
             before = {name: fits[name].chi_square for name in running}
     return fits
+
+
+def _keeps_pace(fit: Descent, came: float, least: float, claimed: float) -> bool:
+    """Whether a fit that came so far down in `_PACE` evaluations may yet come near the best, or there to the best."""
+    goal = least + EXCLUDED
+    if fit.chi_square > goal:
+        return came > _LEAST_PACE * (fit.chi_square - goal) or claimed < goal
+    return fit.chi_square - _SPEEDS_UP * came * (EVALUATIONS - fit.evaluations) / _PACE <= least
 
 
 def near_its_end(fit: Descent, floor: float, share: float, evaluations: int = EVALUATIONS) -> Descent:

@@ -110,3 +110,13 @@ def test_a_fit_far_above_the_noise_that_hardly_comes_down_is_at_its_end() -> Non
     far, near = cast(Descent, Falling(100_000.0, 1.0)), cast(Descent, Falling(110.0, 0.1))
     assert near_its_end(far, 100.0, 1e-3).evaluations < 10
     assert near_its_end(near, 100.0, 1e-3).evaluations == EVALUATIONS
+
+
+def test_a_refit_that_came_near_is_left_where_its_pace_will_not_bring_it_to_the_best() -> None:
+    """Fifty-five behind, by a tenth an evaluation and by fifteen times that; chosen by hand, as no campaign shows it
+    alone."""
+    creeps, comes = cast(Descent, Falling(1055.0, 0.1)), cast(Descent, Falling(1055.0, 1.5))
+    ends = raced({"creeps": creeps, "comes": comes}, {"creeps": 900.0, "comes": 900.0}, 1000.0)
+    evaluations = {name: each.evaluations for name, each in ends.items()}
+    assert evaluations["creeps"] < 20
+    assert evaluations["comes"] == EVALUATIONS
