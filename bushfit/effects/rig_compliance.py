@@ -12,7 +12,7 @@ from bushfit.errors import ModelError
 #: The iterations stop when what is missing of the motion is less than this, relative to the imposed motion: rounding.
 TOLERANCE = 1e-14
 #: The same of a history, before a last step that counts as linear and leaves a hundredth of it.
-_LAST = 1e-12
+_LAST = 1e-10
 #: Most rounds of an iteration: chosen, many more than a rig takes that is stiffer than the bushing.
 ROUNDS = 60
 #: Share of the least that was missing so far, below which a round brought the motion nearer.
