@@ -54,8 +54,8 @@ _SAME_WAY = 0.8
 #: Share of a step's length that its bend may have, both in units of noise; chosen: further on the way bends otherwise,
 #: and nearly all steps fail.
 _MOST_BENT = 0.2
-#: A step that is expected to lower chi-square by less is the last, in units of the misfit's variance: a tenth of a
-#: standard error.
+#: A step that is expected to lower chi-square by less is the last: a tenth of a standard error, however large the
+#: misfit, as it is in units of noise that models are compared.
 _LEAST_FALL = 0.01
 #: Least squared norm of a parameter's derivatives, in units of noise, with which it moves: the shape of an effect of
 #: no amount stays.
@@ -133,8 +133,7 @@ class Descent:
         """The fit one evaluation on: at a lower chi-square with less damping, or where it was with more."""
         damping = self.damping
         step, expected = self._step(damping)
-        variance = max(self.chi_square / self.residual.size, 1.0)
-        evaluations, converged = self.evaluations + 1, 0.0 <= expected < _LEAST_FALL * variance
+        evaluations, converged = self.evaluations + 1, 0.0 <= expected < _LEAST_FALL
         bend = self._bend(step, damping)
         # so far out between the bounds, or on a way that bends so much, that only caution leads down
         while expected < 0.0 or self._length(bend) > _MOST_BENT * self._length(step):
