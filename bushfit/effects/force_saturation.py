@@ -26,13 +26,13 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     if setting.kind != "sweep" or not np.any(p["share"]):
         return inside
     level, wave = np.asarray(p["level"])[..., None], np.exp(2j * np.pi * np.arange(SAMPLES) / SAMPLES)
-    motion = np.broadcast_to(amplitude, inside.shape)[..., None]
+    motion = np.broadcast_to(amplitude, (*np.shape(amplitude)[:-1], inside.shape[-1]))[..., None]
     first = np.abs(inside) * amplitude
     above = first > _NEAR * p["level"]
     near = above.any(axis=tuple(range(above.ndim - 1)))
     if not near.any():
         return inside
-    sine = dead_zone((inside[..., None] * motion * wave)[..., near, :].real, level)
+    sine = dead_zone((inside[..., near, None] * motion[..., near, :] * wave).real, level)
     beyond = dead_zone(below.cycle(omega[..., near], motion[..., near, :] * wave.real, near), level)
     rest = np.zeros(np.broadcast_shapes(first.shape, np.shape(p["level"])), dtype=complex)
     rest[..., near] = (beyond - sine) @ FIRST

@@ -117,14 +117,15 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
 
 
 def _move(start: Any, sign: Any, distance: Any) -> tuple[Any, Any, Any]:
-    """Eq. (5) from u_s = `start` over the distance d: u, du/du_s and du/dd."""
+    """Eq. (5) from u_s = `start` over the distance d: u, and v and v + d of the module's notes."""
     room = 1.0 - sign * start
     reach = room + distance
-    return (
-        start + sign * distance * room / reach,
-        1.0 - (distance / reach) ** 2,
-        sign * (room / reach) ** 2,
-    )
+    return start + sign * distance * room / reach, room, reach
+
+
+def _move_slopes(sign: Any, distance: Any, room: Any, reach: Any) -> tuple[Any, Any]:
+    """du/du_s and du/dd of a move."""
+    return 1.0 - (distance / reach) ** 2, sign * (room / reach) ** 2
 
 
 def _passed(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tuple[Any, Any, Any]]:
@@ -133,7 +134,8 @@ def _passed(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tup
     path = [(u, 0.0 * u, 1.0 + 0.0 * u)]
     for sense, distance in zip(senses, distances, strict=True):
         start, slope, kept = path[-1]
-        end, by_start, by_distance = _move(start, sense, distance)
+        end, *room_and_reach = _move(start, sense, distance)
+        by_start, by_distance = _move_slopes(sense, distance, *room_and_reach)
         path.append((end, by_start * slope - by_distance * distance, by_start * kept))
     return path
 
@@ -174,21 +176,24 @@ def _at_turns(strides: Array, periodic: bool, eps_half: Array) -> tuple[Array, A
     return at, slopes
 
 
-def _walk(eps_half: Array, history: History) -> tuple[Array, Array]:
-    """u = s_f/sigma_fmax and du/deps_half at every sample of one history or many, for one eps_half or many."""
+def _begun(eps_half: Array, history: History) -> tuple[Array, Array, Array, Array]:
+    """u and du/dln eps_half where each piece of one history or many begins, for one eps_half or many, and the sense and
+    the distance d of every sample from there."""
     turning, eps_half = history.turning, np.atleast_1d(np.asarray(eps_half, dtype=float))
-    start, slope = map(turning.at_samples, _at_turns(turning.strides, history.periodic, eps_half))
-    distance = np.abs(turning.travel) / eps_half
-    u, by_start, by_distance = _move(start, np.sign(turning.travel), distance)
-    return u, (by_start * slope - by_distance * distance) / eps_half
+    sense, distance = np.sign(turning.travel), np.abs(turning.travel) / eps_half
+    return *_at_turns(turning.strides, history.periodic, eps_half), sense, distance
 
 
 def stress(p: Values, history: History) -> Array:
     """s_f along the history (Eq. 5): from (0, 0) at rest, or on the steady loop [Pa]."""
-    return p["sigma_fmax"] * _walk(p["eps_half"], history)[0]
+    start, _, sense, distance = _begun(p["eps_half"], history)
+    return p["sigma_fmax"] * _move(history.turning.at_samples(start), sense, distance)[0]
 
 
 def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
     """d/dsigma_fmax = u and d/deps_half = sigma_fmax du/deps_half."""
-    u, slope = _walk(p["eps_half"], history)
-    return {"sigma_fmax": u, "eps_half": p["sigma_fmax"] * slope}
+    start, slope, sense, distance = _begun(p["eps_half"], history)
+    u, *room_and_reach = _move(history.turning.at_samples(start), sense, distance)
+    by_start, by_distance = _move_slopes(sense, distance, *room_and_reach)
+    slope = by_start * history.turning.at_samples(slope) - by_distance * distance  # by ln eps_half
+    return {"sigma_fmax": u, "eps_half": p["sigma_fmax"] * slope / p["eps_half"]}

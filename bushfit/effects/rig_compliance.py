@@ -26,7 +26,8 @@ _UNSETTLED = 1e-3
 _MANY_ROUNDS = 16
 #: Largest motion of the bushing that an iteration may try, relative to the imposed motion.
 _LARGEST_MOTION = 2.0
-#: Rounds before the last two from which the next is foreseen; chosen: three take a third of the rounds, more no less.
+#: Differences between the last rounds from which the next is foreseen; chosen: three take a third of the rounds, more
+#: no less.
 _REMEMBERED = 3
 #: Share of all their squares that is added to each, so that two that teach the same do no harm: above rounding.
 _SAME_DIRECTION = 1e-12
@@ -93,7 +94,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     yielding = 1.0 / (1.0 + compliance * rigid)
     size = np.max(np.abs(imposed), axis=-1, keepdims=True)
     felt = below(history.with_value(reached, beneath))
-    last, pace, past = np.inf * size, np.ones_like(size), list[Sequence[Array]]()
+    last, pace, before, past = np.inf * size, np.ones_like(size), None, list[tuple[Array, Array]]()
     best, idle = last, 0
     for number in range(ROUNDS):
         missing = imposed - reached - compliance * felt
@@ -110,8 +111,11 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         best = np.where(off < _NEARER * best, off, best)
         pace, last = np.where(off < last, pace, 0.5 * pace), off
         change = np.fft.irfft(turned, n=length)[..., :count]
-        past = [*past[-_REMEMBERED:], np.broadcast_arrays(reached, change)]
-        reached = reached + pace * (change - _foreseen(past))
+        if before is not None:
+            changed = change - before[1]
+            past = [*past[1 - _REMEMBERED :], (changed, changed + reached - before[0])]
+        before = reached, change
+        reached = reached + pace * (change - _foreseen(past, change))
         reached = np.clip(reached, -_LARGEST_MOTION * size, _LARGEST_MOTION * size)
         felt = below(history.with_value(reached, beneath))
     if not history.periodic and np.any(off > _UNSETTLED * size):
@@ -124,15 +128,21 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     return felt
 
 
-def _foreseen(past: Sequence[Sequence[Array]]) -> Array:
-    """What the last rounds, motions and changes (..., n), teach of the next change (D. G. Anderson, J. ACM 12 (1965)
-    547): the combination of their differences that takes most off it."""
-    motions, changes = (np.stack(each, axis=-2) for each in zip(*past, strict=True))
-    moved, changed = (each[..., 1:, :] - each[..., :-1, :] for each in (motions, changes))
+def _foreseen(past: Sequence[tuple[Array, Array]], change: Array) -> Array | float:
+    """What the last rounds teach of the next change (D. G. Anderson, J. ACM 12 (1965) 547): the combination of their
+    differences that takes most off this one, (..., n).
+
+    Args:
+        past: by how much the change differed from one round to the next, (..., n), and that with the motion's
+            difference.
+    """
+    if not past:
+        return 0.0
+    changed = np.stack([each for each, _ in past], axis=-2)
     normal = changed @ changed.mT
     little = _SAME_DIRECTION * np.einsum("...ii->...", normal)[..., None, None] + np.finfo(float).tiny
-    weights = np.linalg.solve(normal + little * np.eye(len(past) - 1), changed @ changes[..., -1, :, None])
-    return np.squeeze(weights.mT @ (moved + changed), axis=-2)
+    weights = np.linalg.solve(normal + little * np.eye(len(past)), changed @ change[..., None])
+    return sum(weights[..., k, :] * both for k, (_, both) in enumerate(past))
 
 
 def _pulse_stiffness(below: ForceBelow, history: History, length: int) -> Array:
