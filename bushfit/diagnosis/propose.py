@@ -129,7 +129,7 @@ def sensitivity(
     It is that at next to no amount, per typical amount; the residuals are those of the model without the effect, (n,).
     Shapes with which there is no finite response, as within free play, are left out.
     """
-    model = model.with_effect(effect.name)
+    bare, model = model, model.with_effect(effect.name)
     axes = {
         qualified(effect, parameter): probes(data_sets, model, parameter)
         for parameter in effect.parameters
@@ -141,8 +141,10 @@ def sensitivity(
     grids = {name: np.array([[shape[name]] for shape in shapes]) for name in axes}
     values = {**model.values, **grids, qualified(effect, amount): little}
     answers = [
-        np.broadcast_to(data_set.residual(model, values), (len(shapes), data_set.size)) for data_set in data_sets
+        data_set.residual(model, values) if effect.acts_at(data_set.direction) else data_set.residual(bare)
+        for data_set in data_sets
     ]
+    answers = [np.broadcast_to(answer, (len(shapes), answer.shape[-1])) for answer in answers]
     rows = np.concatenate(answers, axis=-1)
     finite = np.isfinite(rows).all(axis=1)
     return [shapes[i] for i in np.flatnonzero(finite)], (rows[finite] - residual) / _STEP

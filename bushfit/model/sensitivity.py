@@ -12,7 +12,7 @@ from typing import cast
 
 import numpy as np
 
-from bushfit.effects import Branch, Parameter, qualified
+from bushfit.effects import Branch, Parameter, place_of, qualified
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Value, Values
 from bushfit.effects.history import History
 from bushfit.geometry import Place
@@ -42,7 +42,7 @@ def stiffness_and_slopes(
     """
     respond = partial(model.stiffness, direction, frequency, amplitude, kind=kind, under=under)
     if not model.only_branches:
-        return differences(model, names, lambda values: respond(values=values))
+        return _differences_at(direction, model, names, lambda values: respond(values=values))
     omega = 2.0 * np.pi * frequency
     strain = amplitude * model.unit_strain(direction)
     total = np.zeros((len(names), frequency.size), dtype=complex)
@@ -57,7 +57,7 @@ def force_and_slopes(
     [per unit]."""
     respond = partial(model.force, direction, displacement, kind="loop", under=under)
     if not model.only_branches:
-        return differences(model, names, lambda values: respond(values=values))
+        return _differences_at(direction, model, names, lambda values: respond(values=values))
     per_displacement = model.unit_strain(direction)
     test = (displacement.scaled(per_displacement),)
     total = np.zeros((len(names), displacement.value.shape[-1]))
@@ -85,6 +85,17 @@ def _add(total: Array, model: Model, names: Sequence[str], face: Face, test: tup
             slopes = dict(zip(moved, differences(model, moved, partial(response, branch))[1], strict=True))
         for name, slope in slopes.items():
             total[row[name]] += slope
+
+
+def _differences_at(
+    place: Place, model: Model, names: Sequence[str], respond: Callable[[Values], Array]
+) -> tuple[Array, Array]:
+    """As `differences`; parameters that belong to another place are not moved, as nothing comes of it here."""
+    here = [i for i, name in enumerate(names) if place_of(name) in (None, str(place))]
+    response, moved = differences(model, [names[i] for i in here], respond)
+    slopes = np.zeros((len(names), response.size), dtype=response.dtype)
+    slopes[here] = moved
+    return response, slopes
 
 
 def differences(model: Model, names: Sequence[str], respond: Callable[[Values], Array]) -> tuple[Array, Array]:
