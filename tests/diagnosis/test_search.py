@@ -106,3 +106,16 @@ def test_a_search_made_again_passes_over_what_fell_far_behind(measured: Measured
     assert same
     assert same.name == best.name == "inertia"
     assert same.evidence.chi_square == pytest.approx(best.evidence.chi_square, abs=0.05)
+
+
+def test_a_wrong_name_is_exchanged_for_the_right_one(measured: Measured, fitted: Fitted) -> None:
+    """The mass is there and the dashpot was added."""
+    campaign = measured(INERTIA, SHARED)
+    plain, wrong = fitted(campaign), fitted(campaign, "viscous")
+    search = Search.begin(plain, Settings(), plain.model.values, (), {})
+    found, added = search.exchange(wrong, ["viscous"])
+    (step,) = search.steps(found, added)
+    print(f"chi-square {wrong.chi_square:.0f} with viscous, {found.chi_square:.0f} with {added}")
+    assert added == [step.name] == ["inertia"]
+    assert found.chi_square < wrong.chi_square
+    assert step.gain == pytest.approx(plain.chi_square - found.chi_square)

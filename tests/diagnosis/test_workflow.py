@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,7 +28,9 @@ from rigged import PLAN, SHARED, Diagnosed, Measured, changed
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, ParameterSetting, SimulateSettings
+from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.record import Settings
+from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE
 from bushfit.errors import BushfitError
@@ -141,6 +143,25 @@ def test_with_less_no_bolder_name(measured: Measured, part: Callable[..., Campai
 
 def held(campaign: Campaign, **settings: ParameterSetting) -> Campaign:
     return replace(campaign, fit=FitSettings(parameters=settings))
+
+
+@pytest.mark.parametrize(("tolerance", "exchanged"), [(0.01, False), (0.03, True)])
+def test_effects_of_a_model_that_is_far_off_are_not_exchanged(
+    measured: Measured, monkeypatch: pytest.MonkeyPatch, tolerance: float, exchanged: bool
+) -> None:
+    """One of two effects may be added, and 8 % are left: more than five usual tolerances, less than five large ones."""
+    asked_for = list[Sequence[str]]()
+    exchange = Search.exchange
+
+    def counted(search: Search, current: Evidence, added: Sequence[str]) -> tuple[Evidence, list[str]]:
+        asked_for.append(added)
+        return exchange(search, current, added)
+
+    monkeypatch.setattr(Search, "exchange", counted)
+    monkeypatch.setattr("bushfit.diagnosis.verdict.leads", lambda _: "")  # which search on their own
+    diagnosis = asked(measured(TWO, SHARED), max_effects=1, tolerance=tolerance)
+    assert bool(asked_for) == exchanged
+    assert diagnosis.verdict in ("unexplained", "described", "partly")
 
 
 def test_held_parameters_stay(measured: Measured) -> None:

@@ -313,10 +313,20 @@ def test_a_loop_clock_that_runs_slow_is_a_faster_loop() -> None:
     same(off, PLAIN, 0.0)
 
 
-def test_circumstances_of_each_point_reach_the_rubber_through_a_bent_waveform() -> None:
-    """Play asks for whole cycles of the bushing below it, a row for each operating point."""
-    values = {"clearance.delta": 2e-5, "drift.gain": 0.1, "mullins_levels.share": 0.1, "temperature.softening": 0.01}
-    model = Model.started(PLAIN.bushing, (*BASE, "clearance", "drift", "mullins_levels", "temperature"), {})
+@pytest.mark.parametrize(
+    ("bends", "of_it"),
+    [
+        ("clearance", {"clearance.delta": 2e-5}),
+        ("force_saturation", {"force_saturation.share": 0.3, "force_saturation.level": 180.0}),
+    ],
+)
+def test_circumstances_of_each_point_reach_the_rubber_through_a_bent_waveform(
+    bends: str, of_it: dict[str, float]
+) -> None:
+    """Play asks for whole cycles of the bushing below it, a row for each operating point; a force channel that
+    saturates only for those that come near its level, here the last two of three."""
+    values = {"drift.gain": 0.1, "mullins_levels.share": 0.1, "temperature.softening": 0.01, **of_it}
+    model = Model.started(PLAIN.bushing, (*BASE, bends, "drift", "mullins_levels", "temperature"), {})
     model = model.with_values({**PLAIN.values, **values})
     under = Circumstances(np.array([290.0, 300.0, 305.0]), np.array([0.0, 0.3, 1.0]), np.array([0.0, 0.02, 0.05]))
     together = model.stiffness("axial", FREQUENCY, AMPLITUDE, under=under)
