@@ -142,7 +142,7 @@ def fingerprint(
         return None
     nearest = min((fit.after for fit in fits), key=lambda after: after.chi_square)
     goal = nearest.chi_square + _FAR * max(nearest.reduced, 1.0)
-    fits = [fit.to_its_end(bounds) if fit.after.chi_square < goal else fit for fit in fits]
+    fits = [fit.to_its_end(bounds) for fit in fits if fit.after.chi_square < goal]
     by_measure = {fit.terms.measure: fit for fit in sorted(fits, key=lambda fit: -fit.after.chi_square)}
     best, *others = sorted(by_measure.values(), key=lambda fit: fit.after.chi_square)
     left = ScoreTest(best.after, smooth, [np.arange(len(smooth))], PATTERN_LEFT)
@@ -202,13 +202,13 @@ class _Fit:
         """The same fit, taken up again where it was stopped before its end."""
         if not self.after.solution.stopped:
             return self
-        return _refitted(self.terms, bounds, self.begun, _EVALUATIONS - _FIRST_EVALUATIONS, self.point)
+        return _refitted(self.terms, bounds, self.begun, _EVALUATIONS - _FIRST_EVALUATIONS, self)
 
 
 def _refitted(
-    terms: Terms, bounds: Bounds, powers: tuple[float, float], evaluations: int, point: Array | None = None
+    terms: Terms, bounds: Bounds, powers: tuple[float, float], evaluations: int, before: _Fit | None = None
 ) -> _Fit:
-    """The term and all parameters refitted together from these powers, or from a point on the way from them.
+    """The term and all parameters refitted together from these powers, or from where a fit from them was stopped.
 
     A term in shares of the stiffness multiplies that of the model without it.
     """
@@ -237,8 +237,9 @@ def _refitted(
         return np.concatenate((terms.jacobian(value, model, coordinates.names), terms.columns(own, model, value))).T
 
     ends = np.append(low, _LEAST), np.append(high, _MOST)
-    start = point
-    if start is None:
+    if before:
+        start = before.point
+    else:
         start = np.append(coordinates.point(base.model.values), (0.0, 0.0, *powers))
         linear = slopes(start)[:, :-2]
         start[-4:-2] = -np.linalg.lstsq(linear, base.residual, rcond=None)[0][-2:]
@@ -247,7 +248,8 @@ def _refitted(
     least = _LEAST_FALL / base.residual.size
     found = least_squares(misfit, inside, slopes, ends, ftol=least, x_scale="jac", max_nfev=evaluations)
     model, stopped = at(tuple(found.x.tolist()))[0], found.status == 0
-    solution = Solution(model, coordinates, found.fun, slopes(found.x).T, int(found.nfev), {}, stopped)
+    taken = found.nfev + (before.after.solution.evaluations if before else 0)
+    solution = Solution(model, coordinates, found.fun, slopes(found.x).T, taken, {}, stopped)
     after = Evidence(solution, data_sets)
     a, b, p, q = found.x[-4:]
     size = float(np.hypot(a, b))

@@ -33,12 +33,12 @@ def leads(search: Search) -> str:
         begun = _weighed(search)
         anew = Search.begin(begun, search.settings, search.start, search.held, search.bounds)
         final, added = anew.exchange(*anew.grow())
-        steps = anew.steps(final, added)
     except (FitError, ModelError):  # a model of which these tests tell nothing
         return ""
     before, after = plain_misfit(begun), plain_misfit(final)
-    if not steps or after > _LEFT * before:
+    if not added or after > _LEFT * before:
         return ""
+    steps = anew.steps(final, added)
     sets = " and ".join(" or ".join((step.name, *(rival.name for rival in step.rivals))) for step in steps)
     sizes = f"{number(100.0 * before, 2)} to {number(100.0 * after, 2)} %"
     return f"; no more than leads, every test weighed by what is missed of it: {sets} bring the model from {sizes} off"

@@ -25,7 +25,7 @@ _PROBES = 5
 #: Least and largest order of a derivative that is tried: one far below and one far above that of filled rubber, 0.2.
 _ORDERS = (0.05, 0.9)
 #: Amount at which a sensitivity is taken, relative to the typical one: small enough to be a derivative, large enough to
-#: keep ten digits of the difference.
+#: keep seven digits of the difference.
 _STEP = 1e-5
 
 

@@ -40,13 +40,16 @@ _PACE, _LEAST_PACE = 6, 0.15
 #: Of the pace of one that came near, so many times which has to bring it to the best before its evaluations are used
 #: up; chosen: one that creeps along a bent valley may come to a better stretch.
 _SPEEDS_UP = 2.0
+#: Chi-square behind the best at which a candidate may still be as good by BIC: the margin and the price of a parameter.
+_AS_GOOD = 12.0
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """One effect refitted together with everything else, and what it took off chi-square.
 
-    `left` tells that the fit was stopped before its end, far behind the best.
+    `left` tells that the fit was stopped before its end, far behind the best. One that came near and crept is stopped
+    as well, where nothing depends on its last digits.
     """
 
     name: str
@@ -120,7 +123,7 @@ def _begun(
 
 def raced(fits: Mapping[str, Descent], claimed: Mapping[str, float], least: float) -> dict[str, Descent]:
     """All fits step by step, until each has ended, or cannot come near the best or a chi-square that is known, or comes
-    nearer too slowly though it never claimed to come near, or came near and is too slow to come nearest.
+    nearer too slowly though it never claimed to come near, or came near and is too slow to be as good.
 
     Args:
         claimed: the chi-square that each proposal promised.
@@ -141,11 +144,12 @@ def raced(fits: Mapping[str, Descent], claimed: Mapping[str, float], least: floa
 
 
 def _keeps_pace(fit: Descent, came: float, least: float, claimed: float) -> bool:
-    """Whether a fit that came so far down in `_PACE` evaluations may yet come near the best, or there to the best."""
+    """Whether a fit that came so far down in `_PACE` evaluations may yet come near the best, and there as near as to be
+    as good."""
     goal = least + EXCLUDED
     if fit.chi_square > goal:
         return came > _LEAST_PACE * (fit.chi_square - goal) or claimed < goal
-    return fit.chi_square - _SPEEDS_UP * came * (EVALUATIONS - fit.evaluations) / _PACE <= least
+    return fit.chi_square - _SPEEDS_UP * came * (EVALUATIONS - fit.evaluations) / _PACE <= least + _AS_GOOD
 
 
 def near_its_end(fit: Descent, floor: float, share: float, evaluations: int = EVALUATIONS) -> Descent:

@@ -18,7 +18,7 @@ from bushfit.diagnosis.mistakes import mistaken
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.refit import can_reach
 from bushfit.diagnosis.search import CHANCE_LEVEL, Search
-from bushfit.diagnosis.verdict import consistent, is_consistent, judge
+from bushfit.diagnosis.verdict import consistent, find_remainder, is_consistent, judge
 from bushfit.effects import effect_named, qualified
 from bushfit.effects.mistakes import candidate_named, mistake_named
 from bushfit.fitting.data import Data
@@ -33,13 +33,13 @@ from bushfit.model.result import Outlier
 _MOST_ROUNDS = 4
 #: Searches that are made again with errors of levels, at most; chosen for time: each is as long as the first.
 _MOST_SEARCHES = 2
-#: Rounds of scoring and refitting, in all searches, after which none is made again; chosen for time: where so many
-#: closed no gap, errors of levels that are a little larger close none.
+#: Rounds of scoring and refitting in the searches so far, from which errors of levels that are counted are not
+#: estimated anew for another search; chosen for time.
 _MANY_ROUNDS = 15
-#: Smooth misfit of the model that the search ended with, in units of the tolerance, beyond which its effects are not
-#: exchanged; chosen: of 731 searches, 54 left more, and no exchange brought one of these below the tolerance, nor any
-#: that left more than 4.5.
-_BEYOND_EXCHANGE = 5.0
+#: Smooth misfit of the model that growth ended with, relative to |K| or to half a loop's force range, beyond which its
+#: effects are not exchanged, if it is more than chance; chosen: of 731 searches, 54 left more, and no exchange brought
+#: one of these below a tolerance of 1 %, nor any that left more than 4.5 %.
+_BEYOND_EXCHANGE = 0.05
 #: Largest error of a level, in units of the largest standard deviation that counts as the rig's; chosen: between the
 #: 2.1 % that errors of 1 % made of one clean campaign and the 2.5 % that a wrong label made of another.
 _MOST_ERRORS = 1.5
@@ -70,7 +70,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     searched, counted = _search(data, begun, model, settings), False
     rounds = len(searched.search.rounds)
     for _ in range(_MOST_SEARCHES):
-        if rounds >= _MANY_ROUNDS or (errors := _errors_beside(searched, data)) is None:
+        if (counted and rounds >= _MANY_ROUNDS) or (errors := _errors_beside(searched, data)) is None:
             break
         data, counted = data.with_level_errors(errors.error, errors.freedom), True
         begun = _begin(data, model, settings)
@@ -92,8 +92,8 @@ class _Searched(NamedTuple):
 
     Args:
         best: the best that the library can do with these tests; None where nothing is missing.
-        added: the effects that it added; none where nothing is missing or a mistake in the record explains the gap.
-        told: the finding in that case.
+        added: the effects that it added.
+        told: the finding, where nothing is missing or a mistake in the record explains the gap.
     """
 
     search: Search
@@ -104,9 +104,7 @@ class _Searched(NamedTuple):
     @property
     def finding(self) -> Diagnosis:
         """The verdict, once the noise is settled."""
-        if self.told:
-            return self.told
-        return judge(self.search, self.best if self.best and self.added else self.search.base, self.added)
+        return self.told or judge(self.search, self.best or self.search.base, self.added)
 
 
 def _search(
@@ -123,8 +121,10 @@ def _search(
         best = search.first.best
         return _Searched(search, best.evidence if best else search.base)
     grown, added = search.grow()
-    if largest_smooth_misfit(grown) > _BEYOND_EXCHANGE * settings.tolerance:
-        return _Searched(search, grown, added)
+    if largest_smooth_misfit(grown) > max(_BEYOND_EXCHANGE, settings.tolerance):
+        remainder = find_remainder(search, grown)
+        if remainder and not remainder.fault:
+            return _Searched(search, grown, added)
     return _Searched(search, *search.exchange(grown, added))
 
 

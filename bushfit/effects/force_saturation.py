@@ -26,7 +26,7 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     if setting.kind != "sweep" or not np.any(p["share"]):
         return inside
     level, wave = np.asarray(p["level"])[..., None], np.exp(2j * np.pi * np.arange(SAMPLES) / SAMPLES)
-    motion = np.broadcast_to(amplitude, (*np.shape(amplitude)[:-1], inside.shape[-1]))[..., None]
+    inside, motion = inside + np.zeros_like(amplitude), amplitude[..., None]
     first = np.abs(inside) * amplitude
     above = first > _NEAR * p["level"]
     near = above.any(axis=tuple(range(above.ndim - 1)))
