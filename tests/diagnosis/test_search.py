@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from asking import INERTIA, TWO, asked, names
 from rigged import SHARED, Diagnosed, Fitted, Measured
 
+from bushfit.diagnosis.propose import sensitivity
 from bushfit.diagnosis.record import Settings
 from bushfit.diagnosis.search import Search
-from bushfit.effects import BASE, LIBRARY
+from bushfit.effects import BASE, LIBRARY, effect_named
 
 
 def test_what_was_left_on_its_way_has_no_gain(diagnosed: Diagnosed) -> None:
@@ -119,3 +121,11 @@ def test_a_wrong_name_is_exchanged_for_the_right_one(measured: Measured, fitted:
     assert added == [step.name] == ["inertia"]
     assert found.chi_square < wrong.chi_square
     assert step.gain == pytest.approx(plain.chi_square - found.chi_square)
+
+
+def test_what_belongs_to_another_direction_has_no_sensitivity_there(measured: Measured, fitted: Fitted) -> None:
+    plain = fitted(measured(INERTIA, SHARED))
+    effect = effect_named("stiffness_factor.radial")
+    _, (column,) = sensitivity(plain.model, plain.data_sets, plain.residual, effect)
+    there = {(str(data_set.direction), bool(np.any(column[place]))) for data_set, place in plain.place.items()}
+    assert there == {("axial", False), ("radial", True)}

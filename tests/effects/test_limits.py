@@ -313,6 +313,18 @@ def test_a_loop_clock_that_runs_slow_is_a_faster_loop() -> None:
     same(off, PLAIN, 0.0)
 
 
+def test_a_spring_alone_under_a_force_channel_that_saturates() -> None:
+    """Its force is a sine, of which the describing function tells what lies beyond the level."""
+    share, level = 0.3, 40.0
+    own = {"force_saturation.share": share, "force_saturation.level": level}
+    spring = Model(PLAIN.bushing, ("elastic",), {"mu": 1e6})
+    k = spring.stiffness("axial", FREQUENCY, AMPLITUDE)
+    expected = k * (1.0 - share * first_harmonic(np.abs(k) * AMPLITUDE, level))
+    found = spring.with_effect("force_saturation", own).stiffness("axial", FREQUENCY, AMPLITUDE)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    np.testing.assert_array_equal(np.abs(found) < np.abs(k), np.abs(k) * AMPLITUDE > level)
+
+
 @pytest.mark.parametrize(
     ("bends", "of_it"),
     [

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bushfit.effects import BASE, History
+from bushfit.effects.contract import Array, Values
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.model.sensitivity import differences, force_and_slopes, stiffness_and_slopes
@@ -96,3 +97,21 @@ def test_one_sided_at_a_bound(paper_model: Model) -> None:
     heavy = paper_model.with_effect("inertia")
     slope = stiffness_and_slopes(heavy, *at, ["inertia.mass"])[1][0]
     np.testing.assert_allclose(slope, -((2.0 * np.pi * FREQUENCY) ** 2), rtol=1e-6, atol=1e-2)
+
+
+@pytest.mark.parametrize("direction", list(Direction))
+def test_what_belongs_to_another_place_has_no_slope_there(paper_model: Model, direction: Direction) -> None:
+    model = paper_model.with_effect("stiffness_factor.radial").with_effect("amplitude_rolloff")
+    names = [*model.parameters]
+    amplitude = AMPLITUDE * (100.0 if direction.is_rotation else 1.0)
+    response, found = stiffness_and_slopes(model, direction, FREQUENCY, amplitude, names)
+
+    def respond(values: Values) -> Array:
+        return model.stiffness(direction, FREQUENCY, amplitude, values=values)
+
+    known = differences(model, names, respond)
+    np.testing.assert_array_equal(response, known[0])
+    np.testing.assert_array_equal(found, known[1])
+    moved = dict(zip(names, np.any(found != 0.0, axis=1), strict=True))
+    assert moved["mu"]
+    assert moved["stiffness_factor.radial"] == (direction == Direction.RADIAL)
