@@ -32,7 +32,7 @@ SAME = 6.0
 APART = 10.0
 #: Chi-square within which a richer rival meets a simpler model's noise-free prediction: then it contains the simpler.
 _CONTAINS = 1.0
-#: Times that an added effect is exchanged or dropped before the search ends; chosen: more only go round in circles.
+#: Times that an added effect is exchanged before the search ends; chosen: more only go round in circles.
 _MOST_SWAPS = 4
 #: A swap counts where it improves BIC by more than this, which is above rounding.
 _LEAST_IMPROVEMENT = 1e-6
@@ -273,16 +273,17 @@ class Search:
             name = names[settled]
             others = [other for other in names if other != name]
             place = self._place(current, name, others)
-            best = place.best
-            may_swap = swaps < _MOST_SWAPS and not any(effect_named(other).after == name for other in others)
-            if may_swap and best and best.name != name and best.evidence.bic < current.bic - _LEAST_IMPROVEMENT:
+            best, least = place.best, current.bic - _LEAST_IMPROVEMENT
+            if any(effect_named(other).after == name for other in others):
+                settled += 1
+            elif best and best.name != name and best.evidence.bic < least and swaps < _MOST_SWAPS:
                 names[settled], current = best.name, best.evidence
-            elif may_swap and others and not self._counts(name, current, place):
-                names, current = others, place.evidence
+                settled, swaps = 0, swaps + 1
+            elif others and not self._counts(name, current, place):
+                names, settled = others, 0
+                current = fit(place.evidence.model, current.data_sets, self.held, self.bounds)
             else:
                 settled += 1
-                continue
-            settled, swaps = 0, swaps + 1
         return current, names
 
     def steps(self, current: Evidence, added: Sequence[str]) -> list[Step]:
