@@ -1,38 +1,72 @@
-"""Sliders: springs that slip one after the other, in place of the friction branch."""
+"""Sliders: springs that slip one after the other, in place of the friction branch.
+
+Notes:
+    Each takes the stress s at most, and slips at a strain e_y of its own. There are any number of them, as many in one
+    part of a decade of e_y as in another, so that nothing jumps where one more slips: a mean over them is an integral
+    over ln e_y from e_s/exp(spread) to e_s exp(spread).
+"""
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Values
+from bushfit.effects.contract import Array, Value, Values
 from bushfit.effects.history import History
 
-#: Sliders in parallel; chosen: over a decade of slip strains their steps are 0.2 % of the modulus.
-_COUNT = 24
+#: Sliders that stand for all of them along other motions than a steady one to and fro; chosen: over a decade of slip
+#: strains their steps are 1e-4 of the modulus.
+_COUNT = 100
 #: Where each slips, from -1 to 1 of the spread in the logarithm of strain.
 _PLACES = (2.0 * np.arange(_COUNT) + 1.0) / _COUNT - 1.0
 
 
-def _slips(p: Values) -> Array:
-    """Strains at which the sliders slip, (..., 1, sliders)."""
-    spread = np.asarray(p["spread"])[..., None] * _PLACES
-    return np.atleast_1d(p["e_s"])[..., None] * np.exp(spread)
+def _ends(p: Values) -> tuple[Array, Array]:
+    """Least and largest strain at which a slider slips."""
+    middle, factor = np.atleast_1d(p["e_s"]), np.exp(np.asarray(p["spread"]))
+    return middle / factor, middle * factor
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """(A + iB)/(2 e0): each slider of stress s and slip strain e_y gives, with cos t = 1 - 2 e_y/e0 beyond e_y,
-    A = s/e_y e0 (t - sin(2 t)/2)/pi, B = 4 s/pi (1 - e_y/e0) [Pa]."""
-    slip = _slips(p)
-    share = np.minimum(slip / np.maximum(np.asarray(strain)[..., None], np.finfo(float).tiny), 1.0)
-    turn = np.arccos(1.0 - 2.0 * share)
-    shape = (turn - 0.5 * np.sin(2.0 * turn)) / np.pi + 4.0j / np.pi * share * (1.0 - share)
-    return 0.5 * p["sigma"] * np.mean(shape / slip, axis=-1)
+    """(A + iB)/(2 e0) [Pa] of the steady loop of strain amplitude e0.
+
+    Notes:
+        A slider that slips, r = e_y/e0 < 1 and cos t = 1 - 2r, gives A = s (t - sin(2t)/2)/(pi r) and
+        B = 4 s (1 - r)/pi; one that does not gives A = s/r. Of these over e_y the integrals over ln e_y are
+        (4 (t + sin t) - (t - sin(2t)/2)/r + 4i (ln r - r))/(pi e0) and -1/e_y.
+    """
+    low, high = _ends(p)
+    strain = np.maximum(strain, np.finfo(float).tiny)
+
+    def slipping(end: Array) -> Array:
+        r = np.minimum(end / strain, 1.0)
+        t = np.arccos(1.0 - 2.0 * r)
+        turned = 4.0 * (t + np.sin(t)) - (t - 0.5 * np.sin(2.0 * t)) / r
+        return (turned + 4.0j * (np.log(r) - r)) / np.pi
+
+    stuck = 1.0 / np.clip(strain, low, high) - 1.0 / high
+    whole = (slipping(high) - slipping(low)) / strain + stuck
+    return 0.5 * p["sigma"] / np.log(high / low) * whole
+
+
+def _loaded(strain: Array, low: Value, high: Value) -> Array:
+    """Mean of min(strain/e_y, 1): the stress of all sliders over the largest, loaded from rest."""
+    slipped = np.clip(strain, low, high)
+    return (np.log(slipped / low) + strain * (1.0 / slipped - 1.0 / high)) / np.log(high / low)
 
 
 def stress(p: Values, history: History) -> Array:
     """Sum of the sliders' stresses, elastic up to their slip strain and constant beyond, from rest or steady [Pa].
 
-    On a steady cycle the motion begins at its top, where every slider has the stress of half the range, or slips.
+    Notes:
+        On a steady motion to and fro each branch of the loop is the first loading at twice its size (G. Masing, Proc.
+        2nd Int. Congr. Appl. Mech., 1926). Along any other motion some sliders stand for all, each followed by itself.
     """
-    turning, slip = history.turning, _slips(p)
+    turning = history.turning
+    if history.periodic and turning.strides.shape[-1] == 2:  # to and fro
+        low, high = _ends(p)
+        sense = turning.at_samples(np.sign(turning.strides))
+        moved = 2.0 * _loaded(np.abs(turning.travel) / 2.0, low, high) - _loaded(history.amplitude, low, high)
+        return p["sigma"] * sense * moved
+    spread = np.asarray(p["spread"])[..., None] * _PLACES
+    slip = np.atleast_1d(p["e_s"])[..., None] * np.exp(spread)  # (..., 1, sliders)
     strides = turning.strides[..., None] / slip
     top = np.minimum(history.amplitude[..., None] / slip, 1.0) if history.periodic else np.zeros((1, 1))
     held = np.empty_like(strides)

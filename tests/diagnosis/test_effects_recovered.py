@@ -24,12 +24,8 @@ SLOW = {name for name in hideable() if "compliance" in name}
 NEAR = ("force_saturation.level", "force_saturation.share")
 
 
-#: Of few sliders each makes a minimum of its own, whose errors say nothing of the next: the interval misses the truth.
-FEW = pytest.mark.xfail(reason="intervals of sliders hold for one of many minima", strict=True)
-
-
 def _marks(name: str) -> list[pytest.MarkDecorator]:
-    return [pytest.mark.slow] if name in SLOW else [FEW] if name == "sliders" else []
+    return [pytest.mark.slow] if name in SLOW else []
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=_marks(name)) for name in hideable()])

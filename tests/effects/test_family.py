@@ -41,9 +41,6 @@ ACTIVE = {"delay"}
 SAMPLES = 2**14
 #: A warm test, late in the session and after a large strain.
 UNDER = Circumstances(temperature=303.0, turn=0.7, strained=0.08, left=0.08, rested=0.03)
-#: Effects made of parts that set in one after the other: the slope jumps there, by so much, and no rule of differences
-#: over both sides meets it.
-KINKED = {"sliders": 5e-3}
 
 
 def random_model(rng: np.random.Generator) -> Model:
@@ -283,7 +280,7 @@ def test_sensitivities_match_finite_differences(effect: Effect, rng: np.random.G
         ):
             worst = max(worst, float(np.max(np.abs(found - expected)) * size / scale))
     print(f"{effect.name}: sensitivities within {worst:.1e} of the response per relative change")
-    assert worst < KINKED.get(effect.name, 2e-6)
+    assert worst < 2e-6
 
 
 def test_twins_answer_alike_in_both_faces_and_only_the_bushings_is_proposed(rng: np.random.Generator) -> None:

@@ -3,7 +3,7 @@
 #define BUSHING_H
 #include "model.h"
 
-enum { FRICTIONS = 2, SLIDERS = 24 };
+enum { FRICTIONS = 2, SLIDERS = 100 };
 
 /* Where on the list of values each quantity of one direction stands; 0 and 1 stand there too, for what it has not. */
 typedef struct {
