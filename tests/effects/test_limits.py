@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from bushfit.effects import BASE, LIBRARY, Effect, History, qualified
+from bushfit.effects import BASE, LIBRARY, Effect, History, qualified, sliders
 from bushfit.effects.contract import Circumstances
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
 from bushfit.effects.maxwell import relax
@@ -345,3 +345,28 @@ def test_circumstances_of_each_point_reach_the_rubber_through_a_bent_waveform(
     points = enumerate(zip(FREQUENCY, AMPLITUDE, strict=True))
     alone = [model.stiffness("axial", f, x, under=under.at(i)) for i, (f, x) in points]
     np.testing.assert_allclose(together, alone, rtol=1e-12)
+
+
+SLIDERS = {"sigma": 2.5e4, "e_s": 0.015, "spread": 1.3}
+
+
+@pytest.mark.parametrize("strain", [1e-6, 3e-3, 5e-3, 0.015, 0.05, 0.1, 1.0])
+def test_sliders_are_the_mean_of_very_many(strain: float) -> None:
+    """Below the range of their slip strains (4e-3 to 0.055), in it and beyond."""
+    places = (np.arange(100_000) + 0.5) / 50_000 - 1.0
+    slip = SLIDERS["e_s"] * np.exp(SLIDERS["spread"] * places)
+    r = np.minimum(slip / strain, 1.0)
+    t = np.arccos(1.0 - 2.0 * r)
+    each = ((t - 0.5 * np.sin(2.0 * t)) / np.pi + 4.0j / np.pi * r * (1.0 - r)) / slip
+    found = sliders.modulus(SLIDERS, np.array([30.0]), np.array([strain]))
+    np.testing.assert_allclose(found, 0.5 * SLIDERS["sigma"] * np.mean(each), rtol=1e-8)
+
+
+@pytest.mark.parametrize("amplitude", [3e-3, 0.015, 0.2])
+def test_sliders_along_a_settled_motion_from_rest_are_those_of_the_steady_one(amplitude: float) -> None:
+    """The one is followed slider by slider, the other is the first loading at twice its size."""
+    count = 512
+    phase = 2.0 * np.pi * np.arange(3 * count) / count
+    steady = sliders.stress(SLIDERS, History.steady(amplitude * np.sin(phase[:count]), 5.0))
+    rested = sliders.stress(SLIDERS, History(amplitude * np.sin(phase), 1.0 / (5.0 * count), False, 5.0))
+    assert np.max(np.abs(rested[-count:] - steady)) < 3e-4 * np.max(np.abs(steady))
