@@ -10,6 +10,7 @@ from scipy.special import ndtri
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.holdout import HoldOut
+from bushfit.diagnosis.refit import EXCLUDED
 from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.search import SAME
 from bushfit.diagnosis.terms import Measure, Terms, end_parts, halves, inner_parts, predicted
@@ -29,8 +30,6 @@ _MOST = -_LEAST
 _INSIDE = 1e-6
 #: Evaluations of the model in one fit at most, and before a measure that fits far worse than the best is left.
 _EVALUATIONS, _FIRST_EVALUATIONS = 120, 60
-#: Chi-square by which it fits far worse, in units of the misfit's variance: then nothing of it is told.
-_FAR = 60.0
 #: A fit ends where chi-square falls by less, in units of the misfit's variance: a tenth of a standard error.
 _LEAST_FALL = 0.01
 #: Reduced chi-square beyond which a gap has bent the parameters too far for a fit to start from them.
@@ -141,7 +140,7 @@ def fingerprint(
     if not fits:
         return None
     nearest = min((fit.after for fit in fits), key=lambda after: after.chi_square)
-    goal = nearest.chi_square + _FAR * max(nearest.reduced, 1.0)
+    goal = nearest.chi_square + EXCLUDED * max(nearest.reduced, 1.0)
     fits = [fit.to_its_end(bounds) for fit in fits if fit.after.chi_square < goal]
     by_measure = {fit.terms.measure: fit for fit in sorted(fits, key=lambda fit: -fit.after.chi_square)}
     best, *others = sorted(by_measure.values(), key=lambda fit: fit.after.chi_square)
@@ -222,18 +221,18 @@ def _refitted(
     scale = float(np.mean(np.abs(terms.unit(base.model)) ** -1 * np.abs(terms.stiffness)))
 
     @lru_cache(maxsize=2)
-    def at(where: tuple[float, ...]) -> tuple[Model, Array, Array]:
-        model = base.model.with_values(coordinates.values(np.array(where[:-4])))
-        shape = scale * np.exp(about @ where[-2:])
-        value = (where[-4] + 1j * where[-3]) * shape
+    def at(point: tuple[float, ...]) -> tuple[Model, Array, Array]:
+        model = base.model.with_values(coordinates.values(np.array(point[:-4])))
+        shape = scale * np.exp(about @ point[-2:])
+        value = (point[-4] + 1j * point[-3]) * shape
         return model, value, np.stack((shape, 1j * shape, *(value * (about * changes).T)))
 
-    def misfit(where: Array) -> Array:
-        model, value, _ = at(tuple(where.tolist()))
+    def misfit(point: Array) -> Array:
+        model, value, _ = at(tuple(point.tolist()))
         return terms.residual(value, model)
 
-    def slopes(where: Array) -> Array:
-        model, value, own = at(tuple(where.tolist()))
+    def slopes(point: Array) -> Array:
+        model, value, own = at(tuple(point.tolist()))
         return np.concatenate((terms.jacobian(value, model, coordinates.names), terms.columns(own, model, value))).T
 
     ends = np.append(low, _LEAST), np.append(high, _MOST)
