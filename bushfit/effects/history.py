@@ -25,6 +25,7 @@ class History:
         frequency: of the excitation [Hz]; like the step, it may differ between motions, (..., 1).
         driver: the imposed motion, where something that gives way lies between it and this one.
         solved: where equations over this motion were solved last, by name: good starts of the next solution, no more.
+        accuracy: how far equations over this motion may be from solved, relative to it.
     """
 
     value: Array
@@ -33,6 +34,7 @@ class History:
     frequency: float
     driver: Array | None = None
     solved: dict[str, Any] = field(default_factory=dict)
+    accuracy: float = 1e-10
 
     @classmethod
     def steady(cls, value: Array, frequency: float, cycles: int = 1) -> History:
@@ -181,8 +183,12 @@ def reversals(value: Array) -> Array:
 
     Where it rests before it turns, the last sample of the rest counts.
     """
-    sense = np.sign(np.diff(value, axis=-1))
-    if not sense.all():
-        moving = np.maximum.accumulate(np.where(sense != 0.0, np.arange(sense.shape[-1]), 0), axis=-1)
-        sense = np.take_along_axis(sense, moving, axis=-1)
-    return np.concatenate([np.zeros_like(sense[..., :1], dtype=bool), sense[..., 1:] * sense[..., :-1] < 0.0], axis=-1)
+    steps = np.diff(value, axis=-1)
+    rising = steps > 0.0
+    if not (moves := steps != 0.0).all():
+        moving = np.maximum.accumulate(np.where(moves, np.arange(steps.shape[-1]), 0), axis=-1)
+        rising, moves = (np.take_along_axis(each, moving, axis=-1) for each in (rising, moves))
+        moves[..., 1:] &= moves[..., :-1]
+    turned = np.zeros_like(rising)
+    turned[..., 1:] = (rising[..., 1:] != rising[..., :-1]) & moves[..., 1:]
+    return turned

@@ -1,18 +1,14 @@
 """Rig compliance: the rig gives way in series with the bushing, which is moved less than the rig imposes."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.fft import next_fast_len
 
-from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Value, Values
+from bushfit.effects.contract import Array, ForceBelow, Setting, StiffnessBelow, Values
 from bushfit.effects.history import History
 from bushfit.errors import ModelError
 
-#: The iterations stop when what is missing of the motion is less than this, relative to the imposed motion: rounding.
-TOLERANCE = 1e-14
-#: The same of a history, before a last step that counts as linear and leaves a hundredth of it.
-_LAST = 1e-10
+#: The secants end when the logarithm of the amplitude is off by less than this, before a last step along the secant.
+_NEAR = 1e-8
 #: Most rounds of an iteration: chosen, many more than a rig takes that is stiffer than the bushing.
 ROUNDS = 60
 #: Share of the least that was missing so far, below which a round brought the motion nearer.
@@ -31,6 +27,7 @@ _LARGEST_MOTION = 2.0
 _REMEMBERED = 3
 #: Share of all their squares that is added to each, so that two that teach the same do no harm: above rounding.
 _SAME_DIRECTION = 1e-12
+_EACH = np.eye(_REMEMBERED)
 #: The name of its solutions.
 _NAME = "compliance"
 #: The name of the solutions of what gives way beneath it, as a sleeve in a rig.
@@ -40,43 +37,45 @@ _PULSE_AT = 4
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """K/(1 + c K) [N/m] with K at the amplitude X/|1 + c K| that reaches the bushing; does not act in torsion."""
+    """K/(1 + c K) [N/m] with K at the amplitude X e^v that reaches the bushing; does not act in torsion.
+
+    Notes:
+        v + ln|1 + c K(X e^v)| = 0, by secants. Near the solution the last secant also gives K there, unasked.
+    """
     compliance = p["compliance"]
-    inside = below(omega, amplitude * np.exp(_log_share(compliance, below, omega, amplitude)))
+
+    def excess(v: Array, inside: Array) -> Array:
+        """v + ln|1 + c K|."""
+        given = compliance * inside
+        return v + 0.5 * np.log1p(2.0 * given.real + given.real**2 + given.imag**2)
+
+    old = np.zeros(np.broadcast_shapes(np.shape(compliance), np.shape(amplitude)))
+    inside_old = below(omega, amplitude + old)
+    excess_old = excess(old, inside_old)
+    new = -excess_old
+    for _ in range(ROUNDS):
+        inside = below(omega, amplitude * np.exp(new))
+        off = excess(new, inside)
+        run, rise = new - old, off - excess_old
+        slope = np.where((rise != 0.0) & (rise * run > 0.0), rise / np.where(run == 0.0, 1.0, run), 1.0)
+        step = -off / slope
+        if np.all(np.abs(off) <= _NEAR):
+            inside = inside + (inside - inside_old) * step / np.where(run == 0.0, 1.0, run)
+            break
+        old, excess_old, inside_old, new = new, off, inside, new + step
     return inside / (1.0 + compliance * inside)
 
 
-def _log_share(compliance: Value, below: StiffnessBelow, omega: Array, amplitude: Array) -> Array:
-    """Logarithm v of the share of the amplitude that reaches the bushing: v + ln|1 + c K(X e^v)| = 0, by secants."""
-
-    def lost(v: Array) -> Array:
-        """ln|1 + c K| at the amplitude X e^v."""
-        given = compliance * below(omega, amplitude * np.exp(v))
-        return 0.5 * np.log1p(2.0 * given.real + given.real**2 + given.imag**2)
-
-    old = np.zeros(np.broadcast_shapes(np.shape(compliance), np.shape(amplitude)))
-    old_excess = lost(old)
-    new = -old_excess
-    for _ in range(ROUNDS):
-        excess = new + lost(new)
-        if np.all(np.abs(excess) <= TOLERANCE):
-            break
-        run, rise = new - old, excess - old_excess
-        slope = np.where((rise != 0.0) & (rise * run > 0.0), rise / np.where(run == 0.0, 1.0, run), 1.0)
-        old, old_excess, new = new, excess, new - excess / slope
-    return new
-
-
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """Force [N] of the motion x_b = x - c F(x_b) that reaches the bushing.
+    """Force F [N] of the motion x - c F that reaches the bushing.
 
     Notes:
-        Solved for the whole history at once. Each round computes what is missing of the motion, x - x_b - c F(x_b), and
-        adds it to x_b times 1/(1 + c K), harmonic by harmonic. K is measured once with a pulse: a poor K costs rounds,
-        not accuracy. So K and x_b of the last model that was asked about this motion are where the next one starts.
+        Solved for the whole history at once. Each round asks what answers the motion x - c F, and adds what that force
+        is more than F, times 1/(1 + c K), harmonic by harmonic. K is measured once with a pulse: a poor K costs rounds,
+        not accuracy. So K and F of the last model that was asked about this motion are where the next one starts.
         What gives way beneath starts each round from its solution of the round before.
         Friction below that turns sharply would make it many rounds: so those before tell the next. Where a round does
-        not bring x_b nearer, the next steps are halved. Dry friction below turns its sense with the imposed motion:
+        not bring F nearer, the next steps are halved. Dry friction below turns its sense with the imposed motion:
         that it sticks for a moment is neglected.
     """
     compliance = p["compliance"]
@@ -86,38 +85,36 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     count = imposed.shape[-1]
     length = count if history.periodic else next_fast_len(2 * count, real=True)
     beneath = solved.setdefault(_BENEATH, {})
-    rigid, reached = solved.pop(_NAME, (None, imposed))
+    rigid, reached = solved.pop(_NAME, (None, np.zeros_like(imposed)))
     if reached.shape not in (imposed.shape[-1:], imposed.shape):
-        rigid, reached = None, imposed
+        rigid, reached = None, np.zeros_like(imposed)
     if rigid is None:
         rigid = _pulse_stiffness(below, history, length)
     yielding = 1.0 / (1.0 + compliance * rigid)
     size = np.max(np.abs(imposed), axis=-1, keepdims=True)
-    felt = below(history.with_value(reached, beneath))
-    last, pace, before, past = np.inf * size, np.ones_like(size), None, list[tuple[Array, Array]]()
-    best, idle = last, 0
+    farthest = _LARGEST_MOTION * size
+    best = last = np.inf * size
+    pace, idle, past = np.ones_like(size), 0, None
     for number in range(ROUNDS):
-        missing = imposed - reached - compliance * felt
-        off = np.max(np.abs(missing), axis=-1, keepdims=True)
-        turned = yielding * np.fft.rfft(missing, n=length)
-        if np.all(off <= _LAST * size):
+        motion = np.clip(imposed - compliance * reached, -farthest, farthest)
+        felt = below(history.with_value(motion, beneath))
+        missing = felt - reached
+        off = np.max(np.abs(compliance * missing), axis=-1, keepdims=True)
+        change = np.fft.irfft(yielding * np.fft.rfft(missing, n=length), n=length)[..., :count]
+        past = past or _Past(change.shape)
+        step = past.step(reached, change)
+        if np.all(off <= history.accuracy * size):
+            reached = reached + step
             many = imposed.ndim > 1  # else of many models on one motion the last is kept
             kept = [each if many else each.reshape(-1, each.shape[-1])[-1] for each in (rigid, reached)]
             solved[_NAME] = (kept[0] if number < _MANY_ROUNDS else None, kept[1])
-            return felt + np.fft.irfft(rigid * turned, n=length)[..., :count]
-        idle = 0 if np.any((off < _NEARER * best) & (off > _LAST * size)) else idle + 1
+            return reached
+        idle = 0 if np.any((off < _NEARER * best) & (off > history.accuracy * size)) else idle + 1
         if idle == _IDLE:
             break
         best = np.where(off < _NEARER * best, off, best)
         pace, last = np.where(off < last, pace, 0.5 * pace), off
-        change = np.fft.irfft(turned, n=length)[..., :count]
-        if before is not None:
-            changed = change - before[1]
-            past = [*past[1 - _REMEMBERED :], (changed, changed + reached - before[0])]
-        before = reached, change
-        reached = reached + pace * (change - _foreseen(past, change))
-        reached = np.clip(reached, -_LARGEST_MOTION * size, _LARGEST_MOTION * size)
-        felt = below(history.with_value(reached, beneath))
+        reached = reached + pace * step
     if not history.periodic and np.any(off > _UNSETTLED * size):
         raise ModelError(
             "the rig gives way too much to be followed through time",
@@ -128,21 +125,32 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     return felt
 
 
-def _foreseen(past: Sequence[tuple[Array, Array]], change: Array) -> Array | float:
-    """What the last rounds teach of the next change (D. G. Anderson, J. ACM 12 (1965) 547): the combination of their
-    differences that takes most off this one, (..., n).
+class _Past:
+    """What the last rounds of an iteration teach of the next (D. G. Anderson, J. ACM 12 (1965) 547).
 
-    Args:
-        past: by how much the change differed from one round to the next, (..., n), and that with the motion's
-            difference.
+    Kept are the last few differences from one round to the next, by turns in one of a few places, empty at first.
     """
-    if not past:
-        return 0.0
-    changed = np.stack([each for each, _ in past], axis=-2)
-    normal = changed @ changed.mT
-    little = _SAME_DIRECTION * np.einsum("...ii->...", normal)[..., None, None] + np.finfo(float).tiny
-    weights = np.linalg.solve(normal + little * np.eye(len(past)), changed @ change[..., None])
-    return sum(weights[..., k, :] * both for k, (_, both) in enumerate(past))
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self._changed, self._both = np.zeros((2, *shape[:-1], _REMEMBERED, shape[-1]))
+        self._products = np.zeros((*shape[:-1], _REMEMBERED, _REMEMBERED))
+        self._place = 0
+        self._before: tuple[Array, Array] | None = None
+
+    def step(self, reached: Array, change: Array) -> Array:
+        """The change that a round asks for, (..., n), less the combination of the last differences that takes most off
+        it, with what that moves."""
+        before, self._before = self._before, (reached, change)
+        if before is None:
+            return change
+        k, self._place = self._place, (self._place + 1) % _REMEMBERED
+        changed = change - before[1]
+        self._changed[..., k, :], self._both[..., k, :] = changed, changed + reached - before[0]
+        products = self._products
+        products[..., k, :] = products[..., :, k] = (self._changed @ changed[..., None])[..., 0]
+        little = _SAME_DIRECTION * np.einsum("...ii->...", products)[..., None, None] + np.finfo(float).tiny
+        weights = np.linalg.solve(products + little * _EACH, self._changed @ change[..., None])
+        return np.asarray(change - (weights.mT @ self._both)[..., 0, :])
 
 
 def _pulse_stiffness(below: ForceBelow, history: History, length: int) -> Array:

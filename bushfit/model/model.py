@@ -41,13 +41,18 @@ FIVE = tuple(parameter.name for name in BASE for parameter in effect_named(name)
 
 @dataclass(frozen=True)
 class _Structure:
-    """The effects of a model by kind, and their parameters; the same for all models with these effects."""
+    """The effects of a model by kind, and their parameters; the same for all models with these effects.
+
+    Args:
+        fading: the linear branches that fade with memory, whose steady answers add up harmonic by harmonic.
+    """
 
     records: tuple[Effect, ...]
     parameters: Mapping[str, Parameter]
     branches: tuple[Branch, ...]
     modifiers: tuple[Modifier, ...]
     layers: tuple[Layer, ...]
+    fading: tuple[Branch, ...]
 
     @classmethod
     @lru_cache(maxsize=256)
@@ -70,6 +75,7 @@ class _Structure:
             tuple(effect for effect in records if isinstance(effect, Branch)),
             tuple(effect for effect in records if isinstance(effect, Modifier)),
             tuple(effect for effect in records if isinstance(effect, Layer)),
+            tuple(effect for effect in records if isinstance(effect, Branch) and effect.size),
         )
 
 
@@ -318,12 +324,28 @@ class Model:
         per_displacement = self.unit_strain(setting.direction)
         factor = self.stiffness_per_modulus(setting.direction) / (2.0 * per_displacement)
 
+        fading, known = self._structure.fading, dict[int, tuple[Any, Array]]()
+
         def rubber(displacement: History) -> Array:
-            strain = displacement.scaled(per_displacement)
-            omega = np.atleast_1d(displacement.omega)
-            base = self._adjusted(setting, values, omega, displacement.amplitude, strain.amplitude)
-            stresses = (branch.stress(seen_by(branch, values, base), strain) for branch in self._structure.branches)
+            strain, base = displacement.scaled(per_displacement), values
+            if self._structure.modifiers:
+                omega = np.atleast_1d(displacement.omega)
+                base = self._adjusted(setting, values, omega, displacement.amplitude, strain.amplitude)
+            together = fading if displacement.periodic else ()
+            alone = (branch for branch in self._structure.branches if branch not in together)
+            stresses = [branch.stress(seen_by(branch, values, base), strain) for branch in alone]
+            if together:
+                stresses.append(strain.response(lambda omega: modulus(omega, base, strain)))
             return factor * sum(stresses, start=np.zeros(1))
+
+        def modulus(omega: Array, base: Values, strain: History) -> Array:
+            """Of the linear branches, (..., harmonics), kept for the next motion at the same times."""
+            step, found = known.get(omega.size, (None, np.zeros(1)))
+            if step is not strain.step or base is not values:
+                moduli = (branch.modulus(seen_by(branch, values, base), omega, strain.amplitude) for branch in fading)
+                found = 2.0 * sum(moduli)
+                known[omega.size] = strain.step, found
+            return found
 
         def wrap(below: ForceBelow, group: Sequence[Layer]) -> ForceBelow:
             layer, own = _as_one(group, values)
