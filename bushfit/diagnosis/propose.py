@@ -60,9 +60,7 @@ def proposals(evidence: Evidence, excluded: Collection[str], held: Sequence[str]
     """
     missing = missing_effects(evidence.model, [str(data_set.direction) for data_set in evidence.data_sets], excluded)
     answers = {
-        effect: sensitivity(evidence.model, evidence.data_sets, evidence.residual, effect)
-        for effect in missing
-        if effect.replaces is None
+        effect: sensitivity(evidence.model, evidence.data_sets, effect) for effect in missing if effect.replaces is None
     }
     asked = [effect for effect, (shapes, _) in answers.items() if shapes]
     probed = [answers[effect] for effect in asked]
@@ -121,13 +119,11 @@ def _replacing(evidence: Evidence, effect: Effect, held: Sequence[str]) -> Propo
     return Proposal(effect.name, model, max(score, 0.0), columns, 0, visible=True, together=True)
 
 
-def sensitivity(
-    model: Model, data_sets: Sequence[DataSet], residual: Array, effect: Effect
-) -> tuple[list[dict[str, float]], Array]:
+def sensitivity(model: Model, data_sets: Sequence[DataSet], effect: Effect) -> tuple[list[dict[str, float]], Array]:
     """Shapes of an effect on a grid that the tests suggest, and its whitened sensitivity in each, (shapes, n).
 
-    It is that at next to no amount, per typical amount; the residuals are those of the model without the effect, (n,).
-    Shapes with which there is no finite response, as within free play, are left out.
+    It is that at next to no amount, per typical amount, against none in the same call, so that what is solved by rounds
+    errs alike in both. Shapes with which there is no finite response, as within free play, are left out.
     """
     bare, model = model, model.with_effect(effect.name)
     axes = {
@@ -136,18 +132,21 @@ def sensitivity(
         if parameter.neutral is None
     }
     shapes = [dict(zip(axes, point, strict=True)) for point in product(*axes.values())]
-    amount = effect.amount
-    little = np.full((len(shapes), 1), model.values[qualified(effect, amount)] + _STEP * amount.typical)
-    grids = {name: np.array([[shape[name]] for shape in shapes]) for name in axes}
-    values = {**model.values, **grids, qualified(effect, amount): little}
+    amount = qualified(effect, effect.amount)
+    none = model.values[amount]
+    little = np.append(np.full(len(shapes), none + _STEP * effect.amount.typical), none)[:, None]
+    grids = {name: np.array([[shape[name]] for shape in (*shapes, shapes[-1])]) for name in axes}
+    values = {**model.values, **grids, amount: little}
     answers = [
         data_set.residual(model, values) if effect.acts_at(data_set.direction) else data_set.residual(bare)
         for data_set in data_sets
     ]
-    answers = [np.broadcast_to(answer, (len(shapes), answer.shape[-1])) for answer in answers]
+    answers = [np.broadcast_to(answer, (len(little), answer.shape[-1])) for answer in answers]
     rows = np.concatenate(answers, axis=-1)
-    finite = np.isfinite(rows).all(axis=1)
-    return [shapes[i] for i in np.flatnonzero(finite)], (rows[finite] - residual) / _STEP
+    finite = np.isfinite(rows[:-1]).all(axis=1)
+    if not np.isfinite(rows[-1]).all() and finite.any():
+        raise RuntimeError("NOT FINITE" + effect.name)
+    return [shapes[i] for i in np.flatnonzero(finite)], (rows[:-1][finite] - rows[-1]) / _STEP
 
 
 def probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> Array:

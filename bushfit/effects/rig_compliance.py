@@ -9,6 +9,9 @@ from bushfit.errors import ModelError
 
 #: The secants end when the logarithm of the amplitude is off by less than this, before a last step along the secant.
 _NEAR = 1e-8
+#: Share of what is missing of the motion at first that may be missing in the end, where derivatives are taken: chosen,
+#: less than a fit notices; and what is missing for rounding, relative to the motion.
+_RESOLVED, _ROUNDING = 1e-4, 1e-13
 #: Most rounds of an iteration: chosen, many more than a rig takes that is stiffer than the bushing.
 ROUNDS = 60
 #: Share of the least that was missing so far, below which a round brought the motion nearer.
@@ -93,7 +96,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     yielding = 1.0 / (1.0 + compliance * rigid)
     size = np.max(np.abs(imposed), axis=-1, keepdims=True)
     farthest = _LARGEST_MOTION * size
-    best = last = np.inf * size
+    best = last = first = np.inf * size
     pace, idle, past = np.ones_like(size), 0, None
     for number in range(ROUNDS):
         motion = np.clip(imposed - compliance * reached, -farthest, farthest)
@@ -103,7 +106,10 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         change = np.fft.irfft(yielding * np.fft.rfft(missing, n=length), n=length)[..., :count]
         past = past or _Past(change.shape)
         step = past.step(reached, change)
-        if np.all(off <= history.accuracy * size):
+        first = np.where(number, first, off)
+        # of many models on one motion it is the differences that are asked for, however small
+        resolved = off.ndim == size.ndim or np.all(off <= np.maximum(_RESOLVED * first, _ROUNDING * size))
+        if resolved and np.all(off <= history.accuracy * size):
             reached = reached + step
             many = imposed.ndim > 1  # else of many models on one motion the last is kept
             kept = [each if many else each.reshape(-1, each.shape[-1])[-1] for each in (rigid, reached)]

@@ -14,7 +14,7 @@ from bushfit.errors import ModelError
 from bushfit.export.contract import Order
 from bushfit.export.losses import of_band
 from bushfit.geometry import Place
-from bushfit.model.arms import Arms, fading, model_arms, qualified_size
+from bushfit.model.arms import Arms, model_arms, qualified_size
 from bushfit.model.model import Model
 from bushfit.prediction import Prediction
 from bushfit.units import number
@@ -150,7 +150,7 @@ def _values(
 ) -> tuple[tuple[Value, ...], list[dict[str, str]]]:
     """All values, and for each place the name of its own by that of the parameter: where modifiers make it differ from
     place to place it is called `<parameter>.<place>`."""
-    sizes, parts = {part.size for part in arms}, {qualified_size(branch) for branch in fading(model)}
+    sizes, parts = {part.size for part in arms}, {qualified_size(branch) for branch in model.fading}
     constants, settable = list[Value](), list[Value]()
     names = [dict[str, str]() for _ in places]
     for effect in model.records:

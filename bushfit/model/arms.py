@@ -49,6 +49,10 @@ _OVERHANGS = (0.0, 1.0, 2.0)
 #: Least modulus of an arm at the start, relative to what the arms are to be together.
 _SMALLEST = 1e-3
 
+#: Logarithm of an arm's modulus over the target's, far beyond any, at which a step that goes too far is held: `exp`
+#: would overflow.
+_FAR = 100.0
+
 
 @dataclass(frozen=True, eq=False)
 class Arms:
@@ -128,7 +132,7 @@ def model_arms(model: Model, band: tuple[float, float], accuracy: float = ACCURA
     Effects that share a size, as the springpot and the spring in series with it, are one part. A size of 0 is none.
     """
     parts: dict[str, list[str]] = {}
-    for branch in fading(model):
+    for branch in model.fading:
         parts.setdefault(qualified_size(branch), []).append(branch.name)
     return tuple(
         fitted_arms(partial(part_modulus, model, size), band, accuracy, stands_for=" and ".join(names), size=size)
@@ -144,11 +148,6 @@ def listed(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float]]
     return at_rest + [(name, float(modulus), float(time)) for name, modulus, time in every]
 
 
-def fading(model: Model) -> tuple[Branch, ...]:
-    """The branches of a model that arms can stand for."""
-    return tuple(effect for effect in model.records if isinstance(effect, Branch) and effect.size)
-
-
 def qualified_size(branch: Branch) -> str:
     """The parameter that a branch's modulus goes with, as files and reports name it."""
     own = {parameter.name: qualified(branch, parameter) for parameter in branch.parameters}
@@ -159,7 +158,7 @@ def qualified_size(branch: Branch) -> str:
 def part_modulus(model: Model, size: str, omega: Array) -> Array:
     """mu^ [Pa] of the branches of one size at angular frequencies [rad/s], (n,)."""
     still = np.zeros_like(omega)
-    own = (branch for branch in fading(model) if qualified_size(branch) == size)
+    own = (branch for branch in model.fading if qualified_size(branch) == size)
     return np.asarray(sum(branch.modulus(seen_by(branch, model.values, model.values), omega, still) for branch in own))
 
 
@@ -198,7 +197,7 @@ def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 
     def parts(x: Array) -> tuple[Array, Array]:
         """Each arm over the target, (n, k), and its slope by the logarithm of its time."""
         basis = _basis(omega, np.exp(x[count:]))
-        arm = basis * unit * np.exp(x[:count]) / target[:, None]
+        arm = basis * unit * np.exp(np.minimum(x[:count], _FAR)) / target[:, None]
         return arm, arm * (1.0 - basis)
 
     def residual(x: Array) -> Array:

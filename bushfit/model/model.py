@@ -131,6 +131,11 @@ class Model:
         return self._structure.parameters
 
     @property
+    def fading(self) -> tuple[Branch, ...]:
+        """The linear branches that fade with memory."""
+        return self._structure.fading
+
+    @property
     def only_branches(self) -> bool:
         """Whether the response is the plain sum of the branches, without modifiers and layers."""
         return len(self._structure.branches) == len(self.records)
@@ -343,7 +348,7 @@ class Model:
             step, found = known.get(omega.size, (None, np.zeros(1)))
             if step is not strain.step or base is not values:
                 moduli = (branch.modulus(seen_by(branch, values, base), omega, strain.amplitude) for branch in fading)
-                found = 2.0 * sum(moduli)
+                found = np.asarray(2.0 * sum(moduli))
                 known[omega.size] = strain.step, found
             return found
 

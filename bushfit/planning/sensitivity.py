@@ -21,7 +21,7 @@ from bushfit.effects.contract import UNKNOWN, Array, Circumstances
 from bushfit.fitting.data_sets import DataSet, new_loop, new_sweep, parted
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.noise import SweepNoise
-from bushfit.fitting.solve import Coordinates, jacobian, residual
+from bushfit.fitting.solve import Coordinates, jacobian
 from bushfit.fitting.whitening import Whitening
 from bushfit.geometry import Place
 from bushfit.planning.contract import Knowledge, Noise, Test
@@ -184,8 +184,7 @@ class Grid:
         """
         model, places = self.known.model, {str(test.direction) for test in self.tests}
         missing = [effect for effect in missing_effects(model, places) if not (effect.replaces or effect.under)]
-        blank = residual(model, self.data_sets)
-        of_effects = [(effect, sensitivity(model, self.data_sets, blank, effect)[1]) for effect in missing]
+        of_effects = [(effect, sensitivity(model, self.data_sets, effect)[1]) for effect in missing]
         return [Column(effect, row) for effect, rows in of_effects for row in rows]
 
 

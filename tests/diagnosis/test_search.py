@@ -126,6 +126,6 @@ def test_a_wrong_name_is_exchanged_for_the_right_one(measured: Measured, fitted:
 def test_what_belongs_to_another_direction_has_no_sensitivity_there(measured: Measured, fitted: Fitted) -> None:
     plain = fitted(measured(INERTIA, SHARED))
     effect = effect_named("stiffness_factor.radial")
-    _, (column,) = sensitivity(plain.model, plain.data_sets, plain.residual, effect)
+    _, (column,) = sensitivity(plain.model, plain.data_sets, effect)
     there = {(str(data_set.direction), bool(np.any(column[place]))) for data_set, place in plain.place.items()}
     assert there == {("axial", False), ("radial", True)}
