@@ -11,7 +11,7 @@ from bushfit.errors import ModelError
 _NEAR = 1e-8
 #: Share of what is missing of the motion at first that may be missing in the end, where derivatives are taken: chosen,
 #: less than a fit notices; and what is missing for rounding, relative to the motion.
-_RESOLVED, _ROUNDING = 1e-4, 1e-13
+_RESOLVED, _ROUNDING = 1e-3, 1e-13
 #: Most rounds of an iteration: chosen, many more than a rig takes that is stiffer than the bushing.
 ROUNDS = 60
 #: Share of the least that was missing so far, below which a round brought the motion nearer.
