@@ -110,13 +110,15 @@ def missing_effects(model: Model, places: Collection[str], excluded: Collection[
 
 
 def _replacing(evidence: Evidence, effect: Effect, held: Sequence[str]) -> Proposal:
-    """An effect in place of a branch, as its first step from where that branch stood would leave it."""
-    model = evidence.model.with_effect(effect.name)
+    """An effect in place of a branch, as its first step from the best of where that branch suggests would leave it."""
+    models = [evidence.model.with_effect(effect.name, start) for start in evidence.model.starts(effect)]
+    fits = [fit_from(model, evidence.data_sets, held, {}) for model in models]
+    promised = [fit.chi_square - fit.expected_fall for fit in fits]
+    best = int(np.argmin(promised))
     own = [qualified(effect, parameter) for parameter in effect.parameters]
-    fit = fit_from(model, evidence.data_sets, held, {})
-    score = evidence.chi_square - fit.chi_square + fit.expected_fall
-    columns = fit.jacobian[[fit.coordinates.names.index(name) for name in own]]
-    return Proposal(effect.name, model, max(score, 0.0), columns, 0, visible=True, together=True)
+    columns = fits[best].jacobian[[fits[best].coordinates.names.index(name) for name in own]]
+    score = max(evidence.chi_square - promised[best], 0.0)
+    return Proposal(effect.name, models[best], score, columns, 0, visible=True, together=True)
 
 
 def sensitivity(model: Model, data_sets: Sequence[DataSet], effect: Effect) -> tuple[list[dict[str, float]], Array]:

@@ -183,7 +183,8 @@ class Effect:
         frees: mistakes of the record that are single values of it; where one explains the tests as well, it stands.
         under: what of a test's circumstances it depends on, by the names of `Circumstances`.
         taken: what a prediction takes of these where they are not known, for its user; none of the rig's effects.
-        in_place_of: of one that replaces a branch, where a fit begins: its values by those of that branch.
+        in_place_of: of one that replaces a branch, where a fit may begin, the likeliest first: its values by those of
+            that branch.
         harmonic_only: whether it has no law in time: of a loop it answers the first harmonic alone, by
             `harmonic_response`, and the rig refuses it.
         after: the effect without which it is no other: it is looked for beside that one only.
@@ -210,7 +211,7 @@ class Effect:
     under: tuple[Literal["temperature", "turn", "strained", "left", "rested"], ...] = ()
     taken: str = ""
     harmonic_only: bool = False
-    in_place_of: Callable[[Values], dict[str, float]] | None = None
+    in_place_of: Callable[[Values], list[dict[str, float]]] | None = None
     after: str | None = None
     never_with: tuple[str, ...] = ()
     becomes: tuple[str, Callable[[Values], dict[str, float] | None]] | None = None

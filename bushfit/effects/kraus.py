@@ -16,10 +16,10 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     return p["delta"] * (1.0 + 2.0j * p["r"] * ratio) / (1.0 + ratio**2)
 
 
-def in_place_of(p: Values) -> dict[str, float]:
-    """Where a fit begins that had friction before: the same stiffness at rest, the same strain at half of it."""
+def in_place_of(p: Values) -> list[dict[str, float]]:
+    """Where a fit may begin that had friction before: the same stiffness at rest, the same strain at half of it."""
     at_rest = p["sigma_fmax"] / (2.0 * p["eps_half"])
-    return {"delta": at_rest, "r": 0.2, "e_c": p["eps_half"], "n": 0.6}
+    return [{"delta": at_rest, "r": 0.2, "e_c": p["eps_half"], "n": 0.6}]
 
 
 stress = partial(harmonic_stress, modulus)

@@ -77,6 +77,10 @@ def stress(p: Values, history: History) -> Array:
     return p["sigma"] * np.clip(start + turning.travel[..., None] / slip, -1.0, 1.0).mean(axis=-1)
 
 
-def in_place_of(p: Values) -> dict[str, float]:
-    """Where a fit begins that had friction before: the same stress, and half of it at the same strain."""
-    return {"sigma": p["sigma_fmax"], "e_s": 2.0 * p["eps_half"], "spread": 1.5}
+def in_place_of(p: Values) -> list[dict[str, float]]:
+    """Where a fit may begin that had friction before: the same stress, and half of it at the same strain; or the same
+    strain in the middle of fewer slip strains, as a wide range that ends beyond the tests has a minimum of its own."""
+    return [
+        {"sigma": p["sigma_fmax"], "e_s": 2.0 * p["eps_half"], "spread": 1.5},
+        {"sigma": p["sigma_fmax"], "e_s": p["eps_half"], "spread": 0.75},
+    ]

@@ -184,13 +184,20 @@ class Model:
 
         Parameters of it without a value start from those of that branch, or else as in `started`.
         """
-        effect, starts = effect_named(name), dict[str, float]()
-        if effect.replaces in self.effects and effect.in_place_of:
-            suggested = effect.in_place_of(self.values)
-            own = [(qualified(effect, each), suggested[each.name], each.bounds) for each in effect.parameters]
-            starts = {key: float(np.clip(value, *bounds)) for key, value, bounds in own}
+        effect = effect_named(name)
         kept = [other for other in self.effects if other != effect.replaces]
-        return Model.started(self.bushing, (*kept, name), {**self.values, **starts, **(values or {})}, self.unnamed)
+        known = {**self.values, **self.starts(effect)[0], **(values or {})}
+        return Model.started(self.bushing, (*kept, name), known, self.unnamed)
+
+    def starts(self, effect: Effect) -> list[dict[str, float]]:
+        """Where a fit of an effect may begin in place of the branch that it replaces; of any other, with no values."""
+        if effect.replaces not in self.effects or not effect.in_place_of:
+            return [{}]
+        own = [(qualified(effect, each), each) for each in effect.parameters]
+        return [
+            {key: float(np.clip(suggested[each.name], *each.bounds)) for key, each in own}
+            for suggested in effect.in_place_of(self.values)
+        ]
 
     def with_twin(self, name: str) -> "Model":
         """The model with that effect in place of its twins, of the same values; as it is where it has none of them."""
