@@ -34,8 +34,9 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
         return inside
     sine = dead_zone((inside[..., near, None] * motion[..., near, :] * wave).real, level)
     beyond = dead_zone(below.cycle(omega[..., near], motion[..., near, :] * wave.real, near), level)
-    rest = np.zeros(np.broadcast_shapes(first.shape, np.shape(p["level"])), dtype=complex)
-    rest[..., near] = (beyond - sine) @ FIRST
+    bent = (beyond - sine) @ FIRST
+    rest = np.zeros((*bent.shape[:-1], first.shape[-1]), dtype=complex)
+    rest[..., near] = bent
     return inside - p["share"] * (inside * first_harmonic(first, p["level"]) + rest / np.maximum(amplitude, _TINY))
 
 
