@@ -35,6 +35,9 @@ _EACH = np.eye(_REMEMBERED)
 _NAME = "compliance"
 #: The name of the solutions of what gives way beneath it, as a sleeve in a rig.
 _BENEATH = "beneath"
+#: Least height of the pulse that measures a stiffness [m]: of a motion that is all within a play nothing is asked, but
+#: it stands beside others.
+_LEAST_PULSE = 1e-9
 #: Sample at which the pulse stands that measures a stiffness: a few after the start, for the force before it.
 _PULSE_AT = 4
 
@@ -96,7 +99,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     yielding = 1.0 / (1.0 + compliance * rigid)
     size = np.max(np.abs(imposed), axis=-1, keepdims=True)
     farthest = _LARGEST_MOTION * size
-    best = last = first = np.inf * size
+    best = last = first = np.full_like(size, np.inf)
     pace, idle, past = np.ones_like(size), 0, None
     for number in range(ROUNDS):
         motion = np.clip(imposed - compliance * reached, -farthest, farthest)
@@ -162,11 +165,11 @@ class _Past:
 def _pulse_stiffness(below: ForceBelow, history: History, length: int) -> Array:
     """Complex stiffness [N/m] at each harmonic of `length` samples: force over displacement of a single pulse.
 
-    The pulse is as high as the amplitude of the motion. Its force counts from the one before it, to which friction does
-    not let it return; the real part is never negative.
+    The pulse is as high as the amplitude of the motion, if that moves. Its force counts from the one before it, to
+    which friction does not let it return; the real part is never negative.
     """
     pulse = np.zeros(history.value.shape)
-    pulse[..., _PULSE_AT : _PULSE_AT + 1] = history.amplitude
+    pulse[..., _PULSE_AT : _PULSE_AT + 1] = np.maximum(history.amplitude, _LEAST_PULSE)
     answer = below(history.with_value(pulse).driven())
     measured = np.fft.rfft(answer - answer[..., :1], n=length) / np.fft.rfft(pulse, n=length)
     return np.maximum(measured.real, 0.0) + 1j * measured.imag

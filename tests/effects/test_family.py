@@ -5,11 +5,11 @@ from __future__ import annotations
 import itertools
 import json
 import pickle
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from random_models import ADDED, UNDER, operating_point, random_model, sized
 
 from bushfit.effects import (
     BASE,
@@ -24,84 +24,26 @@ from bushfit.effects import (
     qualified,
     twins_of,
 )
-from bushfit.effects.contract import Circumstances
 from bushfit.errors import ModelError
-from bushfit.geometry import Bushing, Direction
+from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.rig import lock_in, record
 from bushfit.model.sensitivity import force_and_slopes, stiffness_and_slopes
 
-ADDED = tuple(name for name in LIBRARY if name not in BASE)
 #: Of these there is no law in time.
 TIMELESS = tuple(name for name in ADDED if LIBRARY[name].harmonic_only)
 #: Work can come out of these: a late force channel is no passive system.
 ACTIVE = {"delay"}
 #: The reversal of dry friction falls on a sample only to the accuracy of the sampling.
 SAMPLES = 2**14
-#: A warm test, late in the session and after a large strain.
-UNDER = Circumstances(temperature=303.0, turn=0.7, strained=0.08, left=0.08, rested=0.03)
-
-
-def random_model(rng: np.random.Generator) -> Model:
-    """The paper's model of a random bushing of random rubber."""
-    inner = rng.uniform(6e-3, 22e-3)
-    bushing = Bushing("random", inner, inner * rng.uniform(1.3, 2.2), rng.uniform(20e-3, 70e-3))
-    values = {
-        "mu": rng.uniform(0.6e6, 2e6),
-        "m": rng.uniform(0.8e5, 3.5e5),
-        "alpha": rng.uniform(0.15, 0.3),
-        "sigma_fmax": rng.uniform(5e3, 3e4),
-        "eps_half": rng.uniform(7e-3, 2e-2),
-    }
-    return Model(bushing, BASE, values)
-
-
-def sized(model: Model, name: str, direction: Direction, amplitude: float, rng: np.random.Generator) -> Model:
-    """The model with the effect in a random size that matters at this amplitude."""
-    stiffness = abs(complex(np.ravel(model.stiffness(direction, 50.0, amplitude))[0]))
-    by_hand = {
-        "interface_slip.force": 0.05 * stiffness * amplitude,
-        "bump_stop.gap": 0.6 * amplitude,
-        "bump_stop.stiffness": 0.3 * stiffness,
-        "guide_friction.force": 0.05 * stiffness * amplitude,
-        "one_sided_stop.gap": 0.6 * amplitude,
-        "one_sided_stop.stiffness": 0.3 * stiffness,
-        "force_saturation.level": 0.6 * stiffness * amplitude,
-        "clearance.delta": 0.1 * amplitude,
-        "fixture_play.delta": 0.1 * amplitude,
-        "rig_compliance.compliance": 0.1 / stiffness,
-        "sleeve_compliance.compliance": 0.1 / stiffness,
-        "rig_compliance.radial": 0.1 / stiffness,
-        "sleeve_compliance.radial": 0.1 / stiffness,
-        "inertia.mass": 0.05 * stiffness / (2.0 * np.pi * 155.0) ** 2,
-        "fixture_resonance.mass": 0.05 * stiffness / (2.0 * np.pi * 155.0) ** 2,
-        "self_heating.beta": 0.1 / (100.0 * stiffness * amplitude**2),
-        "force_offset.offset": 0.02 * stiffness * amplitude,
-    }
-    values = {}
-    for parameter in LIBRARY[name].parameters:
-        key = qualified(LIBRARY[name], parameter)
-        share = rng.uniform(0.5, 1.5)
-        values[key] = by_hand[key] * share if key in by_hand else parameter.sized(share)
-    return model.with_effect(name, values)
 
 
 def beside(plain: Model, name: str) -> Model:
     """The model that an effect is added to: without the branch that it replaces."""
     kept = [other for other in plain.effects if other != LIBRARY[name].replaces]
     return Model.started(plain.bushing, kept, plain.values)
-
-
-def operating_point(model: Model, rng: np.random.Generator) -> tuple[Direction, float, float]:
-    """A direction, a frequency [Hz], and an amplitude [m] of 0.3 to 6 % strain."""
-    direction = list(Direction)[rng.integers(2)]
-    return (
-        direction,
-        float(rng.uniform(5.0, 155.0)),
-        10 ** rng.uniform(-2.5, -1.2) / model.bushing.unit_strain(direction),
-    )
 
 
 def steady_sine(amplitude: float, frequency: float, samples: int = SAMPLES) -> History:
@@ -117,16 +59,6 @@ def harmonic_gap(model: Model, direction: Direction, frequency: float, amplitude
 
 def harmonic_error(model: Model) -> float:
     return sum(effect.harmonic_error for effect in model.records)
-
-
-@pytest.fixture
-def rng() -> np.random.Generator:
-    return np.random.default_rng(20240607)
-
-
-@pytest.fixture(params=ADDED)
-def effect(request: pytest.FixtureRequest) -> Effect:
-    return LIBRARY[request.param]
 
 
 def test_its_law_stands_in_the_file_of_an_effect(effect: Effect) -> None:
@@ -326,46 +258,6 @@ def test_a_late_displacement_is_an_early_force(rng: np.random.Generator) -> None
     np.testing.assert_allclose(early[-5:], prompt[-500:-495], rtol=1e-9)
     loss = [m.stiffness(Direction.AXIAL, 100.0, 2e-4) for m in (model, plain)]
     assert np.angle(loss[0]) - np.angle(loss[1]) == pytest.approx(2.0 * np.pi * 100.0 * 1e-4)
-
-
-def stacked(models: list[Model]) -> Mapping[str, np.ndarray]:
-    return {name: np.array([[model.values[name]] for model in models]) for name in models[0].parameters}
-
-
-@pytest.mark.parametrize("beside", [(), ("loop_clock",)], ids=["alone", "in another time each"])
-def test_a_stack_of_values_equals_one_after_the_other(
-    effect: Effect, beside: tuple[str, ...], rng: np.random.Generator
-) -> None:
-    plain = random_model(rng)
-    direction, _, amplitude = operating_point(plain, rng)
-    model = sized(plain, effect.name, direction, amplitude, rng)
-    for other in {*beside} - {effect.name}:
-        model = sized(model, other, direction, amplitude, rng)
-    models = [
-        model.with_values({name: value * rng.uniform(0.9, 1.1) for name, value in model.values.items()})
-        for _ in range(3)
-    ]
-    frequency, amplitudes = np.array([0.1, 40.0, 155.0, 155.0]), amplitude * np.array([1.0, 0.5, 1.5, 0.0])
-    turns = np.linspace(0.0, 1.0, 4)
-    each_point = Circumstances(295.0 + turns, turns, 0.1 * turns, 0.1 * turns, 0.1 - 0.1 * turns)
-    both = model.stiffness(direction, frequency, amplitudes, kind="loop", values=stacked(models), under=each_point)
-    assert both.shape == (3, 4)
-    for row, each in zip(both, models, strict=True):
-        for i, one in enumerate(row):
-            under = each_point.at(i)
-            alone = each.stiffness(direction, frequency[i], amplitudes[i], kind="loop", under=under)
-            np.testing.assert_allclose(one, alone, rtol=1e-12)
-    phase = np.arange(600) / 200
-    motion = amplitude * np.sin(2.0 * np.pi * phase)
-    for history in (
-        History.steady(motion, 5.0, cycles=3),
-        History(motion, 1e-3, periodic=False, frequency=5.0),
-    ):
-        answer = model.force(direction, history, kind="loop", values=stacked(models), under=UNDER)
-        both = np.broadcast_to(answer, (3, 600))
-        for row, each in zip(both, models, strict=True):
-            expected = each.force(direction, history, kind="loop", under=UNDER)
-            np.testing.assert_allclose(row, expected, rtol=1e-10, atol=1e-10 * np.ptp(expected))
 
 
 def test_any_two_compose(effect: Effect, rng: np.random.Generator) -> None:
