@@ -115,3 +115,25 @@ def test_what_belongs_to_another_place_has_no_slope_there(paper_model: Model, di
     moved = dict(zip(names, np.any(found != 0.0, axis=1), strict=True))
     assert moved["mu"]
     assert moved["stiffness_factor.radial"] == (direction == Direction.RADIAL)
+
+
+@pytest.mark.parametrize("moved", [0.0, 1e-9, 0.02], ids=["where it was", "next to it", "a step away"])
+def test_slopes_under_a_compliant_rig_hold_however_near_the_last_model_was(paper_model: Model, moved: float) -> None:
+    """The motion is solved no further than a fit needs: derivatives are right to a thousandth all the same."""
+    last = paper_model.with_effect("sleeve_compliance", {"sleeve_compliance.compliance": 8e-8})
+    last = last.with_values({"sigma_fmax": 5e4, "eps_half": 2e-3}).with_effect("maxwell", {"maxwell.mu1": 0.0})
+    model = last.with_values({name: value * (1.0 + moved) for name, value in last.values.items() if name in FIVE})
+    motion = 3e-4 * np.sin(2.0 * np.pi * np.arange(1024) / 1024)
+    loop = History(motion, 1.0 / 1024, periodic=True, frequency=1.0, accuracy=1e-8)
+    names = list(model.parameters)
+    force_and_slopes(last, Direction.AXIAL, loop, names)
+    force, slopes = force_and_slopes(model, Direction.AXIAL, loop, names)
+    exact = History(motion, 1.0 / 1024, periodic=True, frequency=1.0, accuracy=1e-14)
+    np.testing.assert_allclose(
+        force, model.force(Direction.AXIAL, exact, kind="loop"), rtol=0.0, atol=1e-7 * force.max()
+    )
+    for name, slope in zip(names, slopes, strict=True):
+        expected = differences(model, [name], lambda values: model.force("axial", exact, kind="loop", values=values))[1]
+        off = np.abs(slope - expected[0]).max() / np.abs(expected).max() if np.any(expected) else np.abs(slope).max()
+        print(f"{name}: off by {off:.1e}")
+        assert off < 1e-3
