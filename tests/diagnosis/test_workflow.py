@@ -36,6 +36,7 @@ from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE
 from bushfit.errors import BushfitError
 from bushfit.fitting.data import Data
+from bushfit.fitting.levels import LevelErrors
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
@@ -164,6 +165,22 @@ def test_effects_of_a_model_that_is_far_off_are_not_exchanged(
     diagnosis = asked(measured(TWO, SHARED), max_effects=1)
     assert bool(asked_for) == (remainder is None)
     assert diagnosis.verdict in ("unexplained", "described", "partly")
+
+
+@pytest.mark.parametrize(("rounds", "searches"), [(15, 2), (1, 1)], ids=["short searches", "long ones"])
+def test_after_long_searches_errors_of_levels_are_not_estimated_anew(
+    measured: Measured, monkeypatch: pytest.MonkeyPatch, rounds: int, searches: int
+) -> None:
+    asked_for = list[object]()
+
+    def always(searched: object, _: Data) -> LevelErrors:
+        asked_for.append(searched)
+        return LevelErrors((2e-3, 2e-3), 10, 50.0, matters=True)
+
+    monkeypatch.setattr("bushfit.diagnosis.workflow._errors_beside", always)
+    monkeypatch.setattr("bushfit.diagnosis.workflow._MANY_ROUNDS", rounds)
+    asked(measured(INERTIA, SHARED))
+    assert len(asked_for) == searches
 
 
 def test_held_parameters_stay(measured: Measured) -> None:
