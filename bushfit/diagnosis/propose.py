@@ -145,10 +145,9 @@ def sensitivity(model: Model, data_sets: Sequence[DataSet], effect: Effect) -> t
     ]
     answers = [np.broadcast_to(answer, (len(little), answer.shape[-1])) for answer in answers]
     rows = np.concatenate(answers, axis=-1)
-    finite = np.isfinite(rows[:-1]).all(axis=1)
-    if not np.isfinite(rows[-1]).all() and finite.any():
-        raise RuntimeError("NOT FINITE" + effect.name)
-    return [shapes[i] for i in np.flatnonzero(finite)], (rows[:-1][finite] - rows[-1]) / _STEP
+    *finite, known = np.isfinite(rows).all(axis=1)
+    without = rows[-1] if known else np.concatenate([data_set.residual(bare) for data_set in data_sets])
+    return [shapes[i] for i in np.flatnonzero(finite)], (rows[:-1][finite] - without) / _STEP
 
 
 def probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> Array:

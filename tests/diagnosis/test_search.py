@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import cast
+
 import numpy as np
 import pytest
 from asking import INERTIA, TWO, asked, names
@@ -11,6 +14,9 @@ from bushfit.diagnosis.propose import sensitivity
 from bushfit.diagnosis.record import Settings
 from bushfit.diagnosis.search import Search
 from bushfit.effects import BASE, LIBRARY, effect_named
+from bushfit.effects.contract import Array, Values
+from bushfit.fitting.data_sets import DataSet
+from bushfit.model.model import Model
 
 
 def test_what_was_left_on_its_way_has_no_gain(diagnosed: Diagnosed) -> None:
@@ -129,3 +135,24 @@ def test_what_belongs_to_another_direction_has_no_sensitivity_there(measured: Me
     _, (column,) = sensitivity(plain.model, plain.data_sets, effect)
     there = {(str(data_set.direction), bool(np.any(column[place]))) for data_set, place in plain.place.items()}
     assert there == {("axial", False), ("radial", True)}
+
+
+class Gapped:
+    """A test that answers the stiffness of a stop, and nothing finite where its gap is wide."""
+
+    direction, frequency, amplitude = "axial", np.array([5.0, 50.0]), np.array([1e-4, 1e-3])
+
+    def residual(self, model: Model, values: Values | None = None) -> Array:
+        if "bump_stop" not in model.effects:
+            return np.array([3.0])
+        values = values or model.values
+        return np.where(values["bump_stop.gap"] > 5e-4, np.nan, 3.0 + 2.0 * values["bump_stop.stiffness"])
+
+
+def test_shapes_without_a_response_are_left_out(paper_model: Model) -> None:
+    """The widest gap, at which no stop is asked for its stiffness either, is one of them."""
+    stop = effect_named("bump_stop")
+    shapes, columns = sensitivity(paper_model, cast(Sequence[DataSet], [Gapped()]), stop)
+    assert 0 < len(shapes) == len(columns)
+    assert all(shape["bump_stop.gap"] <= 5e-4 for shape in shapes)
+    np.testing.assert_allclose(columns, 2.0 * stop.amount.typical, rtol=1e-6)
