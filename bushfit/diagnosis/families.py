@@ -125,14 +125,16 @@ def fitted_with(evidence: Evidence, effect: Effect, held: Sequence[str], bounds:
 
 
 def _starts(evidence: Evidence, effect: Effect) -> Iterator[Model]:
-    """Models to start from: as the fitted one suggests, and with each shape parameter elsewhere.
+    """Models to start from: each that the fitted one suggests, and the first with each shape parameter elsewhere.
 
     What has a neutral amount starts at a tenth of its typical one: at its neutral value a fit may not see its shape.
     """
     amount = effect.amount
     little = {} if effect.replaces else {qualified(effect, amount): amount.sized(0.1)}
-    model = evidence.model.with_effect(effect.name, little)
-    yield model
+    model, *others = [
+        evidence.model.with_effect(effect.name, little | start) for start in evidence.model.starts(effect)
+    ]
+    yield from (model, *others)
     for parameter in effect.parameters:
         if parameter.neutral is None:
             name = qualified(effect, parameter)

@@ -5,7 +5,7 @@ Notes:
     effect's sensitivity, less what the model's own parameters can absorb of it.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
@@ -18,6 +18,7 @@ from bushfit.effects import Branch, Effect, Parameter, at_places, qualified, twi
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data_sets import DataSet, parted
+from bushfit.fitting.descent import Descent
 from bushfit.model.model import Model
 
 #: Values tried of a shape parameter (a time, a gap, a frequency), spread evenly in its logarithm.
@@ -81,8 +82,7 @@ def proposals(evidence: Evidence, excluded: Collection[str], held: Sequence[str]
         found.append(Proposal(effect.name, model, float(scores[best]), columns, sense, visible))
     for effect in missing:
         if effect.replaces in evidence.model.effects:
-            with suppress(FitError, ModelError):  # no response with this effect: no candidate
-                found.append(_replacing(evidence, effect, held))
+            found += filter(None, [_replacing(evidence, effect, held)])
     return sorted(found, key=lambda proposal: -proposal.score)
 
 
@@ -109,16 +109,25 @@ def missing_effects(model: Model, places: Collection[str], excluded: Collection[
     ]
 
 
-def _replacing(evidence: Evidence, effect: Effect, held: Sequence[str]) -> Proposal:
-    """An effect in place of a branch, as its first step from the best of where that branch suggests would leave it."""
-    models = [evidence.model.with_effect(effect.name, start) for start in evidence.model.starts(effect)]
-    fits = [fit_from(model, evidence.data_sets, held, {}) for model in models]
-    promised = [fit.chi_square - fit.expected_fall for fit in fits]
-    best = int(np.argmin(promised))
+def _replacing(evidence: Evidence, effect: Effect, held: Sequence[str]) -> Proposal | None:
+    """An effect in place of a branch, as its first step from the best start that the branch suggests would leave it;
+    None where it has no response there."""
+    fits = []
+    for start in evidence.model.starts(effect):
+        with suppress(FitError, ModelError):  # no response from there
+            fits.append(fit_from(evidence.model.with_effect(effect.name, start), evidence.data_sets, held, {}))
+    if not fits:
+        return None
+    best = min(fits, key=_promised)
     own = [qualified(effect, parameter) for parameter in effect.parameters]
-    columns = fits[best].jacobian[[fits[best].coordinates.names.index(name) for name in own]]
-    score = max(evidence.chi_square - promised[best], 0.0)
-    return Proposal(effect.name, models[best], score, columns, 0, visible=True, together=True)
+    columns = best.jacobian[[best.coordinates.names.index(name) for name in own]]
+    score = max(evidence.chi_square - _promised(best), 0.0)
+    return Proposal(effect.name, best.model, score, columns, 0, visible=True, together=True)
+
+
+def _promised(fit: Descent) -> float:
+    """The chi-square of a fit after its next step, were the model linear."""
+    return fit.chi_square - fit.expected_fall
 
 
 def sensitivity(model: Model, data_sets: Sequence[DataSet], effect: Effect) -> tuple[list[dict[str, float]], Array]:
@@ -136,18 +145,23 @@ def sensitivity(model: Model, data_sets: Sequence[DataSet], effect: Effect) -> t
     shapes = [dict(zip(axes, point, strict=True)) for point in product(*axes.values())]
     amount = qualified(effect, effect.amount)
     none = model.values[amount]
-    little = np.append(np.full(len(shapes), none + _STEP * effect.amount.typical), none)[:, None]
-    grids = {name: np.array([[shape[name]] for shape in (*shapes, shapes[-1])]) for name in axes}
-    values = {**model.values, **grids, amount: little}
-    answers = [
-        data_set.residual(model, values) if effect.acts_at(data_set.direction) else data_set.residual(bare)
-        for data_set in data_sets
-    ]
-    answers = [np.broadcast_to(answer, (len(little), answer.shape[-1])) for answer in answers]
-    rows = np.concatenate(answers, axis=-1)
-    *finite, known = np.isfinite(rows).all(axis=1)
-    without = rows[-1] if known else np.concatenate([data_set.residual(bare) for data_set in data_sets])
-    return [shapes[i] for i in np.flatnonzero(finite)], (rows[:-1][finite] - without) / _STEP
+
+    def answers(shapes: Sequence[Mapping[str, float]]) -> Array:
+        """Residuals with a little of the effect in each shape, and in the last line with none, whatever its shape."""
+        little = np.append(np.full(len(shapes), none + _STEP * effect.amount.typical), none)[:, None]
+        grids = {name: np.array([[shape[name]] for shape in (*shapes, shapes[-1])]) for name in axes}
+        values = {**model.values, **grids, amount: little}
+        rows = [
+            data_set.residual(model, values) if effect.acts_at(data_set.direction) else data_set.residual(bare)
+            for data_set in data_sets
+        ]
+        return np.concatenate([np.broadcast_to(row, (len(little), row.shape[-1])) for row in rows], axis=-1)
+
+    rows = answers(shapes)
+    told = np.asarray(np.isfinite(rows).all(axis=1))
+    shapes = [shape for shape, finite in zip(shapes, told[:-1], strict=True) if finite]
+    rows = answers(shapes) if shapes and not told[-1] else rows[[*told[:-1], True]]
+    return shapes, (rows[:-1] - rows[-1]) / _STEP
 
 
 def probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> Array:

@@ -30,10 +30,8 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     wave = np.cos(2.0 * np.pi * np.arange(SAMPLES) / SAMPLES)
     bent = dead_zone(amplitude[..., None] * wave, np.asarray(delta)[..., None])
     crossed = reach > 0.0
-    motions, each_twice = (
-        np.concatenate((reach[..., None] * wave, bent), axis=-2),
-        np.tile(np.arange(omega.shape[-1]), 2),
-    )
+    each_twice = np.tile(np.arange(omega.shape[-1]), 2)
+    motions = np.concatenate((reach[..., None] * wave, bent), axis=-2)
     answers = below.cycle(omega[..., each_twice], motions, (..., each_twice)) @ FIRST
     round_, seen = np.split(answers, 2, axis=-1)
     round_, seen = round_ / np.where(crossed, reach, 1.0), seen / np.where(crossed, amplitude, 1.0)

@@ -25,7 +25,8 @@ class History:
         frequency: of the excitation [Hz]; like the step, it may differ between motions, (..., 1).
         driver: the imposed motion, where something that gives way lies between it and this one.
         solved: where equations over this motion were solved last, by name: good starts of the next solution, no more.
-        accuracy: how far equations over this motion may be from solved, relative to it.
+        accuracy: how far equations over this motion may be from solved, relative to it, before a last step; answers
+            from another start differ by as little.
     """
 
     value: Array

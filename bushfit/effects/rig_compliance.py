@@ -9,11 +9,13 @@ from bushfit.errors import ModelError
 
 #: The secants end when the logarithm of the amplitude is off by less than this, before a last step along the secant.
 _NEAR = 1e-8
-#: Share of what is missing of the motion at first that may be missing in the end, where derivatives are taken: chosen,
-#: less than a fit notices; and what is missing for rounding, relative to the motion.
-_RESOLVED, _ROUNDING = 1e-3, 1e-13
+#: Share of the difference between the forces of two models on one motion that may be missing of it: chosen, less than a
+#: fit notices, whose derivatives these differences are.
+_RESOLVED = 1e-3
+#: Difference of two forces that is rounding, relative to them.
+_ROUNDING = 1e-13
 #: Most rounds of an iteration: chosen, many more than a rig takes that is stiffer than the bushing.
-ROUNDS = 60
+_ROUNDS = 60
 #: Share of the least that was missing so far, below which a round brought the motion nearer.
 _NEARER = 0.9
 #: Rounds in a row that bring it no nearer, after which it stays as it is; chosen: a slow approach needs twelve.
@@ -30,13 +32,14 @@ _LARGEST_MOTION = 2.0
 _REMEMBERED = 3
 #: Share of all their squares that is added to each, so that two that teach the same do no harm: above rounding.
 _SAME_DIRECTION = 1e-12
+#: Adds to each.
 _EACH = np.eye(_REMEMBERED)
 #: The name of its solutions.
 _NAME = "compliance"
 #: The name of the solutions of what gives way beneath it, as a sleeve in a rig.
 _BENEATH = "beneath"
-#: Least height of the pulse that measures a stiffness [m]: of a motion that is all within a play nothing is asked, but
-#: it stands beside others.
+#: Least height of the pulse that measures a stiffness [m]: a motion that stands still beside others that move, as
+#: within a play, would have no pulse to divide by.
 _LEAST_PULSE = 1e-9
 #: Sample at which the pulse stands that measures a stiffness: a few after the start, for the force before it.
 _PULSE_AT = 4
@@ -56,10 +59,10 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
         return v + 0.5 * np.log1p(2.0 * given.real + given.real**2 + given.imag**2)
 
     old = np.zeros(np.broadcast_shapes(np.shape(compliance), np.shape(amplitude)))
-    inside_old = below(omega, amplitude + old)
+    inside_old = below(omega, np.broadcast_to(amplitude, old.shape))
     excess_old = excess(old, inside_old)
     new = -excess_old
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         inside = below(omega, amplitude * np.exp(new))
         off = excess(new, inside)
         run, rise = new - old, off - excess_old
@@ -99,9 +102,9 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     yielding = 1.0 / (1.0 + compliance * rigid)
     size = np.max(np.abs(imposed), axis=-1, keepdims=True)
     farthest = _LARGEST_MOTION * size
-    best = last = first = np.full_like(size, np.inf)
+    best = last = np.full_like(size, np.inf)
     pace, idle, past = np.ones_like(size), 0, None
-    for number in range(ROUNDS):
+    for number in range(_ROUNDS):
         motion = np.clip(imposed - compliance * reached, -farthest, farthest)
         felt = below(history.with_value(motion, beneath))
         missing = felt - reached
@@ -109,16 +112,14 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         change = np.fft.irfft(yielding * np.fft.rfft(missing, n=length), n=length)[..., :count]
         past = past or _Past(change.shape)
         step = past.step(reached, change)
-        first = np.where(number, first, off)
-        # of many models on one motion it is the differences that are asked for, however small
-        resolved = off.ndim == size.ndim or np.all(off <= np.maximum(_RESOLVED * first, _ROUNDING * size))
-        if resolved and np.all(off <= history.accuracy * size):
+        # what is no number counts as settled, so that it takes no other with it
+        if not np.any(off > history.accuracy * size) and _tells_apart(reached, missing):
             reached = reached + step
             many = imposed.ndim > 1  # else of many models on one motion the last is kept
-            kept = [each if many else each.reshape(-1, each.shape[-1])[-1] for each in (rigid, reached)]
+            kept = [each if many else each.reshape(-1, each.shape[-1])[-1].copy() for each in (rigid, reached)]
             solved[_NAME] = (kept[0] if number < _MANY_ROUNDS else None, kept[1])
             return reached
-        idle = 0 if np.any((off < _NEARER * best) & (off > history.accuracy * size)) else idle + 1
+        idle = 0 if np.any(off < _NEARER * best) else idle + 1
         if idle == _IDLE:
             break
         best = np.where(off < _NEARER * best, off, best)
@@ -132,6 +133,15 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
             expected="a rig several times stiffer than the bushing",
         )
     return felt
+
+
+def _tells_apart(reached: Array, missing: Array) -> bool:
+    """Whether the forces of models on one motion are known as well as their differences from the last of them ask."""
+    if missing.ndim == 1:
+        return True
+    reached = np.broadcast_to(reached, missing.shape)
+    apart, unknown = (np.max(np.abs(each - each[-1]), axis=-1) for each in (reached, missing))
+    return not np.any(unknown > np.maximum(_RESOLVED * apart, _ROUNDING * np.max(np.abs(reached), axis=-1)))
 
 
 class _Past:

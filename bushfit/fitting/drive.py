@@ -54,7 +54,7 @@ TOLD_MEAN = 0.05
 #: Rows of a cycle behind an estimate of how its noise depends from row to row; chosen: fewer resolve no correlation.
 _FEWEST_ROWS = 32
 #: How far equations over a loop's motion may be from solved, relative to it: a ten-thousandth of the noise of the best
-#: rigs, and derivatives lose nothing, as all rows of a difference stop at the same round.
+#: rigs. Derivatives are resolved apart from that.
 _ACCURACY = 1e-8
 #: Share of a cycle by which a record may go on after its last whole one and still count as whole: rounding.
 _WHOLE = 1e-6

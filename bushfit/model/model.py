@@ -45,6 +45,7 @@ class _Structure:
 
     Args:
         fading: the linear branches that fade with memory, whose steady answers add up harmonic by harmonic.
+        others: the branches that do not.
     """
 
     records: tuple[Effect, ...]
@@ -53,6 +54,7 @@ class _Structure:
     modifiers: tuple[Modifier, ...]
     layers: tuple[Layer, ...]
     fading: tuple[Branch, ...]
+    others: tuple[Branch, ...]
 
     @classmethod
     @lru_cache(maxsize=256)
@@ -76,6 +78,7 @@ class _Structure:
             tuple(effect for effect in records if isinstance(effect, Modifier)),
             tuple(effect for effect in records if isinstance(effect, Layer)),
             tuple(effect for effect in records if isinstance(effect, Branch) and effect.size),
+            tuple(effect for effect in records if isinstance(effect, Branch) and not effect.size),
         )
 
 
@@ -336,15 +339,15 @@ class Model:
         per_displacement = self.unit_strain(setting.direction)
         factor = self.stiffness_per_modulus(setting.direction) / (2.0 * per_displacement)
 
-        fading, known = self._structure.fading, dict[int, tuple[Any, Array]]()
+        structure, known = self._structure, dict[int, tuple[Any, Array]]()
 
         def rubber(displacement: History) -> Array:
             strain, base = displacement.scaled(per_displacement), values
-            if self._structure.modifiers:
+            if structure.modifiers:
                 omega = np.atleast_1d(displacement.omega)
                 base = self._adjusted(setting, values, omega, displacement.amplitude, strain.amplitude)
-            together = fading if displacement.periodic else ()
-            alone = (branch for branch in self._structure.branches if branch not in together)
+            together = displacement.periodic and structure.fading
+            alone = structure.others if together else structure.branches
             stresses = [branch.stress(seen_by(branch, values, base), strain) for branch in alone]
             if together:
                 stresses.append(strain.response(lambda omega: modulus(omega, base, strain)))
@@ -352,11 +355,15 @@ class Model:
 
         def modulus(omega: Array, base: Values, strain: History) -> Array:
             """Of the linear branches, (..., harmonics), kept for the next motion at the same times."""
-            step, found = known.get(omega.size, (None, np.zeros(1)))
-            if step is not strain.step or base is not values:
-                moduli = (branch.modulus(seen_by(branch, values, base), omega, strain.amplitude) for branch in fading)
-                found = np.asarray(2.0 * sum(moduli))
-                known[omega.size] = strain.step, found
+            count, step = strain.value.shape[-1], strain.step
+            if base is values and count in known and known[count][0] is step:
+                return known[count][1]
+            moduli = (
+                branch.modulus(seen_by(branch, values, base), omega, strain.amplitude) for branch in structure.fading
+            )
+            found = np.asarray(2.0 * sum(moduli))
+            if base is values:
+                known[count] = step, found
             return found
 
         def wrap(below: ForceBelow, group: Sequence[Layer]) -> ForceBelow:
