@@ -96,11 +96,12 @@ class History:
 
     @cached_property
     def rate(self) -> Array:
-        """Time derivative of the values, same shape."""
+        """Time derivative of the values by central differences, same shape; a motion from rest was at 0 before."""
         if self.periodic:
             ahead, behind = np.roll(self.value, -1, axis=-1), np.roll(self.value, 1, axis=-1)
             return (ahead - behind) / (2.0 * self.step)
-        return np.gradient(self.value, axis=-1) / self.step
+        from_rest = np.concatenate([np.zeros_like(self.value[..., :1]), self.value], axis=-1)
+        return np.gradient(from_rest, axis=-1)[..., 1:] / self.step
 
     @property
     def cycles(self) -> int:

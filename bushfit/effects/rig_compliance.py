@@ -84,7 +84,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         not accuracy. So K and F of the last model that was asked about this motion are where the next one starts.
         What gives way beneath starts each round from its solution of the round before.
         Friction below that turns sharply would make it many rounds: so those before tell the next. Where a round does
-        not bring F nearer, the next steps are halved. Dry friction below turns its sense with the imposed motion:
+        not bring F nearer, the next steps are halved, and doubled again where one does. Dry friction below turns its sense with the imposed motion:
         that it sticks for a moment is neglected.
     """
     compliance = p["compliance"]
@@ -123,7 +123,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         if idle == _IDLE:
             break
         best = np.where(off < _NEARER * best, off, best)
-        pace, last = np.where(off < last, pace, 0.5 * pace), off
+        pace, last = np.where(off < last, np.minimum(1.0, 2.0 * pace), 0.5 * pace), off
         reached = reached + pace * step
     if not history.periodic and np.any(off > _UNSETTLED * size):
         raise ModelError(

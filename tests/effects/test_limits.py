@@ -118,7 +118,7 @@ def test_rig_and_bushing_share_the_motion(inside: str, history: History) -> None
     alone = PLAIN.with_effect(inside, {f"{inside}.{key}": value for key, value in sizes[inside].items()})
     compliance = 4e-8
     rigged = alone.with_effect("rig_compliance", {"rig_compliance.compliance": compliance})
-    force = rigged.force("radial", history)
+    force = rigged.force("radial", replace(history, solved={}))
     again = alone.force("radial", history.with_value(history.value - compliance * force))
     assert np.max(np.abs(again - force)) < 1e-9 * np.max(np.abs(force))
 
