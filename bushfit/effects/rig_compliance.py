@@ -84,8 +84,8 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         not accuracy. So K and F of the last model that was asked about this motion are where the next one starts.
         What gives way beneath starts each round from its solution of the round before.
         Friction below that turns sharply would make it many rounds: so those before tell the next. Where a round does
-        not bring F nearer, the next steps are halved, and doubled again where one does. Dry friction below turns its sense with the imposed motion:
-        that it sticks for a moment is neglected.
+        not bring F nearer, the next steps are halved, and doubled again where one does. Dry friction below turns its
+        sense with the imposed motion: that it sticks for a moment is neglected.
     """
     compliance = p["compliance"]
     if not np.any(compliance):
