@@ -254,12 +254,11 @@ def find_remainder(search: Search, evidence: Evidence, share: float = 1.0) -> Re
 
 
 def worst_fault(search: Search, evidence: Evidence) -> Fault | None:
-    """The worthiest fault, where it is more than chance, more than its price and larger than the tolerance."""
+    """The worthiest fault of those larger than the tolerance, where it is more than chance and more than its price."""
     found, chance = faults(evidence, CHANCE_LEVEL)
-    worst = max(found, key=lambda fault: fault.worth, default=None)
-    if worst is None or worst.worth < SAME or worst.size < search.settings.tolerance:
-        return None
-    return worst if worst.gain > chance else None
+    large = (fault for fault in found if fault.size >= search.settings.tolerance)
+    worst = max(large, key=lambda fault: fault.worth, default=None)
+    return worst if worst and worst.worth >= SAME and worst.gain > chance else None
 
 
 def _fault_words(fault: Fault) -> str:
