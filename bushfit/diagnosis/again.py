@@ -6,7 +6,7 @@ Notes:
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.holdout import HoldOut, parts
@@ -40,13 +40,13 @@ def searched_again(search: Search, final: Evidence, steps: Sequence[Step], held:
     """
     named, told = {step.name for step in steps}, {part.part for part in held.parts}
     known = {name for step in steps for name in (step.name, *(each.name for each in (*step.rivals, *step.richer)))}
-    settings, found = replace(search.settings, max_effects=len(steps)), []
+    found = []
     for part in parts(search.base.data_sets):
         if part.name not in told:
             continue
         try:
             rest = fit(search.base.model, part.rest(search.base.data_sets), search.held, search.bounds)
-            anew = Search.begin(rest, settings, search.start, search.held, search.bounds, search, narrowed=True)
+            anew = search.without_part(rest, len(steps))
             grown, added = anew.grow()
             if {*added} == named:
                 found.append(Again(part.name, True, ()))

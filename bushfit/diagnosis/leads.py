@@ -31,7 +31,7 @@ def leads(search: Search) -> str:
         return ""
     try:
         begun = _weighed(search)
-        anew = Search.begin(begun, search.settings, search.start, search.held, search.bounds)
+        anew = search.anew(begun)
         final, added = anew.exchange(*anew.grow())
     except (FitError, ModelError):  # a model of which these tests tell nothing
         return ""

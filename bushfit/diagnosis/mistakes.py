@@ -92,7 +92,7 @@ def _weighed(search: Search, data: Data, fitted: Fitted, goal: float) -> list[We
 
 def _closes(evidence: Evidence, search: Search) -> bool:
     """Whether nothing is missing beyond noise and tolerance in mended tests."""
-    return is_consistent(Search.begin(evidence, search.settings, search.start, search.held, search.bounds))
+    return is_consistent(search.anew(evidence))
 
 
 def _named(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -144,6 +144,7 @@ class Search:
         rounds: per set of added effects the refitted model and what every effect says of it.
         earlier: a search on much the same tests, from whose refits this one's start; None without.
         narrowed: whether what fell far behind in that search is refitted only where its score is near the best.
+        most_of_level: departure of a level, relative to |K|, beyond which no rig of the class makes it.
     """
 
     settings: Settings
@@ -153,6 +154,7 @@ class Search:
     rounds: dict[frozenset[str], Round] = field(default_factory=dict)
     earlier: Search | None = None
     narrowed: bool = False
+    most_of_level: float = np.inf
 
     @classmethod
     def begin(
@@ -164,12 +166,23 @@ class Search:
         bounds: Bounds,
         earlier: Search | None = None,
         *,
-        narrowed: bool = False,
+        most_of_level: float = np.inf,
     ) -> Search:
         """A search that has scored every effect of the library once, and refitted the best."""
-        search = cls(settings, start, tuple(held), bounds, earlier=earlier, narrowed=narrowed)
-        search._round(base, ())
-        return search
+        return cls(settings, start, tuple(held), bounds, earlier=earlier, most_of_level=most_of_level)._begun(base)
+
+    def anew(self, base: Evidence) -> Search:
+        """The same search from another fit."""
+        return replace(self, rounds={}, earlier=None)._begun(base)
+
+    def without_part(self, rest: Evidence, most_effects: int) -> Search:
+        """The same search on a part of the tests, narrowed by what this one found."""
+        settings = replace(self.settings, max_effects=most_effects)
+        return replace(self, settings=settings, rounds={}, earlier=self, narrowed=True)._begun(rest)
+
+    def _begun(self, base: Evidence) -> Search:
+        self._round(base, ())
+        return self
 
     @property
     def first(self) -> Round:

@@ -254,11 +254,19 @@ def find_remainder(search: Search, evidence: Evidence, share: float = 1.0) -> Re
 
 
 def worst_fault(search: Search, evidence: Evidence) -> Fault | None:
-    """The worthiest fault of those larger than the tolerance, where it is more than chance and more than its price."""
+    """The worthiest fault of those larger than the tolerance, where it is more than chance and more than its price.
+
+    Errors of levels that few levels tell may be of any size by chance, but not larger than a rig makes them.
+    """
     found, chance = faults(evidence, CHANCE_LEVEL)
-    large = (fault for fault in found if fault.size >= search.settings.tolerance)
-    worst = max(large, key=lambda fault: fault.worth, default=None)
-    return worst if worst and worst.worth >= SAME and worst.gain > chance else None
+    real = (
+        fault
+        for fault in found
+        if fault.size >= search.settings.tolerance
+        and fault.worth >= SAME
+        and (fault.gain > chance or (fault.suspect.kind == "level" and fault.size > search.most_of_level))
+    )
+    return max(real, key=lambda fault: fault.worth, default=None)
 
 
 def _fault_words(fault: Fault) -> str:

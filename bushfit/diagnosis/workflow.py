@@ -43,6 +43,8 @@ _BEYOND_EXCHANGE = 0.05
 #: Largest error of a level, in units of the largest standard deviation that counts as the rig's; chosen: between the
 #: 2.1 % that errors of 1 % made of one clean campaign and the 2.5 % that a wrong label made of another.
 _MOST_ERRORS = 1.5
+#: The same, beyond which no errors of levels explain a level; chosen: what is normal goes so far once in 16,000.
+_NO_RIG = 4.0
 
 
 def diagnose(data: Data, model: Model | None = None, settings: Settings | None = None) -> Diagnosis:
@@ -111,7 +113,9 @@ def _search(
     data: Data, begun: _Begun, model: Model | None, settings: Settings, earlier: Search | None = None
 ) -> _Searched:
     """Look for effects and mistakes in tests whose noise is known."""
-    search = Search.begin(begun.evidence, settings, begun.start, begun.held, data.bounds, earlier)
+    most = _NO_RIG * max(largest_level_error(data.campaign.rig))
+    fitted, start, held = begun.evidence, begun.start, begun.held
+    search = Search.begin(fitted, settings, start, held, data.bounds, earlier, most_of_level=most)
     if is_consistent(search):
         return _Searched(search, None, told=consistent(search))
     told_wrong = mistaken(search, data, lambda mended, goal: _begin(mended, model, settings, goal).evidence)

@@ -65,6 +65,19 @@ def test_the_place_is_named_and_no_effect(measured: Measured, tamper: Tamper, wo
     assert words in diagnosis.where[0].reading
 
 
+@pytest.mark.parametrize(("off", "verdict"), [(1.04, "consistent"), (1.1, "unexplained")])
+def test_a_level_that_no_rig_makes_is_a_fault_however_few_levels_tell_of_errors(
+    measured: Measured, off: float, verdict: str
+) -> None:
+    """Two degrees of freedom would let an error of 0.9 % be any size by chance."""
+    campaign = measured(plan=SHARED)
+    wrong = changed(campaign, 1, np.where(campaign.sweeps[1].amplitude == LEVELS[0], off, 1.0))
+    diagnosis = diagnose(Data.of(wrong).with_level_errors((0.009, 0.004), 2))
+    print(diagnosis.verdict, diagnosis.summary)
+    assert diagnosis.verdict == verdict
+    assert ("the radial level 0.1 mm stands out" in diagnosis.summary) == (verdict == "unexplained")
+
+
 @pytest.mark.parametrize("factor", [1.1, 1.2])
 def test_one_repeat(measured: Measured, factor: float) -> None:
     diagnosis = diagnose(Data.of(repeat_off(measured(plan=SHARED), factor)))

@@ -101,9 +101,8 @@ def test_chance_alone_names_nothing_however_small_a_gap_counts(measured: Measure
 
 def test_a_search_made_again_passes_over_what_fell_far_behind(measured: Measured, fitted: Fitted) -> None:
     plain = fitted(measured(INERTIA, SHARED))
-    given = plain, Settings(), plain.model.values, (), {}
-    whole = Search.begin(*given)
-    again = Search.begin(*given, whole, narrowed=True)
+    whole = Search.begin(plain, Settings(), plain.model.values, (), {})
+    again = whole.without_part(plain, 3)
     foremost = {claim.name for claim in whole.first.proposed[:3]}
     behind = {candidate.name for candidate in whole.first.tried if candidate.left} - foremost
     assert behind
