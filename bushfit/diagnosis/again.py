@@ -6,10 +6,12 @@ Notes:
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
-from bushfit.diagnosis.evidence import Evidence, fit
-from bushfit.diagnosis.holdout import HoldOut, parts
+from bushfit.diagnosis.evidence import Evidence, fit, fit_from
+from bushfit.diagnosis.holdout import HoldOut, Part, parts
+from bushfit.diagnosis.refit import comes_below
 from bushfit.diagnosis.search import SAME, Search, Step
 from bushfit.errors import FitError, ModelError
 
@@ -32,34 +34,68 @@ class Again:
 def searched_again(search: Search, final: Evidence, steps: Sequence[Step], held: HoldOut) -> list[Again]:
     """The search made anew without each part that was held out, with the same noise, and what comes of it.
 
+    Of several effects another name without one part is enough to take them back, and ends it.
+    """
+    told, found = {part.part for part in held.parts}, list[Again]()
+    for part in parts(search.base.data_sets):
+        if part.name in told:
+            with suppress(FitError, ModelError):
+                found.append(_without(part, search, final, steps))
+                if found[-1].others and len(steps) > 1:
+                    break
+    return found
+
+
+def _without(part: Part, search: Search, final: Evidence, steps: Sequence[Step]) -> Again:
+    """What the search makes of the tests without a part.
+
     It adds as many effects as were named and looks for no more: what a part less brings beside them is not asked. Each
     candidate starts where all the tests left it, and one that they left far behind is refitted only where its score
-    without the part is near or among the best. Where the same effects are added, they came again; else their rivals are
-    tried first. Of several effects another name without one part is enough to take them back, and ends it. The search
-    goes step by step and may miss what fits the rest best: where what was named does, it came again.
+    without the part is near or among the best. Where the same effects are added, they came again. Else rivals are tried
+    in place of what was added; or of what was named, where that fits the rest better: the search goes step by step and
+    may miss it.
+
+    Raises:
+        FitError: fewer data than parameters.
+        ModelError: no response.
     """
-    named, told = {step.name for step in steps}, {part.part for part in held.parts}
-    known = {name for step in steps for name in (step.name, *(each.name for each in (*step.rivals, *step.richer)))}
-    found = []
-    for part in parts(search.base.data_sets):
-        if part.name not in told:
-            continue
-        try:
-            rest = fit(search.base.model, part.rest(search.base.data_sets), search.held, search.bounds)
-            anew = search.without_part(rest, len(steps))
-            grown, added = anew.grow()
-            if {*added} == named:
-                found.append(Again(part.name, True, ()))
-                continue
-            other, instead = anew.exchange(grown, added)
-            again = anew.steps(other, instead)
-            sets = [{step.name, *(rival.name for rival in (*step.rivals, *step.richer))} for step in again]
-            every = all(any(name in members for members in sets) for name in named)
-            every = every or fit(final.model, rest.data_sets, search.held, search.bounds).bic < other.bic - SAME
-        except (FitError, ModelError):
-            continue
-        others = () if every else tuple(step.name for step, own in zip(again, sets, strict=True) if not own & known)
-        found.append(Again(part.name, every, others))
-        if others and len(steps) > 1:
-            break
-    return found
+    named, came_again = [step.name for step in steps], Again(part.name, True, ())
+    rest = fit(search.base.model, part.rest(search.base.data_sets), search.held, search.bounds)
+    anew = search.without_part(rest, len(steps))
+    found, added = anew.grow()
+    if {*added} == {*named}:
+        return came_again
+    same = fit(final.model, rest.data_sets, search.held, search.bounds)
+    if same.bic < found.bic:
+        if not _is_challenged(same, search, steps):
+            return came_again
+        found, added = same, named
+    found, added = anew.exchange(found, added)
+    if {*added} == {*named}:
+        return came_again
+    again, known = anew.steps(found, added), {name for step in steps for name in _set(step)}
+    every = {*named} <= {name for step in again for name in _set(step)} or same.bic < found.bic - SAME
+    others = () if every else tuple(step.name for step in again if not known & {*_set(step)})
+    return Again(part.name, every, others)
+
+
+def _is_challenged(same: Evidence, search: Search, steps: Sequence[Step]) -> bool:
+    """Whether the tests without a part like the model as well with a rival in place of an effect that was named, other
+    than its look-alikes, or without the effect; each is refitted from where all the tests left it.
+
+    Args:
+        same: the model with what was named, fitted to the tests without the part.
+    """
+    for step in steps:
+        rivals = (each.evidence.model for each in step.place.tried if each.name not in _set(step))
+        for model in (*rivals, step.place.evidence.model):
+            with suppress(FitError, ModelError):  # no response without the part: no rival
+                begun = fit_from(model, same.data_sets, search.held, search.bounds)
+                if comes_below(begun, same.bic + SAME - len(begun.coordinates.names) * same.penalty):
+                    return True
+    return False
+
+
+def _set(step: Step) -> list[str]:
+    """An effect with all that these tests cannot tell from it."""
+    return [step.name, *(rival.name for rival in (*step.rivals, *step.richer))]

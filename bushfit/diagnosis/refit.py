@@ -174,6 +174,13 @@ def can_reach(fit: Descent, goal: float, claimed: float = np.inf) -> bool:
     return fit.chi_square - most * expected < goal or (early and expected < _SEES_A_WAY)
 
 
+def comes_below(fit: Descent, goal: float) -> bool:
+    """Whether a fit from near its end comes below a chi-square; it is left where it cannot."""
+    while not _ended(fit) and fit.chi_square - _MOST_FALL * fit.expected_fall < goal <= fit.chi_square:
+        fit = fit.stepped()
+    return fit.chi_square < goal
+
+
 def _ended(fit: Descent) -> bool:
     return fit.converged or fit.evaluations >= EVALUATIONS
 
