@@ -7,6 +7,7 @@ takes off chi-square competes with the effects.
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -47,12 +48,13 @@ class Fault:
         return self.gain - self.price
 
 
-def faults(evidence: Evidence, level: float) -> tuple[list[Fault], float]:
+@lru_cache(maxsize=4)
+def faults(evidence: Evidence, level: float) -> tuple[Sequence[Fault], float]:
     """Every single place that could be at fault, and the gain that the best of them exceeds by chance with
-    probability 1 - level."""
+    probability 1 - level; kept for the fits that were asked last, as several questions ask for them."""
     suspects = [*_frequencies(evidence), *_of_each(evidence)]
     if not suspects:
-        return [], np.inf
+        return (), np.inf
     columns = {id(column): column for suspect in suspects for column in suspect.columns}
     index = {key: number for number, key in enumerate(columns)}
     groups = [np.array([index[id(column)] for column in suspect.columns]) for suspect in suspects]
@@ -61,7 +63,7 @@ def faults(evidence: Evidence, level: float) -> tuple[list[Fault], float]:
     places = np.array([looked[suspect.kind] for suspect in suspects])
     prices = (np.array(test.sizes) * evidence.penalty + 2.0 * np.log(places)).tolist()
     largest = [float(np.abs(amount).max()) for amount in test.amounts()]
-    found = list(map(Fault, suspects, test.sizes, test.gains(), prices, largest))
+    found = tuple(map(Fault, suspects, test.sizes, test.gains(), prices, largest))
     return found, test.largest_by_chance(level)
 
 

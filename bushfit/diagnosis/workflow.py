@@ -31,11 +31,6 @@ from bushfit.model.result import Outlier
 
 #: Rounds of looking for wild points at most: each may uncover others beside those left out.
 _MOST_ROUNDS = 4
-#: Searches that are made again with errors of levels, at most; chosen for time: each is as long as the first.
-_MOST_SEARCHES = 2
-#: Rounds of scoring and refitting in the searches so far, from which errors of levels that are counted are not
-#: estimated anew for another search; chosen for time.
-_MANY_ROUNDS = 15
 #: Smooth misfit of the model that growth ended with, relative to |K| or to half a loop's force range, beyond which its
 #: effects are not exchanged, if it is more than chance; chosen: of 731 searches, 54 left more, and no exchange brought
 #: one of these below a tolerance of 1 %, nor any that left more than 4.5 %.
@@ -69,18 +64,15 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     whole, (data, fewer) = data, condensed(data)
     if fewer:
         begun = _begin(data, model, settings)
-    searched, counted = _search(data, begun, model, settings), False
-    rounds = len(searched.search.rounds)
-    for _ in range(_MOST_SEARCHES):
-        if (counted and rounds >= _MANY_ROUNDS) or (errors := _errors_beside(searched, data)) is None:
-            break
-        data, counted = data.with_level_errors(errors.error, errors.freedom), True
+    searched = _search(data, begun, model, settings)
+    errors = _errors_beside(searched, data)
+    if errors:
+        data = data.with_level_errors(errors.error, errors.freedom)
         begun = _begin(data, model, settings)
         searched = _search(data, begun, model, settings, searched.search)
-        rounds += len(searched.search.rounds)
     fewer += _left_out_of_fewer(whole, data, begun.outliers)
     found = searched.finding
-    shared = [_level_words(data, found)] if counted else _class_words(data)
+    shared = [_level_words(data, found)] if errors else _class_words(data)
     of_loops = outliers_at(found.result.model, data.loops)
     outliers = (*told(of_loops, robust=data.robust), *told(left, robust=True))
     notes = (*said, *fewer, *found.notes, *shared, *outliers)

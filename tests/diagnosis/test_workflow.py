@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -167,20 +168,23 @@ def test_effects_of_a_model_that_is_far_off_are_not_exchanged(
     assert diagnosis.verdict in ("unexplained", "described", "partly")
 
 
-@pytest.mark.parametrize(("rounds", "searches"), [(15, 2), (1, 1)], ids=["short searches", "long ones"])
-def test_after_long_searches_errors_of_levels_are_not_estimated_anew(
-    measured: Measured, monkeypatch: pytest.MonkeyPatch, rounds: int, searches: int
+@pytest.mark.parametrize("searches", [1, 2])
+def test_errors_of_levels_that_matter_start_the_search_once_more(
+    measured: Measured, monkeypatch: pytest.MonkeyPatch, searches: int
 ) -> None:
-    asked_for = list[object]()
+    errors = LevelErrors((2e-3, 2e-3), 10, 50.0, matters=True)
+    begun = list[object]()
+    begin = Search.begin
 
-    def always(searched: object, _: Data) -> LevelErrors:
-        asked_for.append(searched)
-        return LevelErrors((2e-3, 2e-3), 10, 50.0, matters=True)
+    def counted(*args: Any, **options: Any) -> Search:
+        begun.append(args)
+        return begin(*args, **options)
 
-    monkeypatch.setattr("bushfit.diagnosis.workflow._errors_beside", always)
-    monkeypatch.setattr("bushfit.diagnosis.workflow._MANY_ROUNDS", rounds)
-    asked(measured(INERTIA, SHARED))
-    assert len(asked_for) == searches
+    monkeypatch.setattr(Search, "begin", counted)
+    monkeypatch.setattr("bushfit.diagnosis.workflow._errors_beside", lambda *_: errors if searches > 1 else None)
+    diagnosis = asked(measured(INERTIA, SHARED))
+    assert len(begun) == searches
+    assert any("of each level" in note for note in diagnosis.notes) == (searches > 1)
 
 
 def test_held_parameters_stay(measured: Measured) -> None:
