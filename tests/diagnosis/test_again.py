@@ -1,0 +1,50 @@
+"""A name is doubted where the tests without a part bring another one out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import pytest
+from asking import INERTIA
+from rigged import SHARED, Fitted, Measured
+
+from bushfit.diagnosis.again import searched_again
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.holdout import hold_out
+from bushfit.diagnosis.record import Settings
+from bushfit.diagnosis.search import Search
+
+
+@pytest.mark.parametrize("rival", ["viscous", "loop_clock"], ids=["far behind", "as good"])
+def test_where_growth_misses_what_was_named_its_rivals_are_tried_if_one_comes_as_near(
+    measured: Measured, fitted: Fitted, monkeypatch: pytest.MonkeyPatch, rival: str
+) -> None:
+    """The mass is there and was named; without each part growth goes astray and adds a dashpot."""
+    campaign = measured(INERTIA, SHARED)
+    plain, right = fitted(campaign), fitted(campaign, "inertia")
+    search = Search.begin(plain, Settings(), plain.model.values, (), {})
+    (step,) = search.steps(right, ["inertia"])
+    assert not step.rivals
+    as_good = rival == "loop_clock"
+    if as_good:  # a candidate in its place with the same prediction, in no set with it
+        twin = replace(step.place.tried[0], name=rival)
+        step = replace(step, place=replace(step.place, tried=(*step.place.tried, twin)))
+
+    def astray(anew: Search) -> tuple[Evidence, list[str]]:
+        return anew.base, ["viscous"]
+
+    asked_for = list[Sequence[str]]()
+    exchange = Search.exchange
+
+    def counted(anew: Search, current: Evidence, added: Sequence[str]) -> tuple[Evidence, list[str]]:
+        asked_for.append(added)
+        return exchange(anew, current, added)
+
+    monkeypatch.setattr(Search, "grow", astray)
+    monkeypatch.setattr(Search, "exchange", counted)
+    again = searched_again(search, right, [step], hold_out(plain, right, {}))
+    print(f"{len(again)} parts, {sum(each.came_again for each in again)} times again, exchanged in {len(asked_for)}")
+    assert len(again) > 4
+    assert all(each.came_again for each in again)
+    assert asked_for == ([["inertia"]] * len(again) if as_good else [])
