@@ -22,7 +22,7 @@ class Again:
 
     Args:
         came_again: whether every effect that was named leads a set, or stands in one, or all of them together close
-            what is left of the gap better than what was found in their place.
+            what is left of the gap better, by more than chance, than what was found in their place.
         others: effects that lead a set in place of one that was named, other than its look-alikes.
     """
 
@@ -51,9 +51,9 @@ def _without(part: Part, search: Search, final: Evidence, steps: Sequence[Step])
 
     It adds as many effects as were named and looks for no more: what a part less brings beside them is not asked. Each
     candidate starts where all the tests left it, and one that they left far behind is refitted only where its score
-    without the part is near or among the best. Where the same effects are added, they came again. Else rivals are tried
-    in place of what was added; or of what was named, where that fits the rest better: the search goes step by step and
-    may miss it.
+    without the part is near or among the best. Where the same effects are added, they came again, and so they did where
+    they fit the rest better than what was added and nothing comes near them: the search goes step by step and may miss
+    the best. Else rivals are tried in place of what was added, or of what was named if that fits better.
 
     Raises:
         FitError: fewer data than parameters.
@@ -66,7 +66,7 @@ def _without(part: Part, search: Search, final: Evidence, steps: Sequence[Step])
     if {*added} == {*named}:
         return came_again
     same = fit(final.model, rest.data_sets, search.held, search.bounds)
-    if same.bic < found.bic:
+    if same.bic < found.bic - SAME:
         if not _is_challenged(same, search, steps):
             return came_again
         found, added = same, named

@@ -7,7 +7,7 @@ takes off chi-square competes with the effects.
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -48,13 +48,24 @@ class Fault:
         return self.gain - self.price
 
 
-@lru_cache(maxsize=4)
-def faults(evidence: Evidence, level: float) -> tuple[Sequence[Fault], float]:
-    """Every single place that could be at fault, and the gain that the best of them exceeds by chance with
-    probability 1 - level; kept for the fits that were asked last, as several questions ask for them."""
+class Faults(NamedTuple):
+    """Every single place that could be at fault.
+
+    Args:
+        chance: gain that the best of them exceeds by chance, with the probability asked for.
+        chance_of_known: the same were the errors of levels known, and not told by a few levels.
+    """
+
+    places: Sequence[Fault]
+    chance: float
+    chance_of_known: float
+
+
+def faults(evidence: Evidence, level: float) -> Faults:
+    """Every single place that could be at fault, and the gain that chance alone stays below with probability level."""
     suspects = [*_frequencies(evidence), *_of_each(evidence)]
     if not suspects:
-        return (), np.inf
+        return Faults((), np.inf, np.inf)
     columns = {id(column): column for suspect in suspects for column in suspect.columns}
     index = {key: number for number, key in enumerate(columns)}
     groups = [np.array([index[id(column)] for column in suspect.columns]) for suspect in suspects]
@@ -63,8 +74,10 @@ def faults(evidence: Evidence, level: float) -> tuple[Sequence[Fault], float]:
     places = np.array([looked[suspect.kind] for suspect in suspects])
     prices = (np.array(test.sizes) * evidence.penalty + 2.0 * np.log(places)).tolist()
     largest = [float(np.abs(amount).max()) for amount in test.amounts()]
-    found = tuple(map(Fault, suspects, test.sizes, test.gains(), prices, largest))
-    return found, test.largest_by_chance(level)
+    found = list(map(Fault, suspects, test.sizes, test.gains(), prices, largest))
+    chance = test.largest_by_chance(level)
+    few = any(freedoms.level for freedoms, *_ in evidence.rigs)
+    return Faults(found, chance, test.largest_by_chance(level, known=True) if few else chance)
 
 
 def _of_each(evidence: Evidence) -> list[Suspect]:

@@ -175,7 +175,7 @@ def can_reach(fit: Descent, goal: float, claimed: float = np.inf) -> bool:
 
 
 def comes_below(fit: Descent, goal: float) -> bool:
-    """Whether a fit from near its end comes below a chi-square; it is left where it cannot."""
+    """Whether a fit from where it once ended, or was left, comes below a chi-square; it is left where it cannot."""
     while not _ended(fit) and fit.chi_square - _MOST_FALL * fit.expected_fall < goal <= fit.chi_square:
         fit = fit.stepped()
     return fit.chi_square < goal

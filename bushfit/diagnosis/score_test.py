@@ -88,14 +88,15 @@ class ScoreTest:
         triples = zip(self.groups, self._roots, self._along, strict=True)
         return [-(root @ along) / self._lengths[group] for group, root, along in triples]
 
-    def largest_by_chance(self, level: float, senses: Sequence[int] | None = None) -> float:
+    def largest_by_chance(self, level: float, senses: Sequence[int] | None = None, *, known: bool = False) -> float:
         """The gain that the best pattern exceeds by chance with probability 1 - level.
 
         Args:
             level: probability, such as 0.995.
             senses: per pattern +1 where only positive amounts are physical, 0 where both signs are.
+            known: whether to take errors of levels as known, however few levels tell them.
         """
-        drawn = _draw(self.evidence, self._left)
+        drawn = _draw(self.evidence, self._left, known=known)
         best = np.zeros(DRAWS)
         for number, (group, root) in enumerate(zip(self.groups, self._roots, strict=True)):
             amounts = root.T @ drawn[group]
@@ -105,7 +106,7 @@ class ScoreTest:
         return float(np.quantile(best, level)) if best.any() else np.inf
 
 
-def _draw(evidence: Evidence, rows: Array) -> Array:
+def _draw(evidence: Evidence, rows: Array, *, known: bool) -> Array:
     """Amounts of noise along rows, (c, DRAWS): what levels share, what blocks share, what scatters from point to
     point."""
     drawn = np.zeros((len(rows), DRAWS))
@@ -115,7 +116,8 @@ def _draw(evidence: Evidence, rows: Array) -> Array:
         in_levels = _rest(of_blocks, of_levels) if levels else of_blocks
         drawn += in_levels @ _normals(in_levels.shape[1], 6 * number) * _unknown(freedoms.shared, 6 * number + 2)
         drawn += of_points @ _normals(of_points.shape[1], 6 * number + 1) * _unknown(freedoms.scatter, 6 * number + 3)
-        drawn += of_levels @ _normals(of_levels.shape[1], 6 * number + 4) * _unknown(freedoms.level, 6 * number + 5)
+        of_level = 0 if known else freedoms.level
+        drawn += of_levels @ _normals(of_levels.shape[1], 6 * number + 4) * _unknown(of_level, 6 * number + 5)
     return drawn
 
 

@@ -144,7 +144,7 @@ class Search:
         rounds: per set of added effects the refitted model and what every effect says of it.
         earlier: a search on much the same tests, from whose refits this one's start; None without.
         narrowed: whether what fell far behind in that search is refitted only where its score is near the best.
-        most_of_level: departure of a level, relative to |K|, beyond which no rig of the class makes it.
+        most_of_level: departure of a level, as a share of |K|, beyond which no rig of the class makes it.
     """
 
     settings: Settings
@@ -172,11 +172,11 @@ class Search:
         return cls(settings, start, tuple(held), bounds, earlier=earlier, most_of_level=most_of_level)._begun(base)
 
     def anew(self, base: Evidence) -> Search:
-        """The same search from another fit."""
+        """The same search from another fit, of the same tests or of tests read anew."""
         return replace(self, rounds={}, earlier=None)._begun(base)
 
     def without_part(self, rest: Evidence, most_effects: int) -> Search:
-        """The same search on a part of the tests, narrowed by what this one found."""
+        """The same search on the tests without a part, narrowed by what this one found."""
         settings = replace(self.settings, max_effects=most_effects)
         return replace(self, settings=settings, rounds={}, earlier=self, narrowed=True)._begun(rest)
 

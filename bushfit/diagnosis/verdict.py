@@ -254,18 +254,19 @@ def find_remainder(search: Search, evidence: Evidence, share: float = 1.0) -> Re
 
 
 def worst_fault(search: Search, evidence: Evidence) -> Fault | None:
-    """The worthiest fault of those larger than the tolerance, where it is more than chance and more than its price.
+    """The worthiest of the faults that are larger than the tolerance and more than chance and their price.
 
-    Errors of levels that few levels tell may be of any size by chance, but not larger than a rig makes them.
+    Where few levels tell the errors of levels, chance has no end: a level that is off by more than a rig of the class
+    makes it then has to be more than chance were these errors known.
     """
-    found, chance = faults(evidence, CHANCE_LEVEL)
-    real = (
-        fault
-        for fault in found
-        if fault.size >= search.settings.tolerance
-        and fault.worth >= SAME
-        and (fault.gain > chance or (fault.suspect.kind == "level" and fault.size > search.most_of_level))
-    )
+    told = faults(evidence, CHANCE_LEVEL)
+
+    def is_real(fault: Fault) -> bool:
+        of_no_rig = fault.suspect.kind == "level" and fault.size > search.most_of_level
+        return fault.gain > (told.chance_of_known if of_no_rig else told.chance)
+
+    large = (fault for fault in told.places if fault.size >= search.settings.tolerance)
+    real = (fault for fault in large if fault.worth >= SAME and is_real(fault))
     return max(real, key=lambda fault: fault.worth, default=None)
 
 

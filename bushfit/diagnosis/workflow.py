@@ -38,7 +38,8 @@ _BEYOND_EXCHANGE = 0.05
 #: Largest error of a level, in units of the largest standard deviation that counts as the rig's; chosen: between the
 #: 2.1 % that errors of 1 % made of one clean campaign and the 2.5 % that a wrong label made of another.
 _MOST_ERRORS = 1.5
-#: The same, beyond which no errors of levels explain a level; chosen: what is normal goes so far once in 16,000.
+#: The same, beyond which a level is a fault though few levels tell such errors; chosen: of one that is normal and as
+#: large as that standard deviation, one in 16,000 goes so far.
 _NO_RIG = 4.0
 
 
@@ -66,13 +67,13 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
         begun = _begin(data, model, settings)
     searched = _search(data, begun, model, settings)
     errors = _errors_beside(searched, data)
-    if errors:
+    if errors is not None:
         data = data.with_level_errors(errors.error, errors.freedom)
         begun = _begin(data, model, settings)
         searched = _search(data, begun, model, settings, searched.search)
     fewer += _left_out_of_fewer(whole, data, begun.outliers)
     found = searched.finding
-    shared = [_level_words(data, found)] if errors else _class_words(data)
+    shared = [_level_words(data, found)] if errors is not None else _class_words(data)
     of_loops = outliers_at(found.result.model, data.loops)
     outliers = (*told(of_loops, robust=data.robust), *told(left, robust=True))
     notes = (*said, *fewer, *found.notes, *shared, *outliers)
@@ -145,7 +146,7 @@ def _level_errors(evidence: Evidence, data: Data) -> LevelErrors:
     """Errors of each level that would explain what a model leaves, but for what the worst single level makes of it
     where that is more than such errors do."""
     absorbed, most = evidence.solution.jacobian, largest_level_error(data.campaign.rig)
-    levels = [fault for fault in faults(evidence, CHANCE_LEVEL)[0] if fault.suspect.kind != "repeat"]
+    levels = [fault for fault in faults(evidence, CHANCE_LEVEL).places if fault.suspect.kind != "repeat"]
     worst = max(levels, key=lambda fault: fault.worth, default=None)
     if worst and worst.size > _MOST_ERRORS * max(most):
         absorbed = np.concatenate((absorbed, worst.suspect.columns))

@@ -41,7 +41,7 @@ class LevelErrors(NamedTuple):
 
 
 def largest_level_error(rig: RigSettings) -> tuple[float, float]:
-    """Error of a level, in gain and phase [rad], up to which it counts as one of the rig and not as a fault."""
+    """Largest standard deviation of errors of levels, in gain and phase [rad], that counts as the rig's."""
     gain, phase = of_class(rig, ASSUMED_SHARED)
     return _MOST_CLASSES * gain, _MOST_CLASSES * phase
 

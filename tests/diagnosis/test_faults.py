@@ -7,12 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigged import LEVELS, SHARED, Effects, Measured, changed, with_sweep
+from rigged import LEVELS, SHARED, Effects, Fitted, Measured, changed, with_sweep
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.diagnosis.faults import faults
+from bushfit.diagnosis.record import Settings
+from bushfit.diagnosis.search import CHANCE_LEVEL, SAME, Search
+from bushfit.diagnosis.verdict import worst_fault
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.fitting.data import Data
+from bushfit.fitting.data_sets import parted, with_level_errors
 
 Tamper = Callable[[Campaign], Campaign]
 
@@ -65,17 +69,36 @@ def test_the_place_is_named_and_no_effect(measured: Measured, tamper: Tamper, wo
     assert words in diagnosis.where[0].reading
 
 
-@pytest.mark.parametrize(("off", "verdict"), [(1.04, "consistent"), (1.1, "unexplained")])
+@pytest.mark.parametrize(("off", "verdict"), [(1.05, "consistent"), (1.075, "unexplained")])
 def test_a_level_that_no_rig_makes_is_a_fault_however_few_levels_tell_of_errors(
     measured: Measured, off: float, verdict: str
 ) -> None:
-    """Two degrees of freedom would let an error of 0.9 % be any size by chance."""
+    """Two degrees of freedom would let an error of 0.9 % be any size by chance; 6 % are what a rig may have at most."""
     campaign = measured(plan=SHARED)
     wrong = changed(campaign, 1, np.where(campaign.sweeps[1].amplitude == LEVELS[0], off, 1.0))
     diagnosis = diagnose(Data.of(wrong).with_level_errors((0.009, 0.004), 2))
     print(diagnosis.verdict, diagnosis.summary)
     assert diagnosis.verdict == verdict
     assert ("the radial level 0.1 mm stands out" in diagnosis.summary) == (verdict == "unexplained")
+
+
+@pytest.mark.parametrize(("off", "beyond_chance"), [(1.013, False), (1.02, True)])
+def test_a_level_of_no_rig_still_has_to_be_more_than_chance(
+    measured: Measured, fitted: Fitted, off: float, beyond_chance: bool
+) -> None:
+    """A rig that states no error at all makes none, and still a level is off by chance."""
+    campaign = measured(plan=SHARED)
+    plain = fitted(changed(campaign, 1, np.where(campaign.sweeps[1].amplitude == LEVELS[0], off, 1.0)))
+    loops, sweeps = parted(plain.data_sets)
+    evidence = replace(plain, data_sets=(*loops, *with_level_errors(sweeps, (1e-3, 1e-3), 2)))
+    told = faults(evidence, CHANCE_LEVEL)
+    worst = max(told.places, key=lambda place: place.worth)
+    print(f"{worst.suspect.words}: {worst.gain:.1f}, by chance {told.chance_of_known:.1f} to {told.chance:.0f}")
+    assert worst.worth >= SAME
+    search = Search.begin(evidence, Settings(), plain.model.values, (), {})
+    assert worst_fault(search, evidence) is None
+    found = worst_fault(replace(search, most_of_level=0.0), evidence)
+    assert (found is not None) == beyond_chance
 
 
 @pytest.mark.parametrize("factor", [1.1, 1.2])
@@ -118,8 +141,8 @@ def test_errors_of_every_level_are_noise_and_no_finding(measured: Measured, repe
 def test_sizes_and_gains_of_a_fault(measured: Measured, fitted: Callable[..., object]) -> None:
     """A level 5 % too stiff is found 5 % too stiff, but for what the fit follows; no other level is."""
     clean, found = (fitted(campaign) for campaign in (measured(plan=SHARED), level_too_stiff(measured(plan=SHARED))))
-    quiet, chance = faults(clean, 0.998)  # type: ignore[arg-type]
-    loud, _ = faults(found, 0.998)  # type: ignore[arg-type]
+    quiet, chance, _ = faults(clean, 0.998)  # type: ignore[arg-type]
+    loud, *_ = faults(found, 0.998)  # type: ignore[arg-type]
     best = max(loud, key=lambda fault: fault.worth)
     print(
         f"{best.suspect.words}: {100 * best.size:.1f} %, gain {best.gain:.0f}; clean {max(f.gain for f in quiet):.1f}"

@@ -11,7 +11,7 @@ from rigged import SHARED, Fitted, Measured
 
 from bushfit.diagnosis.evidence import EVALUATIONS, Evidence, fit
 from bushfit.diagnosis.propose import Proposal, proposals
-from bushfit.diagnosis.refit import EXCLUDED, Candidate, near_its_end, raced, refits
+from bushfit.diagnosis.refit import EXCLUDED, Candidate, comes_below, near_its_end, raced, refits
 from bushfit.effects.contract import Array
 from bushfit.fitting.descent import Descent
 
@@ -120,3 +120,13 @@ def test_a_refit_that_came_near_is_left_where_its_pace_will_not_bring_it_to_the_
     evaluations = {name: each.evaluations for name, each in ends.items()}
     assert evaluations["creeps"] < 20
     assert evaluations["comes"] == EVALUATIONS
+
+
+def test_whether_a_fit_comes_below_a_goal() -> None:
+    """A hundred above it, by one an evaluation: asked until it is there, may not be expected to, or took too long."""
+    slow, quick = cast(Descent, Falling(1100.0, 1.0)), cast(Descent, Falling(1100.0, 10.0))
+    assert comes_below(quick, 1000.0)
+    assert not comes_below(slow, 1000.0)
+    assert not comes_below(replace(quick, expected_fall=1.0), 1000.0)
+    assert comes_below(replace(quick, converged=True), 1101.0)
+    assert not comes_below(replace(quick, converged=True), 1100.0)

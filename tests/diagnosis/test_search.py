@@ -102,7 +102,8 @@ def test_chance_alone_names_nothing_however_small_a_gap_counts(measured: Measure
 def test_a_search_made_again_passes_over_what_fell_far_behind(measured: Measured, fitted: Fitted) -> None:
     plain = fitted(measured(INERTIA, SHARED))
     whole = Search.begin(plain, Settings(), plain.model.values, (), {})
-    again = whole.without_part(plain, 3)
+    again = whole.without_part(plain, 1)
+    assert again.settings.max_effects == 1 < whole.settings.max_effects
     foremost = {claim.name for claim in whole.first.proposed[:3]}
     behind = {candidate.name for candidate in whole.first.tried if candidate.left} - foremost
     assert behind
