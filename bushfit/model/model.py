@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial, reduce
+from functools import cached_property, partial, reduce
 from itertools import groupby
 from types import MappingProxyType
 from typing import Any, Literal, cast
@@ -10,26 +10,14 @@ from typing import Any, Literal, cast
 import numpy as np
 
 from bushfit import geometry
-from bushfit.effects import (
-    BASE,
-    LIBRARY,
-    Branch,
-    Effect,
-    Layer,
-    Level,
-    Modifier,
-    Parameter,
-    Setting,
-    effect_named,
-    qualified,
-    twins_of,
-)
+from bushfit.effects import BASE, Branch, Effect, Layer, Level, Parameter, Setting, effect_named, qualified, twins_of
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Condition, ForceBelow, StiffnessBelow, Values
 from bushfit.effects.history import History
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import STRAINING, Bushing, Direction, Place
+from bushfit.model.structure import Structure
 from bushfit.units import for_people
 
 #: What records a response: a sweep or a loop, which may have force chains of their own.
@@ -37,49 +25,6 @@ Kind = Literal["sweep", "loop"]
 
 #: Names of the paper's five parameters.
 FIVE = tuple(parameter.name for name in BASE for parameter in effect_named(name).parameters)
-
-
-@dataclass(frozen=True)
-class _Structure:
-    """The effects of a model by kind, and their parameters; the same for all models with these effects.
-
-    Args:
-        fading: the linear branches that fade with memory, whose steady answers add up harmonic by harmonic.
-        others: the branches that do not.
-    """
-
-    records: tuple[Effect, ...]
-    parameters: Mapping[str, Parameter]
-    branches: tuple[Branch, ...]
-    modifiers: tuple[Modifier, ...]
-    layers: tuple[Layer, ...]
-    fading: tuple[Branch, ...]
-    others: tuple[Branch, ...]
-
-    @classmethod
-    @lru_cache(maxsize=256)
-    def of(cls, names: tuple[str, ...]) -> "_Structure":
-        """The structure of a model with these effects, in any order; kept, because a fit makes thousands of models."""
-        doubles = {name for name in names if names.count(name) > 1}
-        if doubles:
-            raise ModelError("an effect is listed twice", found=", ".join(sorted(doubles)))
-        place = {name.partition(".")[0]: place for place, name in enumerate(LIBRARY)}
-        known = map(effect_named, names)
-        order = sorted(
-            known, key=lambda effect: (effect.level, place.get(effect.name.partition(".")[0], len(place)), effect.name)
-        )
-        records = tuple(order)
-        return cls(
-            records,
-            MappingProxyType(
-                {qualified(effect, parameter): parameter for effect in records for parameter in effect.parameters}
-            ),
-            tuple(effect for effect in records if isinstance(effect, Branch)),
-            tuple(effect for effect in records if isinstance(effect, Modifier)),
-            tuple(effect for effect in records if isinstance(effect, Layer)),
-            tuple(effect for effect in records if isinstance(effect, Branch) and effect.size),
-            tuple(effect for effect in records if isinstance(effect, Branch) and not effect.size),
-        )
 
 
 @dataclass(frozen=True)
@@ -120,8 +65,8 @@ class Model:
         return Model, (self.bushing, self.effects, dict(self.values), self.unnamed)
 
     @cached_property
-    def _structure(self) -> _Structure:
-        return _Structure.of(self.effects)
+    def _structure(self) -> Structure:
+        return Structure.of(self.effects)
 
     @property
     def records(self) -> tuple[Effect, ...]:
