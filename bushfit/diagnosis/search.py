@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence, fit, fit_from
+from bushfit.diagnosis.faults import Faults, faults
 from bushfit.diagnosis.propose import Proposal, proposals
 from bushfit.diagnosis.record import Settings
 from bushfit.diagnosis.refit import EXCLUDED, Candidate, can_reach, near_its_end, refits
@@ -170,6 +171,14 @@ class Search:
     ) -> Search:
         """A search that has scored every effect of the library once, and refitted the best."""
         return cls(settings, start, tuple(held), bounds, earlier=earlier, most_of_level=most_of_level)._begun(base)
+
+    @cached_property
+    def _base_faults(self) -> Faults:
+        return faults(self.base, CHANCE_LEVEL)
+
+    def faults(self, evidence: Evidence) -> Faults:
+        """Every single place that could be at fault beside a fitted model; of the model as it came they are kept."""
+        return self._base_faults if evidence is self.base else faults(evidence, CHANCE_LEVEL)
 
     def anew(self, base: Evidence) -> Search:
         """The same search from another fit, of the same tests or of tests read anew."""

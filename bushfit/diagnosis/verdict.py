@@ -9,7 +9,7 @@ from bushfit.diagnosis.again import searched_again
 from bushfit.diagnosis.described import describe
 from bushfit.diagnosis.document import Description, Verdict
 from bushfit.diagnosis.evidence import Evidence, fit, result_of
-from bushfit.diagnosis.faults import Fault, faults
+from bushfit.diagnosis.faults import Fault
 from bushfit.diagnosis.form import other_form
 from bushfit.diagnosis.holdout import HoldOut, hold_out
 from bushfit.diagnosis.leads import leads
@@ -259,7 +259,7 @@ def worst_fault(search: Search, evidence: Evidence) -> Fault | None:
     Where few levels tell the errors of levels, chance has no end: a level that is off by more than a rig of the class
     makes it then has to be more than chance were these errors known.
     """
-    told = faults(evidence, CHANCE_LEVEL)
+    told = search.faults(evidence)
 
     def is_real(fault: Fault) -> bool:
         of_no_rig = fault.suspect.kind == "level" and fault.size > search.most_of_level

@@ -12,12 +12,11 @@ import numpy as np
 from bushfit.diagnosis.claims import adopted
 from bushfit.diagnosis.condense import condensed
 from bushfit.diagnosis.evidence import Evidence, fit_from
-from bushfit.diagnosis.faults import faults
 from bushfit.diagnosis.locate import largest_smooth_misfit
 from bushfit.diagnosis.mistakes import mistaken
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.refit import can_reach
-from bushfit.diagnosis.search import CHANCE_LEVEL, Search
+from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import consistent, find_remainder, is_consistent, judge
 from bushfit.effects import effect_named, qualified
 from bushfit.effects.mistakes import candidate_named, mistake_named
@@ -132,21 +131,21 @@ def _errors_beside(searched: _Searched, data: Data) -> LevelErrors | None:
     Notes:
         Effects were chosen among many, in many shapes, and each such choice gains 2 ln(shapes) by chance.
     """
-    first, best = searched.search.first, searched.best
+    search, first, best = searched.search, searched.search.first, searched.best
     if best is None:
         return None
-    beside, alone = _level_errors(best, data), _level_errors(first.evidence, data)
+    beside, alone = _level_errors(best, search, data), _level_errors(first.evidence, search, data)
     shapes = sum(len(claim.columns) for claim in first.proposed)
     ahead = first.evidence.bic - best.bic + beside.gain - alone.gain
     found = alone if alone.matters and ahead < 2.0 * np.log(max(shapes, 1)) * len(searched.added) else beside
     return found if found.matters else None
 
 
-def _level_errors(evidence: Evidence, data: Data) -> LevelErrors:
+def _level_errors(evidence: Evidence, search: Search, data: Data) -> LevelErrors:
     """Errors of each level that would explain what a model leaves, but for what the worst single level makes of it
     where that is more than such errors do."""
     absorbed, most = evidence.solution.jacobian, largest_level_error(data.campaign.rig)
-    levels = [fault for fault in faults(evidence, CHANCE_LEVEL).places if fault.suspect.kind != "repeat"]
+    levels = [fault for fault in search.faults(evidence).places if fault.suspect.kind != "repeat"]
     worst = max(levels, key=lambda fault: fault.worth, default=None)
     if worst and worst.size > _MOST_ERRORS * max(most):
         absorbed = np.concatenate((absorbed, worst.suspect.columns))
