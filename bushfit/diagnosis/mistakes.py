@@ -52,7 +52,8 @@ def mistaken(search: Search, data: Data, fitted: Fitted) -> Diagnosis | None:
     rivals = {effect.name: effect.evidence.bic} if effect else {}
     rivals |= {f"fault: {fault.suspect.words}": search.base.bic - fault.worth} if fault else {}
     weighed = _weighed(search, data, fitted, min(rivals.values(), default=search.base.bic) + SAME)
-    closing = [one for one in weighed if one.bic < weighed[0].bic + SAME and _closes(one.evidence, search)]
+    near = (one for one in weighed if one.bic < weighed[0].bic + SAME and _taken(search, one) > search.first.critical)
+    closing = [one for one in near if _closes(one.evidence, search)]
     if not closing:
         return None
     free = (effect.name,) if effect and _frees(effect, closing[0].claim) else ()
@@ -105,8 +106,13 @@ def _named(
     ]
 
 
+def _taken(search: Search, one: Weighed) -> float:
+    """What a claim takes off chi-square: to be believed, more than chance makes of the best effect."""
+    return search.base.chi_square - one.evidence.chi_square
+
+
 def _gain(search: Search, one: Weighed) -> str:
-    return f"takes {search.base.chi_square - one.evidence.chi_square:.0f} off chi-square without a parameter"
+    return f"takes {_taken(search, one):.0f} off chi-square without a parameter"
 
 
 def _told(search: Search, data: Data, one: Weighed, behind: Sequence[Weighed], richer: Sequence[str]) -> Diagnosis:
@@ -150,9 +156,10 @@ def _judged(search: Search, data: Data, weighed: Sequence[Weighed], closing: Seq
     """Every claim that was refitted, and why it won or lost."""
     base, judged = search.base, []
     for one in weighed:
-        gain = base.chi_square - one.evidence.chi_square
+        gain = _taken(search, one)
         far = one.evidence.chi_square > weighed[0].evidence.chi_square + EXCLUDED
         lost = "far behind the best of the record" if far else "does not close the gap, or an effect does better"
+        lost = lost if gain > search.first.critical else "gains no more than chance alone can"
         why = "closes the gap" if one in closing else lost
         held = hold_out(base, one.evidence, search.bounds).after
         judged.append(Judged(" + ".join(one.claim.labels(data)), gain, gain, base.bic - one.bic, held, {}, why))
