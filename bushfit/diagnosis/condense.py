@@ -1,5 +1,5 @@
-"""Long sweeps in means over narrow bands, and of very many levels some: a diagnosis asks for every point of a campaign
-thousands of times, and for every level as often."""
+"""Long sweeps in means over narrow bands, and of very many levels or loops some: a diagnosis asks for every point of a
+campaign thousands of times, and for every level as often."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ import numpy as np
 from bushfit.campaign.schema import RigSettings
 from bushfit.effects.contract import Array, Circumstances
 from bushfit.fitting.data import Data
-from bushfit.fitting.data_sets import SweepData
+from bushfit.fitting.data_sets import LoopData, SweepData, repeats_of, with_gain_errors
 from bushfit.fitting.noise import LineKey, SweepNoise, sweep_noise
 from bushfit.reading.measurement import Sweep
 
@@ -20,6 +20,8 @@ _LONG = 400
 _BANDS = 100
 #: Lines of a sweep, levels mostly, that are looked at; chosen for time: each is searched without.
 _MOST_LINES = 40
+#: Rows of all loops together that are looked at; chosen for memory: hundreds of shapes of effects change each.
+_MOST_ROWS = 200_000
 
 
 class _Means(NamedTuple):
@@ -38,16 +40,19 @@ class _Means(NamedTuple):
 
 
 def condensed(data: Data) -> tuple[Data, tuple[str, ...]]:
-    """The same tests with long runs of sweeps in means over narrow bands, of very many lines some, evenly spread; and a
-    sentence on each sweep that this changes.
+    """The same tests with long runs of sweeps in means over narrow bands, of very many lines, or rows of loops, some,
+    evenly spread; and a sentence on each sweep that this changes, and one on the loops.
 
     Rows without weight are in no mean. The noise from point to point of a line in means is theirs, estimated anew; what
     runs share stays as it was.
     """
+    rig, loops, said = data.campaign.rig, _some(data.loops), tuple[str, ...]()
+    if len(loops) < len(data.loops):
+        data, every = replace(data, loops=tuple(with_gain_errors(loops, rig))), len(data.loops)
+        said = (f"{len(loops)} of the {every} loops are diagnosed, repeats last, evenly spread",)
     made = {data_set: means for data_set in data.sweeps if (means := _told(data_set))}
     if not made:
-        return data, ()
-    rig = data.campaign.rig
+        return data, said
     noises = {
         id(noise): _noise(noise, [means for data_set, means in made.items() if data_set.noise is noise], rig)
         for noise in (data_set.noise for data_set in data.sweeps)
@@ -60,7 +65,21 @@ def condensed(data: Data) -> tuple[Data, tuple[str, ...]]:
             sweeps.append(replace(data_set, sweep=means.sweep, noise=noise, weight=weight, under=means.under))
         else:
             sweeps.append(replace(data_set, noise=noise))
-    return replace(data, sweeps=tuple(sweeps)), tuple(f"{each.sweep.name}: {each.words}" for each in made.values())
+    said += tuple(f"{each.sweep.name}: {each.words}" for each in made.values())
+    return replace(data, sweeps=tuple(sweeps)), said
+
+
+def _some(loops: Sequence[LoopData]) -> Sequence[LoopData]:
+    """The loops whose rows can be looked at: each once before any is repeated, and of too many some, evenly spread."""
+    sizes = np.array([loop.size for loop in loops])
+    if sizes.sum() <= _MOST_ROWS:
+        return loops
+    times_before = np.tril(repeats_of(loops), -1).sum(axis=1)
+    turn = np.argsort(times_before, kind="stable")
+    once = turn[: np.count_nonzero(times_before == 0)]
+    fit = max(int(np.count_nonzero(np.cumsum(sizes[turn]) <= _MOST_ROWS)), 1)
+    chosen = once[np.linspace(0, once.size - 1, fit).round().astype(int)] if fit < once.size else turn[:fit]
+    return [loops[place] for place in np.sort(chosen)]
 
 
 def _noise(before: SweepNoise, made: Sequence[_Means], rig: RigSettings) -> SweepNoise:

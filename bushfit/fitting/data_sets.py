@@ -38,11 +38,15 @@ def with_gain_errors(loops: Sequence[LoopData], stated: RigSettings) -> list[Loo
         All repeats of a loop share it. Independent errors larger by the root of their number leave the mean of the
         repeats, all that tells of the bushing, just as unsure.
     """
+    errors = of_class(stated, (0.0, 0.0))[0] * np.sqrt(np.count_nonzero(repeats_of(loops), axis=1))
+    return [replace(loop, gain_error=error) for loop, error in zip(loops, errors.tolist(), strict=True)]
+
+
+def repeats_of(loops: Sequence[LoopData]) -> Array:
+    """Which loops repeat which, themselves among them, (n, n) bool."""
     at = np.log([(loop.drive.amplitude, loop.drive.frequency) for loop in loops]).reshape(-1, 2)
     place = np.array([str(loop.direction) for loop in loops])
-    repeats = np.all(np.abs(at[:, None] - at) <= _SAME_LOOP, axis=-1) & (place[:, None] == place)
-    errors = of_class(stated, (0.0, 0.0))[0] * np.sqrt(np.count_nonzero(repeats, axis=1))
-    return [replace(loop, gain_error=error) for loop, error in zip(loops, errors.tolist(), strict=True)]
+    return np.all(np.abs(at[:, None] - at) <= _SAME_LOOP, axis=-1) & (place[:, None] == place)
 
 
 def sweep_data(

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.condense import condensed
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects.contract import Array
@@ -223,3 +224,27 @@ def test_means_that_a_robust_fit_leaves_out_are_told() -> None:
     assert told == "swept: 1 of these points left out, farther off than noise"
     as_it_was = replace(robust.campaign, sweeps=(sweep,))
     assert not any("left out" in note for note in diagnose(Data.of(as_it_was)).notes)
+
+
+def test_of_very_many_rows_of_loops_each_loop_once_is_diagnosed_before_any_is_repeated(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Three loops, the first of them four times."""
+    campaign = load_campaign(Path("configs/cmp_15961.toml"))
+    (loop,) = campaign.loops
+    sizes = (1.0, 1.0, 0.5, 1.0, 1.0, 0.2)
+    loops = tuple(
+        replace(loop, name=f"loop_{number}", displacement=size * loop.displacement, force=size * loop.force)
+        for number, size in enumerate(sizes)
+    )
+    data = Data.of(replace(campaign, loops=loops, rig=RigSettings(gain_error=0.01)))
+    assert condensed(data)[1] == ()
+    most = {4: (0, 1, 2, 5), 3: (0, 2, 5), 2: (0, 5)}
+    for fit, kept in most.items():
+        monkeypatch.setattr("bushfit.diagnosis.condense._MOST_ROWS", fit * data.loops[0].size)
+        fewer, said = condensed(data)
+        assert [each.name for each in fewer.loops] == [f"loop_{number}" for number in kept]
+        assert said == (f"{fit} of the 6 loops are diagnosed, repeats last, evenly spread",)
+        assert fewer.sweeps == data.sweeps
+        once = sum(sizes[number] == 1.0 for number in kept)
+        assert fewer.loops[0].gain_error == pytest.approx(0.01 * np.sqrt(once))
