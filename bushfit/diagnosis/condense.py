@@ -40,8 +40,8 @@ class _Means(NamedTuple):
 
 
 def condensed(data: Data) -> tuple[Data, tuple[str, ...]]:
-    """The same tests with long runs of sweeps in means over narrow bands, of very many lines, or rows of loops, some,
-    evenly spread; and a sentence on each sweep that this changes, and one on the loops.
+    """The same tests with long runs of sweeps in means over narrow bands, and of very many lines of a sweep, or rows of
+    loops, only some lines or loops; and a sentence on each sweep that this changes, and one on the loops.
 
     Rows without weight are in no mean. The noise from point to point of a line in means is theirs, estimated anew; what
     runs share stays as it was.
@@ -49,7 +49,7 @@ def condensed(data: Data) -> tuple[Data, tuple[str, ...]]:
     rig, loops, said = data.campaign.rig, _some(data.loops), tuple[str, ...]()
     if len(loops) < len(data.loops):
         data, every = replace(data, loops=tuple(with_gain_errors(loops, rig))), len(data.loops)
-        said = (f"{len(loops)} of the {every} loops are diagnosed, repeats last, evenly spread",)
+        said = (f"{len(loops)} of the {every} loops are diagnosed: together they have more than {_MOST_ROWS} rows",)
     made = {data_set: means for data_set in data.sweeps if (means := _told(data_set))}
     if not made:
         return data, said
@@ -70,16 +70,29 @@ def condensed(data: Data) -> tuple[Data, tuple[str, ...]]:
 
 
 def _some(loops: Sequence[LoopData]) -> Sequence[LoopData]:
-    """The loops whose rows can be looked at: each once before any is repeated, and of too many some, evenly spread."""
+    """Of loops with too many rows those that can be looked at, one of each direction at the least.
+
+    Each comes once before any is repeated; of too many that differ some, evenly spread over direction, amplitude and
+    frequency.
+    """
     sizes = np.array([loop.size for loop in loops])
     if sizes.sum() <= _MOST_ROWS:
         return loops
+    at = [(str(loop.direction), loop.drive.amplitude, loop.drive.frequency) for loop in loops]
     times_before = np.tril(repeats_of(loops), -1).sum(axis=1)
-    turn = np.argsort(times_before, kind="stable")
-    once = turn[: np.count_nonzero(times_before == 0)]
-    fit = max(int(np.count_nonzero(np.cumsum(sizes[turn]) <= _MOST_ROWS)), 1)
-    chosen = once[np.linspace(0, once.size - 1, fit).round().astype(int)] if fit < once.size else turn[:fit]
-    return [loops[place] for place in np.sort(chosen)]
+    once = sorted(np.flatnonzero(times_before == 0).tolist(), key=at.__getitem__)
+    again = [n for n in np.argsort(times_before, kind="stable").tolist() if times_before[n]]
+    of_each = {next(n for n in once if at[n][0] == direction) for direction, *_ in at}
+
+    def fit(chosen: set[int]) -> bool:
+        return bool(sizes[list(chosen)].sum() <= _MOST_ROWS)
+
+    steps = (np.linspace(0, len(once) - 1, count).round().astype(int) for count in range(len(once), 0, -1))
+    chosen = next(filter(fit, (of_each | {once[n] for n in step} for step in steps)), of_each)
+    for n in again if len(chosen) == len(once) else ():
+        if fit(chosen | {n}):
+            chosen = chosen | {n}
+    return [loops[n] for n in sorted(chosen)]
 
 
 def _noise(before: SweepNoise, made: Sequence[_Means], rig: RigSettings) -> SweepNoise:

@@ -12,7 +12,7 @@ from bushfit.diagnosis.holdout import hold_out
 from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.record import Diagnosis, Judged, Named
 from bushfit.diagnosis.refit import EXCLUDED, Candidate
-from bushfit.diagnosis.search import SAME, Search
+from bushfit.diagnosis.search import SAME, Search, critical_gain
 from bushfit.diagnosis.verdict import finish, is_consistent, worst_fault
 from bushfit.effects import effect_named, qualified
 from bushfit.errors import FitError, ModelError
@@ -47,12 +47,14 @@ def mistaken(search: Search, data: Data, fitted: Fitted) -> Diagnosis | None:
         Two effects cost more by BIC than a claim and the margin by which candidates count as one set, and a claim that
         closes the gap leaves nothing that they could gain: so it need only be weighed against single effects. One whose
         free factor makes the claim at one value has to be better by the margin: else the claim is the simpler name.
+        Where a gap is slight, a claim may close it by chance: it has to gain more than chance makes of the best effect.
     """
     fault, effect = worst_fault(search, search.base), search.first.real
     rivals = {effect.name: effect.evidence.bic} if effect else {}
     rivals |= {f"fault: {fault.suspect.words}": search.base.bic - fault.worth} if fault else {}
     weighed = _weighed(search, data, fitted, min(rivals.values(), default=search.base.bic) + SAME)
-    near = (one for one in weighed if one.bic < weighed[0].bic + SAME and _taken(search, one) > search.first.critical)
+    chance = critical_gain(search.base, search.first.proposed, known=True) if search.first.proposed else 0.0
+    near = (one for one in weighed if one.bic < weighed[0].bic + SAME and _taken(search, one) > chance)
     closing = [one for one in near if _closes(one.evidence, search)]
     if not closing:
         return None
@@ -64,7 +66,7 @@ def mistaken(search: Search, data: Data, fitted: Fitted) -> Diagnosis | None:
         told = _doubtful(search, data, closing, others)
     else:
         told = _told(search, data, closing[0], [one for one in weighed if one is not closing[0]], free)
-    candidates = [*told.candidates, *_judged(search, data, weighed, closing)]
+    candidates = [*told.candidates, *_judged(search, data, weighed, closing, chance)]
     return replace(told, candidates=tuple(sorted(candidates, key=lambda judged: -judged.score)))
 
 
@@ -107,7 +109,7 @@ def _named(
 
 
 def _taken(search: Search, one: Weighed) -> float:
-    """What a claim takes off chi-square: to be believed, more than chance makes of the best effect."""
+    """What a claim takes off chi-square."""
     return search.base.chi_square - one.evidence.chi_square
 
 
@@ -152,14 +154,17 @@ def _doubtful(search: Search, data: Data, closing: Sequence[Weighed], others: Se
     )
 
 
-def _judged(search: Search, data: Data, weighed: Sequence[Weighed], closing: Sequence[Weighed]) -> list[Judged]:
-    """Every claim that was refitted, and why it won or lost."""
+def _judged(
+    search: Search, data: Data, weighed: Sequence[Weighed], closing: Sequence[Weighed], chance: float
+) -> list[Judged]:
+    """Every claim that was refitted, and why it won or lost; `chance` alone can make so much."""
     base, judged = search.base, []
     for one in weighed:
         gain = _taken(search, one)
         far = one.evidence.chi_square > weighed[0].evidence.chi_square + EXCLUDED
-        lost = "far behind the best of the record" if far else "does not close the gap, or an effect does better"
-        lost = lost if gain > search.first.critical else "gains no more than chance alone can"
+        lost = "does not close the gap, or an effect does better"
+        lost = lost if gain > chance else f"gain below {number(chance, 3)}, which chance alone can make"
+        lost = "far behind the best of the record" if far else lost
         why = "closes the gap" if one in closing else lost
         held = hold_out(base, one.evidence, search.bounds).after
         judged.append(Judged(" + ".join(one.claim.labels(data)), gain, gain, base.bic - one.bic, held, {}, why))

@@ -368,8 +368,9 @@ def _added(name: str, current: Evidence, without: Evidence) -> Candidate:
     return Candidate(name, current, without.chi_square - current.chi_square)
 
 
-def critical_gain(evidence: Evidence, proposed: Sequence[Proposal]) -> float:
-    """The gain that the best of all candidates makes of noise alone, with probability 1 - CHANCE_LEVEL."""
+def critical_gain(evidence: Evidence, proposed: Sequence[Proposal], *, known: bool = False) -> float:
+    """The gain that the best of all candidates makes of noise alone, with probability 1 - CHANCE_LEVEL; with errors of
+    levels taken as known, or as few levels tell them."""
     if not proposed:
         return float("inf")
     columns = np.concatenate([proposal.columns for proposal in proposed])
@@ -379,7 +380,7 @@ def critical_gain(evidence: Evidence, proposed: Sequence[Proposal]) -> float:
         each = [own] if proposal.together else np.split(own, len(own))
         groups += each
         senses += [proposal.sense] * len(each)
-    return ScoreTest(evidence, columns, groups, SENSITIVITY_LEFT).largest_by_chance(CHANCE_LEVEL, senses)
+    return ScoreTest(evidence, columns, groups, SENSITIVITY_LEFT).largest_by_chance(CHANCE_LEVEL, senses, known=known)
 
 
 def footprint(before: Evidence, after: Evidence) -> float:

@@ -226,25 +226,32 @@ def test_means_that_a_robust_fit_leaves_out_are_told() -> None:
     assert not any("left out" in note for note in diagnose(Data.of(as_it_was)).notes)
 
 
+@pytest.mark.parametrize(
+    ("most", "kept"),
+    [(6.0, "012345"), (5.0, "01235"), (4.1, "0125"), (3.2, "015"), (2.2, "15"), (0.1, "15")],
+)
 def test_of_very_many_rows_of_loops_each_loop_once_is_diagnosed_before_any_is_repeated(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, most: float, kept: str
 ) -> None:
-    """Three loops, the first of them four times."""
+    """Three that differ, one of them radial and of a third as many rows, and three repeats of one."""
     campaign = load_campaign(Path("configs/cmp_15961.toml"))
     (loop,) = campaign.loops
-    sizes = (1.0, 1.0, 0.5, 1.0, 1.0, 0.2)
+    once = loop.at(slice(0, loop.time.size // 3 + 1))  # of three cycles
+    made = [(loop, 1.0, 0), (loop, 0.5, 0), (loop, 1.0, 0), (loop, 1.0, 0), (loop, 1.0, 0), (once, 1.0, 1)]
+    directions = Direction.AXIAL, Direction.RADIAL
     loops = tuple(
-        replace(loop, name=f"loop_{number}", displacement=size * loop.displacement, force=size * loop.force)
-        for number, size in enumerate(sizes)
+        replace(
+            of, name=f"{n}", displacement=size * of.displacement, force=size * of.force, direction=directions[place]
+        )
+        for n, (of, size, place) in enumerate(made)
     )
     data = Data.of(replace(campaign, loops=loops, rig=RigSettings(gain_error=0.01)))
     assert condensed(data)[1] == ()
-    most = {4: (0, 1, 2, 5), 3: (0, 2, 5), 2: (0, 5)}
-    for fit, kept in most.items():
-        monkeypatch.setattr("bushfit.diagnosis.condense._MOST_ROWS", fit * data.loops[0].size)
-        fewer, said = condensed(data)
-        assert [each.name for each in fewer.loops] == [f"loop_{number}" for number in kept]
-        assert said == (f"{fit} of the 6 loops are diagnosed, repeats last, evenly spread",)
-        assert fewer.sweeps == data.sweeps
-        once = sum(sizes[number] == 1.0 for number in kept)
-        assert fewer.loops[0].gain_error == pytest.approx(0.01 * np.sqrt(once))
+    monkeypatch.setattr("bushfit.diagnosis.condense._MOST_ROWS", most * data.loops[0].size)
+    fewer, said = condensed(data)
+    assert "".join(each.name for each in fewer.loops) == kept
+    assert len(said) == (len(kept) < 6)
+    assert all(f"{len(kept)} of the 6 loops are diagnosed" in words for words in said)
+    assert fewer.sweeps == data.sweeps
+    whole = sum(made[int(name)][1] == 1.0 and made[int(name)][2] == 0 for name in kept)
+    assert fewer.loops[0].gain_error == pytest.approx(0.01 * np.sqrt(whole if kept[0] != "1" else 1))

@@ -13,7 +13,6 @@ from rigged import SHARED, Diagnosed, Measured
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import adopted
-from bushfit.diagnosis.search import Round
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.errors import ModelError
 from bushfit.fitting.data import Data
@@ -94,7 +93,7 @@ def test_a_mistake_has_to_gain_more_than_chance_makes_of_the_best_effect(
     campaign = MADE[AXIAL](measured(None, SHARED))
     named = asked(campaign)
     before, after = (evidence.chi_square for evidence in (named.before, named.after))
-    monkeypatch.setattr(Round, "critical", share * (before - after))
+    monkeypatch.setattr("bushfit.diagnosis.mistakes.critical_gain", lambda *_, **__: share * (before - after))
     diagnosis = asked(campaign)
     assert (AXIAL in [effect.label for effect in diagnosis.effects]) == (share < 1.0)
 
