@@ -47,13 +47,15 @@ def mistaken(search: Search, data: Data, fitted: Fitted) -> Diagnosis | None:
         Two effects cost more by BIC than a claim and the margin by which candidates count as one set, and a claim that
         closes the gap leaves nothing that they could gain: so it need only be weighed against single effects. One whose
         free factor makes the claim at one value has to be better by the margin: else the claim is the simpler name.
-        Where a gap is slight, a claim may close it by chance: it has to gain more than chance makes of the best effect.
+        Where a gap is slight, a claim may close it by chance: it has to gain more than chance makes of the best effect,
+        if these tests could show any.
     """
     fault, effect = worst_fault(search, search.base), search.first.real
     rivals = {effect.name: effect.evidence.bic} if effect else {}
     rivals |= {f"fault: {fault.suspect.words}": search.base.bic - fault.worth} if fault else {}
     weighed = _weighed(search, data, fitted, min(rivals.values(), default=search.base.bic) + SAME)
-    chance = critical_gain(search.base, search.first.proposed, known=True) if search.first.proposed else 0.0
+    largest = critical_gain(search.base, search.first.proposed, known=True)
+    chance = largest if np.isfinite(largest) else 0.0
     near = (one for one in weighed if one.bic < weighed[0].bic + SAME and _taken(search, one) > chance)
     closing = [one for one in near if _closes(one.evidence, search)]
     if not closing:

@@ -98,6 +98,15 @@ def test_a_mistake_has_to_gain_more_than_chance_makes_of_the_best_effect(
     assert (AXIAL in [effect.label for effect in diagnosis.effects]) == (share < 1.0)
 
 
+def test_a_mistake_is_named_where_no_effect_may_be(measured: Measured) -> None:
+    """There is no best effect then, of which chance could make something."""
+    campaign = MADE[AXIAL](measured(None, SHARED))
+    every = [judged.name for judged in asked(campaign).candidates if ":" not in judged.name]
+    diagnosis = asked(campaign, without=tuple(every))
+    assert not {judged.name for judged in diagnosis.candidates} & {*every}
+    assert [effect.label for effect in diagnosis.effects] == [AXIAL]
+
+
 def test_what_cannot_be_told_apart_is_ambiguous(measured: Measured) -> None:
     """Loops in kgf, or sweeps multiplied by 9.81 once too often: the same ratio."""
     made = on_loops(lambda x: replace(x, force=x.force / 9.80665), 0, 1)
