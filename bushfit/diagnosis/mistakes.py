@@ -54,6 +54,8 @@ def mistaken(search: Search, data: Data, fitted: Fitted) -> Diagnosis | None:
     rivals = {effect.name: effect.evidence.bic} if effect else {}
     rivals |= {f"fault: {fault.suspect.words}": search.base.bic - fault.worth} if fault else {}
     weighed = _weighed(search, data, fitted, min(rivals.values(), default=search.base.bic) + SAME)
+    if not weighed:
+        return None
     largest = critical_gain(search.base, search.first.proposed, known=True)
     chance = largest if np.isfinite(largest) else 0.0
     near = (one for one in weighed if one.bic < weighed[0].bic + SAME and _taken(search, one) > chance)

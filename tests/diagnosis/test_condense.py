@@ -231,10 +231,10 @@ def test_means_that_a_robust_fit_leaves_out_are_told() -> None:
     [(6.0, "012345"), (5.0, "01235"), (4.1, "0125"), (3.2, "015"), (2.2, "15"), (0.1, "15")],
 )
 def test_of_very_many_rows_of_loops_each_loop_once_is_diagnosed_before_any_is_repeated(
-    monkeypatch: pytest.MonkeyPatch, most: float, kept: str
+    root: Path, monkeypatch: pytest.MonkeyPatch, most: float, kept: str
 ) -> None:
     """Three that differ, one of them radial and of a third as many rows, and three repeats of one."""
-    campaign = load_campaign(Path("configs/cmp_15961.toml"))
+    campaign = load_campaign(root / "configs/cmp_15961.toml")
     (loop,) = campaign.loops
     once = loop.at(slice(0, loop.time.size // 3 + 1))  # of three cycles
     made = [(loop, 1.0, 0), (loop, 0.5, 0), (loop, 1.0, 0), (loop, 1.0, 0), (loop, 1.0, 0), (once, 1.0, 1)]

@@ -29,7 +29,6 @@ from rigged import PLAN, SHARED, Diagnosed, Measured, changed
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, ParameterSetting, SimulateSettings
-from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.record import Settings
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import Remainder
@@ -150,21 +149,13 @@ def held(campaign: Campaign, **settings: ParameterSetting) -> Campaign:
 
 @pytest.mark.parametrize("remainder", [Remainder("a real gap stays", None), None], ids=["real", "chance"])
 def test_effects_of_a_model_that_is_far_off_are_not_exchanged(
-    measured: Measured, monkeypatch: pytest.MonkeyPatch, remainder: Remainder | None
+    measured: Measured, monkeypatch: pytest.MonkeyPatch, exchanged: list[Sequence[str]], remainder: Remainder | None
 ) -> None:
     """One of two effects may be added, and 8 % are left: whether that is more than chance decides."""
-    asked_for = list[Sequence[str]]()
-    exchange = Search.exchange
-
-    def counted(search: Search, current: Evidence, added: Sequence[str]) -> tuple[Evidence, list[str]]:
-        asked_for.append(added)
-        return exchange(search, current, added)
-
-    monkeypatch.setattr(Search, "exchange", counted)
     monkeypatch.setattr("bushfit.diagnosis.verdict.leads", lambda _: "")  # which search on their own
     monkeypatch.setattr("bushfit.diagnosis.workflow.find_remainder", lambda *_: remainder)
     diagnosis = asked(measured(TWO, SHARED), max_effects=1)
-    assert bool(asked_for) == (remainder is None)
+    assert bool(exchanged) == (remainder is None)
     assert diagnosis.verdict in ("unexplained", "described", "partly")
 
 
