@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from commandline import Done, call
+from hypothesis import HealthCheck, settings
 
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.effects import BASE
@@ -21,6 +22,13 @@ from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing
 from bushfit.model.model import Model
 from bushfit.model.result import Result
+
+#: Tries of each property: few for a commit, many where CI looks once more (`--hypothesis-profile=full`).
+for name, tries in (("commit", 10), ("full", 100)):
+    settings.register_profile(
+        name, max_examples=tries, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    )
+settings.load_profile("commit")
 
 ROOT = Path(__file__).parents[1]
 TABLE_1 = {"mu": 1.09e6, "m": 2.0e5, "alpha": 0.24, "sigma_fmax": 1.46e4, "eps_half": 1.3e-2}

@@ -7,10 +7,15 @@ import shlex
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from itertools import chain
 from pathlib import Path
 
+import click
 import pytest
+from commandline import Done, call
+
+from bushfit.cli import cli
 
 ROOT = Path(__file__).parents[1]
 #: Every page of the repository.
@@ -74,22 +79,30 @@ def shown_commands(page: str) -> list[tuple[str, list[str]]]:
     return [(command, shown) for command, shown in examples(text) if COMMAND.match(command)]
 
 
+def as_typed(folder: Path, arguments: list[str], shown: list[str]) -> Done:
+    program = str(Path(sys.executable).with_name("bushfit"))
+    done = subprocess.run([program, *arguments], cwd=folder, capture_output=True, check=False, encoding="utf-8")
+    return Done(done.returncode, done.stdout, done.stderr)
+
+
+def without_pictures(folder: Path, arguments: list[str], shown: list[str]) -> Done:
+    """In this process, and without the pictures that the page does not speak of: they take most of the time."""
+    known = cli.get_command(click.Context(cli), arguments[0])
+    draws = known is not None and "no_plots" in {option.name for option in known.params}
+    return call(folder, *arguments, *["--no-plots"] * (draws and ".png" not in "".join(shown)))
+
+
 @pytest.mark.parametrize("page", [page for page in PAGES if shown_commands(page)])
-def test_every_command_of_a_page_runs_and_says_what_is_shown(page: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("run", [without_pictures, pytest.param(as_typed, marks=pytest.mark.slow)])
+def test_every_command_of_a_page_runs_and_says_what_is_shown(
+    page: str, run: Callable[[Path, list[str], list[str]], Done], tmp_path: Path
+) -> None:
     """In order, in a folder that holds the data and campaigns and nothing that another page has made."""
     for name in ("data", "configs"):
         shutil.copytree(ROOT / name, tmp_path / name)
-    program = str(Path(sys.executable).with_name("bushfit"))
     stale = []
     for command, shown in shown_commands(page):
-        done = subprocess.run(
-            [program, *shlex.split(command, comments=True)[1:]],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            check=False,
-            encoding="utf-8",
-        )
+        done = run(tmp_path, shlex.split(command, comments=True)[1:], shown)
         print(f"$ {command} -> {done.returncode}")
         assert done.returncode == status(command), f"$ {command}\n{done.stderr}"
         stale += [f"$ {command}\n{line}" for line in shown if not says(line, done.stdout + done.stderr)]

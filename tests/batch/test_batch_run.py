@@ -296,12 +296,13 @@ def command(folder: Path, *options: str) -> list[str]:
     return [str(Path(sys.executable).with_name("bushfit")), "batch", "many.csv", "-o", str(folder), *options]
 
 
-def test_killed_at_any_moment_and_resumed_it_is_as_if_it_had_run_through(typed: Callable[..., Any], shop: Path) -> None:
+@pytest.mark.parametrize("kills", [1, pytest.param(3, marks=pytest.mark.slow)])
+def test_killed_at_any_moment_and_resumed_it_is_as_if_it_had_run_through(shop: Path, kills: int) -> None:
     (shop / "many.csv").write_text("campaign\n" + "".join(f"bushings/b{n % 5}/bushing.toml\n" for n in range(40)))
     whole = subprocess.run(command(Path("whole"), "-q"), cwd=shop, check=False)
     assert whole.returncode == 0
     draw, kept = random.Random(5), []
-    for wanted in sorted(draw.sample(range(2, 36), 3)):
+    for wanted in sorted(draw.sample(range(2, 36), kills)):
         running = subprocess.Popen(command(Path("killed"), "--resume", "-q"), cwd=shop, stderr=subprocess.DEVNULL)
         while running.poll() is None and sum(1 for _ in (shop / "killed/bushings").glob("*/row.json")) < wanted:
             time.sleep(0.001)

@@ -29,6 +29,8 @@ from bushfit.report.contents import Formats
 from bushfit.simulation.files import to_files
 from bushfit.simulation.measured import simulate
 
+pytestmark = pytest.mark.slow
+
 _PROGRAM = str(Path(sys.executable).with_name("bushfit"))
 _KINDS = 8
 

@@ -21,6 +21,8 @@ from bushfit.reading.encoding import detect
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import Numerals
 
+pytestmark = pytest.mark.slow
+
 _REASON = "the group bench is not installed"
 chardet = pytest.importorskip("chardet", reason=_REASON)
 charset_normalizer = pytest.importorskip("charset_normalizer", reason=_REASON)

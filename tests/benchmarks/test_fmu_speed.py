@@ -13,10 +13,13 @@ from pathlib import Path
 
 import fmpy
 import numpy as np
+import pytest
 from fmus import Running, order_of, wandering, written
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from bushfit.model.model import Model
+
+pytestmark = pytest.mark.slow
 
 #: Communication step [s]: usual in multibody codes, 16 in a cycle of the highest frequency of the motion, 60 Hz.
 STEP = 1e-3

@@ -24,6 +24,8 @@ from bushfit.model.model import Model
 from bushfit.reading.loops import read_loop
 from bushfit.reading.sweeps import read_sweep
 
+pytestmark = pytest.mark.slow
+
 _WHOLE = """
 import json, resource, sys, time
 from pathlib import Path

@@ -40,6 +40,8 @@ from bushfit.prediction import predict
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.scorecard.hidden import hidden_campaign
 
+pytestmark = pytest.mark.slow
+
 #: Cycles and steps of the stepped rig that keep it within 1e-4 of the steady state: m and alpha answer with ten times
 #: that.
 RUN_IN, STEPS = 10, 2048

@@ -17,6 +17,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows bounds 
 
 #: Address space [bytes] and processor time [s] of a command: a fit of the paper's campaign takes a third of each.
 LIMITS = (1_500_000_000, 30)
+FIRST, *REST = BOMBS
 
 
 def bounded(folder: Path, *arguments: str, times: int = 1) -> Done:
@@ -49,7 +50,7 @@ def assert_refused(done: Done, *says: str) -> None:
     assert all(words in done.stderr for words in says), done.stderr
 
 
-@pytest.mark.parametrize("bomb", BOMBS)
+@pytest.mark.parametrize("bomb", [FIRST, *(pytest.param(bomb, marks=pytest.mark.slow) for bomb in REST)])
 def test_workbooks_that_would_fill_the_machine(bomb: str, folder: Path) -> None:
     (folder / "book.xlsx").write_bytes(BOMBS[bomb])
     print(f"{len(BOMBS[bomb])} bytes")
@@ -82,6 +83,7 @@ def test_a_fit_to_runs_of_12_000_points(long_runs: Path) -> None:
     assert json.loads((long_runs / "x" / "dynamic.json").read_text())["fit"]["points"] == 2 * 12_000
 
 
+@pytest.mark.slow
 def test_a_diagnosis_of_runs_of_12_000_points(long_runs: Path) -> None:
     done = bounded(long_runs, "diagnose", "campaign.toml", "-o", "x", "--no-plots", times=2)
     assert done.returncode == 0, done.stderr

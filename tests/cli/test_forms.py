@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -50,9 +51,14 @@ ARGUMENTS = {
 }
 
 
-def having(option: str) -> list[str]:
+#: Commands that take a second or less: of the others a commit sees their files in their own tests.
+QUICK = {"predict", "reduce", "inspect", "export", "compare"}
+
+
+def having(option: str) -> list[Any]:
     commands = {name: cli.get_command(CONTEXT, name) for name in cli.list_commands(CONTEXT)}
-    return [name for name, found in commands.items() if found and option in {each.name for each in found.params}]
+    names = [name for name, found in commands.items() if found and option in {each.name for each in found.params}]
+    return [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in names]
 
 
 @pytest.fixture(scope="module")

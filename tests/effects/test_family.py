@@ -260,6 +260,7 @@ def test_a_late_displacement_is_an_early_force(rng: np.random.Generator) -> None
     assert np.angle(loss[0]) - np.angle(loss[1]) == pytest.approx(2.0 * np.pi * 100.0 * 1e-4)
 
 
+@pytest.mark.slow
 def test_any_two_compose(effect: Effect, rng: np.random.Generator) -> None:
     for other in ADDED:
         if other == effect.name:

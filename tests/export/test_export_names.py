@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import openpyxl
 import pytest
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from readers import abaqus_options, bulk_cards, by_abaqus, by_pynastran, teimorbit
 
@@ -34,13 +34,12 @@ NASTY = [
     "Büchse 套管",
     "   ",
 ]
-SAMPLED = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def nasty(function: Callable) -> Callable:
     for name in NASTY:
         function = example(name=name)(function)
-    return SAMPLED(given(name=st.text(min_size=1, max_size=60))(function))
+    return given(name=st.text(min_size=1, max_size=60))(function)
 
 
 @pytest.fixture(scope="module")

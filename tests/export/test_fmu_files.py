@@ -176,12 +176,16 @@ def test_effects_without_a_law_in_time_are_refused(paper_model: Model, name: str
     assert refused.value.place == name
 
 
+@pytest.fixture(scope="module")
+def plain_names(paper_model: Model) -> list[str]:
+    """Names of the values of the paper's bushing in time."""
+    return [value.name for value in in_time(order_of(paper_model, (Direction.AXIAL,))).values]
+
+
 @pytest.mark.parametrize("name", [name for name, effect in LIBRARY.items() if effect.level is Level.INSTRUMENT])
-def test_effects_of_the_rig_are_left_out(paper_model: Model, name: str) -> None:
+def test_effects_of_the_rig_are_left_out(paper_model: Model, plain_names: list[str], name: str) -> None:
     found = in_time(order_of(paper_model.with_effect(name), (Direction.AXIAL,)))
-    assert [value.name for value in found.values] == [
-        v.name for v in in_time(order_of(paper_model, (Direction.AXIAL,))).values
-    ]
+    assert [value.name for value in found.values] == plain_names
 
 
 def test_what_is_held_is_said_with_its_error(paper_model: Model) -> None:

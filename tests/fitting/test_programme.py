@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bushfit.campaign.schema import SimulatedLoop, SimulateSettings
@@ -188,7 +188,6 @@ def test_amplitudes_that_change_all_the_time_are_refused(paper_model: Model) -> 
         programme(record)
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     st.lists(st.floats(0.1, 2.0), min_size=2, max_size=5),
     st.integers(3, 6),

@@ -14,8 +14,8 @@ from bushfit.campaign.campaign import load_campaign
 from bushfit.errors import BushfitError
 from bushfit.model.file import load_result
 
-#: Fewer of what takes longer: workbooks are read in a process of their own, and a plan is a search.
-EXAMPLES = {"workbook": 15, "report": 60, "plan": 20}
+#: Tries at most of what takes longer: workbooks are read in a process of their own, and a plan is a search.
+MOST = {"workbook": 15, "report": 60, "plan": 20}
 each_target = pytest.mark.parametrize("name", TARGETS)
 
 
@@ -39,11 +39,17 @@ def test_every_seed_has_a_name(name: str) -> None:
     assert [name for name in names if not re.fullmatch(r"[a-z]\w*\.(csv|toml|json|xml|txt)", name)] == []
 
 
+def tried(name: str) -> settings:
+    """As many tries as elsewhere, and of what takes longer no more than MOST."""
+    return settings(max_examples=min(MOST.get(name, 1000), settings.default.max_examples))
+
+
+@pytest.mark.hypothesis
 @each_target
 def test_any_bytes(name: str) -> None:
     run = ready(name)
 
-    @settings(max_examples=EXAMPLES.get(name, 100), deadline=None)
+    @tried(name)
     @given(st.binary(max_size=300) | st.text(max_size=300).map(lambda text: text.encode("utf-8", "surrogatepass")))
     def check(data: bytes) -> None:
         run(data)
@@ -64,11 +70,12 @@ def mutated(draw: st.DrawFn, originals: list[bytes]) -> bytes:
     return data
 
 
+@pytest.mark.hypothesis
 @each_target
 def test_mutated_files(name: str) -> None:
     run = ready(name)
 
-    @settings(max_examples=EXAMPLES.get(name, 200), deadline=None)
+    @tried(name)
     @given(mutated(kept(name)))
     def check(data: bytes) -> None:
         run(data)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bushfit.effects import BASE
@@ -39,7 +39,6 @@ def test_so_many_arms_leave_so_much(band: tuple[float, float], count: int, large
 
 @example(alpha=0.7721080689591432, decades=3.2421875, accuracy=0.002)  # a step of a fit went far beyond numbers
 @given(alpha=st.floats(0.05, 0.95), decades=st.floats(0.5, 4.0), accuracy=st.sampled_from([0.05, 0.01, 0.002]))
-@settings(max_examples=15, deadline=None)
 def test_arms_keep_within_their_error_and_give_off_no_energy(alpha: float, decades: float, accuracy: float) -> None:
     arms = springpot(alpha, (1.0, 10.0**decades), accuracy)
     assert np.all(arms.modulus > 0.0)

@@ -254,6 +254,7 @@ def test_a_plan_after_a_campaign_is_no_blinder(root: Path, hours: float) -> None
     assert not found.notes
 
 
+@pytest.mark.slow
 def test_rivals_stand_beside_what_a_diagnosis_is_sure_of_and_take_few_hours(known: Knowledge) -> None:
     """Simulated tests of a bushing with a plain inertia, and a damping that a lag of the record explains as well."""
     model = known.model.with_effect("inertia", {"inertia.mass": 0.05}).with_effect("viscous", {"viscous.eta": 60.0})

@@ -76,7 +76,13 @@ def test_torsion_counts_in_rad(tmp_path: Path) -> None:
     assert loop.displacement.max() == pytest.approx(np.radians(1.0), rel=1e-2)
 
 
-@pytest.mark.parametrize("lead", ["", "# rig 3\n\n", 'Operator "A"\n', "\ufeff", "Prüfstand 3\n"])
+@pytest.mark.parametrize(
+    "lead",
+    [
+        "# rig 3\n\n",
+        *(pytest.param(lead, marks=pytest.mark.slow) for lead in ("", 'Operator "A"\n', "\ufeff", "Prüfstand 3\n")),
+    ],
+)
 def test_a_large_file_reads_like_a_small_one(lead: str, tmp_path: Path) -> None:
     """5 MB, which pandas reads on all cores; an error late in the file still has its line."""
     count = 300_000

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bushfit.reading.runs import nominal, runs_of
@@ -22,7 +22,6 @@ def swept(amplitudes: np.ndarray, frequencies: np.ndarray, repeats: int, scatter
     return [frequency, meant * (1.0 + scatter * random.uniform(-1.0, 1.0, meant.size)), meant, repeat]
 
 
-@settings(deadline=None)
 @given(st.integers(1, 3), st.sampled_from([0.0, 1e-3, 0.01, 0.03, 0.08]), st.integers(0, 10_000), st.booleans())
 def test_amplitude_sweeps_as_reached_have_their_levels_back(
     repeats: int, scatter: float, seed: int, numbered: bool

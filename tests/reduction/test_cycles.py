@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bushfit.reduction.cycles import (
@@ -113,7 +113,6 @@ def test_a_row_alone_far_off_its_neighbours_is_an_outlier() -> None:
     assert not lone_outliers(time, corner).any()
 
 
-@settings(max_examples=200, deadline=None)
 @given(st.lists(st.integers(-6, 6), min_size=2, max_size=60), st.integers(1, 6))
 def test_turning_points_alternate_and_stand_out(values: list[int], least: int) -> None:
     series = np.array(values, dtype=float)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from stepped import Stepped, settled, stepped
 
@@ -270,7 +270,6 @@ def test_the_record_in_data_can_be_made_again(paper_model: Model, root: Path) ->
     np.testing.assert_allclose(kept.force, made.force, atol=0.02)
 
 
-@settings(max_examples=100, deadline=None)
 @given(
     frequency=st.floats(1.0, 150.0),
     amplitude=st.floats(1e-6, 1e-2),

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from commandline import call
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from reading_html import LARGEST, NASTY, assert_harmless, change, drawn, loads, parsed
 
@@ -209,7 +209,6 @@ def test_a_large_campaign_stays_small_and_says_what_is_left_out(results: Results
         assert words in text
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_names_do_no_harm(root: Path, data: st.DataObject) -> None:
     """Whatever stands in a text, the page has the same elements and attributes, and says it to the letter."""
@@ -302,7 +301,6 @@ def thinned(results: Results, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_any_cell_may_be_spoiled(thinned: Path, tmp_path_factory: Any, data: st.DataObject) -> None:
     """It is one error, or a page all the same; never another exception."""

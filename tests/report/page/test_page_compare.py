@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from commandline import call
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from reading_html import LARGEST, NASTY, assert_harmless, change, drawn, loads, parsed
 
@@ -94,7 +94,6 @@ def spoiled(value: Any, name: str, key: str = "") -> Any:
     return name if isinstance(value, str) and key in FOREIGN else value
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(name=NASTY)
 def test_names_do_no_harm(compared: Path, name: str) -> None:
     for document in (document_of(compared, each) for each in NAMES):
@@ -154,7 +153,6 @@ def leaves(node: Any) -> Iterator[tuple[Any, Any]]:
         yield from leaves(node[key])
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     name=st.sampled_from(NAMES),
     place=st.integers(0, 10**6),

@@ -160,6 +160,7 @@ def test_same_model_makes_one_column(paper_model: Model, campaign: list[DataSet]
     assert headings(figure)[0].startswith("nothing added")
 
 
+@pytest.mark.slow
 def test_any_set_of_tests_is_drawn_and_nothing_lies_on_another(
     paper_model: Model, heavier: Callable[[float], Model], swept: Swept, looped: Looped
 ) -> None:

@@ -74,7 +74,7 @@ def loops(paper_model: Model, looped: Looped) -> Callable[..., list[LoopData]]:
     return make
 
 
-@pytest.mark.parametrize("count", [2, 8, 40, 300])
+@pytest.mark.parametrize("count", [2, 40, *(pytest.param(count, marks=pytest.mark.slow) for count in (8, 300))])
 def test_sweeps_of_many_amplitudes(paper_model: Model, swept: Swept, count: int) -> None:
     """A line an amplitude, named by a legend as long as that can, else by a colour bar."""
     data_sets = [swept(paper_model, amplitudes=np.geomspace(2e-5, 1e-3, count), repeats=1)]
@@ -150,7 +150,7 @@ def test_rows_of_a_map_are_the_amplitudes_as_long_as_they_fit() -> None:
     assert np.all(np.diff(many) >= 0.0)
 
 
-@pytest.mark.parametrize("count", [2, 8, 40, 300])
+@pytest.mark.parametrize("count", [2, 40, *(pytest.param(count, marks=pytest.mark.slow) for count in (8, 300))])
 def test_many_loops(paper_model: Model, loops: Callable[..., list[LoopData]], count: int) -> None:
     data_sets = loops(count)
     figure = checked(loops_figure(paper_model, data_sets, "mount"))
