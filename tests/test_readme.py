@@ -89,7 +89,7 @@ def without_pictures(folder: Path, arguments: list[str], shown: list[str]) -> Do
     """In this process, and without the pictures that the page does not speak of: they take most of the time."""
     known = cli.get_command(click.Context(cli), arguments[0])
     draws = known is not None and "no_plots" in {option.name for option in known.params}
-    return call(folder, *arguments, *["--no-plots"] * (draws and ".png" not in "".join(shown)))
+    return call(folder, *arguments, *["--no-plots"] * (draws and not re.search(r"\.(png|svg|pdf)\b", "".join(shown))))
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if shown_commands(page)])
