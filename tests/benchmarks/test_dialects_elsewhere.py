@@ -1,6 +1,6 @@
 """How many of the dialects that bushfit reads other libraries read, each left to itself and told what a file is like:
 
-    pytest tests/benchmarks/test_dialects_elsewhere.py -s
+    pytest tests/benchmarks/test_dialects_elsewhere.py -m slow -s
 
 bushfit reads all of them, as tests/reading/test_dialects.py shows.
 """
