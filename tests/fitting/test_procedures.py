@@ -84,7 +84,7 @@ def test_other_bushings_from_one_campaign(
         assert abs(two_step.model.values[parameter] - model.values[parameter]) < 3.5 * stderr
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [NAMES[0], *(pytest.param(name, marks=pytest.mark.slow) for name in NAMES[1:])])
 def test_the_mean_of_20_seeds_is_the_truth(
     rig: Rig, paper_noise: SimulateSettings, models: dict[str, Model], name: str
 ) -> None:

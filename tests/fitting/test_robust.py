@@ -70,6 +70,7 @@ def moved(one: Result, other: Result) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("shared", [False, True])
+@pytest.mark.parametrize("seeds", [2, pytest.param(8, marks=pytest.mark.slow)])
 def test_three_percent_outliers_move_no_parameter_by_a_standard_error(
     rig: Rig,
     paper_noise: SimulateSettings,
@@ -77,9 +78,10 @@ def test_three_percent_outliers_move_no_parameter_by_a_standard_error(
     paper_model: Model,
     kind: str,
     shared: bool,
+    seeds: int,
 ) -> None:
     shifts, found = [], []
-    for seed in range(8):
+    for seed in range(seeds):
         clean = rig(paper_model, shared_noise if shared else paper_noise, seed)
         before, dirty = fit_joint(Data.of(clean)), spoilt_campaign(clean, kind, seed)
         after = robust(dirty)
@@ -120,13 +122,14 @@ def test_an_outlier_of_the_displacement_does_not_disturb_the_motion(
         assert kind == "stuck" or drive.outliers["displacement"].rows.size > 0.8 * SHARE * loop.force.size
 
 
+@pytest.mark.parametrize("seeds", [1, pytest.param(6, marks=pytest.mark.slow)])
 def test_clean_tests_have_no_outliers_and_the_same_answer(
-    rig: Rig, paper_noise: SimulateSettings, shared_noise: SimulateSettings, other_models: dict[str, Model]
+    rig: Rig, paper_noise: SimulateSettings, shared_noise: SimulateSettings, other_models: dict[str, Model], seeds: int
 ) -> None:
     found, shifts = [], []
     for model in other_models.values():
         for noise in (paper_noise, shared_noise):
-            for seed in range(6):
+            for seed in range(seeds):
                 campaign = rig(model, noise, seed)
                 before, after = fit_joint(Data.of(campaign)), robust(campaign)
                 found.append(len(before.outliers) + len(after.outliers))
@@ -198,15 +201,16 @@ def test_an_outlier_of_the_displacement_is_said_to_be_left_out_whatever_the_loss
 
 
 @pytest.mark.parametrize(("factor", "missed"), [(0.7, 0), (1.1, 2)])
+@pytest.mark.parametrize("stride", [5, pytest.param(1, marks=pytest.mark.slow)])
 def test_one_outlier_of_a_short_sweep_without_repeats_is_found_at_any_row(
-    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, factor: float, missed: int
+    rig: Rig, paper_noise: SimulateSettings, paper_model: Model, factor: float, missed: int, stride: int
 ) -> None:
     """Nine points a level leave four degrees of freedom beside the smooth curve, which the outlier bends, at an end
     so far that a small one may hide."""
     short = SimulatedSweep(Direction.AXIAL, (1e-4, 2e-4, 5e-4), tuple(np.linspace(5.0, 125.0, 9)))
     settings = replace(paper_noise, repeats=1, sweeps=(short,))
-    found = []
-    for row in range(27):
+    found, tried = [], range(0, 27, stride)
+    for row in tried:
         campaign = rig(paper_model, settings, row)
         assert robust(campaign).outliers == ()
         stiffness = campaign.sweeps[0].stiffness.copy()
@@ -214,7 +218,7 @@ def test_one_outlier_of_a_short_sweep_without_repeats_is_found_at_any_row(
         dirty = replace(campaign, sweeps=(replace(campaign.sweeps[0], stiffness=stiffness),))
         found.append([entry.row - 1 for entry in robust(dirty).outliers])
     print(f"times {factor}: {sum(map(len, found))} points found of {len(found)}")
-    assert all(rows in ([row], []) for row, rows in enumerate(found))
+    assert all(rows in ([row], []) for row, rows in zip(tried, found, strict=True))
     assert found.count([]) <= missed
 
 

@@ -46,10 +46,11 @@ def radial(bushing: Bushing) -> float:
     return bushing.stiffness_per_modulus(Direction.RADIAL)
 
 
-def test_radial_against_many_digits() -> None:
+@pytest.mark.parametrize("stride", [3, pytest.param(1, marks=pytest.mark.slow)])
+def test_radial_against_many_digits(stride: int) -> None:
     worst = {True: (0.0, ""), False: (0.0, "")}
-    for ratio in RATIOS:
-        for slenderness in LENGTHS:
+    for ratio in RATIOS[::stride]:
+        for slenderness in LENGTHS[::stride]:
             bushing = tube(ratio, slenderness)
             exact = radial_exact(bushing.inner_radius, bushing.outer_radius, bushing.length)
             error = abs(float(radial(bushing) / exact - 1))

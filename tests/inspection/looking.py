@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.geometry import Direction
@@ -22,7 +23,8 @@ NOISE = {
         **{"gain_error": 5e-3, "phase_error": 5e-3},
     },
 }
-SEEDS = 25
+#: Clean campaigns: of a commit, and of all.
+SEEDS = [4, pytest.param(25, marks=pytest.mark.slow)]
 
 
 def plan(**settings: float) -> SimulateSettings:

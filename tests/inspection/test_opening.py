@@ -23,27 +23,29 @@ from bushfit.simulation.undisturbed import Undisturbed
 
 
 @pytest.mark.parametrize("rig", NOISE)
-def test_clean_tests_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str) -> None:
+@pytest.mark.parametrize("seeds", SEEDS)
+def test_clean_tests_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str, seeds: int) -> None:
     raised = []
-    for seed in range(SEEDS):
+    for seed in range(seeds):
         made = measure(clean, plan(seed=seed, **NOISE[rig]))
         for test in (*made.loops, *made.sweeps):
             raised += [f"seed {seed}, {test.name}: {sentence}" for sentence in look(tmp_path, test).looked.odd]
-    print(f"{rig} rig: {len(raised)} sentences over {SEEDS} clean campaigns")
+    print(f"{rig} rig: {len(raised)} sentences over {seeds} clean campaigns")
     assert raised == []
 
 
 @pytest.mark.parametrize("rig", NOISE)
-def test_clean_loops_without_time_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str) -> None:
+@pytest.mark.parametrize("seeds", SEEDS)
+def test_clean_loops_without_time_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str, seeds: int) -> None:
     """Time rebuilt from a noisy motion is uneven at its turning points; rows there are no outliers for it."""
     raised, file = [], tmp_path / "axial.csv"
-    for seed in range(SEEDS):
+    for seed in range(seeds):
         loops = measure(clean, plan(seed=seed, **NOISE[rig])).loops
         for loop, waveform, frequency in zip(loops, ("sine", "triangle"), ("0.1 Hz", "0.2 Hz"), strict=True):
             raw_loop_table(loop).iloc[:, 1:].to_csv(file, index=False)
             seen = inspect(file, {"frequency": frequency, "waveform": waveform})
             raised += [f"seed {seed}, {waveform}: {sentence}" for sentence in seen.looked.odd]
-    print(f"{rig} rig: {len(raised)} sentences over {2 * SEEDS} clean loops without time")
+    print(f"{rig} rig: {len(raised)} sentences over {2 * seeds} clean loops without time")
     assert raised == []
 
 
@@ -154,11 +156,12 @@ def damaged(values: np.ndarray, kind: int, random: np.random.Generator) -> np.nd
     return values
 
 
-def test_damaged_files_are_told_or_refused(root: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("tries", [24, pytest.param(96, marks=pytest.mark.slow)])
+def test_damaged_files_are_told_or_refused(root: Path, tmp_path: Path, tries: int) -> None:
     """Whatever a file holds: a look at it, or one of bushfit's errors; no warning of NumPy's, no other exception."""
     files = "cmp_15961/loop_axial_1.csv", "cmp_15961/sweep_axial.csv", "cmp_15961_raw/stepped_sine_axial.csv"
     told = refused = 0
-    for seed in range(96):
+    for seed in range(tries):
         random = np.random.default_rng(seed)
         table = pd.read_csv(root / "data" / files[seed % 3])
         rows = damaged(table.to_numpy(dtype=float).copy(), seed // 3 % 8, random)
@@ -168,8 +171,8 @@ def test_damaged_files_are_told_or_refused(root: Path, tmp_path: Path) -> None:
         except BushfitError:
             refused += 1
     print(f"{told} told, {refused} refused")
-    assert told > 40
-    assert refused > 25
+    assert told > 0.4 * tries
+    assert refused > 0.25 * tries
 
 
 def test_a_sweep_in_another_dialect(sweep: Sweep, tmp_path: Path) -> None:
