@@ -189,6 +189,7 @@ def test_statuses(bushfit: Run, tmp_path: Path) -> None:
     assert "--force" in refused.stderr
 
 
+@pytest.mark.slow
 def test_a_small_score_card(bushfit: Run, tmp_path: Path) -> None:
     run = bushfit("scorecard", "--campaigns", "5", "--jobs", "1", "-o", str(tmp_path / "x"), "--json")
     assert run.returncode == 0, run.stderr

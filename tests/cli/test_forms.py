@@ -52,7 +52,7 @@ ARGUMENTS = {
 
 
 #: Commands that take a second or less: of the others a commit sees their files in their own tests.
-QUICK = {"predict", "reduce", "inspect", "export", "compare"}
+QUICK = {"predict", "reduce", "export"}
 
 
 def having(option: str) -> list[Any]:

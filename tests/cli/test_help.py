@@ -31,6 +31,7 @@ def examples(text: str) -> list[list[str]]:
     return [line[1:] for line in lines]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_examples_of_the_help_work(typed: Run, root: Path, tmp_path: Path, command: str) -> None:
     for name in ("configs", "data"):

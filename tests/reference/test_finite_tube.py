@@ -66,6 +66,7 @@ def test_against_finite_elements_of_others(agree: Agree, root: Path) -> None:
     agree('radial stiffness with `shape = "calibrated"`, 14 shapes', [digits(calibrated, exact)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inner", [0.15, 10 / 18, 0.9])
 def test_the_middle_of_a_long_tube(inner: float) -> None:
     """Between two lengths the stiffness grows by what the closed form says, Eqs. 8 and 7 being its strain."""
@@ -86,6 +87,7 @@ def test_the_middle_of_a_long_tube(inner: float) -> None:
         assert 1.0 < friction < 1.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [(0.15, 0.1), (0.9, 0.1), (10 / 18, 34 / 18)])
 def test_finer_meshes_change_nothing(shape: tuple[float, float]) -> None:
     coarse, fine, finer = (solve_tube(*shape, fineness=fineness) for fineness in (0.7, 1.0, 1.7))
@@ -134,6 +136,7 @@ def judge(kept: list[tuple[float, float]], *, fineness: float = 1.0) -> None:
     assert strain < 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mu", "error"), [(1e6, 0.005), (1e7, 0.02)])
 def test_a_bulk_modulus_of_2_gpa(mu: float, error: float) -> None:
     """Thick and thin, flat and long tubes: how much less stiff they are than incompressible ones."""

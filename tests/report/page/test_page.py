@@ -192,6 +192,7 @@ def grown(table: pd.DataFrame, column: str, times: int) -> pd.DataFrame:
     return pd.concat([table.assign(**{column: table[column] + f" {n}"}) for n in range(times)], ignore_index=True)
 
 
+@pytest.mark.slow
 def test_a_large_campaign_stays_small_and_says_what_is_left_out(results: Results) -> None:
     contents = read_results(results("mystery_mount"))
     tables = {name: make() for name, make in contents.tables.items()}

@@ -119,7 +119,10 @@ def test_amplitudes_as_each_point_reached_them(paper_model: Model) -> None:
     assert len(figure.axes) == 6, "a row of panels more"
 
 
-@pytest.mark.parametrize("frequencies", [(40.0,), (10.0, 40.0, 100.0), tuple(np.geomspace(5.0, 150.0, 30))])
+@pytest.mark.parametrize(
+    "frequencies",
+    [(40.0,), tuple(np.geomspace(5.0, 150.0, 30)), pytest.param((10.0, 40.0, 100.0), marks=pytest.mark.slow)],
+)
 def test_sweeps_of_the_amplitude(paper_model: Model, frequencies: tuple[float, ...]) -> None:
     """Amplitudes across, logarithmic; a line and a row of the map for each frequency that was held."""
     random = np.random.default_rng(1)
@@ -174,7 +177,7 @@ def test_twins_of_long_names(paper_model: Model, loops: Callable[..., list[LoopD
         checked(gap_figure(paper_model, after, data_sets, LONG_NAME, LONG_NAME))
 
 
-@pytest.mark.parametrize(("levels", "histories"), [(2, 1), (8, 40), (300, 2)])
+@pytest.mark.parametrize(("levels", "histories"), [(2, 1), (8, 40), pytest.param(300, 2, marks=pytest.mark.slow)])
 def test_reduction_of_many_levels(levels: int, histories: int) -> None:
     time = np.linspace(0.0, 2.0 * levels, 4000)
     motion = 1e-3 * np.sin(20.0 * time)
@@ -190,7 +193,9 @@ def test_reduction_of_many_levels(levels: int, histories: int) -> None:
     assert len(named(box)) == min(levels, 8) + (levels > 8)
 
 
-@pytest.mark.parametrize(("bushings", "quantities"), [(10, 2), (40, 60), (300, 300)])
+@pytest.mark.parametrize(
+    ("bushings", "quantities"), [(10, 2), (40, 60), pytest.param(300, 300, marks=pytest.mark.slow)]
+)
 def test_batch_of_many_quantities(bushings: int, quantities: int) -> None:
     values = np.random.default_rng(2).normal(1.0, 0.02, bushings)
     panels = [Panel("axial |K| at 25 Hz, 0.1 mm [N/mm]", values, (0.9, 1.1), [0])] * quantities
