@@ -103,6 +103,7 @@ def test_the_reduced_files_are_those_that_reduce_makes(campaign: Campaign, root:
             np.testing.assert_allclose(kept["amplitude [mm]"], 1e3 * found.amplitude, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_leads_from_half_of_the_masses_shrink_the_gap_on_the_other_half(
     root: Path, campaign: Campaign, compound: Result
 ) -> None:

@@ -50,6 +50,7 @@ def test_effects_without_a_law_in_time_are_recovered_from_their_first_harmonic(n
     assert 0.85 < agrees(result, truth.values) < 1.15
 
 
+@pytest.mark.slow
 def test_a_second_relaxation_is_no_other_effect(diagnosed: Diagnosed) -> None:
     """Two are named, or described where the two cannot be told from one of another shape; one is one."""
     one = {"maxwell": {"mu1": 3e5, "tau": 2e-2}}

@@ -85,6 +85,7 @@ def test_a_mistake_is_named_with_the_line_that_puts_it_right(truth: str, measure
     assert [line for line in mended.result.warnings if line.startswith("mended by --adopt ")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.98, 1.02])
 def test_a_mistake_has_to_gain_more_than_chance_makes_of_the_best_effect(
     measured: Measured, monkeypatch: pytest.MonkeyPatch, share: float
@@ -148,6 +149,7 @@ def test_what_all_tests_share_is_not_seen_and_not_named(measured: Measured) -> N
     assert said(asked(campaign)) == "consistent "
 
 
+@pytest.mark.slow
 def test_a_mistake_can_be_left_out(measured: Measured) -> None:
     campaign = MADE[AXIAL](measured(None, SHARED))
     for without in ("peak_to_peak", AXIAL):

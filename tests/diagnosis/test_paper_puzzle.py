@@ -58,6 +58,7 @@ def told(label: str, found: list[Diagnosis]) -> None:
         print(f"{label}: {diagnosis.verdict} {' and '.join(names)} | {diagnosis.next_test}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("reached", "seen"), [(0.9, 1.0), (1.1, 1.0), (0.3, 0.3)])
 def test_a_level_of_another_amplitude_is_to_be_measured_again(clean: Undisturbed, reached: float, seen: float) -> None:
     """Moved by 10 % less or more than was read; and run at 0.15 mm, read rightly and filed under 0.5 mm."""

@@ -48,6 +48,7 @@ def test_a_name_that_does_not_hold_out_is_taken_back(measured: Measured, monkeyp
     assert "no more than a lead: inertia" in diagnosis.summary
 
 
+@pytest.mark.slow
 def test_a_wrong_name_that_shrinks_the_held_out_gap_is_not_named_for_it(measured: Measured) -> None:
     """Hold-out alone does not tell a wrong name: others that fit as well do, and what comes out without a part."""
     campaign = measured({"rig_compliance": {"compliance": 2e-8}}, SHARED)
@@ -188,6 +189,7 @@ def test_compliance_in_one_direction_alone_is_never_a_bold_name(measured: Measur
     assert not proposed & {"sleeve_compliance", "rig_compliance"}
 
 
+@pytest.mark.slow
 def test_friction_of_a_guide_is_named_as_slip_unless_the_user_tells(measured: Measured) -> None:
     """The library has one law for both; the campaign may tell which it is."""
     campaign = measured({"guide_friction": {"force": 6.0}}, SHARED)

@@ -134,6 +134,7 @@ def test_with_less_a_clean_campaign_is_still_consistent(measured: Measured, part
     assert asked(part(measured({}, SHARED))).verdict == "consistent"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", CUTS)
 def test_with_less_no_bolder_name(measured: Measured, part: Callable[..., Campaign]) -> None:
     diagnosis = asked(part(measured(INERTIA, SHARED)))

@@ -66,9 +66,15 @@ def test_stopped_at_every_system_call(where: str, how: str, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("times", "otherwise", "arguments"),
     [
-        (50, "--frequencies|10:20:5 Hz", ("predict", "data/arm_bushing/truth.json", "--no-plots")),
-        (8, "--no-report", ("run", "configs/cmp_15961.toml", "--no-plots")),
-        (12, "--format|csv", ("export", "data/arm_bushing/truth.json", "--format", "nastran")),
+        (10, "--frequencies|10:20:5 Hz", ("predict", "data/arm_bushing/truth.json", "--no-plots")),
+        *(
+            pytest.param(*more, marks=pytest.mark.slow)
+            for more in (
+                (50, "--frequencies|10:20:5 Hz", ("predict", "data/arm_bushing/truth.json", "--no-plots")),
+                (8, "--no-report", ("run", "configs/cmp_15961.toml", "--no-plots")),
+                (12, "--format|csv", ("export", "data/arm_bushing/truth.json", "--format", "nastran")),
+            )
+        ),
     ],
     ids=lambda given: given[0] if isinstance(given, tuple) else "",
 )

@@ -43,6 +43,7 @@ def test_every_effect_but_the_paper_s_can_be_hidden() -> None:
     assert set(FIRST) <= set(hideable())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, mistake in MISTAKES.items() if mistake.kinds])
 def test_a_mistake_mends_what_the_card_makes(name: str) -> None:
     """What is written into a file with a mistake is the clean test again, once it is mended."""

@@ -6,6 +6,8 @@ from bushfit.effects import effect_named
 from bushfit.scorecard.families import tasks
 from bushfit.scorecard.scorecard import work
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("hidden", [("clearance", "viscous"), ("high_pass", "second_friction")])
 def test_both_are_named_and_nothing_else(hidden: tuple[str, str]) -> None:

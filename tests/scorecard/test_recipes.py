@@ -35,6 +35,7 @@ def changes(one: Simulated, other: Simulated) -> list[float]:
     return [float(change) for change in (*swept, *looped)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*FAULTS, *OUTSIDE_LAWS])
 def test_what_is_wrong_shows_about_as_large_as_asked(name: str, plain: Simulated) -> None:
     made, sealed = cooked({**FAULTS, **OUTSIDE_LAWS}[name], SEED)

@@ -53,6 +53,7 @@ def test_a_card_has_every_kind_and_the_same_seed_the_same(capsys: pytest.Capture
     assert large == tasks(300, 1) != tasks(300, 2)
 
 
+@pytest.mark.slow
 def test_no_false_alarm_and_no_confident_wrong_name(outcomes: list[Outcome]) -> None:
     for outcome in outcomes:
         truth = " + ".join(outcome.task.hidden) or outcome.task.outside or "none"
@@ -69,6 +70,7 @@ def test_no_false_alarm_and_no_confident_wrong_name(outcomes: list[Outcome]) -> 
     assert sum(outcome.truth_in_sets for outcome in single) >= len(single) - 1
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_findings(outcomes: list[Outcome], tmp_path: Path) -> None:
     first = [outcome for outcome in outcomes if outcome.task.kind in ("single", "clean")][:3]
     again = run([outcome.task for outcome in first], tmp_path, 2, lambda _: None)
@@ -76,6 +78,7 @@ def test_the_same_seed_gives_the_same_findings(outcomes: list[Outcome], tmp_path
         assert replace(one, seconds=0.0) == replace(other, seconds=0.0)
 
 
+@pytest.mark.slow
 def test_truths_are_sealed_apart_from_the_campaigns(outcomes: list[Outcome], folder: Path) -> None:
     for outcome in outcomes:
         stem = f"{outcome.task.kind}_{outcome.task.seed}"
@@ -143,6 +146,7 @@ def test_a_diagnosis_is_the_same_without_the_sealed_folder(tmp_path: Path, monke
     assert outcome.named == ("delay",)
 
 
+@pytest.mark.slow
 def test_an_effect_is_plain_whether_it_was_named_or_not(tmp_path: Path) -> None:
     """What the library lacks is left unexplained: its best stand-in counts all the same."""
     from bushfit.scorecard import scorecard
