@@ -39,7 +39,8 @@ def command(
     adopted), ambiguous (look-alikes: all are listed, none is added), described (it has no name, but a smooth
     correction), partly (a little remains) or unexplained (no known effect closes the gap; the model is left as it was).
 
-    Writes diagnosis.json, model.json with what was added, gap.csv, candidates.csv, gap.png and report.html.
+    Writes diagnosis.json, model.json with what was added, which is the joint fit where nothing was, as of `bushfit run`,
+    gap.csv, candidates.csv, gap.png and report.html.
     """
     from bushfit.diagnosis.record import Settings
     from bushfit.jobs.diagnose import Diagnose
@@ -73,10 +74,9 @@ def tell_diagnosis(options: Options, name: str, outcome: Diagnosed) -> None:
 
 
 def tell_verdict(options: Options, name: str, outcome: Diagnosed) -> None:
-    """The verdict in a word and in a sentence."""
-    verdict = outcome.diagnosis.verdict
-    colour = _COLOURS.get(verdict, "yellow")
-    options.console.print(f"[bold]{escape(name)}:[/bold] [bold {colour}]{verdict}[/]")
+    """The verdict in a word, with what stays unknown, and in a sentence."""
+    colour = _COLOURS.get(outcome.headline, "yellow")
+    options.console.print(f"[bold]{escape(name)}:[/bold] [bold {colour}]{escape(outcome.headline)}[/]")
     options.console.print(f"  {escape(outcome.diagnosis.summary)}")
 
 

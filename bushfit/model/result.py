@@ -1,6 +1,6 @@
 """What a fit found: a model, how uncertain its values are, and how well it meets the tests."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -173,6 +173,11 @@ class Result:
         """Of the bushing, or of the first specimen where there is none."""
         return self.specimens[0].name if self.specimens and not self.model.bushing else self.model.name
 
+    @property
+    def left_open(self) -> str:
+        """What the first line on a result has to say of parameters that are unknown by 100 %; "" where none is."""
+        return told_open(self.covariance.unknown(self.model.values))
+
     def place(self, name: str) -> Place:
         """The specimen of this name, or else the direction; a ModelError where it is neither."""
         return place_named(name, self.specimens)
@@ -186,13 +191,18 @@ class Result:
         if stderr is None:
             return None
         parameter = self.model.parameters[name]
-        half = float(self.covariance.half_width(np.array(self.covariance.names)[:, None] == name)[0])
+        half = self.covariance.half(name)
         low, high = value - half, value + half
         if parameter.log and value > 0.0:
             factor = float(np.exp(min(half / value, _LARGEST_EXPONENT)))
             low, high = value / factor, value * factor
         least, most = parameter.bounds
         return max(low, min(least, value)), min(high, max(most, value))
+
+
+def told_open(unknown: Sequence[str]) -> str:
+    """A sentence on parameters that are unknown by 100 %; "" where none is."""
+    return f"the tests leave {', '.join(unknown)} open (unknown by 100 % or more)" if unknown else ""
 
 
 def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
