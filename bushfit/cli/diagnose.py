@@ -39,8 +39,8 @@ def command(
     adopted), ambiguous (look-alikes: all are listed, none is added), described (it has no name, but a smooth
     correction), partly (a little remains) or unexplained (no known effect closes the gap; the model is left as it was).
 
-    Writes diagnosis.json, model.json with what was added, which is the joint fit where nothing was, as of `bushfit run`,
-    gap.csv, candidates.csv, gap.png and report.html.
+    Writes diagnosis.json, model.json with what was added (the joint fit, where nothing was), gap.csv, candidates.csv,
+    gap.png and report.html.
     """
     from bushfit.diagnosis.record import Settings
     from bushfit.jobs.diagnose import Diagnose
@@ -130,7 +130,8 @@ def _tell_effect(options: Options, effect: Mapping[str, Any]) -> None:
         size = f"{value} {unit}".removesuffix(" -")
         console.print(f"    {parameter} = {size}" + (f", 95 % {' to '.join(ends)}" if ends else ""))
     if effect["twins"]:
-        console.print(f"    its size is known, its level is not: it could as well be {' or '.join(effect['twins'])}")
+        known = "its level is not known" if effect["alternatives"] else "its size is known, its level is not"
+        console.print(f"    {known}: it could as well be {' or '.join(effect['twins'])}")
     if effect["correction"]:
         console.print(f"    the line that puts it right: {escape(effect['correction'])}")
     if effect["alternatives"]:
