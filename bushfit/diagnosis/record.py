@@ -113,8 +113,7 @@ class Diagnosis:
         next_test: the measurement that would decide or confirm, or "".
         before: the model as it came, refitted to all tests.
         after: the model with what was added; where a mistake in the record is named, fitted to the mended tests.
-        result: the model to use with its uncertainty: `after`; `before` where the record is mistaken. Of a campaign to
-            which nothing was added the commands give the plain fit, as `fit` makes it.
+        result: the model to use with its uncertainty: `after`, by jobs the plain fit; `before` of a mistaken record.
         description: of a gap that has no name; None where there is none, or it is like no such term.
     """
 

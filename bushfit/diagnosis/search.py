@@ -329,8 +329,7 @@ class Search:
             if rival.name == name or rival.evidence.chi_square - current.chi_square > EXCLUDED:
                 continue
             distance = self._distance(clean, rival)
-            contains = distance < _CONTAINS and rival.evidence.parameters > current.parameters
-            if contains:
+            if distance < _CONTAINS and rival.evidence.parameters > current.parameters:
                 richer.append(rival)
             elif rival.evidence.bic - current.bic < SAME or distance < APART:
                 rivals.append(rival)

@@ -31,7 +31,7 @@ from bushfit.fitting.solve import Bounds, Coordinates, Solution
 from bushfit.geometry import place_named
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
-from bushfit.model.result import End, Result, told_open
+from bushfit.model.result import End, Result
 from bushfit.units import number
 
 STATIC = ("mu", "sigma_fmax", "eps_half")
@@ -267,10 +267,9 @@ def cautions(
     notes = [f"{data_set.name}: {note}" for data_set in data_sets for note in data_set.notes]
     if not names:
         return [*notes, _checked(model, data_sets)]
-    unknown = told_open([name for name in covariance.unknown(model.values) if name in names])
     return [
         *notes,
-        *([unknown] if unknown else []),
+        *filter(None, [covariance.restricted(names).left_open(model.values)]),
         *([_STOPPED.format(solution.evaluations, _FLAT if solution.flat else _SLOPE)] if solution.stopped else []),
         *(_at_edge(name, end, bounds) for name, end in at_bound.items()),
         *left_open(model, data_sets, [name for name in names if name not in at_bound], covariance),

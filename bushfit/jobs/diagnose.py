@@ -51,10 +51,7 @@ class Diagnosed:
 
 @dataclass(frozen=True)
 class Diagnose:
-    """Where model and tests disagree, and what is missing; starts from the effects of `model` where one is given.
-
-    `joint` is the plain fit of the campaign, where it is known already.
-    """
+    """Where model and tests disagree, and what is missing; from the effects of `model`, beside the plain fit `joint`."""
 
     settings: Settings = field(default_factory=Settings)
     model: Model | None = None
@@ -75,7 +72,7 @@ class Diagnose:
                 hint="bushfit fit says how well the values given meet the tests; free one to diagnose",
             )
         found = with_plan(diagnose(data, self.model, self.settings), data.campaign.path)
-        if not (found.changed or self.model or self.settings.adopt):  # the model to use is the plain one, as fit has it
+        if not (found.changed or self.model or self.settings.adopt):  # then the model to use is that of `fit`
             found = replace(found, result=(self.joint or Fit().run(data)).result)
         return Diagnosed(about(data, "diagnose", self._options()), found)
 

@@ -100,8 +100,8 @@ class Run:
         two_step, why_not = _two_step(data)
         joint = Fit().run(data)
         diagnosed = Diagnose(joint=joint).run(data) if joint.result.fitted else None
-        predicted = Predict().run((diagnosed or joint).result, data.campaign)
-        return Ran(data, static, two_step, why_not, joint, diagnosed, predicted)
+        found = (diagnosed or joint).result
+        return Ran(data, static, two_step, why_not, joint, diagnosed, Predict().run(found, data.campaign))
 
 
 def _two_step(data: Data) -> tuple[TwoStep | None, str]:

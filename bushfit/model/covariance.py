@@ -64,9 +64,10 @@ class Covariance:
         """Half width of the 95 % interval of one of the parameters, in its SI unit."""
         return float(self.half_width(np.array(self.names)[:, None] == name)[0])
 
-    def unknown(self, values: Mapping[str, float]) -> list[str]:
-        """The parameters that are unknown by 100 %: half of whose 95 % interval is their value or more."""
-        return [name for name in self.names if self.half(name) >= abs(values[name])]
+    def left_open(self, values: Mapping[str, float]) -> str:
+        """A sentence on parameters half of whose 95 % interval is their value or more; "" where there is none."""
+        unknown = ", ".join(name for name in self.names if self.half(name) >= abs(values[name]))
+        return unknown and f"the tests leave {unknown} open (unknown by 100 % or more)"
 
     def freedom(self, slopes: Array) -> Array:
         """Effective degrees of freedom of the variances of n quantities with these slopes, (k, n) -> (n,).

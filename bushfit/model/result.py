@@ -1,6 +1,6 @@
 """What a fit found: a model, how uncertain its values are, and how well it meets the tests."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -175,8 +175,8 @@ class Result:
 
     @property
     def left_open(self) -> str:
-        """What the first line on a result has to say of parameters that are unknown by 100 %; "" where none is."""
-        return told_open(self.covariance.unknown(self.model.values))
+        """What the first line on a result has to say of parameters that are unknown by 100 %; "" without any."""
+        return self.covariance.left_open(self.model.values)
 
     def place(self, name: str) -> Place:
         """The specimen of this name, or else the direction; a ModelError where it is neither."""
@@ -198,11 +198,6 @@ class Result:
             low, high = value / factor, value * factor
         least, most = parameter.bounds
         return max(low, min(least, value)), min(high, max(most, value))
-
-
-def told_open(unknown: Sequence[str]) -> str:
-    """A sentence on parameters that are unknown by 100 %; "" where none is."""
-    return f"the tests leave {', '.join(unknown)} open (unknown by 100 % or more)" if unknown else ""
 
 
 def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:

@@ -99,8 +99,7 @@ class Outcome:
         return {*self.task.hidden, *(self.sealed.hidden if self.sealed else ())}
 
     def _is_true(self, *names: str) -> bool:
-        """Whether one of the names says what was done; a family says it for all its places, where no effect
-        is called so: one that acts everywhere is not one that acts at a single place."""
+        """Whether one of the names says what was done; a family that is no effect itself says it for all its places."""
         families = self.truths - LIBRARY.keys()
         return any(name in self.truths or name.partition(".")[0] in families for name in names)
 
