@@ -39,7 +39,7 @@ def command(
     adopted), ambiguous (look-alikes: all are listed, none is added), described (it has no name, but a smooth
     correction), partly (a little remains) or unexplained (no known effect closes the gap; the model is left as it was).
 
-    Writes diagnosis.json, model.json with what was added, gap.csv, candidates.csv, gap.png and report.html, as run does.
+    Writes diagnosis.json, model.json with what was added, gap.csv, candidates.csv, gap.png, report.html, as run does.
     """
     from bushfit.diagnosis.record import Settings
     from bushfit.jobs.diagnose import Diagnose

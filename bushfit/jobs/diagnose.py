@@ -51,7 +51,7 @@ class Diagnosed:
 
 @dataclass(frozen=True)
 class Diagnose:
-    """Where model and tests disagree, and what is missing; from the effects of `model`, beside the plain fit `joint`."""
+    """Where model and tests disagree, and what is missing, from the effects of `model`, with the plain fit `joint`."""
 
     settings: Settings = field(default_factory=Settings)
     model: Model | None = None
