@@ -142,15 +142,16 @@ def _one_by_one(
     commands = settings.commands or ()
     result = load_result(Path(settings.model)) if settings.model else None
     data = Data.of(campaign) if set(commands) - {"predict"} else None
-    diagnosed = None
+    diagnosed = joint = None
     if "fit" in commands and data:
         fitted = Fit(settings.directions or (), settings.effects or ()).run(data)
         result, made = fitted.result, formats.files(fitted.contents)
+        joint = None if settings.directions or settings.effects else fitted
         if "diagnose" in commands:  # as `run` calls them: model.json is with what diagnose added
             made["joint.json"] = made.pop("model.json")
         files |= made
     if "diagnose" in commands and data:
-        diagnosed = _diagnose(settings).run(data)
+        diagnosed = replace(_diagnose(settings), joint=joint).run(data)
         result = diagnosed.result
         files |= formats.files(diagnosed.contents)
     assert result is not None  # the manifest has seen to it that there is a model

@@ -39,7 +39,7 @@ def command(
     adopted), ambiguous (look-alikes: all are listed, none is added), described (it has no name, but a smooth
     correction), partly (a little remains) or unexplained (no known effect closes the gap; the model is left as it was).
 
-    Writes diagnosis.json, model.json with what was added, gap.csv, candidates.csv, gap.png and report.html.
+    Writes diagnosis.json, model.json with what was added, gap.csv, candidates.csv, gap.png, report.html, as run does.
     """
     from bushfit.diagnosis.record import Settings
     from bushfit.jobs.diagnose import Diagnose
@@ -73,10 +73,9 @@ def tell_diagnosis(options: Options, name: str, outcome: Diagnosed) -> None:
 
 
 def tell_verdict(options: Options, name: str, outcome: Diagnosed) -> None:
-    """The verdict in a word and in a sentence."""
-    verdict = outcome.diagnosis.verdict
-    colour = _COLOURS.get(verdict, "yellow")
-    options.console.print(f"[bold]{escape(name)}:[/bold] [bold {colour}]{verdict}[/]")
+    """The verdict in a word, with what stays unknown, and in a sentence."""
+    colour = _COLOURS.get(outcome.headline, "yellow")
+    options.console.print(f"[bold]{escape(name)}:[/bold] [bold {colour}]{escape(outcome.headline)}[/]")
     options.console.print(f"  {escape(outcome.diagnosis.summary)}")
 
 
@@ -130,7 +129,8 @@ def _tell_effect(options: Options, effect: Mapping[str, Any]) -> None:
         size = f"{value} {unit}".removesuffix(" -")
         console.print(f"    {parameter} = {size}" + (f", 95 % {' to '.join(ends)}" if ends else ""))
     if effect["twins"]:
-        console.print(f"    its size is known, its level is not: it could as well be {' or '.join(effect['twins'])}")
+        known = "its level is not known" if effect["alternatives"] else "its size is known, its level is not"
+        console.print(f"    {known}: it could as well be {' or '.join(effect['twins'])}")
     if effect["correction"]:
         console.print(f"    the line that puts it right: {escape(effect['correction'])}")
     if effect["alternatives"]:

@@ -11,7 +11,7 @@ from bushfit.cli.common import Options, Task, with_task
 from bushfit.cli.diagnose import tell_findings, tell_verdict
 from bushfit.cli.options import command_called
 from bushfit.cli.predict import tell_predictions
-from bushfit.cli.show import new_table, parameter_table, report, tell_fit, tell_result, tell_sources, warn
+from bushfit.cli.show import new_table, report, tell_fit, tell_result, tell_sources, warn
 from bushfit.units import alike, for_people, number
 
 if TYPE_CHECKING:
@@ -140,11 +140,8 @@ def _tell_steps(options: Options, name: str, outcome: Ran) -> None:
         tell_fit(options, name, outcome.joint)
     if outcome.two_step:
         _tell_cost(options, outcome.two_step.result, outcome.joint.result)
-    if outcome.diagnosed and not outcome.added:
-        if outcome.diagnosed.diagnosis.verdict == "consistent":
-            tell_findings(options, outcome.diagnosed)
-        options.console.print(parameter_table("the same from the tests of every direction", outcome.diagnosed.result))
-        warn(options, outcome.diagnosed.result.warnings)
+    if outcome.diagnosed and outcome.diagnosed.diagnosis.verdict == "consistent":
+        tell_findings(options, outcome.diagnosed)
 
 
 def _tell_passes(options: Options, two_step: TwoStep) -> None:

@@ -23,7 +23,9 @@ _MOST_TESTS = 8
 
 
 def tell_fit(options: Options, name: str, outcome: Fitted) -> None:
-    """Each step of a fit."""
+    """Each step of a fit, and before all what it leaves open."""
+    if left := outcome.result.left_open:
+        options.console.print(f"[bold]{escape(name)}:[/bold] [yellow]{escape(left)}[/]")
     for title, result in outcome.reports:
         report(options, f"{name}: {title}", result)
 

@@ -113,7 +113,7 @@ class Diagnosis:
         next_test: the measurement that would decide or confirm, or "".
         before: the model as it came, refitted to all tests.
         after: the model with what was added; where a mistake in the record is named, fitted to the mended tests.
-        result: the model to use with its uncertainty: `after`; `before` where the record is mistaken.
+        result: the model to use with its uncertainty: `after`, by jobs the plain fit; `before` of a mistaken record.
         description: of a gap that has no name; None where there is none, or it is like no such term.
     """
 
@@ -139,7 +139,7 @@ class Diagnosis:
     @property
     def added(self) -> bool:
         """Whether the model to use holds more than the one that came."""
-        return self.result.model is not self.before.model
+        return self.result.model.effects != self.before.model.effects
 
     @property
     def calibration(self) -> tuple[float, float]:

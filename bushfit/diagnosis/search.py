@@ -321,8 +321,7 @@ class Search:
         """Sort an effect's rivals: those these tests cannot tell from it, and those that contain it.
 
         A rival is the same within SAME by BIC, or nearer than APART to the model's own noise-free prediction. A richer
-        one that meets this prediction contains the model: then the simpler name stands. So it does where the rival is
-        the same effect in one direction alone.
+        one that meets this prediction contains the model: then the simpler name stands.
         """
         place, rivals, richer = self._place(current, name, others), [], []
         clean = [data_set.noise_free(current.model) for data_set in current.data_sets]
@@ -330,11 +329,9 @@ class Search:
             if rival.name == name or rival.evidence.chi_square - current.chi_square > EXCLUDED:
                 continue
             distance = self._distance(clean, rival)
-            contains = distance < _CONTAINS and rival.evidence.parameters > current.parameters
-            alike = rival.evidence.bic - current.bic < SAME or distance < APART
-            if contains or (alike and rival.name.partition(".")[0] == name):
+            if distance < _CONTAINS and rival.evidence.parameters > current.parameters:
                 richer.append(rival)
-            elif alike:
+            elif rival.evidence.bic - current.bic < SAME or distance < APART:
                 rivals.append(rival)
         gain = _added(name, current, place.evidence).gain
         return Step(name, gain, tuple(rivals), tuple(richer), place)

@@ -26,7 +26,7 @@ _LINES = (Direction.AXIAL, Direction.RADIAL)
 #: Of the places tested, axial first, those that a search gives an effect of a place, by the word in library.toml.
 _SOUGHT: dict[str, Callable[[Sequence[str]], Sequence[str]]] = {
     "others": lambda places: places[1:],
-    "lines": lambda places: _LINES if set(_LINES) <= set(places) else (),
+    "lines": lambda places: [place for place in places if place in _LINES],
 }
 _TABLE: dict[str, Any] = tomllib.loads(Path(__file__).with_name("library.toml").read_text(encoding="utf-8"))
 #: What a file may have of the law of an effect: fields of its record.

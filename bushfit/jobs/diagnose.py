@@ -12,6 +12,7 @@ from bushfit.diagnosis.workflow import diagnose
 from bushfit.errors import FitError, typed
 from bushfit.fitting.data import Data
 from bushfit.jobs.about import about, asked, document_of
+from bushfit.jobs.fits import Fit, Fitted
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.planning.knowledge import look_alikes
@@ -27,7 +28,12 @@ class Diagnosed:
     diagnosis: Diagnosis
 
     def __repr__(self) -> str:
-        return f"{self.campaign['name']}: {self.diagnosis.verdict}\n  {self.diagnosis.summary}"
+        return f"{self.campaign['name']}: {self.headline}\n  {self.diagnosis.summary}"
+
+    @property
+    def headline(self) -> str:
+        """The verdict, and which parameters are unknown by 100 %."""
+        return "; ".join(filter(None, (self.diagnosis.verdict, self.result.left_open)))
 
     @property
     def result(self) -> Result:
@@ -45,10 +51,11 @@ class Diagnosed:
 
 @dataclass(frozen=True)
 class Diagnose:
-    """Where model and tests disagree, and what is missing; starts from the effects of `model` where one is given."""
+    """Where model and tests disagree, and what is missing, from the effects of `model`, with the plain fit `joint`."""
 
     settings: Settings = field(default_factory=Settings)
     model: Model | None = None
+    joint: Fitted | None = None
 
     def kinds(self, campaign: Campaign) -> Kinds:
         return Kinds(("diagnosis", "model"), ("gap", "candidates"), ("gap",), ("report",))
@@ -65,6 +72,8 @@ class Diagnose:
                 hint="bushfit fit says how well the values given meet the tests; free one to diagnose",
             )
         found = with_plan(diagnose(data, self.model, self.settings), data.campaign.path)
+        if not (found.changed or self.model or self.settings.adopt):  # then the model to use is that of `fit`
+            found = replace(found, result=(self.joint or Fit().run(data)).result)
         return Diagnosed(about(data, "diagnose", self._options()), found)
 
     def _options(self) -> tuple[str, ...]:

@@ -68,7 +68,7 @@ class Ran:
     @property
     def added(self) -> bool:
         """Whether the model to use holds more than the joint fit."""
-        return self.result.model.effects != self.joint.result.model.effects
+        return bool(self.diagnosed and self.diagnosed.diagnosis.added)
 
     @cached_property
     def document(self) -> Mapping[str, Any]:
@@ -99,10 +99,9 @@ class Run:
         static = FitStatic().run(data) if data.loops else None
         two_step, why_not = _two_step(data)
         joint = Fit().run(data)
-        diagnosed = Diagnose().run(data) if data.free(FIVE) else None
-        found = diagnosed and diagnosed.diagnosis
-        result = found.result if found and found.changed else joint.result
-        return Ran(data, static, two_step, why_not, joint, diagnosed, Predict().run(result, data.campaign))
+        diagnosed = Diagnose(joint=joint).run(data) if joint.result.fitted else None
+        found = (diagnosed or joint).result
+        return Ran(data, static, two_step, why_not, joint, diagnosed, Predict().run(found, data.campaign))
 
 
 def _two_step(data: Data) -> tuple[TwoStep | None, str]:

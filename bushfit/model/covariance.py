@@ -1,6 +1,6 @@
 """The covariance of fitted parameters, and the widths of the intervals that follow from it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
@@ -59,6 +59,15 @@ class Covariance:
             slopes: of each quantity by each parameter, (k, n).
         """
         return stdtrit(self.freedom(slopes), 0.975) * np.linalg.norm(self.root.T @ slopes, axis=0)
+
+    def half(self, name: str) -> float:
+        """Half width of the 95 % interval of one of the parameters, in its SI unit."""
+        return float(self.half_width(np.array(self.names)[:, None] == name)[0])
+
+    def left_open(self, values: Mapping[str, float]) -> str:
+        """A sentence on parameters half of whose 95 % interval is their value or more; "" where there is none."""
+        unknown = ", ".join(name for name in self.names if self.half(name) >= abs(values[name]))
+        return unknown and f"the tests leave {unknown} open (unknown by 100 % or more)"
 
     def freedom(self, slopes: Array) -> Array:
         """Effective degrees of freedom of the variances of n quantities with these slopes, (k, n) -> (n,).

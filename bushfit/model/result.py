@@ -173,6 +173,11 @@ class Result:
         """Of the bushing, or of the first specimen where there is none."""
         return self.specimens[0].name if self.specimens and not self.model.bushing else self.model.name
 
+    @property
+    def left_open(self) -> str:
+        """What the first line on a result has to say of parameters that are unknown by 100 %; "" without any."""
+        return self.covariance.left_open(self.model.values)
+
     def place(self, name: str) -> Place:
         """The specimen of this name, or else the direction; a ModelError where it is neither."""
         return place_named(name, self.specimens)
@@ -186,7 +191,7 @@ class Result:
         if stderr is None:
             return None
         parameter = self.model.parameters[name]
-        half = float(self.covariance.half_width(np.array(self.covariance.names)[:, None] == name)[0])
+        half = self.covariance.half(name)
         low, high = value - half, value + half
         if parameter.log and value > 0.0:
             factor = float(np.exp(min(half / value, _LARGEST_EXPONENT)))

@@ -209,7 +209,7 @@ FAULTS: dict[str, Recipe] = {
     "loop_rate": Recipe("the loops' clock is wrong by any factor", ("loop_clock",), file=_clock),
     "wild_points": Recipe("several points are off", file=_wild),
     "repeat_differs": Recipe("one repeat differs from the others", file=_repeat_differs),
-    "compliance": _in_rig("the rig gives way in one direction only", _compliance, "rig_compliance"),
+    "compliance": _in_rig("a rig gives in one direction", _compliance, "rig_compliance.axial", "rig_compliance.radial"),
     "charge_amplifier": _in_rig(
         "a charge amplifier takes away what is slow in the sweeps", _charge_amplifier, "high_pass"
     ),

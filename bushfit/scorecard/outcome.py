@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from bushfit.effects import LIBRARY
 from bushfit.scorecard.hidden import Sealed
 
 #: The verdict of the reader, where it does not take a file with a mistake.
@@ -98,8 +99,9 @@ class Outcome:
         return {*self.task.hidden, *(self.sealed.hidden if self.sealed else ())}
 
     def _is_true(self, *names: str) -> bool:
-        """Whether one of the names says what was done; a family says it for all its places."""
-        return any(name in self.truths or name.partition(".")[0] in self.truths for name in names)
+        """Whether one of the names says what was done; a family that is no effect itself says it for all its places."""
+        families = self.truths - LIBRARY.keys()
+        return any(name in self.truths or name.partition(".")[0] in families for name in names)
 
     @property
     def _claims(self) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:

@@ -86,7 +86,7 @@ class Recipe:
 
     Args:
         sentence: what is done, for the reader of a card.
-        truths: names that say it, those of other levels among them; a family of effects stands for all its places.
+        truths: names that say it, of other levels, too; a family that is no effect itself stands for all its places.
         plan: the tests, by the bench with the plan of any campaign.
         rig: what the rig does around the model.
         file: what was written, by what was measured.

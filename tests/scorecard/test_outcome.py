@@ -11,6 +11,9 @@ from bushfit.scorecard.card import card
 from bushfit.scorecard.hidden import Sealed
 from bushfit.scorecard.outcome import Outcome, Task
 
+EVERYWHERE, EITHER = ("sleeve_compliance",), ("sleeve_compliance", "sleeve_compliance.radial")
+RIG = (("rig_compliance", "rig_compliance.radial"),)
+
 
 def said(
     verdict: str, *sets: tuple[str, ...], truths: tuple[str, ...] = (), kind: str = "fault", **more: Any
@@ -34,6 +37,13 @@ def said(
         (said("named", ("stiffness_factor.radial",), truths=("stiffness_factor",)), (), False),
         (said("named", ("interface_slip",), truths=("guide",), twins=(("guide",),)), (), False),
         (said("named", ("viscous",), truths=("maxwell",), richer=("maxwell",)), (), False),
+        (said("named", EVERYWHERE, truths=("rig_compliance.radial",), twins=(("rig_compliance",),)), EVERYWHERE, False),
+        (
+            said("named", ("sleeve_compliance.radial",), truths=("rig_compliance",)),
+            ("sleeve_compliance.radial",),
+            False,
+        ),
+        (said("ambiguous", EITHER, truths=("rig_compliance.radial",), twins=RIG), (), False),
     ],
 )
 def test_every_wrong_name_counts(outcome: Outcome, kept: tuple[str, ...], wrong_set: bool) -> None:
