@@ -333,14 +333,14 @@ class SweepData(DataSet):
         every = np.unique(self.held)
         for held in every:
             here = self.held == held
-            words = self._line_words(int(np.argmax(here)))
+            words = self.line_words(int(np.argmax(here)))
             if every.size > 1:
                 yield self._suspect(words, "level", here)
             numbers = np.unique(self.repeat[here])
             for number in numbers if numbers.size > 2 else ():
                 yield self._suspect(f"repeat {number} of {words}", "repeat", here & (self.repeat == number))
 
-    def _line_words(self, point: int) -> str:
+    def line_words(self, point: int) -> str:
         """The line that a point belongs to, for people."""
         if self.sweep.stepped == "frequency":
             return f"the {self.direction} level {shown_amplitude(self.direction, self.amplitude[point])}"

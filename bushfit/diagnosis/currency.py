@@ -1,0 +1,328 @@
+"""What every explanation of a gap is worth: the logarithm of the marginal likelihood of the tests under it.
+
+Notes:
+    Around a fitted model the whitened residuals are r = noise + W e + J p + U a: errors e of the rig, independent and
+    of unit variance times a size that is not known; parameters p, with a flat prior or one of known precision; and
+    amounts a of what may be missing. With S = k^2 I + W D W^T and the parameters projected out,
+    P = S^-1 - S^-1 J (J^T S^-1 J)^-1 J^T S^-1, the logarithm of the restricted likelihood is
+    -(r^T P r + ln|S| + ln|J^T S^-1 J|)/2 but for a constant (Patterson and Thompson, 1971). Amounts of variance v^2
+    along columns U add, with the eigenvalues l of U^T P U and the components b of U^T P r along its eigenvectors,
+    sum (v^2 b^2/(1 + v^2 l) - ln(1 + v^2 l))/2. Sizes of the rig's errors and of amounts are summed over nodes with
+    weights of a prior. Only inner products enter; errors of the rig stay within blocks of rows, so that a node costs
+    one small triangular solution a block.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.special import chdtrc, log_ndtr, logsumexp
+
+from bushfit.diagnosis.priors import SIZES
+from bushfit.effects.contract import Array
+
+#: Share of a parameter's information that is added to it, so that what the tests leave open can be inverted.
+_ROUNDING = 1e-9
+#: Change of |K| by a unit of an amount, below which the tests do not see it.
+_UNSEEN = 1e-9
+
+
+@dataclass(frozen=True)
+class Node:
+    """One size of each of the rig's errors, with the logarithm of its weight.
+
+    Args:
+        scatter: standard deviation of a sweep's point, relative to the one that counts.
+        errors: standard deviations by kind of error, in units of the rig's class.
+        wide: whether errors of levels are larger than the class allows.
+    """
+
+    scatter: float
+    errors: tuple[float, ...]
+    log_weight: float
+    wide: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Rows of the tests that share errors of the rig, and no others.
+
+    Args:
+        rows: their numbers, (n,).
+        columns: whitened residuals that an error of the class makes of them, (w, n).
+        kinds: number of each error's kind, (w,).
+        scatters: whether the rows scatter as sweeps' points do, which nodes change.
+    """
+
+    rows: Array
+    columns: Array
+    kinds: Array
+    scatters: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Columns with a Gaussian prior, whose amounts are relative to |K|.
+
+    Args:
+        columns: whitened residuals of a unit of each amount, (c, n).
+        unit: share of |K| that a unit changes, (c,); all 1 where columns are given per share.
+        together: whether the amounts are independent of one size; else one column is chosen, each as likely.
+        sense: +1 where only positive amounts make sense, of columns of which one is chosen.
+    """
+
+    columns: Array
+    unit: Array
+    together: bool
+    sense: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Worth:
+    """What a group is worth.
+
+    Args:
+        log_evidence: of the tests with it, of all sizes and nodes together.
+        size: of what it changes, relative to |K|, as the tests leave it.
+        likeliest: the size at which the tests are likeliest.
+        by_node: logarithm of the evidence at each node, best size, (nodes,).
+    """
+
+    log_evidence: float
+    size: float
+    likeliest: float
+    by_node: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Ledger:
+    """Everything linear about one fitted model and its tests.
+
+    Args:
+        residual: whitened by the points' own scatter alone, (n,).
+        jacobian: by the parameters and what else moves freely, (k, n).
+        precision: prior precision of each of these; 0 where the prior is flat, (k,).
+        blocks: of the rig's errors.
+        groups: what may be missing.
+        nodes: of the rig's errors.
+    """
+
+    residual: Array
+    jacobian: Array
+    precision: Array
+    blocks: Sequence[Block]
+    groups: Sequence[Group]
+    nodes: Sequence[Node]
+
+    @cached_property
+    def _every(self) -> Array:
+        """Residual, derivatives and columns of all groups, (1 + k + c, n)."""
+        return np.concatenate([self.residual[None], self.jacobian, *(group.columns for group in self.groups)])
+
+    @cached_property
+    def _scatters(self) -> Array:
+        """Which rows scatter as sweeps' points do, (n,) bool."""
+        scatters = np.zeros(self.residual.size, dtype=bool)
+        for block in self.blocks:
+            scatters[block.rows] |= block.scatters
+        return scatters
+
+    @cached_property
+    def _places(self) -> list[Array]:
+        """Numbers of the rows of each group among all."""
+        ends = 1 + len(self.jacobian) + np.cumsum([0, *(len(group.columns) for group in self.groups)])
+        return [np.arange(*pair) for pair in pairwise(ends.tolist())]
+
+    @cached_property
+    def _alike(self) -> list[tuple[list[int], Array]]:
+        """Groups that move together, those with as many columns side by side: their numbers, (m,), and rows, (m, g)."""
+        sizes: dict[int, list[int]] = {}
+        for number, group in enumerate(self.groups):
+            if group.together:
+                sizes.setdefault(len(group.columns), []).append(number)
+        return [(own, np.array([self._places[number] for number in own])) for own in sizes.values()]
+
+    @cached_property
+    def _products(self) -> "_Products":
+        every, scatters = self._every, self._scatters
+        first = 1 + len(self.jacobian)
+        parts = [every[:, scatters], every[:, ~scatters]]
+        wide = max((len(block.kinds) for block in self.blocks), default=0)
+        inner, along = np.zeros((len(self.blocks), wide, wide)), np.zeros((len(self.blocks), wide, len(every)))
+        kinds = np.full((len(self.blocks), wide), -1)
+        for number, block in enumerate(self.blocks):
+            size = len(block.kinds)
+            inner[number, :size, :size] = block.columns @ block.columns.T
+            along[number, :size] = block.columns @ every[:, block.rows].T
+            kinds[number, :size] = block.kinds
+        return _Products(
+            tuple(part[:first] @ part.T for part in parts),
+            tuple(np.einsum("cn,cn->c", part, part) for part in parts),
+            [tuple(part[own] @ part[own].swapaxes(-1, -2) for part in parts) for _, own in self._alike],
+            inner,
+            along,
+            kinds,
+            np.array([block.scatters for block in self.blocks], dtype=bool),
+            int(scatters.sum()),
+        )
+
+    @cached_property
+    def _solved(self) -> "_Solved":
+        """At every node what the tests say without a group, and along all groups."""
+        count = sum(len(group.columns) for group in self.groups)
+        base, misfit = np.empty(len(self.nodes)), np.empty(len(self.nodes))
+        size, along = np.empty((2, len(self.nodes), count))
+        grams: list[list[Array]] = [[] for _ in self._alike]
+        k, products, known = len(self.jacobian), self._products, self.precision > 0.0
+        for number, node in enumerate(self.nodes):
+            left, log_size = products.beside(node)
+            share = 1.0 / node.scatter**2
+            gram = share * products.rows[0] + products.rows[1] - left[:, : 1 + k].T @ left
+            information = gram[1:, 1 : 1 + k] + np.diag(self.precision)
+            scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
+            root = np.linalg.cholesky(information / np.outer(scale, scale) + _ROUNDING * np.eye(k))
+            free = solve_triangular(root, gram[1:] / scale[:, None], lower=True)
+            rest = gram[0] - free[:, 0] @ free
+            log_size += 2.0 * float(np.sum(np.log(np.diag(root) * scale)))
+            log_size -= float(np.sum(np.log(self.precision[known])))
+            base[number] = node.log_weight - 0.5 * (rest[0] + log_size)
+            misfit[number], along[number] = rest[0], rest[1 + k :]
+            taken = np.concatenate((left, free))
+            square = share * products.squares[0] + products.squares[1] - np.einsum("wc,wc->c", taken, taken)
+            size[number] = np.maximum(square[1 + k :], 0.0)
+            for (_, own), parts, found in zip(self._alike, products.grams, grams, strict=True):
+                there = taken.T[own]
+                found.append(share * parts[0] + parts[1] - there @ there.swapaxes(-1, -2))
+        return _Solved(base, misfit, size, along, [np.array(each) for each in grams])
+
+    @property
+    def log_evidence(self) -> float:
+        """Of the tests with nothing missing, errors of the rig within what its class allows."""
+        return float(logsumexp(self._solved.base[self._within]))
+
+    @property
+    def log_evidence_wide(self) -> float:
+        """The same with errors of levels beyond the class."""
+        beyond = ~self._within
+        return float(logsumexp(self._solved.base[beyond])) if beyond.any() else -np.inf
+
+    def likely(self, far: float) -> list[Node]:
+        """The nodes that nothing missing, or one of the groups, brings so near the best in ln evidence."""
+        alone = self._solved.base
+        best = np.maximum.reduce([alone, *(worth.by_node for worth in self.worths)])
+        kept = (alone > alone.max() - far) | (best > best.max() - far)
+        return [node for node, near in zip(self.nodes, kept.tolist(), strict=True) if near]
+
+    @cached_property
+    def _within(self) -> Array:
+        return np.array([not node.wide for node in self.nodes])
+
+    @property
+    def chance(self) -> float:
+        """Probability that tests of this model and rig leave more than these do, over the nodes as likely as they are.
+
+        Notes: a posterior predictive check on r^T P r (Gelman, Meng and Stern, 1996).
+        """
+        base = np.where(self._within, self._solved.base, -np.inf)
+        freedom = self.residual.size - np.count_nonzero(self.precision == 0.0)
+        return float(np.exp(base - logsumexp(base)) @ chdtrc(max(freedom, 1), self._solved.misfit))
+
+    @cached_property
+    def worths(self) -> list[Worth]:
+        """What each group is worth, errors of the rig within what its class allows."""
+        found: dict[int, Worth] = {}
+        first = 1 + len(self.jacobian)
+        for (numbers, own), gram in zip(self._alike, self._solved.grams, strict=True):
+            gains, moved = _of_all(gram, self._solved.along[:, own - first])
+            for place, number in enumerate(numbers):
+                found[number] = self._worth(gains[:, place, None], moved[:, place, None])
+        for number, (group, own) in enumerate(zip(self.groups, self._places, strict=True)):
+            if not group.together:
+                there = self._solved.size[:, own - first, None], self._solved.along[:, own - first, None]
+                found[number] = self._worth(*_of_one(group, *there))
+        return [found[number] for number in range(len(self.groups))]
+
+    def _worth(self, gains: Array, moved: Array) -> Worth:
+        """From gains in ln evidence and squares of the change, (nodes, columns, sizes)."""
+        whole = self._solved.base[:, None, None] + gains
+        within = whole[self._within]
+        top = within.max()
+        share = np.exp(within - top)
+        total = share.sum()
+        size = float(np.sqrt(np.sum(share * moved[self._within]) / total))
+        likeliest = float(SIZES[int(np.argmax(share.sum(axis=(0, 1))))])
+        log_evidence = float(top + np.log(total) - np.log(whole.shape[1] * SIZES.size))
+        return Worth(log_evidence, size, likeliest, whole.max(axis=(1, 2)))
+
+
+def _of_one(group: Group, size: Array, along: Array) -> tuple[Array, Array]:
+    """Gain in ln evidence, and square of the change relative to |K|, of one column of a group, (nodes, columns, sizes)."""
+    seen = group.unit > _UNSEEN
+    v2 = np.square(SIZES * np.where(seen, 1.0 / np.where(seen, group.unit, 1.0), 0.0)[:, None])
+    grown = 1.0 + v2 * size
+    gain = 0.5 * (v2 * along**2 / grown - np.log(grown))
+    mean = -v2 * along / grown
+    if group.sense:
+        error = np.sqrt(np.where(seen[:, None], v2, 1.0) / grown)
+        gain = gain + np.log(2.0) + log_ndtr(group.sense * mean / error)
+    return gain, np.square(mean * group.unit[:, None])
+
+
+def _of_all(gram: Array, along: Array) -> tuple[Array, Array]:
+    """The same of groups whose columns move together, (nodes, groups, sizes)."""
+    size, vectors = np.linalg.eigh(gram)
+    along = np.einsum("nmij,nmi->nmj", vectors, along)[:, :, None]
+    size, v2 = np.maximum(size, 0.0)[:, :, None], np.square(SIZES)[:, None]
+    grown = 1.0 + v2 * size
+    gain = 0.5 * np.sum(v2 * along**2 / grown - np.log(grown), axis=-1)
+    return gain, np.sum(np.square(v2 * along / grown), axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class _Products:
+    """Inner products of rows, of those that scatter and of the others.
+
+    Args:
+        rows: of residual and derivatives with all rows, (1 + k, 1 + k + c) each.
+        squares: of each row with itself.
+        grams: of the columns of groups that move together, (m, g, g) each.
+        inner, along: of each block's errors with one another and with all rows, (blocks, w, w) and (blocks, w, c).
+        kinds: of the errors, -1 where a block has fewer, (blocks, w).
+        scatters: of the blocks, (blocks,) bool.
+        count: residuals that scatter.
+    """
+
+    rows: tuple[Array, ...]
+    squares: tuple[Array, ...]
+    grams: list[tuple[Array, ...]]
+    inner: Array
+    along: Array
+    kinds: Array
+    scatters: Array
+    count: int
+
+    def beside(self, node: Node) -> tuple[Array, float]:
+        """What errors of the rig account for, as rows whose products are to be taken off, (w, c), and ln|S|."""
+        errors = np.append(node.errors, 0.0)[self.kinds]
+        share = np.where(self.scatters, 1.0 / node.scatter, 1.0)
+        sized = errors * share[:, None]
+        inner = np.eye(errors.shape[1]) + sized[:, :, None] * self.inner * sized[:, None, :]
+        root = np.linalg.cholesky(inner)
+        left = np.linalg.inv(root) @ ((sized * share[:, None])[:, :, None] * self.along)
+        log_size = 2.0 * float(np.sum(np.log(np.einsum("bii->bi", root)))) + 2.0 * self.count * np.log(node.scatter)
+        return left.reshape(-1, self.along.shape[-1]), log_size
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """At every node: ln evidence without a group, misfit, and U^T P U (its diagonal, and whole of groups that move
+    together) and U^T P r of the columns."""
+
+    base: Array
+    misfit: Array
+    size: Array
+    along: Array
+    grams: list[Array]

@@ -1,0 +1,25 @@
+"""Effects of the library that the model lacks."""
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from bushfit.diagnosis.currency import Group
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.explanations.contract import Explanation
+from bushfit.diagnosis.propose import proposals
+
+
+def effects(evidence: Evidence, excluded: Collection[str], held: Sequence[str]) -> list[Explanation]:
+    """Every effect that these tests could show, of which one shape is chosen; one that replaces a branch by its refit."""
+    share = np.empty(evidence.residual.size)
+    for data_set, place in evidence.place.items():
+        share[place] = data_set.relative_noise
+    found = []
+    for proposal in proposals(evidence, excluded, held):
+        group = None
+        if not proposal.together:
+            unit = np.abs(proposal.columns * share).max(axis=1)
+            group = Group(proposal.columns, unit, together=False, sense=proposal.sense)
+        found.append(Explanation("effect", proposal.name.partition(".")[0], proposal.name, group, proposal))
+    return found

@@ -1,0 +1,67 @@
+"""Something smooth that has no name: a Gaussian process over frequency and strain, or harmonics of the loops."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from bushfit.diagnosis.currency import Group
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.explanations.contract import Explanation
+from bushfit.effects.contract import Array
+from bushfit.effects.unnamed import nodes_among
+from bushfit.fitting.data_sets import SweepData, parted
+
+#: Lengths in ln frequency and ln strain over which a curve changes: smooth, and rough.
+_LENGTHS = {"smooth": (1.5, 1.2), "rough": (0.5, 0.5)}
+#: Features of a process at most, and the variance of one, relative to the largest, that counts.
+_MOST_FEATURES, _LEAST_VARIANCE = 16, 1e-4
+#: Points at most that a process is made of.
+_MOST_POINTS = 150
+
+
+def unnamed(evidence: Evidence) -> list[Explanation]:
+    """Processes of one direction or of all, and the harmonics of the loops."""
+    loops, sweeps = parted(evidence.data_sets)
+    found = [(f"{how} {where}", columns) for how in _LENGTHS for where, columns in _processes(evidence, sweeps, how)]
+    if loops:
+        own = [evidence.embedded(column, loop) for loop in loops for column in loop.contrasts()]
+        found.append(("loops", np.array(own)))
+    return [
+        Explanation("unnamed", "unnamed", name, Group(columns, np.ones(len(columns)), together=True))
+        for name, columns in found
+    ]
+
+
+def _processes(evidence: Evidence, sweeps: Sequence[SweepData], how: str) -> Iterator[tuple[str, Array]]:
+    if not sweeps:
+        return
+    model, lengths = evidence.model, np.array(_LENGTHS[how])
+    points = [
+        np.log(np.stack((sweep.frequency, sweep.amplitude * model.unit_strain(sweep.direction)), axis=1)) / lengths
+        for sweep in sweeps
+    ]
+    features = _features(np.concatenate(points))
+    ends = np.cumsum([0, *(len(each) for each in points)])
+    own = [
+        np.array([evidence.embedded(sweep.whiten(feature * unit), sweep) for feature in features[:, a:b] for unit in (1.0, 1.0j)])
+        for sweep, a, b in zip(sweeps, ends[:-1], ends[1:], strict=True)
+    ]
+    directions = dict.fromkeys(str(sweep.direction) for sweep in sweeps)
+    for direction in directions:
+        yield direction, np.concatenate([each for each, sweep in zip(own, sweeps, strict=True) if str(sweep.direction) == direction])
+    if len(directions) > 1:
+        yield "all", np.sum(own, axis=0)
+
+
+def _features(points: Array) -> Array:
+    """Patterns over points whose sum with independent amounts has unit variance and falls off with distance, (c, n)."""
+    distinct, place = np.unique(points.round(6), axis=0, return_inverse=True)
+    some = distinct[nodes_among(distinct, _MOST_POINTS)]
+    values, vectors = np.linalg.eigh(_kernel(some, some))
+    order = np.argsort(-values)[:_MOST_FEATURES]
+    order = order[values[order] > _LEAST_VARIANCE * values.max()]
+    return (_kernel(distinct, some) @ vectors[:, order] / np.sqrt(values[order])).T[:, place.ravel()]
+
+
+def _kernel(one: Array, other: Array) -> Array:
+    return np.exp(-0.5 * np.sum(np.square(one[:, None] - other), axis=-1))

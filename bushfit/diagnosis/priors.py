@@ -1,0 +1,33 @@
+"""Every constant that moves a verdict, in one table: odds beforehand, sizes, errors of rigs, and when a word is said."""
+
+import numpy as np
+
+#: Odds beforehand of each kind of explanation; what is left is for nothing. One bushing in two meets its model; a
+#: library that was written from what bushings and rigs show holds what most others lack.
+ODDS = {"effect": 0.22, "place": 0.15, "record": 0.03, "unnamed": 0.10}
+#: Sizes of what may be missing, relative to |K|, each as likely: from what no test shows to what no one overlooks.
+SIZES = np.geomspace(0.004, 0.4, 7)
+#: Sizes of errors of the rig in units of its class, with their weights: what a run shares, ...
+RUNS = ((0.15, 0.2), (0.5, 0.3), (1.0, 0.25), (2.0, 0.2), (4.0, 0.05))
+#: ... what all runs of a level share, and each loop by itself, ...
+LEVELS = ((0.0, 0.35), (0.4, 0.3), (1.0, 0.25), (2.5, 0.1))
+#: ... and what wanders slowly along a run.
+WANDERING = ((0.0, 0.6), (0.5, 0.25), (1.5, 0.15))
+#: Errors of levels, in units of the class, above which they are an explanation of their own.
+WITHIN_CLASS = 1.5
+#: Harmonics of what wanders along a run; their variance falls as 1/j^2.
+WAVES = 4
+#: Degrees of freedom of the scatter, from which on it counts as known.
+KNOWN = 30
+#: Logarithm of odds below which a node, a state of the search or an explanation is not followed.
+FAR = 12.0
+#: States of the search that are kept, in the first round and later; rounds; refits of a state likewise.
+BEAM, ROUNDS, REFITS = (4, 3), 3, (7, 3)
+#: Probability of nothing, from which on a verdict is `consistent`.
+NOTHING = 0.15
+#: Probability from which on an explanation is named; a set that reaches it is told, of so many at most.
+NAMED, MOST_TOLD = 0.97, 4
+#: Share of what names and the unnamed bring together, that names bring alone where they may stand: `partly`.
+MOSTLY = 0.9
+#: Probability of what the leader leaves, below which it does not fit.
+DOES_NOT_FIT = 0.002

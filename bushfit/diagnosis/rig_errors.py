@@ -1,0 +1,99 @@
+"""Errors of the rig as columns: what a run, a level or a loop shares, and what wanders along a run."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import product
+from math import log
+
+import numpy as np
+from scipy.special import chdtri
+
+from bushfit.campaign.schema import RigSettings
+from bushfit.diagnosis.currency import Block, Node
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.priors import KNOWN, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
+from bushfit.effects.contract import Array
+from bushfit.fitting.data_sets import LoopData, SweepData, parted, repeats_of
+from bushfit.fitting.noise import ASSUMED_SHARED, of_class
+from bushfit.fitting.solve import jacobian, residual
+
+#: Kinds of errors, by their place in `Node.errors`.
+_RUN, _LEVEL, _WAVE, _LOOP = range(4)
+#: Points of a run, from which on it can wander.
+_FEWEST = 4
+
+
+def scattering_alone(evidence: Evidence) -> Evidence:
+    """The same fit with residuals in units of what scatters from point to point: what points share is told apart."""
+    data_sets = tuple(
+        replace(each, noise=replace(each.noise, shared=(0.0, 0.0), level=(0.0, 0.0)))
+        if isinstance(each, SweepData)
+        else replace(each, gain_error=0.0)
+        if isinstance(each, LoopData)
+        else each
+        for each in evidence.data_sets
+    )
+    solution, names = evidence.solution, evidence.solution.coordinates.names
+    rows = jacobian(solution.model, data_sets, names)
+    return Evidence(replace(solution, residual=residual(solution.model, data_sets), jacobian=rows), data_sets)
+
+
+def nodes(evidence: Evidence) -> list[Node]:
+    """Sizes of the rig's errors with their prior weights; the scatter has some of its own where few repeats tell it."""
+    sweeps = parted(evidence.data_sets)[1]
+    freedom = max((each.freedoms.scatter for each in sweeps), default=0)
+    thirds = (np.arange(3) + 0.5) / 3
+    scatters = np.sqrt(freedom / chdtri(freedom, 1.0 - thirds)).tolist() if 0 < freedom < KNOWN else [1.0]
+    runs = RUNS if sweeps else ((0.0, 1.0),)
+    waves = WANDERING if sweeps else ((0.0, 1.0),)
+    return [
+        Node(scatter, (run, level, wave, level), log(a * b * c / len(scatters)), wide=level > WITHIN_CLASS)
+        for scatter, (run, a), (level, b), (wave, c) in product(scatters, runs, LEVELS, waves)
+    ]
+
+
+def blocks(evidence: Evidence, rig: RigSettings) -> list[Block]:
+    """What shares errors: of each level of a sweep its gains, and its phases; loops that repeat one another."""
+    loops, sweeps = parted(evidence.data_sets)
+    gain = of_class(rig, ASSUMED_SHARED)
+    found = [block for sweep in sweeps for block in _of_sweep(evidence, sweep, gain)]
+    groups = {tuple(np.flatnonzero(row).tolist()) for row in repeats_of(loops)} if loops else set()
+    for group in sorted(groups):
+        rows = np.concatenate([np.arange(*_ends(evidence, loops[place])) for place in group])
+        column = gain[0] * np.concatenate([loops[place].unit_gain for place in group])
+        found.append(Block(rows, column[None], np.array([_LOOP]), scatters=False))
+    return found
+
+
+def _ends(evidence: Evidence, data_set: SweepData | LoopData) -> tuple[int, int]:
+    place = evidence.place[data_set]
+    return place.start, place.stop
+
+
+def _of_sweep(evidence: Evidence, sweep: SweepData, classes: Sequence[float]) -> Iterator[Block]:
+    first, _ = _ends(evidence, sweep)
+    size, runs = sweep.frequency.size, np.split(np.arange(sweep.frequency.size), sweep.block_starts[1:])
+    units = sweep.whiten(np.full(size, 1.0 + 1.0j)).reshape(2, size)
+    for held in np.unique(sweep.held):
+        line = np.flatnonzero(sweep.held == held)
+        own = [run - line[0] for run in runs if sweep.held[run[0]] == held]
+        columns, kinds = _shared(line.size, own)
+        for part, each in enumerate(classes):
+            rows = first + part * size + line
+            yield Block(rows, each * columns * units[part, line], kinds, scatters=True)
+
+
+def _shared(size: int, runs: Sequence[Array]) -> tuple[Array, Array]:
+    """What errors of the class make of a line's points, (w, n), by the places of each run in it; and their kinds."""
+    columns, kinds = [np.ones(size)], [_LEVEL]
+    for run in runs:
+        among = np.zeros(size)
+        among[run] = 1.0
+        columns.append(among)
+        kinds.append(_RUN)
+        for order in range(1, WAVES + 1) if run.size >= _FEWEST else ():
+            wave = np.zeros(size)
+            wave[run] = np.sqrt(2.0) * np.cos(np.pi * order * (np.arange(run.size) + 0.5) / run.size) / order
+            columns.append(wave)
+            kinds.append(_WAVE)
+    return np.array(columns), np.array(kinds)
