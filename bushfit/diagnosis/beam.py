@@ -3,27 +3,43 @@
 Effects are refitted with all parameters and counted by Laplace's method; places and what has no name stay linear.
 """
 
+from __future__ import annotations
+
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import log
 
 import numpy as np
+from scipy.special import logsumexp
 
 from bushfit.campaign.schema import RigSettings
+from bushfit.diagnosis.claims import Claim, Screen, claims
 from bushfit.diagnosis.currency import Block, Ledger, Node, Worth
-from bushfit.diagnosis.evidence import EVALUATIONS, Evidence, fit_from
+from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.explanations import Explanation, effects, places, unnamed
-from bushfit.diagnosis.priors import BEAM, FAR, ODDS, REFITS, ROUNDS, SIZES
+from bushfit.diagnosis.priors import BEAM, FAR, LEVELS, NAMED, ODDS, REFITS, ROUNDS, SIZES
 from bushfit.diagnosis.propose import probes
-from bushfit.diagnosis.refit import refitted
+from bushfit.diagnosis.refit import refitted, within_reach
 from bushfit.diagnosis.rig_errors import blocks, nodes, scattering_alone
 from bushfit.effects import effect_named, qualified
-from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
+from bushfit.fitting.data import Data
+from bushfit.fitting.noise import ASSUMED_SHARED, of_class
 from bushfit.fitting.solve import Bounds
+
+#: Probability of nothing from which on records are not doubted. For time: each claim is a fit.
+_SURE = 0.99
+#: Claims that are fitted, those first under which the tests could agree best; places added to a state. For time.
+_CLAIMS, _PLACES = 4, 2
+#: Logarithm of odds behind its state within which an effect is refitted; for time.
+_SLIGHT = 3.0
+#: What the shape of an effect in place of a branch is expected to cost; decides of its refit alone.
+_OF_A_BRANCH = 5.0
+#: Reduced chi-square beyond which a model has bent its parameters too far for a refit to start from its values.
+_BENT = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,16 +47,18 @@ class Asked:
     """What a search works with.
 
     Args:
-        base: the model as it came, fitted.
-        rig: the class of the rig.
-        without: effects not to consider.
+        data: the tests.
+        base: the model as it came, fitted to them.
+        fitted: fits it to tests of which a record was put right.
+        without: effects and mistakes not to consider.
         most: effects added at the most.
         start: values read off the data, for a model that the gap has bent too far.
         held, bounds: parameters that do not move, and limits of the others inside their own.
     """
 
+    data: Data
     base: Evidence
-    rig: RigSettings
+    fitted: Callable[[Data], Evidence]
     without: Sequence[str]
     most: int
     start: Mapping[str, float]
@@ -54,40 +72,78 @@ class Hypothesis:
 
     Args:
         effects: by name, in the order in which they were added.
+        claim: that a record is mistaken, or None.
         places: of the tests gone wrong.
         unnamed: the process without a name; "" without.
         levels: whether errors of levels are larger than the class of the rig allows.
         log_posterior: logarithm of prior times evidence.
         size: of what it changes, relative to |K|.
-        evidence: the model with the effects, refitted; None where they were only counted linearly.
-        chance: probability of what it leaves; None as of `evidence`.
+        weighed: the state that it is, with its effects refitted, or to which its last explanation was added linearly.
     """
 
     effects: tuple[str, ...]
+    claim: Claim | None
     places: tuple[Explanation, ...]
     unnamed: str
     levels: bool
     log_posterior: float
     size: float
-    evidence: Evidence | None = None
-    chance: float | None = None
+    weighed: Weighed
 
     @property
-    def key(self) -> frozenset[str]:
+    def key(self) -> frozenset[Hashable]:
         marks = ["levels"] if self.levels else []
-        return frozenset((*self.effects, *(place.name for place in self.places), *filter(None, [self.unnamed]), *marks))
+        more = [each for each in (self.unnamed, self.claim and (self.claim.mistake.name, self.claim.tests)) if each]
+        return frozenset((*self.effects, *(place.name for place in self.places), *more, *marks))
+
+    @property
+    def refitted(self) -> bool:
+        """Whether all of its effects were refitted, and not only counted linearly."""
+        return self.effects == self.weighed.state.effects
+
+    @property
+    def chance(self) -> float:
+        """Probability of tests that it meets worse than these."""
+        return self.weighed.first.chance
 
 
 @dataclass(frozen=True, eq=False)
-class _State:
+class Tests:
+    """Tests as they are recorded, or with a record put right, and the model as it came fitted to them."""
+
+    base: Evidence
+    rig: RigSettings
+    claim: Claim | None = None
+
+    @cached_property
+    def bare(self) -> Evidence:
+        return scattering_alone(self.base)
+
+    @cached_property
+    def blocks(self) -> list[Block]:
+        return blocks(self.bare, self.rig)
+
+    @cached_property
+    def nodes(self) -> list[Node]:
+        return nodes(self.bare)
+
+    @cached_property
+    def fixed(self) -> list[Explanation]:
+        """Explanations that do not depend on the model."""
+        return [*places(self.bare), *unnamed(self.bare)]
+
+
+@dataclass(frozen=True, eq=False)
+class State:
     """A set of effects and places around which everything else is weighed.
 
     Args:
-        precision: prior precision of coordinates of effects, by name.
+        precision: prior precision of coordinates of effects, by name; infinite of what rests on an end of its range.
         density: ln of their prior density, with the factor of Laplace's method.
         amounts: size of each place's amounts, relative to |K|.
     """
 
+    tests: Tests
     effects: tuple[str, ...]
     places: tuple[Explanation, ...]
     evidence: Evidence
@@ -98,12 +154,14 @@ class _State:
     size: float = 0.0
 
     @property
-    def key(self) -> frozenset[str]:
-        return frozenset((*self.effects, *(place.name for place in self.places)))
+    def key(self) -> frozenset[Hashable]:
+        claim = self.tests.claim
+        own = [(claim.mistake.name, claim.tests)] if claim else []
+        return frozenset((*self.effects, *(place.name for place in self.places), *own))
 
 
 @dataclass(frozen=True, eq=False)
-class _Weighed:
+class Weighed:
     """A state with what every explanation beside it is worth.
 
     Args:
@@ -111,13 +169,29 @@ class _Weighed:
         first: what is worth something at every size of the rig's errors: nothing more, and what has no name.
     """
 
-    state: _State
-    bare: Evidence
-    first: Ledger
+    state: State
     asked: Asked
-    places: Sequence[Explanation]
 
-    @property
+    @cached_property
+    def bare(self) -> Evidence:
+        same = self.state.evidence is self.state.tests.base
+        return self.state.tests.bare if same else scattering_alone(self.state.evidence)
+
+    @cached_property
+    def first(self) -> Ledger:
+        state, tests = self.state, self.state.tests
+        known = [state.precision.get(name, 0.0) for name in self.bare.solution.coordinates.names]
+        moves = np.isfinite(known)
+        precision = np.array(known)[moves].tolist()
+        free = [self.bare.solution.jacobian[moves]]
+        for place, amount in zip(state.places, state.amounts, strict=True):
+            free.append(place.columns)
+            precision += [amount**-2] * len(place.columns)
+        curves = [each.group for each in tests.fixed if each.kind == "unnamed" and each.group]
+        residual, jacobian = self.bare.residual, np.concatenate(free)
+        return Ledger(residual, jacobian, np.array(precision), tests.blocks, curves, tests.nodes)
+
+    @cached_property
     def log_posterior(self) -> float:
         return self.state.log_prior + self.state.density + self.first.log_evidence
 
@@ -128,9 +202,20 @@ class _Weighed:
     @cached_property
     def worths(self) -> list[tuple[Explanation, Worth]]:
         """Every explanation that can be counted linearly, at the sizes of the rig's errors that matter."""
-        every = [each for each in (*self.effects, *self.places) if each.group is not None]
+        every = [each for each in (*self.effects, *self.state.tests.fixed) if each.group is not None]
         groups = [each.group for each in every if each.group is not None]
         return list(zip(every, replace(self.first, groups=groups, nodes=self.first.likely(FAR)).worths, strict=True))
+
+    def with_(self, each: Explanation, worth: Worth, log_odds: float) -> Hypothesis:
+        """This state with an explanation more, counted linearly."""
+        state = self.state
+        names = (*state.effects, each.name) if each.kind == "effect" else state.effects
+        spots = (*state.places, each) if each.kind == "place" else state.places
+        curve = each.name if each.kind == "unnamed" else ""
+        posterior = state.log_prior + state.density + log_odds + worth.log_evidence
+        return Hypothesis(
+            names, state.tests.claim, spots, curve, False, posterior, max(state.size, worth.size), self
+        )
 
 
 class Search:
@@ -138,146 +223,184 @@ class Search:
 
     def __init__(self, asked: Asked) -> None:
         self.asked = asked
-        self.found: dict[frozenset[str], Hypothesis] = {}
-        bare = scattering_alone(asked.base)
-        self._blocks: list[Block] = blocks(bare, asked.rig)
-        self._nodes: list[Node] = nodes(bare)
-        self._fixed = [*places(bare), *unnamed(bare)]
-        self.root = self._weigh(_State((), (), asked.base, log(1.0 - sum(ODDS.values()))), bare)
-        self._odds = _odds([*self.root.effects, *self._fixed])
+        self.found: dict[frozenset[Hashable], Hypothesis] = {}
+        self._seen: set[frozenset[Hashable]] = set()
+        tests = Tests(asked.base, asked.data.campaign.rig)
+        self.root = self._weigh(State(tests, (), (), asked.base, log(1.0 - sum(ODDS.values()))))
+        self._odds = _odds([*self.root.effects, *tests.fixed])
 
     def run(self) -> list[Hypothesis]:
         """Every hypothesis that was weighed, the most probable first."""
-        beam, seen = [self.root], {self.root.state.key}
+        beam = [self.root]
         for depth in range(ROUNDS + 1):
             for weighed in beam:
-                self._tell(weighed, depth)
+                self._note_with_each(weighed, depth)
             if depth == ROUNDS:
                 break
-            fresh = []
-            for weighed in beam:
-                for state in self._grown(weighed, depth, seen):
-                    seen.add(state.key)
-                    with suppress(np.linalg.LinAlgError):
-                        fresh.append(self._weigh(state))
+            fresh = [each for weighed in beam for each in self._grown(weighed, depth)]
+            if depth == 0 and self.nothing < _SURE:
+                fresh += self._of_records()
             for weighed in fresh:
                 self._note_state(weighed)
-            fresh.sort(key=lambda each: -each.log_posterior)
-            best = max(each.log_posterior for each in self.found.values() if not each.unnamed)
-            near = [each for each in fresh if each.log_posterior > best - FAR]
-            beam = near[: BEAM[min(depth, 1)]]
+            best = max(each.log_posterior for each in self.found.values() if not (each.unnamed or each.levels))
+            near = sorted(fresh, key=lambda each: -each.log_posterior)[: BEAM[min(depth, 1)]]
+            beam = [each for each in near if each.log_posterior > best - FAR]
             if not beam:
                 break
+        self._settle()
+        return self.ordered
+
+    @property
+    def ordered(self) -> list[Hypothesis]:
         return sorted(self.found.values(), key=lambda each: -each.log_posterior)
 
+    @property
+    def nothing(self) -> float:
+        """Probability that nothing is missing, as far as the search has come."""
+        return float(np.exp(self.root.log_posterior - logsumexp([each.log_posterior for each in self.found.values()])))
+
+    def _settle(self) -> None:
+        """Refit what only a linear count promises, as long as it is among the most probable."""
+        for _ in range(sum(REFITS)):
+            every = self.ordered
+            share = np.exp([each.log_posterior - every[0].log_posterior for each in every])
+            ahead = np.cumsum(share) - share
+            open_ = [each for each, before in zip(every, ahead / share.sum(), strict=True) if before < NAMED and not each.refitted]
+            if not open_:
+                return
+            first = open_[0]
+            grown = self._with_effects(first.weighed, [first.effects[-1]], len(first.weighed.state.key))
+            for weighed in grown:
+                self._note_state(weighed)
+            if not grown:  # no response with it, or far behind
+                del self.found[first.key]
+
     def _prior(self, kind: str, name: str) -> float:
-        """Logarithm of the odds beforehand; what can only be asked for beside another has those of a family."""
-        least = min(odds for (own, _), odds in self._odds.items() if own == kind)
-        return self._odds.get((kind, name), least)
+        """Logarithm of the odds beforehand; what can only be asked for beside another has the least of its kind."""
+        if (kind, name) not in self._odds:
+            self._odds[kind, name] = min(odds for (own, _), odds in self._odds.items() if own == kind)
+        return self._odds[kind, name]
 
-    def _weigh(self, state: _State, bare: Evidence | None = None) -> _Weighed:
-        bare = bare or scattering_alone(state.evidence)
-        precision = [state.precision.get(name, 0.0) for name in bare.solution.coordinates.names]
-        free = [bare.solution.jacobian]
-        for place, amount in zip(state.places, state.amounts, strict=True):
-            assert place.group is not None
-            free.append(place.group.columns)
-            precision += [amount**-2] * len(place.group.columns)
-        curves = [each.group for each in self._fixed if each.kind == "unnamed" and each.group]
-        first = Ledger(bare.residual, np.concatenate(free), np.array(precision), self._blocks, curves, self._nodes)
-        return _Weighed(state, bare, first, self.asked, self._fixed)
+    def _weigh(self, state: State) -> Weighed:
+        self._seen.add(state.key)
+        return Weighed(state, self.asked)
 
-    def _tell(self, weighed: _Weighed, depth: int) -> None:
-        """Note every explanation beside a state, counted linearly, and the state itself."""
+    def _note_with_each(self, weighed: Weighed, depth: int) -> None:
+        """Note a state, and it with every explanation beside it, counted linearly."""
         self._note_state(weighed)
-        state, base = weighed.state, weighed.state.log_prior + weighed.state.density - log(depth + 1)
         for each, worth in weighed.worths:
-            posterior = base + self._prior(each.kind, each.name) + worth.log_evidence
-            size = max(state.size, worth.size)
-            more = {
-                "effect": ((*state.effects, each.name), state.places, ""),
-                "place": (state.effects, (*state.places, each), ""),
-                "unnamed": (state.effects, state.places, each.name),
-            }[each.kind]
-            self._note(Hypothesis(*more, False, posterior, size))
+            if len(weighed.state.effects) < self.asked.most or each.kind != "effect":
+                self._note(weighed.with_(each, worth, self._prior(each.kind, each.name) - log(depth + 1)))
 
-    def _note_state(self, weighed: _Weighed) -> None:
-        state, ledger = weighed.state, weighed.first
+    def _note_state(self, weighed: Weighed) -> None:
+        state, claim = weighed.state, weighed.state.tests.claim
         self._note(
-            Hypothesis(
-                state.effects, state.places, "", False, weighed.log_posterior, state.size, state.evidence, ledger.chance
-            )
+            Hypothesis(state.effects, claim, state.places, "", False, weighed.log_posterior, state.size, weighed)
         )
-        wide = state.log_prior + state.density + ledger.log_evidence_wide
-        self._note(Hypothesis(state.effects, state.places, "", True, wide, max(state.size, 0.0125), state.evidence))
+        wide = state.log_prior + state.density + weighed.first.log_evidence_wide
+        size = max(state.size, LEVELS[-1][0] * max(of_class(state.tests.rig, ASSUMED_SHARED)))
+        self._note(Hypothesis(state.effects, claim, state.places, "", True, wide, size, weighed))
 
     def _note(self, hypothesis: Hypothesis) -> None:
+        """Keep the better of two ways to the same; what was refitted counts before what was not."""
         before = self.found.get(hypothesis.key)
-        if before and before.evidence and not hypothesis.evidence:  # what was refitted is not guessed at
-            return
-        if before is None or hypothesis.log_posterior > before.log_posterior or (hypothesis.evidence and not before.evidence):
+        if before is None or (hypothesis.refitted, hypothesis.log_posterior) > (before.refitted, before.log_posterior):
             self.found[hypothesis.key] = hypothesis
 
-    def _grown(self, weighed: _Weighed, depth: int, seen: set[frozenset[str]]) -> list[_State]:
+    def _grown(self, weighed: Weighed, depth: int) -> list[Weighed]:
         """The state with each of its most promising effects, refitted, and places; and without an effect that may only
         have led the way."""
-        state = weighed.state
-        base = state.log_prior + state.density - log(depth + 1)
-        least = weighed.log_posterior
-        promise = {each.name: base + self._prior("effect", each.name) + worth.log_evidence
-                   for each, worth in weighed.worths if each.kind == "effect"}
-        for each in weighed.effects:
-            if each.group is None and each.proposal:
-                promise[each.name] = least + self._prior("effect", each.name) + 0.5 * each.proposal.score - 5.0
-        names = [name for name in sorted(promise, key=lambda name: -promise[name]) if promise[name] > least - 3.0]
-        names = [name for name in names if state.key | {name} not in seen][: REFITS[min(depth, 1)]]
-        grown = []
-        if names and len(state.effects) < self.asked.most:
-            proposed = [each.proposal for each in weighed.effects if each.name in names and each.proposal]
-            start = self.asked.start if depth == 0 and state.evidence.reduced > 1.5 else {}
-            for name, evidence in refitted(state.evidence, proposed, start, self.asked.held, self.asked.bounds).items():
-                grown.append(self._with_effect(state, name, evidence, depth))
-        grown += self._with_places(weighed, depth, seen)
-        for each in list(grown):
-            if len(each.effects) == 2 and not each.places:
-                grown += self._without_first(each, seen)
-        return grown
+        state, least = weighed.state, weighed.log_posterior
+        base = state.log_prior + state.density
+        promise = {
+            each.name: base + self._prior("effect", each.name) + worth.log_evidence
+            for each, worth in weighed.worths
+            if each.kind == "effect"
+        }
+        promise |= {
+            each.name: least + self._prior("effect", each.name) + 0.5 * each.proposal.score - _OF_A_BRANCH
+            for each in weighed.effects
+            if each.group is None and each.proposal
+        }
+        names = [name for name in sorted(promise, key=lambda name: -promise[name]) if promise[name] > least - _SLIGHT]
+        names = [name for name in names if state.key | {name} not in self._seen][: REFITS[min(depth, 1)]]
+        grown = self._with_effects(weighed, names, depth)
+        grown += [each for other in grown for each in self._without_earlier(other.state)]
+        return grown + self._with_places(weighed, depth)
 
-    def _with_effect(self, state: _State, name: str, evidence: Evidence, depth: int) -> _State:
+    def _with_effects(self, weighed: Weighed, names: Sequence[str], depth: int) -> list[Weighed]:
+        state, asked = weighed.state, self.asked
+        if not names or len(state.effects) >= asked.most:
+            return []
+        proposed = [each.proposal for each in weighed.effects if each.name in names and each.proposal]
+        start = asked.start if not state.effects and state.evidence.reduced > _BENT else {}
+        return [
+            self._weigh(self._with_effect(state, name, evidence, depth))
+            for name, evidence in refitted(state.evidence, proposed, start, asked.held, asked.bounds).items()
+        ]
+
+    def _with_effect(self, state: State, name: str, evidence: Evidence, depth: int) -> State:
         density, precision, size = _laplace(name, evidence, state.evidence)
-        prior = state.log_prior + self._prior("effect", name) - log(depth + 1)
-        return _State(
-            (*state.effects, name), state.places, evidence, prior, {**state.precision, **precision},
-            state.density + density, state.amounts, max(state.size, size),
+        return replace(
+            state,
+            effects=(*state.effects, name),
+            evidence=evidence,
+            log_prior=state.log_prior + self._prior("effect", name) - log(depth + 1),
+            precision={**state.precision, **precision},
+            density=state.density + density,
+            size=max(state.size, size),
         )
 
-    def _with_places(self, weighed: _Weighed, depth: int, seen: set[frozenset[str]]) -> list[_State]:
-        state, own = weighed.state, [(each, worth) for each, worth in weighed.worths if each.kind == "place"]
-        base = state.log_prior + state.density - log(depth + 1)
+    def _with_places(self, weighed: Weighed, depth: int) -> list[Weighed]:
+        state, grown = weighed.state, []
+        own = [(each, worth) for each, worth in weighed.worths if each.kind == "place"]
         own.sort(key=lambda pair: -(self._prior("place", pair[0].name) + pair[1].log_evidence))
-        grown = []
-        for each, worth in own[:2]:
-            posterior = base + self._prior("place", each.name) + worth.log_evidence
-            if posterior > weighed.log_posterior and state.key | {each.name} not in seen:
-                grown.append(
-                    _State(
-                        state.effects, (*state.places, each), state.evidence,
-                        state.log_prior + self._prior("place", each.name) - log(depth + 1), state.precision, state.density,
-                        (*state.amounts, worth.likeliest), max(state.size, worth.size),
-                    )
+        for each, worth in own[:_PLACES]:
+            odds = self._prior("place", each.name) - log(depth + 1)
+            better = weighed.with_(each, worth, odds).log_posterior > weighed.log_posterior
+            if better and state.key | {each.name} not in self._seen:
+                more = replace(
+                    state,
+                    places=(*state.places, each),
+                    log_prior=state.log_prior + odds,
+                    amounts=(*state.amounts, worth.likeliest),
+                    size=max(state.size, worth.size),
                 )
+                grown.append(self._weigh(more))
         return grown
 
-    def _without_first(self, state: _State, seen: set[frozenset[str]]) -> list[_State]:
-        first, second = state.effects
-        if frozenset({second}) in seen:
-            return []
-        root = self.root.state
-        with suppress(FitError, ModelError):
-            model = state.evidence.model.without(first)
-            descent = fit_from(model, state.evidence.data_sets, self.asked.held, self.asked.bounds).finished(EVALUATIONS)
-            return [self._with_effect(root, second, Evidence(descent.solution, state.evidence.data_sets), 0)]
-        return []
+    def _without_earlier(self, state: State) -> Iterator[Weighed]:
+        """A state without each of the effects before its last, refitted: they may only have led the way."""
+        if state.places:
+            return
+        data_sets, (held, bounds) = state.evidence.data_sets, (self.asked.held, self.asked.bounds)
+        for name in state.effects[:-1]:
+            if state.key - {name} in self._seen:
+                continue
+            with suppress(FitError, ModelError):  # no response without it
+                model = state.evidence.model.without(name)
+                evidence = fit(model, data_sets, held, {**within_reach(model, data_sets), **bounds})
+                less = replace(self.root.state, tests=state.tests, evidence=state.tests.base)
+                for order, other in enumerate(each for each in state.effects if each != name):
+                    less = self._with_effect(less, other, evidence, order)
+                yield self._weigh(less)
+
+    def _of_records(self) -> list[Weighed]:
+        """The most promising mistakes in the record, the model as it came fitted to the tests with each put right."""
+        data, base, found = self.asked.data, self.asked.base, []
+        listed = claims(data, self.asked.without)
+        for claim in Screen(data).best(listed, _CLAIMS):
+            with suppress(FitError, ModelError):  # tests that nothing can be fitted to as mended
+                evidence = self.asked.fitted(claim.mended(data))
+                if [each.size for each in evidence.data_sets] == [each.size for each in base.data_sets]:
+                    tests = Tests(evidence, data.campaign.rig, claim)
+                    size = max(
+                        abs(float(np.max(np.abs(one.measured / other.measured - 1.0))))
+                        for one, other in zip(base.data_sets, evidence.data_sets, strict=True)
+                    )
+                    odds = log(ODDS["record"]) - log(len(listed))
+                    found.append(self._weigh(State(tests, (), (), evidence, odds, size=max(size, 1.0))))
+        return found
 
 
 def _odds(every: Sequence[Explanation]) -> dict[tuple[str, str], float]:
@@ -304,7 +427,8 @@ def _laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, di
     method, their precision, and what it changes, relative to |K|.
 
     An amount is log-uniform over two decades, and so is what it changes between the least and the largest size; a shape
-    is uniform over what the tests could show. Of an effect in place of a branch each parameter beyond the branch's two
+    is uniform over what the tests could show; at rest on an end of that, the fall of the likelihood away from the end
+    tells how much of it counts, and it moves no further. Of an effect in place of a branch each parameter beyond the branch's two
     is uniform over a factor of 20.
     """
     effect, names = effect_named(name), evidence.solution.coordinates.names
@@ -328,9 +452,18 @@ def _laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, di
             density -= 0.0 if parameter.neutral == parameter.bounds[0] else log(2.0)
             beyond = max(log(max(size, 1e-9) / SIZES[-1]), log(SIZES[0] / max(size, 1e-9)), 0.0)
             density -= 0.5 * (beyond / 0.7) ** 2
+            continue
+        tried = probes(data_sets, model, parameter)
+        if parameter.log:
+            wide = max(log(tried.max() / max(tried.min(), 1e-30)), 1.0)
         else:
-            tried = probes(data_sets, model, parameter)
-            wide = log(max(tried.max() / max(tried.min(), 1e-30), np.e)) if parameter.log else max(np.ptp(tried) / parameter.typical, 1.0)
-            density -= log(wide)
+            wide = max(float(np.ptp(tried)) / parameter.typical, 1.0)
+        density -= log(wide)
+        if coordinate in evidence.solution.at_bound:
+            count -= 1
+            pull = abs(float(evidence.solution.jacobian[names.index(coordinate)] @ evidence.residual))
+            density += log(min(wide, 1.0 / max(pull, 1e-12)))
+            precision[coordinate] = np.inf
+        else:
             precision[coordinate] = 12.0 / wide**2
     return density + 0.5 * count * log(2.0 * np.pi), precision, size

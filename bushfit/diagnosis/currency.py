@@ -213,7 +213,8 @@ class Ledger:
         """The nodes that nothing missing, or one of the groups, brings so near the best in ln evidence."""
         alone = self._solved.base
         best = np.maximum.reduce([alone, *(worth.by_node for worth in self.worths)])
-        kept = (alone > alone.max() - far) | (best > best.max() - far)
+        within = self._within
+        kept = (alone > alone[within].max() - far) | (best > best[within].max() - far)
         return [node for node, near in zip(self.nodes, kept.tolist(), strict=True) if near]
 
     @cached_property

@@ -17,6 +17,8 @@ from bushfit.units import number
 
 #: Evaluations of the model in its refit at most: a correction is of what the best parameters leave, so it has to end.
 _EVALUATIONS = 400
+#: Probability with which noise alone stays below the threshold of what a power law leaves.
+_CHANCE = 0.998
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +93,7 @@ def _span(values: Sequence[float], factor: float = 1.0) -> str:
 
 
 def describe(
-    evidence: Evidence, chance_level: float, start: Mapping[str, float], held: Sequence[str], bounds: Bounds
+    evidence: Evidence, start: Mapping[str, float], held: Sequence[str], bounds: Bounds
 ) -> Described | None:
     """A smooth correction of a fitted model and its fingerprint; None where no correction stands the hold-out.
 
@@ -99,7 +101,6 @@ def describe(
     in time of what has no name.
 
     Args:
-        chance_level: probability with which noise alone stays below the threshold of what a power law leaves.
         start: values of the model's parameters read off the data, for a model that the gap has bent too far.
         held, bounds: parameters that do not move, and limits of the others inside their own.
     """
@@ -119,7 +120,7 @@ def describe(
     after = Evidence(replace(base.solution, model=model, residual=left, jacobian=rows), base.data_sets)
     whole = replace(after.solution, residual=residual(model, evidence.data_sets))
     forms = [where.excess for where in locate(Evidence(whole, evidence.data_sets)) if where.kind == "loop"]
-    like = fingerprint(base, contrasts(base), chance_level, start, bounds)
+    like = fingerprint(base, contrasts(base), _CHANCE, start, bounds)
     return Described(after, correction, like, max(forms, default=0.0))
 
 

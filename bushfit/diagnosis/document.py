@@ -1,4 +1,4 @@
-"""diagnosis.json, key by key: the schema bushfit/diagnosis/2.
+"""diagnosis.json, key by key: the schema bushfit/diagnosis/3.
 
 Its JSON Schema is made of these types, and the type checker holds to them what `diagnosis.record` writes.
 """
@@ -44,7 +44,6 @@ class EffectEntry(TypedDict):
         parameters: by name.
         evidence: why it was named, in words.
         alternatives: what these tests cannot tell it from.
-        richer: effects of which it is a special case, as far as these tests show.
     """
 
     name: str
@@ -57,7 +56,6 @@ class EffectEntry(TypedDict):
     parameters: dict[str, SizeEntry]
     evidence: str
     alternatives: list[str]
-    richer: list[str]
 
 
 #: The keys have a unit that is no name in Python, so that this type is made by a call.
@@ -110,15 +108,24 @@ class GapEntry(TypedDict):
         heldout: on data that were left out and predicted from the rest; null where nothing can be left out.
         parts: the held-out figures part by part.
         skipped: parts that were not held out.
-        name_again: in how many parts the name came out again when it was searched without the part, and of how many;
-            null where it was not searched.
     """
 
     calibration: BeforeAfter
     heldout: BeforeAfter | None
     parts: tuple[HeldOut, ...]
     skipped: tuple[Skipped, ...]
-    name_again: tuple[int, int] | None
+
+
+class OddsEntry(TypedDict):
+    """One explanation of a gap.
+
+    Args:
+        words: what it is.
+        probability: if anything is missing.
+    """
+
+    words: str
+    probability: float
 
 
 class UsableEntry(TypedDict):
@@ -161,6 +168,8 @@ class DiagnosisFile(TypedDict):
         verdict: in a word: nothing is missing; named, and the gap is closed; several that cannot be told apart; a gap
             without a name, described; most of it named; a gap that nothing explains.
         summary: the verdict in a sentence.
+        nothing: probability that nothing is missing beyond noise and tolerance.
+        odds: what may explain the gap, the most probable first; what is left of 1 is for what is not told.
         effects: what was added, or the leaders of sets that cannot be told apart.
         where: regions of disagreement before anything was added.
         remainder: regions of disagreement that stay.
@@ -171,9 +180,11 @@ class DiagnosisFile(TypedDict):
         warnings: what else a user must know.
     """
 
-    schema: Literal["bushfit/diagnosis/2"]
+    schema: Literal["bushfit/diagnosis/3"]
     verdict: Verdict
     summary: str
+    nothing: float
+    odds: list[OddsEntry]
     effects: list[EffectEntry]
     where: list[WhereEntry]
     remainder: list[WhereEntry]

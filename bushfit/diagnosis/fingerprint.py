@@ -10,9 +10,9 @@ from scipy.special import ndtri
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.holdout import HoldOut
-from bushfit.diagnosis.refit import EXCLUDED
+
 from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
-from bushfit.diagnosis.search import SAME
+from bushfit.diagnosis.priors import TELLS
 from bushfit.diagnosis.terms import Measure, Terms, end_parts, halves, inner_parts, predicted
 from bushfit.effects.contract import Array
 from bushfit.fitting.solve import Bounds, Solution, coordinate_bounds, jacobian, residual
@@ -20,6 +20,8 @@ from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.units import number
 
+#: Chi-square behind the best at which a measure is left on its way.
+_EXCLUDED = 60.0
 #: Powers at which the search for the best begins; rubber, rigs and their mistakes have powers from -1 to 2.
 _POWERS = np.arange(-2.0, 3.01, 0.5)
 #: Least and largest share of the stiffness in phase and in quadrature, and power of frequency and of amplitude.
@@ -140,7 +142,7 @@ def fingerprint(
     if not fits:
         return None
     nearest = min((fit.after for fit in fits), key=lambda after: after.chi_square)
-    goal = nearest.chi_square + EXCLUDED * max(nearest.reduced, 1.0)
+    goal = nearest.chi_square + _EXCLUDED * max(nearest.reduced, 1.0)
     fits = [fit.to_its_end(bounds) for fit in fits if fit.after.chi_square < goal]
     by_measure = {fit.terms.measure: fit for fit in sorted(fits, key=lambda fit: -fit.after.chi_square)}
     best, *others = sorted(by_measure.values(), key=lambda fit: fit.after.chi_square)
@@ -278,7 +280,7 @@ def _read(best: _Fit, others: Sequence[_Fit], held: HoldOut, *, is_all: bool) ->
     scales = np.array([1.0, np.degrees(1.0), 1.0, 1.0])
     ends = [_interval(*each, weights) for each in zip((values * scales).T, (errors * scales).T, strict=True)]
     size, phase, p, q = [(float(value), *pair) for value, pair in zip(best.value * scales, ends, strict=True)]
-    alike = tuple(fit.terms.measure for fit, off in zip(others, apart, strict=True) if off < SAME)
+    alike = tuple(fit.terms.measure for fit, off in zip(others, apart, strict=True) if off < TELLS)
     middle = float(np.exp(best.middle[0])), float(np.exp(best.middle[1]))
     is_power_law = is_all and halves(held)
     return Fingerprint(best.terms.measure, alike, size, phase, p, q, middle, best.after, held, is_power_law)

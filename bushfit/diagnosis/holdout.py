@@ -96,8 +96,6 @@ class HoldOut:
     Args:
         before, after: root mean square over all parts, in units of noise; None where nothing can be held out.
         whitened: the same in units of noise and of the prediction's own error, by which is decided.
-        name_again: in how many parts what was named came out again when it was searched without the part, and of how
-            many; None where it was not searched.
     """
 
     parts: tuple[HeldOut, ...] = ()
@@ -105,7 +103,6 @@ class HoldOut:
     before: float | None = None
     after: float | None = None
     whitened: tuple[float, float] = (0.0, 0.0)
-    name_again: tuple[int, int] | None = None
 
     @classmethod
     def of(cls, told: Mapping[str, Array], skipped: Sequence[Skipped] = ()) -> HoldOut:

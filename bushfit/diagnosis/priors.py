@@ -27,6 +27,8 @@ BEAM, ROUNDS, REFITS = (4, 3), 3, (7, 3)
 NOTHING = 0.15
 #: Probability from which on an explanation is named; a set that reaches it is told, of so many at most.
 NAMED, MOST_TOLD = 0.97, 4
+#: Difference of chi-square that makes such odds between two.
+TELLS = 2.0 * float(np.log(NAMED / (1.0 - NAMED)))
 #: Share of what names and the unnamed bring together, that names bring alone where they may stand: `partly`.
 MOSTLY = 0.9
 #: Probability of what the leader leaves, below which it does not fit.

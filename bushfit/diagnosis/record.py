@@ -69,7 +69,6 @@ class Named:
 
     Args:
         alternatives: effects these tests cannot tell from it.
-        richer: effects of which it is a special case, and whose further freedom these tests do not show.
         test: of a mistake in the record, the test in which it was made; None of what is not made in a test.
         sentence: of a mistake, what would be so; else that of the effect.
         correction: of a mistake, what to write into the campaign.
@@ -78,7 +77,6 @@ class Named:
     name: str
     evidence: str
     alternatives: tuple[str, ...] = ()
-    richer: tuple[str, ...] = ()
     test: str | None = None
     sentence: str = ""
     correction: str = ""
@@ -90,13 +88,26 @@ class Named:
 
 
 @dataclass(frozen=True)
+class Odds:
+    """What may explain a gap, and how probable each is.
+
+    Args:
+        nothing: probability that nothing is missing beyond noise and tolerance.
+        told: explanations in words with their probabilities, if anything is missing; the most probable first.
+    """
+
+    nothing: float
+    told: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True)
 class Judged:
-    """One candidate and why it won or lost."""
+    """One candidate and why it won or lost; its probability is that it is part of what is missing."""
 
     name: str
     score: float
     gain: float | None
-    bic: float | None
+    probability: float
     heldout: float | None
     parameters: Mapping[str, float]
     why: str
@@ -130,6 +141,7 @@ class Diagnosis:
     result: Result
     notes: tuple[str, ...] = ()
     description: Description | None = None
+    odds: Odds = Odds(1.0)
 
     @property
     def changed(self) -> bool:
@@ -149,9 +161,11 @@ class Diagnosis:
     def to_document(self) -> DiagnosisFile:
         """JSON-ready data."""
         document: DiagnosisFile = {
-            "schema": "bushfit/diagnosis/2",
+            "schema": "bushfit/diagnosis/3",
             "verdict": self.verdict,
             "summary": self.summary,
+            "nothing": self.odds.nothing,
+            "odds": [{"words": words, "probability": share} for words, share in self.odds.told],
             "effects": [self._effect(named) for named in self.effects],
             "where": [_where(where) for where in self.where],
             "remainder": [_where(where) for where in self.remainder],
@@ -171,7 +185,6 @@ class Diagnosis:
             "heldout": {"before": held.before, "after": held.after} if held.parts else None,
             "parts": held.parts,
             "skipped": held.skipped,
-            "name_again": held.name_again,
         }
 
     def _usable(self) -> UsableEntry | None:
@@ -203,7 +216,6 @@ class Diagnosis:
             },
             "evidence": named.evidence,
             "alternatives": list(named.alternatives),
-            "richer": list(named.richer),
         }
 
     def _parameter(self, name: str, value: float) -> SizeEntry:

@@ -3,13 +3,16 @@
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 
+import numpy as np
+
 from bushfit.diagnosis.evidence import EVALUATIONS, Evidence, fit_from
-from bushfit.diagnosis.propose import Proposal, stroke
-from bushfit.effects import effect_named, qualified
+from bushfit.diagnosis.propose import Proposal, probes
+from bushfit.effects import qualified
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data_sets import DataSet
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.solve import Bounds
+from bushfit.model.model import Model
 
 #: Chi-square beyond that of the best at which a refit is left on its way.
 _FAR = 60.0
@@ -31,7 +34,7 @@ def refitted(
     """
     fits: dict[str, Descent] = {}
     for proposal in proposed:
-        limits = {**_within_stroke(evidence.data_sets, proposal.name), **bounds}
+        limits = {**within_reach(proposal.model, evidence.data_sets), **bounds}
         known = {name: value for name, value in start.items() if name in proposal.model.values}
         with suppress(FitError, ModelError):  # no response with this effect: no candidate
             fits[proposal.name] = fit_from(proposal.model.with_values(known), evidence.data_sets, held, limits)
@@ -54,8 +57,9 @@ def _goes_on(fit: Descent, best: float) -> bool:
     if _ended(fit):
         return False
     return fit.evaluations < _FIRST or fit.chi_square - _MOST_FALL * fit.expected_fall < best + _FAR
-def _within_stroke(data_sets: Sequence[DataSet], name: str) -> Bounds:
-    """Limits of an effect's displacements [m] to what the tests can show: a stop that is always met is no stop."""
-    effect = effect_named(name)
-    scaled = [parameter for parameter in effect.parameters if parameter.scale == "displacement"]
-    return {qualified(effect, parameter): stroke(data_sets) for parameter in scaled}
+def within_reach(model: Model, data_sets: Sequence[DataSet]) -> Bounds:
+    """Limits of the shapes of a model's effects to what the tests can show: a stop that is always met is no stop, and a
+    resonance far above all frequencies is a mass."""
+    shapes = [(qualified(effect, each), each) for effect in model.records for each in effect.parameters if each.scale]
+    tried = {name: probes(data_sets, model, each) for name, each in shapes}
+    return {name: (float(values.min()), float(values.max())) for name, values in tried.items() if np.ptp(values) > 0.0}

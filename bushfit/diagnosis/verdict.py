@@ -1,375 +1,243 @@
-"""From what the search found to a verdict, in the order in which a careful engineer doubts it."""
+"""The finding as an engineer needs it: what is missing, how large, where, how far it closes the gap, and what to test."""
+
+from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from bushfit.diagnosis.again import searched_again
+from bushfit.diagnosis.beam import Hypothesis, Search
+from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.described import describe
 from bushfit.diagnosis.document import Description, Verdict
-from bushfit.diagnosis.evidence import Evidence, fit, result_of
-from bushfit.diagnosis.faults import Fault
-from bushfit.diagnosis.form import other_form
-from bushfit.diagnosis.holdout import HoldOut, hold_out
-from bushfit.diagnosis.leads import leads
-from bushfit.diagnosis.locate import contrasts, largest_smooth_misfit, locate
+from bushfit.diagnosis.evidence import Evidence, result_of
+from bushfit.diagnosis.holdout import hold_out
+from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.next_test import deciding_test
-from bushfit.diagnosis.propose import Proposal
-from bushfit.diagnosis.record import Diagnosis, Judged, Named, Where
-from bushfit.diagnosis.refit import Candidate
-from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
-from bushfit.diagnosis.search import CHANCE_LEVEL, SAME, Search, Step
-from bushfit.effects import effect_named, effect_of, qualified
+from bushfit.diagnosis.record import Diagnosis, Judged, Named, Odds, Where
+from bushfit.diagnosis.words import Composition, Finding
+from bushfit.effects import effect_named
 from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.fitting.data import Data
 from bushfit.units import number
 
-#: Held-out gap, in units of noise, up to which little is left (`partly`): chosen, wrong names leave more.
-_PARTLY = 1.15
-#: Share of the tolerance that a remainder may have beside a name: more may be another effect that the name bends to.
-_BESIDE_A_NAME = 0.25
-#: Share of all that is smooth in the residuals that may stay beside a fault for it to be all there is: chosen, a wrong
-#: level leaves up to a third, physics that one level shows best a half and more.
-_BESIDE_A_FAULT = 0.4
-#: Faults that no physics makes: a level or a loop that stands out may be what a wrong name leaves.
-_NO_PHYSICS = ("frequency", "repeat", "row")
-#: Parts without which another name comes out, from which on a single name is doubted: one may do so by chance. Of
-#: several effects one part is enough: wrong ones are mostly added several at a time.
-_ELSEWHERE = 2
-#: Share of the parts without which a name has to come out again, more than this: of 64 simulated campaigns right ones
-#: did in four of seven or more, a wrong one in three of six.
-_STANDS = 0.5
-#: What is said where there is no gap.
-_NOTHING = "nothing is missing beyond noise and tolerance"
-#: What is said of a gap without a name.
-_NO_NAME = "a real gap stays that no known effect closes"
-#: Names in one set at most, for it to be a finding: more than three tell an engineer nothing.
-_LARGEST_SET = 3
 
-
-@dataclass(frozen=True)
-class Remainder:
-    """A real gap that stays: its words, and the fault that explains it, if one does."""
-
-    words: str
-    fault: Fault | None
-
-
-def judge(search: Search, final: Evidence, added: Sequence[str]) -> Diagnosis:
-    """Doubt the finding: a fault instead, look-alikes, held-out data, what remains, the same name found again."""
-    base = search.base
-    if not added:
-        trace = search.trace()
-        remainder = find_remainder(search, trace.evidence if trace else base)
-        if remainder is None:
-            return consistent(search)
-        return unexplained(search, remainder.words, fault=remainder.fault)
-    fault = worst_fault(search, base)
-    worth = base.bic - final.bic
-    if fault and fault.worth > worth + SAME:
-        return unexplained(search, _fault_words(fault), fault=fault)
-    if fault and fault.worth > worth - SAME:
-        either = (f"fault: {fault.suspect.words}",)
-        leaders = [replace(_named(step), alternatives=either) for step in search.steps(final, added)]
-        words = f"{_all(added)}, or a fault of the measurement: {fault.suspect.words}"
-        return finish(search, "ambiguous", f"these tests cannot tell {words}", base, leaders, fault=fault)
-    if beyond := _at_bound(final, added):
-        words = f"{_closing(added)} the gap only with {beyond} at the edge of what is possible"
-        return unexplained(search, words, added)
-    remainder = find_remainder(search, final, _BESIDE_A_NAME)
-    gross = remainder and not remainder.fault and largest_smooth_misfit(final) > search.settings.tolerance
-    if remainder and gross and find_remainder(search, base):
-        return unexplained(search, remainder.words, added)  # whatever held-out tests would say
-    held = hold_out(base, final, search.bounds)
-    if not held.passed:
-        words = f"{_closing(added)} the gap only where fitted, so the name is taken back"
-        if find_remainder(search, base):
-            return unexplained(search, words, added)
-        return finish(search, "consistent", f"{_NOTHING}; {words}", base, ())
-    steps = search.steps(final, added)
-    if bent := _bent(final, steps):
-        words = f"these tests show {bent} with another dependence on frequency and amplitude than its law has"
-        return unexplained(search, words, added)
-    if remainder and (gross or not _is_little(remainder, held)):
-        return unexplained(search, remainder.words, added, fault=remainder.fault)
-    names = [_named(step) for step in steps]
-    again = searched_again(search, final, steps, held)
-    counted = (sum(each.came_again for each in again), len(again)) if again else None
-    others = sorted({other for each in again for other in each.others})
-    if sum(bool(each.others) for each in again) >= (_ELSEWHERE if len(steps) == 1 else 1):
-        return _another_name(search, names, others, counted)
-    if any(step.rivals for step in steps):
-        return _ambiguous(search, final, steps, names, counted)
-    if counted and counted[0] <= _STANDS * counted[1]:
-        words = f"without a part of the tests {_all(added)} seldom comes out again"
-        return unexplained(search, words, added, again=counted)
-    untested = _untested(held, steps)
-    if untested and any(step.gain < step.place.critical + SAME for step in steps):
-        return unexplained(search, f"{_closing(added)} the gap by little{untested}", added, again=counted)
-    words = f"{_closing(added)} {'part of the gap; ' + remainder.words if remainder else 'the gap'}{untested}"
-    verdict: Verdict = "partly" if remainder else "named"
-    fault = remainder.fault if remainder else None
-    return finish(search, verdict, words, final, names, fault=fault, held=held, again=counted)
-
-
-def _bent(final: Evidence, steps: Sequence[Step]) -> str | None:
-    """An effect that the tests show with another form than its law has, with all that cannot be told from it."""
-    bent = other_form(final, [step.name for step in steps], CHANCE_LEVEL)
-    rivals = [rival for step in steps if step.name == bent for rival in step.rivals]
-    every = all(other_form(rival.evidence, [rival.name], CHANCE_LEVEL) for rival in rivals)
-    return bent if every else None
-
-
-def _is_little(remainder: Remainder, held: HoldOut) -> bool:
-    """Whether a name may stand beside what remains, within the tolerance or a fault that no physics makes."""
-    little = held.after is not None and held.after <= _PARTLY
-    return little and (remainder.fault is None or remainder.fault.suspect.kind in _NO_PHYSICS)
-
-
-def unexplained(
-    search: Search,
-    words: str,
-    added: Sequence[str] = (),
-    *,
-    fault: Fault | None = None,
-    again: tuple[int, int] | None = None,
-) -> Diagnosis:
-    """The finding that a real gap stays, described where it can be: effects that shrink the gap are leads only.
-
-    Where it cannot, the model stays as it was.
-    """
-    lead = leads(search)
-    if added and not lead:
-        lead = f"; no more than a lead: {_all(added)}"
-    alone = fault and fault.suspect.kind != "frequency" and _share_beside(search.base, fault) < _BESIDE_A_FAULT
-    alone = alone or not search.settings.max_effects  # then nothing is to be added, without a name either
-    start, held, bounds = search.start, search.held, search.bounds
-    if alone or not (found := describe(search.base, CHANCE_LEVEL, start, held, bounds)):
-        return finish(search, "unexplained", words + lead, search.base, (), fault=fault, again=again)
-    told = "" if words == _NO_NAME else f"; {words}"
-    said = f"{_NO_NAME}: {found.size}; {found.words}{told}{lead}"
-    names, out, about = [Named(UNNAMED, found.evidence)], found.correction.held, found.description
-    return finish(search, "described", said, found.after, names, fault=fault, held=out, description=about, again=again)
-
-
-def _share_beside(evidence: Evidence, fault: Fault) -> float:
-    """The share of all that is smooth in the residuals that stays beside a fault."""
-    columns, solution = contrasts(evidence), evidence.solution
-    freed = replace(solution, jacobian=np.concatenate((solution.jacobian, fault.suspect.columns)))
-    tests = [
-        ScoreTest(each, columns, [np.arange(len(columns))], PATTERN_LEFT)
-        for each in (evidence, replace(evidence, solution=freed))
-    ]
-    every, rest = (max(test.gains()[0] - test.sizes[0], 1.0) for test in tests)  # less what noise makes
-    return rest / every
-
-
-def _another_name(
-    search: Search,
-    names: Sequence[Named],
-    others: Sequence[str],
-    again: tuple[int, int] | None,
-) -> Diagnosis:
-    """The finding where another name comes out without some part: a set of look-alikes, or no name."""
-    added = [name.name for name in names]
-    words = f"without some of the tests {' or '.join(others)} comes out in place of {_all(added)}"
-    alternatives = tuple(dict.fromkeys((*names[0].alternatives, *others)))
-    if len(names) > 1 or len(alternatives) >= _LARGEST_SET:
-        return unexplained(search, words, added, again=again)
-    doubtful = [replace(names[0], alternatives=alternatives)]
-    return finish(search, "ambiguous", words, search.base, doubtful, again=again)
-
-
-def _untested(held: HoldOut, steps: Sequence[Step]) -> str:
-    """What hold-out could not show of the effects that were added, in words."""
-    if held.after is None:
-        return "; nothing can be held out of these tests, so it stands on the fit alone"
-    own = {step.name for step in steps}
-    open_parts = [skipped.part for skipped in held.skipped if own & set(skipped.effects)]
-    return (
-        f"; what shows it ({', '.join(open_parts)}) cannot be held out, and no part held out is that one"
-        if open_parts
-        else ""
-    )
-
-
-def _at_bound(final: Evidence, added: Sequence[str]) -> str | None:
-    """The amount of an added effect that came to rest on a bound: what is missing is then another thing."""
-    amounts = {qualified(effect, effect.amount) for effect in map(effect_named, added)}
-    return next((name for name in final.solution.at_bound if name in amounts), None)
-
-
-def _ambiguous(
-    search: Search,
-    final: Evidence,
-    steps: Sequence[Step],
-    names: Sequence[Named],
-    again: tuple[int, int] | None,
-) -> Diagnosis:
-    """Keep what is certain; leave out what has look-alikes.
-
-    More than three that close the gap alike are listed all the same, as leads: that nothing closes it would be wrong.
-    """
-    model = search.base.model
-    for step in steps:
-        if not step.rivals:
-            own = {key: value for key, value in final.model.values.items() if effect_of(key) == step.name}
-            model = model.with_effect(step.name, own)
-    kept = search.base if model is search.base.model else fit(model, final.data_sets, search.held, search.bounds)
-    sets = "; ".join(f"{name.name} from {' or '.join(name.alternatives)}" for name in names if name.alternatives)
-    rivals = [[final.model, *(rival.evidence.model for rival in step.rivals)] for step in steps if step.rivals]
-    words = f"these tests cannot tell {sets}"
-    if any(len(name.alternatives) >= _LARGEST_SET for name in names):
-        words += "; so many names are no more than leads"
-    advice = deciding_test(rivals[0], final.data_sets)
-    return finish(search, "ambiguous", words, kept, names, next_test=advice, again=again)
-
-
-def consistent(search: Search) -> Diagnosis:
-    """The finding that nothing is missing, once that stands; what stays below the tolerance is said."""
-    trace = search.trace()
-    words = _NOTHING + (f"; what there is of {trace.name} stays below the tolerance" if trace else "")
-    return finish(search, "consistent", words, search.base, ())
-
-
-def is_consistent(search: Search) -> bool:
-    """Whether nothing is missing beyond noise and tolerance."""
-    trace = search.trace()
-    return not search.matters and find_remainder(search, trace.evidence if trace else search.base) is None
-
-
-def find_remainder(search: Search, evidence: Evidence, share: float = 1.0) -> Remainder | None:
-    """What is left beyond noise and tolerance: a fault at one place, or something smooth beyond a share of it."""
-    fault = worst_fault(search, evidence)
-    if fault:
-        return Remainder(_fault_words(fault), fault)
-    columns = contrasts(evidence)
-    smooth = ScoreTest(evidence, columns, [np.arange(len(columns))], PATTERN_LEFT)
-    if (
-        smooth.gains()[0] > smooth.largest_by_chance(CHANCE_LEVEL)
-        and largest_smooth_misfit(evidence) > share * search.settings.tolerance
-    ):
-        return Remainder(_NO_NAME, None)
-    return None
-
-
-def worst_fault(search: Search, evidence: Evidence) -> Fault | None:
-    """The worthiest of the faults that are larger than the tolerance and more than chance and their price.
-
-    Where few levels tell the errors of levels, chance has no end: a level that is off by more than a rig of the class
-    makes it then has to be more than chance were these errors known.
-    """
-    told = search.faults(evidence)
-
-    def is_real(fault: Fault) -> bool:
-        of_no_rig = fault.suspect.kind == "level" and fault.size > search.most_of_level
-        return fault.gain > (told.chance_of_known if of_no_rig else told.chance)
-
-    large = (fault for fault in told.places if fault.size >= search.settings.tolerance)
-    real = (fault for fault in large if fault.worth >= SAME and is_real(fault))
-    return max(real, key=lambda fault: fault.worth, default=None)
-
-
-def _fault_words(fault: Fault) -> str:
-    return f"{fault.suspect.words} stands out from all other tests: measure it again before looking for physics"
-
-
-def _closing(added: Sequence[str]) -> str:
-    return f"{_all(added)} {'closes' if len(added) == 1 else 'close'}"
-
-
-def _all(added: Sequence[str]) -> str:
-    return " and ".join(added)
-
-
-def _named(step: Step) -> Named:
-    """The effect of a step, with its gain and how far the next best is behind in words."""
-    words = f"takes {step.gain:.0f} off chi-square"
-    tried = step.place.tried
-    if tried and tried[0].name == step.name:
-        others, bic = [rival for rival in tried[1:] if not rival.left], tried[0].evidence.bic
-        behind = [f"next best {rival.name}, {rival.evidence.bic - bic:.0f} behind by BIC" for rival in others]
-        words += "; " + (behind[0] if behind else "no other comes near")
-    alternatives, richer = (tuple(rival.name for rival in rivals) for rivals in (step.rivals, step.richer))
-    return Named(step.name, words, alternatives, richer)
-
-
-def finish(
-    search: Search,
-    verdict: Verdict,
-    summary: str,
-    after: Evidence,
-    effects: Sequence[Named],
-    *,
-    fault: Fault | None = None,
-    next_test: str = "",
-    held: HoldOut | None = None,
-    description: Description | None = None,
-    again: tuple[int, int] | None = None,
-) -> Diagnosis:
-    """The whole finding, once the verdict stands; what was held out is held out here where it was not yet.
+@dataclass(frozen=True, eq=False)
+class Told:
+    """A finding put into words.
 
     Args:
-        again: in how many parts, and of how many, what was added came out again, whether it was believed or not.
+        hypotheses: all that were weighed, the most probable first.
+        unresolved: effects of the model as it came that these tests could not tell from a twin of the rig.
     """
-    base = search.base
-    told = {*base.model.effects} - {*search.settings.unresolved}
-    if not next_test and effects:
-        next_test = effect_named(effects[0].name).confirmed_by
-    where = (*([_fault_where(fault)] if fault else []), *locate(base))
-    return Diagnosis(
-        verdict,
-        summary,
-        tuple(effects),
-        where,
-        where if after is base else locate(after),
-        replace(held or hold_out(base, after, search.bounds), name_again=again),
-        f"measure again: {fault.suspect.words}" if fault else next_test,
-        tuple(_candidates(search, {named.name for named in effects})),
-        base,
-        after,
-        result_of(after, search.bounds, told),
-        _notes(search),
-        description,
-    )
+
+    search: Search
+    finding: Finding
+    hypotheses: Sequence[Hypothesis]
+    unresolved: Sequence[str]
+
+    @property
+    def data(self) -> Data:
+        return self.search.asked.data
+
+    @property
+    def base(self) -> Evidence:
+        return self.search.asked.base
+
+    @property
+    def first(self) -> Composition | None:
+        return self.finding.told[0] if self.finding.told else None
+
+    def diagnosis(self) -> Diagnosis:
+        """The whole finding."""
+        match self.finding.verdict:
+            case "consistent":
+                return self._finished("consistent", _nothing(self.finding), self.base)
+            case "named" | "partly":
+                return self._named()
+            case "ambiguous":
+                return self._ambiguous()
+        return self._without_name()
+
+    def _named(self) -> Diagnosis:
+        assert self.first
+        best = self.first.best
+        if best.claim:
+            return self._of_record(best.claim)
+        names = [Named(name, self._evidence(name)) for name in best.effects]
+        beside = [place.name for place in best.places] + (["something without a name"] if best.unnamed else [])
+        words = f"{_all(best.effects)} {'closes' if len(best.effects) == 1 else 'close'} "
+        words += f"part of the gap; the rest: {', '.join(beside)}" if beside else "the gap"
+        return self._finished(self.finding.verdict, words, best.weighed.state.evidence, names, places=best)
+
+    def _of_record(self, claim: Claim) -> Diagnosis:
+        """A mistake in the record: the gap shrinks if it was made; the model stays as it was."""
+        assert self.first
+        evidence, best = self._of_claim(self.first), self.first.best
+        names = _entries(self.data, claim, evidence)
+        command = " ".join(["bushfit diagnose CAMPAIGN", *(f"--adopt {name}" for name in claim.labels(self.data))])
+        advice = f"if the records of the tests bear it out, {'; '.join(claim.corrections(self.data))} (or {command})"
+        beside = f", with {_all(best.effects)} beside it" if best.effects else ""
+        words = f"these tests agree if {claim.words(self.data)}{beside}"
+        found = self._finished("named", words, self.base, names, next_test=advice)
+        warning = f"fitted to the tests as they are, which only agree if {claim.words(self.data)}: {advice}"
+        after = best.weighed.state.evidence
+        return replace(
+            found,
+            after=after,
+            remainder=locate(after),
+            holdout=hold_out(self.base, after, self.search.asked.bounds),
+            result=replace(found.result, warnings=(*found.result.warnings, warning)),
+        )
+
+    def _of_claim(self, each: Composition) -> str:
+        gain = self.base.chi_square - each.best.weighed.state.evidence.chi_square
+        return f"takes {gain:.0f} off chi-square without a parameter; {self._probability(each)}"
+
+    def _ambiguous(self) -> Diagnosis:
+        told = self.finding.told
+        labels = {id(each): self.label(each) for each in told}
+        led = next((each for each in told if each.best.effects or each.best.claim), None)
+        others = tuple(labels[id(each)] for each in told if each is not led)
+        names: list[Named] = []
+        if led and led.best.claim:
+            names = [replace(each, alternatives=others) for each in _entries(self.data, led.best.claim, self._of_claim(led))]
+        elif led:
+            names = [Named(name, self._probability(led), others) for name in led.best.effects]
+        words = f"these tests cannot tell {' from '.join(labels.values())}"
+        models = [each.best.weighed.state.evidence.model for each in told if each.best.effects and each.best.refitted]
+        advice = deciding_test(models, self.base.data_sets)
+        if led and led.best.claim:
+            advice = f"look into the records of the tests; {'; '.join(led.best.claim.corrections(self.data))}"
+        spot = next((each.best for each in told if each.best.places), None)
+        return self._finished("ambiguous", words, self.base, names, places=spot, next_test=advice)
+
+    def _without_name(self) -> Diagnosis:
+        """A gap that is described, where a correction stands; else unexplained, with the place at fault if there is one."""
+        asked, finding = self.search.asked, self.finding
+        lead = f"; no more than leads: {_all(finding.leads)}" if finding.leads else ""
+        spot = self.first.best if self.first and finding.verdict == "unexplained" else None
+        if not spot and asked.most and (found := describe(self.base, asked.start, asked.held, asked.bounds)):
+            words = f"a real gap stays that no known effect closes: {found.size}; {found.words}{lead}"
+            names = [Named(UNNAMED, found.evidence)]
+            return self._finished("described", words, found.after, names, description=found.description)
+        words = "a real gap stays that no known effect closes" + lead
+        if spot:
+            words = f"{self.label(self.finding.told[0])} stands out from all other tests: measure it again before looking for physics"
+        return self._finished("unexplained", words, self.base, places=spot)
+
+    def label(self, each: Composition) -> str:
+        """A composition in words: its effects, or what else it is."""
+        best = each.best
+        parts = [*best.effects, *(f"fault: {place.name}" for place in best.places)]
+        parts = ([" + ".join(best.claim.labels(self.data))] if best.claim else []) + parts
+        parts += ["errors of levels beyond the rig's class"] if best.levels else []
+        parts += ["something without a name"] if best.unnamed else []
+        return " + ".join(parts)
+
+    def _evidence(self, name: str) -> str:
+        """Why an effect was named."""
+        gain = self.base.chi_square - self.search.root.state.evidence.chi_square
+        assert self.first
+        after = self.first.best.weighed.state.evidence
+        gain = self.base.chi_square - after.chi_square
+        beside = " with what was named beside it" if len(self.first.best.effects) > 1 else ""
+        return f"takes {gain:.0f} off chi-square{beside}; {self._probability(self.first)}"
+
+    def _probability(self, each: Composition) -> str:
+        others = [other for other in self.finding.told if other is not each]
+        words = f"{number(each.probability, 3)} probable"
+        return words + (f", next {self.label(others[0])} {number(others[0].probability, 2)}" if others else "")
+
+    def _finished(
+        self,
+        verdict: Verdict,
+        summary: str,
+        after: Evidence,
+        names: Sequence[Named] = (),
+        *,
+        places: Hypothesis | None = None,
+        next_test: str = "",
+        description: Description | None = None,
+    ) -> Diagnosis:
+        base, bounds = self.base, self.search.asked.bounds
+        spots = list(places.places) if places else []
+        if not next_test and names:
+            next_test = effect_named(names[0].name).confirmed_by if verdict != "described" else ""
+        if spots:
+            next_test = f"measure again: {spots[0].name}"
+        where = (*(_place_where(base, each.suspect, places) for each in spots if places), *locate(base))
+        return Diagnosis(
+            verdict,
+            summary,
+            tuple(names),
+            where,
+            where if after is base else locate(after),
+            hold_out(base, after, bounds),
+            next_test,
+            tuple(self.candidates),
+            base,
+            after,
+            result_of(after, bounds, {*base.model.effects} - {*self.unresolved}),
+            self._notes(),
+            description,
+            Odds(self.finding.nothing, tuple((self.label(each), each.probability) for each in self.finding.told)),
+        )
+
+    @cached_property
+    def candidates(self) -> list[Judged]:
+        """Every effect of the library beside the model as it came: its score, its refit and its probability."""
+        chance = self.hypotheses[0].log_posterior
+        weight = {id(each): float(np.exp(each.log_posterior - chance)) for each in self.hypotheses}
+        whole = sum(weight.values())
+        alone = {each.effects[0]: each for each in self.hypotheses if each.refitted and len(each.effects) == 1 and len(each.key) == 1}
+        found = []
+        for each in self.search.root.effects:
+            share = sum(weight[id(other)] for other in self.hypotheses if each.name in other.effects) / whole
+            found.append(self._judged(each.name, each.proposal.score, each.proposal.visible, alone.get(each.name), share))
+        return found
+
+    def _judged(self, name: str, score: float, visible: bool, alone: Hypothesis | None, share: float) -> Judged:
+        if alone is None:
+            why = "score too small to refit" if visible else "not visible in these tests"
+            return Judged(name, score, None, share, None, {}, why)
+        after = alone.weighed.state.evidence
+        own = {key: value for key, value in after.model.values.items() if key not in self.base.model.values}
+        told = self.first and name in self.first.best.effects
+        why = "part of the likeliest explanation" if told else "another explanation is likelier"
+        held = hold_out(after, after, self.search.asked.bounds).after
+        return Judged(name, score, self.base.chi_square - after.chi_square, share, held, own, why)
+
+    def _notes(self) -> tuple[str, ...]:
+        """What these tests could not show at all."""
+        unseen = [each.name for each in self.search.root.effects if not each.proposal.visible]
+        blind = [name for name in unseen if not effect_named(name).under]  # what no test states is not asked for
+        return (f"not identifiable from these tests: {', '.join(blind)}",) if blind else ()
 
 
-def _fault_where(fault: Fault) -> Where:
-    suspect = fault.suspect
+def _nothing(finding: Finding) -> str:
+    return "nothing is missing beyond noise and tolerance"
+
+
+def _all(names: Sequence[str]) -> str:
+    return " and ".join(names)
+
+
+def _entries(data: Data, claim: Claim, evidence: str) -> list[Named]:
+    """An entry for each test of a claim."""
+    return [
+        Named(one.mistake.name, evidence, test=one.test(data), sentence=one.words(data), correction=one.corrections(data)[0])
+        for one in claim.each
+    ]
+
+
+def _place_where(base, suspect, best: Hypothesis) -> Where:
     kind, component = ("loop", "force") if suspect.kind == "loop" else ("sweep", "storage")
-    excess = float(np.sqrt(fault.gain / max(fault.columns, 1)))
-    reading = f"{suspect.words} departs by {number(100 * fault.size, 2)} % from what all other tests say"
-    return Where(suspect.direction, kind, suspect.frequency, suspect.amplitude, component, excess, reading)
-
-
-def _candidates(search: Search, kept: set[str]) -> list[Judged]:
-    """Every effect of the library on the base model: score, refit, and why it won or lost."""
-    tried = {candidate.name: candidate for candidate in search.first.tried}
-    return [_judged(search, proposal, tried.get(proposal.name), kept) for proposal in search.first.proposed]
-
-
-def _judged(search: Search, proposal: Proposal, candidate: Candidate | None, kept: set[str]) -> Judged:
-    first, base = search.first, search.base
-    if candidate is None or candidate.left:
-        unseen = "score too small to refit" if proposal.visible else "not visible in these tests"
-        why = "left on its way, far behind the best" if candidate else unseen
-        return Judged(proposal.name, proposal.score, None, None, None, {}, why)
-    evidence = candidate.evidence
-    if proposal.name in kept:
-        why = "kept"
-    elif candidate.gain < first.critical:
-        why = f"gain below {number(first.critical, 3)}, which chance alone can make"
-    elif base.bic - evidence.bic < SAME:
-        why = "gain below its price in parameters"
-    else:
-        why = f"{number(evidence.bic - min(c.evidence.bic for c in first.tried), 3)} behind the best by BIC"
-    own = {name: value for name, value in evidence.model.values.items() if name not in base.model.values}
-    held = hold_out(evidence, evidence, search.bounds).after
-    return Judged(proposal.name, proposal.score, candidate.gain, base.bic - evidence.bic, held, own, why)
-
-
-def _notes(search: Search) -> tuple[str, ...]:
-    """What these tests could not show at all."""
-    unseen = [proposal.name for proposal in search.first.proposed if not proposal.visible]
-    blind = [name for name in unseen if not effect_named(name).under]  # what no test states is not asked for
-    return (f"not identifiable from these tests: {', '.join(blind)}",) if blind else ()
+    columns = np.array(suspect.columns)
+    left = columns @ base.residual / np.maximum(np.linalg.norm(columns, axis=1), 1e-300)
+    reading = f"{suspect.words} departs by {number(100 * best.size, 2)} % from what all other tests say"
+    return Where(
+        suspect.direction, kind, suspect.frequency, suspect.amplitude, component, float(np.sqrt(np.mean(left**2))), reading
+    )

@@ -31,7 +31,7 @@ _SOUGHT: dict[str, Callable[[Sequence[str]], Sequence[str]]] = {
 _TABLE: dict[str, Any] = tomllib.loads(Path(__file__).with_name("library.toml").read_text(encoding="utf-8"))
 #: What a file may have of the law of an effect: fields of its record.
 _LAW = (
-    *("modulus", "stress", "modulus_sensitivities", "stress_sensitivities", "in_place_of", "becomes"),  # of a branch
+    *("modulus", "stress", "modulus_sensitivities", "stress_sensitivities", "in_place_of"),  # of a branch
     *("adjust", "stiffness", "force"),  # of a modifier, and of a layer
 )
 #: The kind of an effect, by a part of the law that no other kind has.

@@ -190,8 +190,7 @@ class Effect:
         after: the effect without which it is no other: it is looked for beside that one only.
         never_with: effects beside which it is not looked for: the two together are a series that follows any law
             between them, and so no name.
-        becomes: the simpler effect that it is at the end of its range, and by a model's values with this effect those
-            with the simpler one in its place; None away from that end.
+        limit: the simpler effect that it is at the end of its range; None where it has none.
     """
 
     name: str
@@ -214,7 +213,7 @@ class Effect:
     in_place_of: Callable[[Values], list[dict[str, float]]] | None = None
     after: str | None = None
     never_with: tuple[str, ...] = ()
-    becomes: tuple[str, Callable[[Values], dict[str, float] | None]] | None = None
+    limit: str | None = None
 
     def acts_at(self, place: Place) -> bool:
         """Whether it acts at a place: one that belongs to a place, by its name, acts there alone."""

@@ -9,7 +9,7 @@ from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.evidence import Evidence, fit, result_of
 from bushfit.diagnosis.propose import proposals
 from bushfit.diagnosis.record import Diagnosis
-from bushfit.diagnosis.refit import refits
+from bushfit.diagnosis.refit import refitted
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import LIBRARY, twins_of
 from bushfit.errors import ModelError, did_you_mean
@@ -129,7 +129,7 @@ def _with_bounded(known: Knowledge, bounded: tuple[str, ...], data_sets: Sequenc
 def _each_added(plain: Evidence, names: Sequence[str], held: Sequence[str], bounds: Bounds) -> dict[str, Evidence]:
     """The fit with each of these effects added in turn, by name; without those that the tests could not show."""
     proposed = [proposal for proposal in proposals(plain, (), held) if proposal.name in names]
-    return {found.name: found.evidence for found in refits(plain, proposed, [], {}, held, bounds)}
+    return refitted(plain, proposed, {}, held, bounds)
 
 
 def look_alikes(found: Diagnosis) -> list[tuple[str, ...]]:

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep
-from bushfit.diagnosis.search import SAME
+from bushfit.diagnosis.priors import TELLS
 from bushfit.effects import qualified
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
@@ -34,8 +34,8 @@ _NINE_OF_TEN = 1.2815515655446004
 #: the 90 % quantile of the normal distribution.
 FOUND = Z95 + _NINE_OF_TEN
 #: Expected chi-square between rivals from which on `diagnose` tells them apart in nine of ten cases: of d it finds d
-#: with a standard deviation of 2 sqrt(d), and it takes those for one set that are within SAME.
-TOLD = (_NINE_OF_TEN + float(np.sqrt(_NINE_OF_TEN**2 + SAME))) ** 2
+#: with a standard deviation of 2 sqrt(d), and it takes those for one set that are within TELLS.
+TOLD = (_NINE_OF_TEN + float(np.sqrt(_NINE_OF_TEN**2 + TELLS))) ** 2
 #: Expected chi-square over that, from which on no more hours are planned; chosen: rivals may be smaller than they seem.
 _SURELY = 2.0
 #: Shares of the hours that are tried for rivals, before all of them.

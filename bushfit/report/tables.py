@@ -226,7 +226,7 @@ def gap_table(
 
 
 def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """Every effect of the library, judged: score, gain, BIC, held-out gap, parameters, and why it won or lost."""
+    """Every effect of the library, judged: score, gain, probability, held-out gap, parameters, and why it won or lost."""
     from bushfit.diagnosis.record import level_of
 
     rows = [
@@ -235,7 +235,7 @@ def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
             "level": level_of(judged.name),
             "score": judged.score,
             "chi-square gain": judged.gain,
-            "BIC gain": judged.bic,
+            "probability": judged.probability,
             "held-out gap [noise]": judged.heldout,
             "parameters": "; ".join(f"{name} = {value:.6g}" for name, value in judged.parameters.items()),
             "why": judged.why,

@@ -14,8 +14,7 @@ from numpy.random import Generator
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
-from bushfit.diagnosis.evidence import fit
-from bushfit.diagnosis.search import footprint
+from bushfit.diagnosis.evidence import fit, footprint
 from bushfit.effects import BASE, LIBRARY, Effect, effect_named, qualified
 from bushfit.effects.contract import Array
 from bushfit.fitting.data import Data

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from bushfit.diagnosis.currency import Group
 from bushfit.diagnosis.propose import Proposal
+from bushfit.effects.contract import Array
 from bushfit.fitting.data_set import Suspect
 
 
@@ -26,3 +27,10 @@ class Explanation:
     group: Group | None
     proposal: Proposal | None = None
     suspect: Suspect | None = None
+
+    @property
+    def columns(self) -> Array:
+        """Of its group."""
+        if self.group is None:
+            raise ValueError(f"{self.name} has no columns")
+        return self.group.columns
