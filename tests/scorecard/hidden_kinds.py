@@ -12,12 +12,14 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as bushfit does: small matrices, and times that mean one processor
 
 import json
+import signal
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import click
@@ -30,6 +32,8 @@ from scipy.stats import beta
 
 from bushfit.cli import cli
 
+#: Processor time [s] after which a diagnosis is given up: no answer at all.
+_LONGEST = 60.0
 SETS = ("working", "held_back", "clean")
 
 
@@ -40,9 +44,9 @@ class Outcome:
     Args:
         seed: of the campaign.
         answer: the truth.
-        verdict: "refused" where the command ended with an error.
+        verdict: "none" where the command ended with an error, or not in time.
         words: names that were told, or the summary where there are none, or the error.
-        judged: None where it was refused.
+        judged: None where there is none; what was visible then counts as not acceptable.
         seconds: processor time of the command.
     """
 
@@ -54,8 +58,14 @@ class Outcome:
     seconds: float
 
 
+def _give_up(number: int, frame: FrameType | None) -> None:
+    raise TimeoutError(f"no answer within {_LONGEST:g} s")
+
+
 def diagnosed(folder: Path) -> tuple[dict[str, Any] | None, str, float]:
     """diagnosis.json of the campaign in a folder, the error where there is none, and processor time."""
+    signal.signal(signal.SIGVTALRM, _give_up)
+    signal.setitimer(signal.ITIMER_VIRTUAL, _LONGEST)
     started = time.process_time()
     arguments = [
         "diagnose",
@@ -68,6 +78,7 @@ def diagnosed(folder: Path) -> tuple[dict[str, Any] | None, str, float]:
     ]
     done = CliRunner().invoke(cli, arguments)
     seconds = time.process_time() - started
+    signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
     written = folder / "out" / "diagnosis.json"
     if done.exit_code or not written.exists():
         return None, f"{done.exception!r} {done.stderr}".strip(), seconds
@@ -80,7 +91,7 @@ def hidden(kind: str, size: float, seed: int) -> Outcome:
         answer = campaign(kind, size, seed, Path(folder))
         diagnosis, error, seconds = diagnosed(Path(folder))
     if diagnosis is None:
-        return Outcome(seed, answer, "refused", error, None, seconds)
+        return Outcome(seed, answer, "none", error, None, seconds)
     names = [" / ".join((each["name"], *each["alternatives"])) for each in diagnosis["effects"]]
     words = "; ".join(names) or str(diagnosis["summary"])
     return Outcome(seed, answer, diagnosis["verdict"], words, acceptable(answer, diagnosis), seconds)
@@ -107,13 +118,13 @@ def table(outcomes: Sequence[Outcome]) -> str:
     """Rates with their intervals, and processor times."""
     told = [each for each in outcomes if each.judged]
     judged = [each.judged for each in told if each.judged]
-    visible = [each.judged for each in told if each.judged and each.answer.visible]
+    visible = [each.judged for each in outcomes if each.answer.visible]
     clean = [each.judged for each in told if each.judged and not each.answer.kind]
-    lines = [f"{len(outcomes)} campaigns, {len(visible)} visible, {len(outcomes) - len(told)} refused"]
+    lines = [f"{len(outcomes)} campaigns, {len(visible)} visible, {len(outcomes) - len(told)} without an answer"]
     if visible:
         lines += [
-            f"visible, acceptable: {rate(sum(each.acceptable for each in visible), len(visible))}",
-            f"visible, passed over: {rate(sum(each.passed_over for each in visible), len(visible))}",
+            f"visible, acceptable: {rate(sum(bool(each and each.acceptable) for each in visible), len(visible))}",
+            f"visible, passed over: {rate(sum(bool(each and each.passed_over) for each in visible), len(visible))}",
         ]
     if clean:
         lines.append(f"clean, false alarms: {rate(sum(each.seen for each in clean), len(clean))}")
@@ -133,7 +144,7 @@ def line(outcome: Outcome) -> str:
     """One campaign in a line."""
     answer, judged = outcome.answer, outcome.judged
     marks = [name for name in ("passed_over", "wrong_name", "wrong_set") if judged and getattr(judged, name)]
-    worth = "refused" if judged is None else "acceptable" if judged.acceptable else " ".join(marks) or "false alarm"
+    worth = "no answer" if judged is None else "acceptable" if judged.acceptable else " ".join(marks) or "false alarm"
     size = f"{100 * answer.size:4.1f} %, left {100 * answer.left:5.1f} %, {answer.misfit:7.0f}"
     truth = f"{answer.kind or 'clean':20s} {size} {'seen' if answer.visible else '-':4s}"
     return f"{outcome.seed:10d} {truth} {outcome.verdict:11s} {worth}: {outcome.words}"
