@@ -1,0 +1,177 @@
+"""Hidden campaigns of kinds that no page lists, diagnosed as typed: what was acceptable, passed over, wrongly named.
+
+    python tests/scorecard/hidden_kinds.py --seed 1 --campaigns 80 --set working
+
+The rig is that of time_rig.py, which shares no law with bushfit.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as bushfit does: small matrices, and times that mean one processor
+
+import json
+import signal
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import click
+import numpy as np
+from click.testing import CliRunner
+from judging import Judged, acceptable
+from kinds import KINDS, SIZES
+from lab_campaign import Answer, campaign
+from scipy.stats import beta
+
+from bushfit.cli import cli
+
+#: Processor time [s] after which a diagnosis is given up: no answer at all.
+_LONGEST = 60.0
+SETS = ("working", "held_back", "clean")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one campaign: the truth, the verdict with what was said, and its worth.
+
+    Args:
+        seed: of the campaign.
+        answer: the truth.
+        verdict: "none" where the command ended with an error, or not in time.
+        words: names that were told, or the summary where there are none, or the error.
+        judged: None where there is none; what was visible then counts as not acceptable.
+        seconds: processor time of the command.
+    """
+
+    seed: int
+    answer: Answer
+    verdict: str
+    words: str
+    judged: Judged | None
+    seconds: float
+
+
+def _give_up(number: int, frame: FrameType | None) -> None:
+    raise TimeoutError(f"no answer within {_LONGEST:g} s")
+
+
+def diagnosed(folder: Path) -> tuple[dict[str, Any] | None, str, float]:
+    """diagnosis.json of the campaign in a folder, the error where there is none, and processor time."""
+    signal.signal(signal.SIGVTALRM, _give_up)
+    signal.setitimer(signal.ITIMER_VIRTUAL, _LONGEST)
+    started = time.process_time()
+    arguments = [
+        "diagnose",
+        str(folder / "bushing.toml"),
+        "-o",
+        str(folder / "out"),
+        "--no-plots",
+        "--no-report",
+        "--json",
+    ]
+    done = CliRunner().invoke(cli, arguments)
+    seconds = time.process_time() - started
+    signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+    written = folder / "out" / "diagnosis.json"
+    if done.exit_code or not written.exists():
+        return None, f"{done.exception!r} {done.stderr}".strip(), seconds
+    return json.loads(written.read_text(encoding="utf-8")), "", seconds
+
+
+def hidden(kind: str, size: float, seed: int) -> Outcome:
+    """One campaign, made, diagnosed and judged."""
+    with tempfile.TemporaryDirectory() as folder:
+        answer = campaign(kind, size, seed, Path(folder))
+        diagnosis, error, seconds = diagnosed(Path(folder))
+    if diagnosis is None:
+        return Outcome(seed, answer, "none", error, None, seconds)
+    names = [" / ".join((each["name"], *each["alternatives"])) for each in diagnosis["effects"]]
+    words = "; ".join(names) or str(diagnosis["summary"])
+    return Outcome(seed, answer, diagnosis["verdict"], words, acceptable(answer, diagnosis), seconds)
+
+
+def asked(chosen: str, seed: int) -> Iterator[tuple[str, float, int]]:
+    """Kind, size and seed of one campaign after the other, each kind as often as any other."""
+    names = [name for name, kind in KINDS.items() if kind.held_back == (chosen == "held_back")]
+    random = np.random.default_rng([seed, SETS.index(chosen)])
+    while True:
+        for name in [""] if chosen == "clean" else random.permutation(names).tolist():
+            size = float(random.choice(SIZES)) if name else 0.0
+            yield name, size, int(random.integers(2**31))
+
+
+def rate(count: int, of: int) -> str:
+    """A share with its 95 % interval (Clopper and Pearson)."""
+    low = float(beta.ppf(0.025, count, of - count + 1)) if count else 0.0
+    high = float(beta.ppf(0.975, count + 1, of - count)) if count < of else 1.0
+    return f"{count} of {of} = {100.0 * count / max(of, 1):.1f} % ({100.0 * low:.1f} to {100.0 * high:.1f})"
+
+
+def table(outcomes: Sequence[Outcome]) -> str:
+    """Rates with their intervals, and processor times."""
+    told = [each for each in outcomes if each.judged]
+    judged = [each.judged for each in told if each.judged]
+    visible = [each.judged for each in outcomes if each.answer.visible]
+    clean = [each.judged for each in told if each.judged and not each.answer.kind]
+    lines = [f"{len(outcomes)} campaigns, {len(visible)} visible, {len(outcomes) - len(told)} without an answer"]
+    if visible:
+        lines += [
+            f"visible, acceptable: {rate(sum(bool(each and each.acceptable) for each in visible), len(visible))}",
+            f"visible, passed over: {rate(sum(bool(each and each.passed_over) for each in visible), len(visible))}",
+        ]
+    if clean:
+        lines.append(f"clean, false alarms: {rate(sum(each.seen for each in clean), len(clean))}")
+    seconds = [each.seconds for each in outcomes]
+    return "\n".join(
+        [
+            *lines,
+            f"wrong name kept, all: {rate(sum(each.wrong_name for each in judged), len(judged))}",
+            f"set without the truth, all: {rate(sum(each.wrong_set for each in judged), len(judged))}",
+            f"processor time: median {np.median(seconds):.2f} s, 90 % {np.quantile(seconds, 0.9):.2f} s, "
+            f"longest {max(seconds):.2f} s",
+        ]
+    )
+
+
+def line(outcome: Outcome) -> str:
+    """One campaign in a line."""
+    answer, judged = outcome.answer, outcome.judged
+    marks = [name for name in ("passed_over", "wrong_name", "wrong_set") if judged and getattr(judged, name)]
+    worth = "no answer" if judged is None else "acceptable" if judged.acceptable else " ".join(marks) or "false alarm"
+    size = f"{100 * answer.size:4.1f} %, left {100 * answer.left:5.1f} %, {answer.misfit:7.0f}"
+    truth = f"{answer.kind or 'clean':20s} {size} {'seen' if answer.visible else '-':4s}"
+    return f"{outcome.seed:10d} {truth} {outcome.verdict:11s} {worth}: {outcome.words}"
+
+
+@click.command()
+@click.option("--seed", type=int, required=True)
+@click.option("--campaigns", type=click.IntRange(1), default=40, show_default=True)
+@click.option("--set", "chosen", type=click.Choice(SETS), default="working", show_default=True)
+@click.option("--jobs", type=click.IntRange(1), default=1, show_default=True)
+@click.option("--lines/--no-lines", help="A line a campaign; of the set that is held back there are none.")
+@click.option("--keep", type=click.Path(path_type=Path), help="A file for outcomes, one a line as JSON.")
+def main(seed: int, campaigns: int, chosen: str, jobs: int, lines: bool, keep: Path | None) -> None:
+    """Diagnose hidden campaigns and print rates with their 95 % intervals."""
+    tasks = [task for task, _ in zip(asked(chosen, seed), range(campaigns), strict=False)]
+    outcomes = []
+    with ProcessPoolExecutor(jobs) as pool:
+        results = map(hidden, *zip(*tasks, strict=True)) if jobs == 1 else pool.map(hidden, *zip(*tasks, strict=True))
+        for outcome in results:
+            outcomes.append(outcome)
+            if lines and chosen != "held_back":
+                click.echo(line(outcome))
+            if keep:
+                with keep.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(asdict(outcome)) + "\n")
+    click.echo(table(outcomes))
+
+
+if __name__ == "__main__":
+    main()

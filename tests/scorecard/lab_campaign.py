@@ -1,0 +1,281 @@
+"""Campaigns as a laboratory writes them: a random bushing and plan, a kind of discrepancy or none, noise, files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from discrepancies import Bench
+from kinds import KINDS, Place, sized
+from numpy.random import Generator
+from scipy.signal import lfilter
+from time_rig import DIRECTIONS, SAMPLES, Array, Bushing, Change, Response, Rubber, Tests, respond
+from visible import CYCLES, Noise, seen
+
+#: The class of the rig: gain, and phase [rad], of which each run has errors.
+CLASS = (5e-3, float(np.radians(0.25)))
+#: Scatter of a loop's displacement, of its amplitude.
+_JITTER = 2e-4
+#: Levels of a sweep beside the largest, and how likely they are planned.
+_LEVELS, _PLANNED = ((0.2, 0.4), (0.1, 0.3), (0.25, 0.5, 0.7), (0.4,)), (0.5, 0.2, 0.2, 0.1)
+#: Strain of the top level, frequency of a loop [Hz], and scatter of a point and of a loop's force.
+_STRAIN, _LOOP, _SCATTER, _FORCE = (0.03, 0.06), 0.1, (0.003, 0.006), (0.002, 0.004)
+#: What people plan who have no time, or another habit, and how many of these come together at most.
+AWKWARD = (
+    "few_steps",
+    "one_repeat",
+    "heavy_tails",
+    "as_reached",
+    "strain_sweep",
+    "level_missing",
+    "one_way",
+    "no_loop",
+)
+_TOGETHER = 3
+#: Degrees of freedom of heavy tails; scatter of an amplitude that was reached; amplitudes of a strain sweep.
+_TAILS, _REACHED, _STRAINS = 3, 0.02, 10
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a campaign is measured.
+
+    Args:
+        directions: that have sweeps; loops are of the first.
+        levels: amplitudes over the largest.
+        steps: frequencies of a sweep [Hz].
+        repeats: of every level.
+        loops: amplitudes of loops over the largest of the sweeps.
+        by_amplitude: whether sweeps step the amplitude at a few frequencies.
+        missing: whether the last direction lacks its first level.
+        reached: scatter of the amplitudes, relative.
+        tails: degrees of freedom of Student's t, infinite for Gauss.
+        repeats_last: whether all levels are repeated one after the other, instead of each at once.
+        noise: of a rig of its class.
+    """
+
+    directions: tuple[int, ...]
+    levels: tuple[float, ...]
+    steps: Array
+    repeats: int
+    loops: tuple[float, ...]
+    noise: Noise
+    by_amplitude: bool = False
+    missing: bool = False
+    reached: float = 0.0
+    tails: float = np.inf
+    repeats_last: bool = False
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The truth of a campaign, and how well it can be seen.
+
+    Args:
+        kind: of discrepancy; "" of a clean campaign.
+        size: to which it was to be brought, of |K| at its largest.
+        right: effects that describe it truly.
+        place: parts of the tests that alone are off.
+        left: largest share of |K| that the best clean model leaves.
+        misfit: chi-square that it leaves without noise, with errors of the rig's class free.
+    """
+
+    kind: str
+    size: float
+    right: tuple[str, ...] = ()
+    place: tuple[Place, ...] = ()
+    left: float = 0.0
+    misfit: float = 0.0
+
+    @property
+    def visible(self) -> bool:
+        """Whether what is left is 2 % of |K| and plain beside noise, wherever one looks."""
+        return self.left >= 0.02 and self.misfit >= 40.0
+
+
+def campaign(kind: str, size: float, seed: int, folder: Path) -> Answer:
+    """Write one campaign into a folder, bushing.toml and its tables, and return the truth; the same seed, the same.
+
+    Args:
+        kind: a name of KINDS; "" for a clean campaign with an awkward plan.
+        size: share of |K| that changes at most.
+        seed: of everything random.
+        folder: made where there is none.
+    """
+    random = np.random.default_rng([seed, 2007])
+    bushing, rubber = _specimen(random)
+    needs = KINDS[kind].needs if kind else ()
+    plan = _plan(random, needs) if kind else awkward(_plan(random, ()), random)
+    tests = _tests(bushing, plan, random)
+    bench = Bench(tests, rubber, random)
+    change = sized(bench, KINDS[kind], size) if kind else Change()
+    response = respond(tests, rubber, change)
+    answer = Answer(kind, size)
+    if kind:
+        left, misfit = seen(tests, rubber, change.record(response.stiffness), response.force, plan.noise)
+        answer = Answer(kind, size, KINDS[kind].right, KINDS[kind].place, left, misfit)
+    _write(folder, tests, plan, change, response, random)
+    return answer
+
+
+def _specimen(random: Generator) -> tuple[Bushing, Rubber]:
+    inner = float(f"{random.uniform(6e-3, 22e-3):.3g}")
+    outer = float(f"{inner * random.uniform(1.4, 2.3):.3g}")
+    mu = float(np.exp(random.uniform(*np.log((0.6e6, 1.8e6)))))
+    rubber = Rubber(
+        mu,
+        mu * random.uniform(0.1, 0.3),
+        random.uniform(0.15, 0.3),
+        mu * random.uniform(0.008, 0.022),
+        random.uniform(0.007, 0.02),
+    )
+    return Bushing(inner, outer, float(f"{random.uniform(0.02, 0.07):.3g}")), rubber
+
+
+def _plan(random: Generator, needs: Sequence[str]) -> Plan:
+    both = "both" in needs or random.random() < 0.75
+    steps = (
+        np.arange(5.0, 156.0, 10.0)
+        if random.random() < 0.4
+        else np.linspace(random.uniform(1.0, 8.0), random.uniform(90.0, 200.0), int(random.integers(18, 31)))
+        if random.random() < 0.6
+        else np.geomspace(random.uniform(0.5, 3.0), random.uniform(90.0, 200.0), int(random.integers(18, 31)))
+    )
+    repeats = int(random.choice([1, 2, 3], p=[0.2, 0.3, 0.5]))
+    loops = ((1.0, 2.0), (1.5,), ())[int(random.choice(3, p=[0.5, 0.35, 0.15]))]
+    return Plan(
+        (0, 1) if both else (int(random.random() < 0.3),),
+        (*_LEVELS[int(random.choice(len(_LEVELS), p=_PLANNED))], 1.0),
+        np.round(steps, 1),
+        max(repeats, 2 * ("repeats" in needs)),
+        loops or (1.5,) * ("loop" in needs),
+        Noise(
+            scatter=random.uniform(*_SCATTER),
+            force=random.uniform(*_FORCE),
+            correlation=float(random.choice([0.0, 0.9, 0.98])),
+            run=CLASS,
+            level=0.5 * (random.random() < 0.5),
+        ),
+        reached=_REACHED * (random.random() < 0.25),
+        repeats_last=random.random() < 0.5,
+    )
+
+
+def awkward(plan: Plan, random: Generator) -> Plan:
+    """The plan with one to three habits of real ones."""
+    count = int(random.integers(1, _TOGETHER + 1))
+    for habit in random.choice(AWKWARD, count, replace=False):
+        if habit == "few_steps":
+            chosen = np.linspace(0, plan.steps.size - 1, int(random.integers(3, 6))).round().astype(int)
+            plan = replace(plan, steps=plan.steps[chosen])
+        elif habit == "strain_sweep":
+            levels = tuple(np.geomspace(0.03, 1.0, _STRAINS).tolist())
+            chosen = np.linspace(0, plan.steps.size - 1, 3).round().astype(int)
+            plan = replace(plan, by_amplitude=True, levels=levels, steps=plan.steps[chosen])
+        elif habit == "one_way":
+            plan = replace(plan, directions=plan.directions[:1])
+        elif habit == "as_reached":
+            plan = replace(plan, reached=_REACHED)
+        elif habit == "heavy_tails":
+            plan = replace(plan, tails=_TAILS)
+        elif habit == "one_repeat":
+            plan = replace(plan, repeats=1)
+        elif habit == "no_loop":
+            plan = replace(plan, loops=())
+        else:
+            plan = replace(plan, missing=True)
+    return plan
+
+
+def _tests(bushing: Bushing, plan: Plan, random: Generator) -> Tests:
+    """The session's points: loops, then each direction, run by run."""
+    strain = random.uniform(*_STRAIN)
+    top = {each: float(f"{strain / bushing.strain(DIRECTIONS[each]):.2g}") for each in plan.directions}
+    rows: list[tuple[float, float, int, int, int, bool]] = [
+        (_LOOP, factor * top[plan.directions[0]], plan.directions[0], number, 1, True)
+        for number, factor in enumerate(plan.loops)
+    ]
+    for direction in plan.directions:
+        amplitudes = [float(f"{factor * top[direction]:.4g}") for factor in plan.levels]
+        if plan.missing and direction == plan.directions[-1] and len(amplitudes) > 1:
+            amplitudes = amplitudes[1:]
+        stepped = [(float(f), x) for x in amplitudes for f in plan.steps]
+        held = [amplitudes.index(x) for _, x in stepped]
+        if plan.by_amplitude:
+            stepped = [(float(f), x) for f in plan.steps for x in amplitudes]
+            held = [list(plan.steps).index(f) for f, _ in stepped]
+        points = [
+            (f, x, direction, level, repeat, False)
+            for repeat in range(1, plan.repeats + 1)
+            for (f, x), level in zip(stepped, held, strict=True)
+        ]
+        rows += points if plan.repeats_last else sorted(points, key=lambda point: point[3])
+    frequency, amplitude, direction, level, repeat, loop = (np.array(column) for column in zip(*rows, strict=True))
+    reached = np.where(loop, 1.0, 1.0 + plan.reached * random.standard_normal(loop.size))
+    return Tests(bushing, frequency, amplitude * reached, direction, level, repeat, loop)
+
+
+def _write(folder: Path, tests: Tests, plan: Plan, change: Change, response: Response, random: Generator) -> None:
+    noise, count = plan.noise, tests.frequency.size
+
+    def scatter() -> Array:
+        if not np.isfinite(plan.tails):
+            return random.standard_normal(count)
+        return random.standard_t(plan.tails, count) / np.sqrt(plan.tails / (plan.tails - 2.0))
+
+    shared = [np.zeros(count), np.zeros(count)]
+    for size, groups in ((1.0, tests.runs()), (noise.level, tests.runs(repeats=False))):
+        for rows in groups:
+            for part, error in zip(shared, noise.run, strict=True):
+                part[rows] += size * error * random.standard_normal()
+    gain, phase = shared
+    white = scatter() + 1j * scatter()
+    measured = response.stiffness * (1.0 + gain) * np.exp(1j * phase) * (1.0 + noise.scatter * white)
+    stiffness = change.record(measured)
+    folder.mkdir(parents=True, exist_ok=True)
+    text = ["[bushing]", 'name = "tested"']
+    for name, value in (("inner_radius", "inner"), ("outer_radius", "outer"), ("length", "length")):
+        text.append(f'{name} = "{1e3 * getattr(tests.bushing, value):.6g} mm"')
+    for number, row in enumerate(np.flatnonzero(tests.loop), 1):
+        name = f"loop_{DIRECTIONS[tests.direction[row]]}_{number}.csv"
+        _write_loop(folder / name, tests, row, response, 1.0 + gain[row], noise, random)
+        text += ["", "[[loops]]", f'file = "{name}"', f'direction = "{DIRECTIONS[tests.direction[row]]}"']
+    form = int(random.integers(3))
+    for direction in plan.directions:
+        name = f"sweep_{DIRECTIONS[direction]}.csv"
+        rows = np.flatnonzero(~tests.loop & (tests.direction == direction))
+        _write_sweep(folder / name, tests, rows, stiffness, form, repeats=plan.repeats > 1)
+        text += ["", "[[sweeps]]", f'file = "{name}"', f'direction = "{DIRECTIONS[direction]}"']
+    (folder / "bushing.toml").write_text("\n".join(text) + "\n", encoding="utf-8")
+
+
+def _write_loop(
+    file: Path, tests: Tests, row: int, response: Response, gain: float, noise: Noise, random: Generator
+) -> None:
+    count = CYCLES * SAMPLES
+    keep = noise.correlation
+    white = random.standard_normal(count + SAMPLES)
+    coloured = lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], white)[SAMPLES:]
+    force, motion = (np.tile(wave[row], CYCLES) for wave in (response.force, response.motion))
+    force = gain * force + noise.force * 0.5 * np.ptp(force) * coloured
+    motion = motion + _JITTER * tests.amplitude[row] * random.standard_normal(count)
+    time = np.arange(count) / (SAMPLES * tests.frequency[row])
+    lines = [f"{t:.5f},{1e3 * x:.6f},{f:.4f}" for t, x, f in zip(time, motion, force, strict=True)]
+    file.write_text("\n".join(["time [s],displacement [mm],force [N]", *lines]) + "\n", encoding="utf-8")
+
+
+def _write_sweep(file: Path, tests: Tests, rows: Array, stiffness: Array, form: int, *, repeats: bool) -> None:
+    """A table in one of three forms: |K| beside loss factor or phase, or storage beside loss stiffness."""
+    k = 1e-3 * stiffness[rows]
+    names, values = (
+        ("stiffness [N/mm],loss factor [-]", (np.abs(k), k.imag / k.real)),
+        ("stiffness [N/mm],phase [deg]", (np.abs(k), np.degrees(np.angle(k)))),
+        ("storage stiffness [N/mm],loss stiffness [N/mm]", (k.real, k.imag)),
+    )[form]
+    lines = [f"frequency [Hz],amplitude [mm],{'repeat,' * repeats}{names}"]
+    for row, first, second in zip(rows, *values, strict=True):
+        number = f"{tests.repeat[row]}," * repeats
+        lines.append(f"{tests.frequency[row]:g},{1e3 * tests.amplitude[row]:.5g},{number}{first:.6g},{second:.6g}")
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
