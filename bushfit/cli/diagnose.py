@@ -82,6 +82,8 @@ def tell_verdict(options: Options, name: str, outcome: Diagnosed) -> None:
 def tell_findings(options: Options, outcome: Diagnosed) -> None:
     """The effects named with their sizes, the gap before and after, what is usable, where it is, and the next test."""
     console, diagnosis, document = options.console, outcome.diagnosis, outcome.document
+    for each in document["odds"]:
+        console.print(f"  {escape(each['chances'])}: {escape(each['words'])}")
     for effect in document["effects"]:
         _tell_effect(options, effect)
     _tell_gap(options, document)
@@ -95,7 +97,7 @@ def tell_findings(options: Options, outcome: Diagnosed) -> None:
 
 
 def _tell_gap(options: Options, document: Mapping[str, Any]) -> None:
-    """The gap, held out first, how often the name came out again, and within what the model is usable."""
+    """The gap, held out first, and within what the model is usable."""
     gap, usable, console = document["gap"], document["usable"], options.console
     table = new_table("gap, in units of noise (1 is the floor)", "", "before", "after")
     held = gap["heldout"]
@@ -104,11 +106,6 @@ def _tell_gap(options: Options, document: Mapping[str, Any]) -> None:
     )
     table.add_row("data fitted", *(f"{value:.2f}" for value in gap["calibration"].values()))
     console.print(table)
-    if gap["name_again"]:
-        again, searched = gap["name_again"]
-        what = "it" if document["effects"] and document["verdict"] != "described" else "what was taken back"
-        parts = f"each of {searched} parts" if searched > 1 else "one part"
-        console.print(f"  searched anew without {parts} of the tests, {what} comes out again in {again}")
     if usable:
         how = "of what was predicted from other runs" if usable["held_out"] else "of what was fitted"
         words = f"{number(100 * usable['stiffness'], 2)} % of stiffness and {number(usable['loss_factor'], 2)}"
@@ -141,18 +138,13 @@ def _tell_evidence(options: Options, effect: Mapping[str, Any]) -> None:
     """Why an effect was named."""
     console = options.console
     console.print(f"  [bold]why {effect['name']}:[/bold] {escape(effect['evidence'])}")
-    if effect["richer"]:
-        console.print(
-            f"    the simpler name; a special case of {', '.join(effect['richer'])}, which these tests do not show"
-        )
 
 
 def _tell_candidates(options: Options, diagnosis: Diagnosis) -> None:
     """Every candidate that was refitted, and why it won or lost."""
-    title = "candidates: what each takes off chi-square, and the gap held out"
-    table = new_table(title, "candidate", "why", "gain", "held out", names=2)
+    title = "candidates: what each takes off chi-square, and how probably it is part of what is missing"
+    table = new_table(title, "candidate", "why", "gain", "probability", names=2)
     for judged in diagnosis.candidates:
         if judged.gain is not None:
-            held = "" if judged.heldout is None else f"{judged.heldout:.2f}"
-            table.add_row(judged.name, judged.why, f"{judged.gain:.0f}", held)
+            table.add_row(judged.name, judged.why, f"{judged.gain:.0f}", f"{judged.probability:.2f}")
     options.console.print(table)

@@ -166,7 +166,7 @@ class Weighed:
 
     Args:
         bare: the fit with residuals in units of what scatters from point to point.
-        first: what is worth something at every size of the rig's errors: nothing more, and what has no name.
+        first: of nothing more, at every size of the rig's errors.
     """
 
     state: State
@@ -187,9 +187,7 @@ class Weighed:
         for place, amount in zip(state.places, state.amounts, strict=True):
             free.append(place.columns)
             precision += [amount**-2] * len(place.columns)
-        curves = [each.group for each in tests.fixed if each.kind == "unnamed" and each.group]
-        residual, jacobian = self.bare.residual, np.concatenate(free)
-        return Ledger(residual, jacobian, np.array(precision), tests.blocks, curves, tests.nodes)
+        return Ledger(self.bare.residual, np.concatenate(free), np.array(precision), tests.blocks, (), tests.nodes)
 
     @cached_property
     def log_posterior(self) -> float:
@@ -201,10 +199,13 @@ class Weighed:
 
     @cached_property
     def worths(self) -> list[tuple[Explanation, Worth]]:
-        """Every explanation that can be counted linearly, at the sizes of the rig's errors that matter."""
+        """Every explanation that can be counted linearly, at the sizes of the rig's errors that matter: those that
+        nothing more, or something smooth, makes likely."""
         every = [each for each in (*self.effects, *self.state.tests.fixed) if each.group is not None]
-        groups = [each.group for each in every if each.group is not None]
-        return list(zip(every, replace(self.first, groups=groups, nodes=self.first.likely(FAR)).worths, strict=True))
+        curves = [each.group for each in every if each.group and each.kind == "unnamed"]
+        likely = replace(self.first, groups=curves).likely(FAR)
+        groups = [each.group for each in every if each.group]
+        return list(zip(every, replace(self.first, groups=groups, nodes=likely).worths, strict=True))
 
     def with_(self, each: Explanation, worth: Worth, log_odds: float) -> Hypothesis:
         """This state with an explanation more, counted linearly."""

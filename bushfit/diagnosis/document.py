@@ -122,10 +122,12 @@ class OddsEntry(TypedDict):
     Args:
         words: what it is.
         probability: if anything is missing.
+        chances: the same for people.
     """
 
     words: str
     probability: float
+    chances: str
 
 
 class UsableEntry(TypedDict):

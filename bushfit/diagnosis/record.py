@@ -108,7 +108,6 @@ class Judged:
     score: float
     gain: float | None
     probability: float
-    heldout: float | None
     parameters: Mapping[str, float]
     why: str
 
@@ -165,7 +164,9 @@ class Diagnosis:
             "verdict": self.verdict,
             "summary": self.summary,
             "nothing": self.odds.nothing,
-            "odds": [{"words": words, "probability": share} for words, share in self.odds.told],
+            "odds": [
+                {"words": words, "probability": share, "chances": chances(share)} for words, share in self.odds.told
+            ],
             "effects": [self._effect(named) for named in self.effects],
             "where": [_where(where) for where in self.where],
             "remainder": [_where(where) for where in self.remainder],
@@ -227,6 +228,15 @@ class Diagnosis:
             "ci95": None if interval is None else list(interval),
             "unit": parameter_named(name).unit,
         }
+
+
+def chances(probability: float) -> str:
+    """A probability as people say it: "9 in 10"."""
+    for of in (10, 100):
+        least = round(probability * of)
+        if 0 < least < of:
+            return f"{least} in {of}"
+    return "all but sure" if probability > 0.5 else "less than 1 in 100"
 
 
 def level_of(name: str) -> str:

@@ -13,7 +13,7 @@ from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.described import describe
 from bushfit.diagnosis.document import Description, Verdict
 from bushfit.diagnosis.evidence import Evidence, result_of
-from bushfit.diagnosis.holdout import hold_out
+from bushfit.diagnosis.holdout import HoldOut, hold_out
 from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.record import Diagnosis, Judged, Named, Odds, Where
@@ -122,7 +122,8 @@ class Told:
         if not spot and asked.most and (found := describe(self.base, asked.start, asked.held, asked.bounds)):
             words = f"a real gap stays that no known effect closes: {found.size}; {found.words}{lead}"
             names = [Named(UNNAMED, found.evidence)]
-            return self._finished("described", words, found.after, names, description=found.description)
+            held = found.correction.held
+            return self._finished("described", words, found.after, names, description=found.description, held=held)
         words = "a real gap stays that no known effect closes" + lead
         if spot:
             words = f"{self.label(self.finding.told[0])} stands out from all other tests: measure it again before looking for physics"
@@ -161,6 +162,7 @@ class Told:
         places: Hypothesis | None = None,
         next_test: str = "",
         description: Description | None = None,
+        held: HoldOut | None = None,
     ) -> Diagnosis:
         base, bounds = self.base, self.search.asked.bounds
         spots = list(places.places) if places else []
@@ -175,7 +177,7 @@ class Told:
             tuple(names),
             where,
             where if after is base else locate(after),
-            hold_out(base, after, bounds),
+            held or hold_out(base, after, bounds),
             next_test,
             tuple(self.candidates),
             base,
@@ -202,13 +204,12 @@ class Told:
     def _judged(self, name: str, score: float, visible: bool, alone: Hypothesis | None, share: float) -> Judged:
         if alone is None:
             why = "score too small to refit" if visible else "not visible in these tests"
-            return Judged(name, score, None, share, None, {}, why)
+            return Judged(name, score, None, share, {}, why)
         after = alone.weighed.state.evidence
         own = {key: value for key, value in after.model.values.items() if key not in self.base.model.values}
         told = self.first and name in self.first.best.effects
         why = "part of the likeliest explanation" if told else "another explanation is likelier"
-        held = hold_out(after, after, self.search.asked.bounds).after
-        return Judged(name, score, self.base.chi_square - after.chi_square, share, held, own, why)
+        return Judged(name, score, self.base.chi_square - after.chi_square, share, own, why)
 
     def _notes(self) -> tuple[str, ...]:
         """What these tests could not show at all."""

@@ -226,7 +226,7 @@ def gap_table(
 
 
 def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """Every effect of the library, judged: score, gain, probability, held-out gap, parameters, and why it won or lost."""
+    """Every effect of the library, judged: score, gain, probability, parameters, and why it won or lost."""
     from bushfit.diagnosis.record import level_of
 
     rows = [
@@ -236,7 +236,6 @@ def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
             "score": judged.score,
             "chi-square gain": judged.gain,
             "probability": judged.probability,
-            "held-out gap [noise]": judged.heldout,
             "parameters": "; ".join(f"{name} = {value:.6g}" for name, value in judged.parameters.items()),
             "why": judged.why,
         }

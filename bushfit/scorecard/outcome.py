@@ -46,7 +46,6 @@ class Outcome:
         verdict: of the diagnosis; "refused" where the reader does not take the file, "failed" where it went wrong.
         named: effects it named or that lead a set.
         sets: all members of each set, leader first.
-        richer: effects that contain what was named as a limit, and their twins.
         gain: chi-square that the best single effect takes off, whether it was added or not.
         heldout: gap on held-out data after, in units of noise; None where nothing was held out.
         covered: per hidden effect that was added, or per parameter of a swept campaign: whether the 95 % interval of
@@ -57,7 +56,6 @@ class Outcome:
         error: what went wrong, or "".
         twins: per set, the names that the same data give its members at other levels.
         before: gap on held-out data before, as `heldout`.
-        again: in how many parts the name came out again, and of how many; None where it was not searched again.
         settled: what came of the planned session, where effects of the library were left open and it was asked for.
         decides: the test on the rig that is asked for, where the virtual rig can make none that decides.
     """
@@ -67,7 +65,6 @@ class Outcome:
     verdict: str
     named: tuple[str, ...] = ()
     sets: tuple[tuple[str, ...], ...] = ()
-    richer: tuple[str, ...] = ()
     gain: float = 0.0
     heldout: float | None = None
     covered: tuple[bool, ...] = ()
@@ -76,7 +73,6 @@ class Outcome:
     error: str = ""
     twins: tuple[tuple[str, ...], ...] = ()
     before: float | None = None
-    again: tuple[int, int] | None = None
     settled: Settled | None = None
     decides: str = ""
 
@@ -95,8 +91,9 @@ class Outcome:
 
     @property
     def truths(self) -> set[str]:
-        """All names that say what was done."""
-        return {*self.task.hidden, *(self.sealed.hidden if self.sealed else ())}
+        """All names that say what was done, with the simpler ones that these are at an end of their range."""
+        done = {*self.task.hidden, *(self.sealed.hidden if self.sealed else ())}
+        return done | {limit for name in done if name in LIBRARY and (limit := LIBRARY[name].limit)}
 
     def _is_true(self, *names: str) -> bool:
         """Whether one of the names says what was done; a family that is no effect itself says it for all its places."""
@@ -112,13 +109,11 @@ class Outcome:
     def truth_in_sets(self) -> bool:
         """Whether every hidden effect was named alone, or as a twin, or in a set of at most three."""
         told = {name for members, twins in self._claims if len(members) <= _LARGEST_SET for name in (*members, *twins)}
-        return set(self.task.hidden) <= told | set(self.richer)
+        return all({name, LIBRARY[name].limit if name in LIBRARY else None} & told for name in self.task.hidden)
 
     @property
     def wrong_kept(self) -> tuple[str, ...]:
         """Names that stay in the model, under whatever verdict, and are not the truth, a twin or a limit of it."""
-        if self._is_true(*self.richer):
-            return ()
         return tuple(
             members[0]
             for members, twins in self._claims

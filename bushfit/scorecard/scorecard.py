@@ -125,6 +125,11 @@ def _settled(
     return replace(outcome, settled="elsewhere", decides=next_test) if outcome.left_open else outcome
 
 
+def _names(alternatives: Sequence[str]) -> tuple[str, ...]:
+    """Effects that look-alikes are made of, each once; what is no effect as it was told."""
+    return tuple(dict.fromkeys(name for each in alternatives for name in each.split(" + ")))
+
+
 def _failed(task: Task, wrong: Exception) -> Outcome:
     return Outcome(task, None, "failed", error=f"{type(wrong).__name__}: {wrong}")
 
@@ -141,19 +146,17 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
         truth,
         diagnosis.verdict,
         tuple(effect.label for effect in diagnosis.effects),
-        tuple((effect.label, *effect.alternatives) for effect in diagnosis.effects),
-        tuple(twin for effect in diagnosis.effects for name in effect.richer for twin in twins_of(name)),
+        tuple((effect.label, *_names(effect.alternatives)) for effect in diagnosis.effects),
         max((judged.gain or 0.0 for judged in diagnosis.candidates if not mistake_named(judged.name)), default=0.0),
         heldout["after"],
         tuple(covered),
         seconds,
         task.kind == "mistake" and _matters(diagnosis.before, truth),
         twins=tuple(
-            tuple(twin for name in (effect.label, *effect.alternatives) for twin in twins_of(name) if twin != name)
+            tuple(twin for name in (effect.label, *_names(effect.alternatives)) for twin in twins_of(name) if twin != name)
             for effect in diagnosis.effects
         ),
         before=heldout["before"],
-        again=diagnosis.holdout.name_again,
     )
 
 

@@ -33,7 +33,7 @@ MODELS = ("model", "dynamic", "static")
 #: The plain fit, beside a model with what was added.
 PLAIN = "joint"
 #: What "schema" of a diagnosis says.
-DIAGNOSIS = "bushfit/diagnosis/2"
+DIAGNOSES = "bushfit/diagnosis/3", "bushfit/diagnosis/2"
 #: Documents of a result.
 _DOCUMENTS = (*MODELS, PLAIN, "diagnosis")
 #: Tables of a result beside those of the predictions, which are named after places.
@@ -72,7 +72,7 @@ def checked(documents: Mapping[str, Mapping[str, Any]], files: Mapping[str, Path
     result = from_document(model, at.get(name))
     if diagnosis is not None:
         hint = "bushfit diagnose writes it anew"
-        require_schema(diagnosis, at.get("diagnosis"), "a diagnosis", DIAGNOSIS, hint=hint)
+        require_schema(diagnosis, at.get("diagnosis"), "a diagnosis", *DIAGNOSES, hint=hint)
     provenance = model.get("provenance", {})
     return Checked(
         result,
