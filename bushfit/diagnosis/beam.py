@@ -38,6 +38,10 @@ _SETTLED = 8
 _CLAIMS, _PLACES = 4, 2
 #: Logarithm of odds behind its state within which an effect is refitted; for time.
 _SLIGHT = 3.0
+#: Sizes over which the prior of an amount is averaged, and the least relative error that they resolve.
+_FINE, _SHARPEST = 1000, 0.01
+#: What a mistake in the record changes, relative to |K|: never so little that it counts as nothing.
+_A_RECORD = 1.0
 #: Reduced chi-square beyond which a model has bent its parameters too far for a refit to start from its values.
 _BENT = 1.5
 
@@ -109,11 +113,22 @@ class Hypothesis:
 
 @dataclass(frozen=True, eq=False)
 class Tests:
-    """Tests as they are recorded, or with a record put right, and the model as it came fitted to them."""
+    """Tests as they are recorded, or with a record put right, and the model as it came fitted to them.
+
+    Args:
+        log_odds: of these beforehand, with nothing else missing.
+        size: of what a record that is put right changes; 0 of the tests as they are.
+    """
 
     base: Evidence
     rig: RigSettings
+    log_odds: float
     claim: Claim | None = None
+    size: float = 0.0
+
+    @property
+    def state(self) -> State:
+        return State(self, (), (), self.base, self.log_odds, size=self.size)
 
     @cached_property
     def bare(self) -> Evidence:
@@ -226,8 +241,8 @@ class Search:
         self.asked = asked
         self.found: dict[frozenset[Hashable], Hypothesis] = {}
         self._seen: set[frozenset[Hashable]] = set()
-        tests = Tests(asked.base, asked.data.campaign.rig)
-        self.root = self._weigh(State(tests, (), (), asked.base, log(1.0 - sum(ODDS.values()))))
+        tests = Tests(asked.base, asked.data.campaign.rig, log(1.0 - sum(ODDS.values())))
+        self.root = self._weigh(tests.state)
         self._odds = _odds([*self.root.effects, *tests.fixed])
 
     def run(self) -> list[Hypothesis]:
@@ -382,7 +397,7 @@ class Search:
             with suppress(FitError, ModelError):  # no response without it
                 model = state.evidence.model.without(name)
                 evidence = fit(model, data_sets, held, {**within_reach(model, data_sets), **bounds})
-                less = replace(self.root.state, tests=state.tests, evidence=state.tests.base)
+                less = state.tests.state
                 for order, other in enumerate(each for each in state.effects if each != name):
                     less = self._with_effect(less, other, evidence, order)
                 yield self._weigh(less)
@@ -395,13 +410,8 @@ class Search:
             with suppress(FitError, ModelError):  # tests that nothing can be fitted to as mended
                 evidence = self.asked.fitted(claim.mended(data))
                 if [each.size for each in evidence.data_sets] == [each.size for each in base.data_sets]:
-                    tests = Tests(evidence, data.campaign.rig, claim)
-                    size = max(
-                        abs(float(np.max(np.abs(one.measured / other.measured - 1.0))))
-                        for one, other in zip(base.data_sets, evidence.data_sets, strict=True)
-                    )
                     odds = log(ODDS["record"]) - log(len(listed))
-                    found.append(self._weigh(State(tests, (), (), evidence, odds, size=max(size, 1.0))))
+                    found.append(self._weigh(Tests(evidence, data.campaign.rig, odds, claim, _A_RECORD).state))
         return found
 
 
@@ -428,8 +438,7 @@ def _laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, di
     """Of an effect that was refitted: ln of the prior density of its own coordinates with the factor of Laplace's
     method, their precision, and what it changes, relative to |K|.
 
-    An amount is log-uniform over two decades, and so is what it changes between the least and the largest size; a shape
-    is uniform over what the tests could show; at rest on an end of that, the fall of the likelihood away from the end
+    What an amount changes is log-uniform between the least and the largest size; a shape is uniform over what the tests could show; at rest on an end of that, the fall of the likelihood away from the end
     tells how much of it counts, and it moves no further. Of an effect in place of a branch each parameter beyond the branch's two
     is uniform over a factor of 20.
     """
@@ -438,6 +447,8 @@ def _laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, di
     other = model.without(name) if effect.replaces is None else before.model
     size = max(each.change(model, other) for each in data_sets)
     density, precision, count = 0.0, {}, 0
+    jacobian = evidence.solution.jacobian
+    variances = np.diag(np.linalg.pinv(jacobian @ jacobian.T, rcond=1e-12, hermitian=True))
     if effect.replaces is not None:
         count = max(len(effect.parameters) - 2, 0)
         own = {qualified(effect, parameter): 0.5 for parameter in effect.parameters}
@@ -449,11 +460,10 @@ def _laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, di
         count += 1
         if parameter is effect.amount:
             amount = max(abs(model.values[coordinate] - (parameter.neutral or 0.0)) / parameter.typical, 1e-12)
-            precision[coordinate] = 0.25 if parameter.log else 0.25 / max(amount, 1e-6) ** 2
-            density -= log(log(100.0)) + (0.0 if parameter.log else log(amount))
+            precision[coordinate] = 0.25 if parameter.log else 0.25 / amount**2
+            error = (1.0 if parameter.log else 1.0 / amount) * np.sqrt(variances[names.index(coordinate)])
+            density += _of_amount(size, float(error)) - (0.0 if parameter.log else log(amount))
             density -= 0.0 if parameter.neutral == parameter.bounds[0] else log(2.0)
-            beyond = max(log(max(size, 1e-9) / SIZES[-1]), log(SIZES[0] / max(size, 1e-9)), 0.0)
-            density -= 0.5 * (beyond / 0.7) ** 2
             continue
         tried = probes(data_sets, model, parameter)
         if parameter.log:
@@ -469,3 +479,16 @@ def _laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, di
         else:
             precision[coordinate] = 12.0 / wide**2
     return density + 0.5 * count * log(2.0 * np.pi), precision, size
+
+
+def _of_amount(size: float, error: float) -> float:
+    """Logarithm of the mean prior density of an amount, per relative change, over its likelihood.
+
+    Args:
+        size: of what it changes as fitted, relative to |K|.
+        error: standard error of the amount, relative to it.
+    """
+    times = np.geomspace(SIZES[0], SIZES[-1], _FINE) / max(size, 1e-12)
+    error = max(error, _SHARPEST)
+    exponent = -0.5 * np.square((times - 1.0) / error)
+    return float(logsumexp(exponent)) - log(_FINE) - 0.5 * log(2.0 * np.pi) - log(error)
