@@ -229,9 +229,7 @@ class Weighed:
         spots = (*state.places, each) if each.kind == "place" else state.places
         curve = each.name if each.kind == "unnamed" else ""
         posterior = state.log_prior + state.density + log_odds + worth.log_evidence
-        return Hypothesis(
-            names, state.tests.claim, spots, curve, False, posterior, max(state.size, worth.size), self
-        )
+        return Hypothesis(names, state.tests.claim, spots, curve, False, posterior, max(state.size, worth.size), self)
 
 
 class Search:
@@ -281,7 +279,11 @@ class Search:
             every = self.ordered
             share = np.exp([each.log_posterior - every[0].log_posterior for each in every])
             ahead = np.cumsum(share) - share
-            open_ = [each for each, before in zip(every, ahead / share.sum(), strict=True) if before < NAMED and not each.refitted]
+            open_ = [
+                each
+                for each, before in zip(every, ahead / share.sum(), strict=True)
+                if before < NAMED and not each.refitted
+            ]
             if not open_:
                 return
             first = open_[0]
@@ -342,8 +344,12 @@ class Search:
         }
         first = [name for name in sorted(evidence, key=lambda name: -evidence[name]) if name in new]
         scores = {each.name: each.proposal.score for each in weighed.effects if each.proposal}  # the best first
-        second = [name for name in scores if name in new and 0.5 * scores[name] + self._prior("effect", name) > -_SLIGHT]
-        return list(dict.fromkeys([*(name for name in first[:by_evidence] if evidence[name] > -_SLIGHT), *second[:by_score]]))
+        second = [
+            name for name in scores if name in new and 0.5 * scores[name] + self._prior("effect", name) > -_SLIGHT
+        ]
+        return list(
+            dict.fromkeys([*(name for name in first[:by_evidence] if evidence[name] > -_SLIGHT), *second[:by_score]])
+        )
 
     def _with_effects(self, weighed: Weighed, names: Sequence[str], depth: int) -> list[Weighed]:
         state, asked = weighed.state, self.asked

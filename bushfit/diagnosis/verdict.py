@@ -103,7 +103,9 @@ class Told:
         others = tuple(labels[id(each)] for each in told if each is not led)
         names: list[Named] = []
         if led and led.best.claim:
-            names = [replace(each, alternatives=others) for each in _entries(self.data, led.best.claim, self._of_claim(led))]
+            names = [
+                replace(each, alternatives=others) for each in _entries(self.data, led.best.claim, self._of_claim(led))
+            ]
         elif led:
             names = [Named(name, self._probability(led), others) for name in led.best.effects]
         words = f"these tests cannot tell {' from '.join(labels.values())}"
@@ -194,11 +196,17 @@ class Told:
         chance = self.hypotheses[0].log_posterior
         weight = {id(each): float(np.exp(each.log_posterior - chance)) for each in self.hypotheses}
         whole = sum(weight.values())
-        alone = {each.effects[0]: each for each in self.hypotheses if each.refitted and len(each.effects) == 1 and len(each.key) == 1}
+        alone = {
+            each.effects[0]: each
+            for each in self.hypotheses
+            if each.refitted and len(each.effects) == 1 and len(each.key) == 1
+        }
         found = []
         for each in self.search.root.effects:
             share = sum(weight[id(other)] for other in self.hypotheses if each.name in other.effects) / whole
-            found.append(self._judged(each.name, each.proposal.score, each.proposal.visible, alone.get(each.name), share))
+            found.append(
+                self._judged(each.name, each.proposal.score, each.proposal.visible, alone.get(each.name), share)
+            )
         return found
 
     def _judged(self, name: str, score: float, visible: bool, alone: Hypothesis | None, share: float) -> Judged:
@@ -229,7 +237,13 @@ def _all(names: Sequence[str]) -> str:
 def _entries(data: Data, claim: Claim, evidence: str) -> list[Named]:
     """An entry for each test of a claim."""
     return [
-        Named(one.mistake.name, evidence, test=one.test(data), sentence=one.words(data), correction=one.corrections(data)[0])
+        Named(
+            one.mistake.name,
+            evidence,
+            test=one.test(data),
+            sentence=one.words(data),
+            correction=one.corrections(data)[0],
+        )
         for one in claim.each
     ]
 
@@ -240,5 +254,11 @@ def _place_where(base, suspect, best: Hypothesis) -> Where:
     left = columns @ base.residual / np.maximum(np.linalg.norm(columns, axis=1), 1e-300)
     reading = f"{suspect.words} departs by {number(100 * best.size, 2)} % from what all other tests say"
     return Where(
-        suspect.direction, kind, suspect.frequency, suspect.amplitude, component, float(np.sqrt(np.mean(left**2))), reading
+        suspect.direction,
+        kind,
+        suspect.frequency,
+        suspect.amplitude,
+        component,
+        float(np.sqrt(np.mean(left**2))),
+        reading,
     )

@@ -38,7 +38,12 @@ class Composition:
     def kinds(self) -> frozenset[str]:
         """Of what parts it is made."""
         best = self.best
-        parts = {"effects": best.effects, "places": best.places or best.levels, "unnamed": best.unnamed, "record": best.claim}
+        parts = {
+            "effects": best.effects,
+            "places": best.places or best.levels,
+            "unnamed": best.unnamed,
+            "record": best.claim,
+        }
         return frozenset(kind for kind, there in parts.items() if there)
 
 
@@ -60,7 +65,9 @@ class Finding:
 
 def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
     """The verdict on hypotheses, the most probable first; what changes less than the tolerance counts as nothing."""
-    weights = np.exp([each.log_posterior for each in hypotheses] - logsumexp([each.log_posterior for each in hypotheses]))
+    weights = np.exp(
+        [each.log_posterior for each in hypotheses] - logsumexp([each.log_posterior for each in hypotheses])
+    )
     pairs = list(zip(hypotheses, weights.tolist(), strict=True))
     small = [_is_nothing(each, tolerance) for each in hypotheses]
     nothing = sum(weight for (_, weight), is_small in zip(pairs, small, strict=True) if is_small)
@@ -115,7 +122,10 @@ def _share_of_names(names: tuple[str, ...], hypotheses: Sequence[Hypothesis]) ->
         own = [
             each.log_posterior
             for each in hypotheses
-            if set(each.effects) == set(effects) and bool(each.unnamed) is unnamed and not each.places and not each.claim
+            if set(each.effects) == set(effects)
+            and bool(each.unnamed) is unnamed
+            and not each.places
+            and not each.claim
         ]
         return max(own, default=-np.inf)
 
@@ -126,9 +136,7 @@ def _share_of_names(names: tuple[str, ...], hypotheses: Sequence[Hypothesis]) ->
 def _leads(compositions: Sequence[Composition]) -> tuple[str, ...]:
     """Effects that nearly all that is probable has in common."""
     names = dict.fromkeys(name for each in compositions[:MOST_TOLD] for name in each.best.effects)
-    share = {
-        name: sum(each.probability for each in compositions if name in each.best.effects) for name in names
-    }
+    share = {name: sum(each.probability for each in compositions if name in each.best.effects) for name in names}
     return tuple(name for name in names if share[name] >= MOSTLY)
 
 

@@ -153,7 +153,9 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
         seconds,
         task.kind == "mistake" and _matters(diagnosis.before, truth),
         twins=tuple(
-            tuple(twin for name in (effect.label, *_names(effect.alternatives)) for twin in twins_of(name) if twin != name)
+            tuple(
+                twin for name in (effect.label, *_names(effect.alternatives)) for twin in twins_of(name) if twin != name
+            )
             for effect in diagnosis.effects
         ),
         before=heldout["before"],

@@ -28,7 +28,9 @@ def places(evidence: Evidence) -> list[Explanation]:
     found = [*_frequencies(evidence, sweeps), *_levels(evidence, sweeps), *_repeats(evidence, sweeps)]
     found += _loops(evidence) if len(loops) < len(evidence.data_sets) else []
     return [
-        Explanation("place", suspect.kind, suspect.words, Group(columns, np.ones(len(columns)), together=True), suspect=suspect)
+        Explanation(
+            "place", suspect.kind, suspect.words, Group(columns, np.ones(len(columns)), together=True), suspect=suspect
+        )
         for suspect in found
         for columns in [np.array(suspect.columns)]
     ]
@@ -37,7 +39,9 @@ def places(evidence: Evidence) -> list[Explanation]:
 def _loops(evidence: Evidence) -> Iterator[Suspect]:
     for loop in parted(evidence.data_sets)[0]:
         for suspect in loop.suspects():
-            yield _suspect(evidence, suspect.words, "loop", [loop], [evidence.embedded(c, loop) for c in suspect.columns])
+            yield _suspect(
+                evidence, suspect.words, "loop", [loop], [evidence.embedded(c, loop) for c in suspect.columns]
+            )
 
 
 def _suspect(
