@@ -32,12 +32,12 @@ from bushfit.fitting.solve import Bounds
 
 #: Probability of nothing from which on records are not doubted. For time: each claim is a fit.
 _SURE = 0.99
+#: Refits at most of what is probable by a linear count alone. For time.
+_SETTLED = 8
 #: Claims that are fitted, those first under which the tests could agree best; places added to a state. For time.
 _CLAIMS, _PLACES = 4, 2
 #: Logarithm of odds behind its state within which an effect is refitted; for time.
 _SLIGHT = 3.0
-#: What the shape of an effect in place of a branch is expected to cost; decides of its refit alone.
-_OF_A_BRANCH = 5.0
 #: Reduced chi-square beyond which a model has bent its parameters too far for a refit to start from its values.
 _BENT = 1.5
 
@@ -262,7 +262,7 @@ class Search:
 
     def _settle(self) -> None:
         """Refit what only a linear count promises, as long as it is among the most probable."""
-        for _ in range(sum(REFITS)):
+        for _ in range(_SETTLED):
             every = self.ordered
             share = np.exp([each.log_posterior - every[0].log_posterior for each in every])
             ahead = np.cumsum(share) - share
@@ -311,23 +311,24 @@ class Search:
     def _grown(self, weighed: Weighed, depth: int) -> list[Weighed]:
         """The state with each of its most promising effects, refitted, and places; and without an effect that may only
         have led the way."""
-        state, least = weighed.state, weighed.log_posterior
-        base = state.log_prior + state.density
-        promise = {
-            each.name: base + self._prior("effect", each.name) + worth.log_evidence
+        grown = self._with_effects(weighed, self._promising(weighed, *REFITS[min(depth, 1)]), depth)
+        grown += [each for other in grown for each in self._without_earlier(other.state)]
+        return grown + self._with_places(weighed, depth)
+
+    def _promising(self, weighed: Weighed, by_evidence: int, by_score: int) -> list[str]:
+        """Effects that are worth a refit: so many of those with the most evidence as far as they are linear, and of
+        those that take most off chi-square, which tells more where the gap is large."""
+        state = weighed.state
+        new = [each.name for each in weighed.effects if state.key | {each.name} not in self._seen]
+        evidence = {
+            each.name: self._prior("effect", each.name) + worth.log_evidence - weighed.first.log_evidence
             for each, worth in weighed.worths
             if each.kind == "effect"
         }
-        promise |= {
-            each.name: least + self._prior("effect", each.name) + 0.5 * each.proposal.score - _OF_A_BRANCH
-            for each in weighed.effects
-            if each.group is None and each.proposal
-        }
-        names = [name for name in sorted(promise, key=lambda name: -promise[name]) if promise[name] > least - _SLIGHT]
-        names = [name for name in names if state.key | {name} not in self._seen][: REFITS[min(depth, 1)]]
-        grown = self._with_effects(weighed, names, depth)
-        grown += [each for other in grown for each in self._without_earlier(other.state)]
-        return grown + self._with_places(weighed, depth)
+        first = [name for name in sorted(evidence, key=lambda name: -evidence[name]) if name in new]
+        scores = {each.name: each.proposal.score for each in weighed.effects if each.proposal}  # the best first
+        second = [name for name in scores if name in new and 0.5 * scores[name] + self._prior("effect", name) > -_SLIGHT]
+        return list(dict.fromkeys([*(name for name in first[:by_evidence] if evidence[name] > -_SLIGHT), *second[:by_score]]))
 
     def _with_effects(self, weighed: Weighed, names: Sequence[str], depth: int) -> list[Weighed]:
         state, asked = weighed.state, self.asked

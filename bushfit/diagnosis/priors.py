@@ -21,8 +21,10 @@ WAVES = 4
 KNOWN = 30
 #: Logarithm of odds below which a node, a state of the search or an explanation is not followed.
 FAR = 12.0
-#: States of the search that are kept, in the first round and later; rounds; refits of a state likewise.
-BEAM, ROUNDS, REFITS = (4, 3), 3, (7, 3)
+#: States of the search that are kept, in the first round and later, and rounds.
+BEAM, ROUNDS = (4, 3), 3
+#: Refits of a state likewise, of what has most evidence by a linear count, and of what takes most off chi-square.
+REFITS = ((4, 3), (2, 2))
 #: Probability of nothing, from which on a verdict is `consistent`.
 NOTHING = 0.15
 #: Probability from which on an explanation is named; a set that reaches it is told, of so many at most.

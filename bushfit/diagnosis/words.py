@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -25,6 +25,14 @@ class Composition:
 
     probability: float
     best: Hypothesis
+
+    @property
+    def parts(self) -> frozenset[str]:
+        """Its effects, kinds of places and what else it is made of."""
+        best = self.best
+        spots = [f"place: {place.family}" for place in best.places] + (["levels"] if best.levels else [])
+        claim = [str(best.claim.mistake.name)] if best.claim else []
+        return frozenset((*best.effects, *spots, *(["unnamed"] if best.unnamed else []), *claim))
 
     @property
     def kinds(self) -> frozenset[str]:
@@ -68,10 +76,11 @@ def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
         if together < NAMED:
             told.append(each)
             together += each.probability
-    common = frozenset.intersection(*(frozenset(each.best.effects) for each in told))
-    sure = next((each for each in told if each.kinds == {"effects"} and set(each.best.effects) == common), None)
-    if sure and sure.best.chance >= DOES_NOT_FIT:  # all that is probable has it, what else there is is not shown
-        return Finding("named", nothing, (sure, *(each for each in told if each is not sure)))
+    common = frozenset.intersection(*(each.parts for each in told))
+    sure = next((each for each in told if each.parts == common), None)
+    if sure:  # all that is probable has these parts; what else there is is not shown
+        found = _of_one(sure, nothing, hypotheses)
+        return replace(found, told=(sure, *(each for each in told if each is not sure)))
     unnamed = sum(each.probability for each in told if "unnamed" in each.kinds)
     if len(told) <= MOST_TOLD and unnamed < 0.5:
         return Finding("ambiguous", nothing, tuple(told))
