@@ -177,12 +177,13 @@ class Ledger:
         size, along = np.empty((2, len(self.nodes), count))
         grams: list[list[Array]] = [[] for _ in self._alike]
         k, products, known = len(self.jacobian), self._products, self.precision > 0.0
+        told = np.diag((products.rows[0] + products.rows[1])[1:, 1 : 1 + k]) + self.precision  # the same at every node
+        scale = np.sqrt(np.maximum(told, np.finfo(float).tiny))
         for number, node in enumerate(self.nodes):
             left, log_size = products.beside(node)
             share = 1.0 / node.scatter**2
             gram = share * products.rows[0] + products.rows[1] - left[:, : 1 + k].T @ left
             information = gram[1:, 1 : 1 + k] + np.diag(self.precision)
-            scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
             root = np.linalg.cholesky(information / np.outer(scale, scale) + _ROUNDING * np.eye(k))
             free = solve_triangular(root, gram[1:] / scale[:, None], lower=True)
             rest = gram[0] - free[:, 0] @ free

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 from asking import INERTIA, asked, no_loops, no_repeats, no_sweeps, one_direction, said
+from bushfit.diagnosis.again import Again
 from rigged import SHARED, Measured, changed
 
 from bushfit.campaign.schema import Loss, RigSettings
 from bushfit.diagnosis import verdict
-from bushfit.diagnosis.again import Again
 from bushfit.diagnosis.holdout import HoldOut
 from bushfit.diagnosis.next_test import MENU
 from bushfit.effects import BASE

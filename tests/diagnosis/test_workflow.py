@@ -25,12 +25,12 @@ from asking import (
     one_loop,
     said,
 )
+from bushfit.diagnosis.search import Search
 from rigged import PLAN, SHARED, Diagnosed, Measured, changed
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, ParameterSetting, SimulateSettings
 from bushfit.diagnosis.record import Settings
-from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import Remainder
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE
