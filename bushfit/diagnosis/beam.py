@@ -19,7 +19,7 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim, Screen, claims
 from bushfit.diagnosis.currency import Block, Ledger, Node, Worth
 from bushfit.diagnosis.evidence import Evidence, fit
-from bushfit.diagnosis.explanations import Explanation, effects, places, unnamed
+from bushfit.diagnosis.explanations import Explanation, FaultyPlace, MissingEffect, effects, places, unnamed
 from bushfit.diagnosis.priors import BEAM, FAR, LEVELS, NAMED, ODDS, REFITS, ROUNDS, SIZES
 from bushfit.diagnosis.propose import probes
 from bushfit.diagnosis.refit import refitted, within_reach
@@ -87,7 +87,7 @@ class Hypothesis:
 
     effects: tuple[str, ...]
     claim: Claim | None
-    places: tuple[Explanation, ...]
+    places: tuple[FaultyPlace, ...]
     unnamed: str
     levels: bool
     log_posterior: float
@@ -160,7 +160,7 @@ class State:
 
     tests: Tests
     effects: tuple[str, ...]
-    places: tuple[Explanation, ...]
+    places: tuple[FaultyPlace, ...]
     evidence: Evidence
     log_prior: float
     precision: Mapping[str, float] = field(default_factory=dict)
@@ -209,7 +209,7 @@ class Weighed:
         return self.state.log_prior + self.state.density + self.first.log_evidence
 
     @cached_property
-    def effects(self) -> list[Explanation]:
+    def effects(self) -> list[MissingEffect]:
         return effects(self.bare, (*self.asked.without, *self.state.effects), self.asked.held)
 
     @cached_property
@@ -226,7 +226,7 @@ class Weighed:
         """This state with an explanation more, counted linearly."""
         state = self.state
         names = (*state.effects, each.name) if each.kind == "effect" else state.effects
-        spots = (*state.places, each) if each.kind == "place" else state.places
+        spots = (*state.places, each) if isinstance(each, FaultyPlace) else state.places
         curve = each.name if each.kind == "unnamed" else ""
         posterior = state.log_prior + state.density + log_odds + worth.log_evidence
         return Hypothesis(names, state.tests.claim, spots, curve, False, posterior, max(state.size, worth.size), self)
@@ -343,7 +343,7 @@ class Search:
             if each.kind == "effect"
         }
         first = [name for name in sorted(evidence, key=lambda name: -evidence[name]) if name in new]
-        scores = {each.name: each.proposal.score for each in weighed.effects if each.proposal}  # the best first
+        scores = {each.name: each.proposal.score for each in weighed.effects}  # the best first
         second = [
             name for name in scores if name in new and 0.5 * scores[name] + self._prior("effect", name) > -_SLIGHT
         ]
@@ -355,7 +355,7 @@ class Search:
         state, asked = weighed.state, self.asked
         if not names or len(state.effects) >= asked.most:
             return []
-        proposed = [each.proposal for each in weighed.effects if each.name in names and each.proposal]
+        proposed = [each.proposal for each in weighed.effects if each.name in names]
         start = asked.start if not state.effects and state.evidence.reduced > _BENT else {}
         return [
             self._weigh(self._with_effect(state, name, evidence, depth))
@@ -376,7 +376,7 @@ class Search:
 
     def _with_places(self, weighed: Weighed, depth: int) -> list[Weighed]:
         state, grown = weighed.state, []
-        own = [(each, worth) for each, worth in weighed.worths if each.kind == "place"]
+        own = [(each, worth) for each, worth in weighed.worths if isinstance(each, FaultyPlace)]
         own.sort(key=lambda pair: -(self._prior("place", pair[0].name) + pair[1].log_evidence))
         for each, worth in own[:_PLACES]:
             odds = self._prior("place", each.name) - log(depth + 1)
@@ -444,9 +444,10 @@ def _laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, di
     """Of an effect that was refitted: ln of the prior density of its own coordinates with the factor of Laplace's
     method, their precision, and what it changes, relative to |K|.
 
-    What an amount changes is log-uniform between the least and the largest size; a shape is uniform over what the tests could show; at rest on an end of that, the fall of the likelihood away from the end
-    tells how much of it counts, and it moves no further. Of an effect in place of a branch each parameter beyond the branch's two
-    is uniform over a factor of 20.
+    What an amount changes is log-uniform between the least and the largest size. A shape is uniform over what the tests
+    could show; at rest on an end of that it moves no further, and the fall of the likelihood away from the end tells
+    how much of it counts. Of an effect in place of a branch each parameter beyond the branch's two is uniform over a
+    factor of 20.
     """
     effect, names = effect_named(name), evidence.solution.coordinates.names
     data_sets, model = evidence.data_sets, evidence.model

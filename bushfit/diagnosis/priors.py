@@ -1,4 +1,4 @@
-"""Every constant that moves a verdict, in one table: odds beforehand, sizes, errors of rigs, and when a word is said."""
+"""Every constant that moves a verdict: odds beforehand, sizes, errors of rigs, and when a word is said."""
 
 import numpy as np
 
