@@ -336,6 +336,10 @@ class SweepData(DataSet):
             return f"the {self.direction} sweep of amplitudes at {self.frequency[point]:.4g} Hz"
         return f"run {self.repeat[point]} of {self.name}, {self.direction}"
 
+    def moved_together(self, chosen: Array) -> list[Array]:
+        """Whitened residuals of some points, (n,) shares, off by one unit of gain, and off by one of phase."""
+        return [self.whiten(unit * chosen.astype(complex)) for unit in (1.0, 1.0j)]
+
     def columns(self) -> dict[str, Any]:
         unit, factor = self.direction.display.displacement
         amplitude = self.amplitude * factor

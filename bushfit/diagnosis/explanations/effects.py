@@ -11,7 +11,7 @@ from bushfit.diagnosis.propose import proposals
 
 
 def effects(evidence: Evidence, excluded: Collection[str], held: Sequence[str]) -> list[MissingEffect]:
-    """Every effect that these tests could show, in one of its shapes; one that replaces a branch is told by its refit."""
+    """Every effect that these tests could show, in one of its shapes; one in place of a branch is told by its refit."""
     share = np.empty(evidence.residual.size)
     for data_set, place in evidence.place.items():
         share[place] = data_set.relative_noise

@@ -106,18 +106,12 @@ def _scopes(sweeps: Sequence[SweepData]) -> list[Sequence[SweepData]]:
     return [*([sweep] for sweep in sweeps), *([sweeps] if len(sweeps) > 1 else [])]
 
 
-def _off(
-    evidence: Evidence, sweeps: Sequence[SweepData], chosen: Sequence[Array], *, sloping: bool = False
-) -> list[Array]:
+def _off(evidence: Evidence, sweeps: Sequence[SweepData], chosen: Sequence[Array], *, sloping: bool = False) -> Array:
     """Residuals of some points of sweeps that are off together: in gain, in phase, and if `sloping` along the step."""
-    columns = []
-    for slope in (False, True)[: 1 + sloping]:
-        for unit in (1.0, 1.0j):
-            column = np.zeros(evidence.residual.size)
-            for sweep, rows in zip(sweeps, chosen, strict=True):
-                value = rows * (_along(sweep.step) if slope else 1.0)
-                column[evidence.place[sweep]] = sweep.whiten(value * unit)
-            columns.append(column)
+    columns = np.zeros((2 + 2 * sloping, evidence.residual.size))
+    for sweep, rows in zip(sweeps, chosen, strict=True):
+        values = [rows.astype(float), *([rows * _along(sweep.step)] if sloping else [])]
+        columns[:, evidence.place[sweep]] = [column for value in values for column in sweep.moved_together(value)]
     return columns
 
 

@@ -1,0 +1,126 @@
+"""Errors that all runs of a level share: repeats do not show them, what a fitted model leaves of the levels does."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from bushfit.campaign.schema import RigSettings
+from bushfit.effects.contract import Array
+from bushfit.fitting.data_sets import DataSet, parted
+from bushfit.fitting.noise import ASSUMED_SHARED, of_class, words_of
+
+#: Error of a level, in units of the rig's class, up to which it counts as one of the rig; chosen: as for outliers of
+#: normal errors.
+_MOST_CLASSES = 3.0
+#: Relative change of the variances at which the scoring ends: far below their standard error.
+_SETTLED = 1e-3
+#: What an error must take off twice the negative logarithm of the likelihood to count; chosen on 40 simulated
+#: campaigns: of chance it took 3 at most on most, and an error of the size of a point's scatter 50.
+_MATTERS = 6.0
+#: The same where no run was repeated: what a run shares is a guess then, and a better one counts soon.
+_MATTERS_UNREPEATED = 0.5
+#: Share of a level's error that the model must leave for the level to tell anything of it.
+_LEFT = 1e-6
+
+
+class LevelErrors(NamedTuple):
+    """Error of each level, as far as a fit tells it.
+
+    Args:
+        error: standard deviation of gain and phase [rad].
+        freedom: degrees of freedom behind it; 0 where it stands at the largest that a rig may have, and is known so.
+        gain: what it takes off twice the negative logarithm of the likelihood, beside what is counted already.
+        matters: whether that is more than chance.
+    """
+
+    error: tuple[float, float]
+    freedom: int
+    gain: float
+    matters: bool
+
+
+def largest_level_error(rig: RigSettings) -> tuple[float, float]:
+    """Largest standard deviation of errors of levels, in gain and phase [rad], that counts as the rig's."""
+    gain, phase = of_class(rig, ASSUMED_SHARED)
+    return _MOST_CLASSES * gain, _MOST_CLASSES * phase
+
+
+def class_words(rig: RigSettings) -> str:
+    """A rig's class as it counts, in words: gain and phase error, and which of them is assumed."""
+    unstated = [name for name, error in zip(("gain", "phase"), rig.stated, strict=True) if error is None]
+    whose = f"{' and '.join(unstated)} assumed" if unstated else "as [rig] states"
+    return f"{words_of(of_class(rig, ASSUMED_SHARED))}, {whose}"
+
+
+def level_errors(
+    data_sets: Sequence[DataSet], residual: Array, absorbed: Array, most: tuple[float, float]
+) -> LevelErrors:
+    """Errors of the levels of sweeps by restricted maximum likelihood, never below 0 and never beyond `most`.
+
+    Args:
+        residual: whitened residuals at the end of a fit, (n,).
+        absorbed: whitened residuals that the fit, or a fault, can make up for, (k, n).
+
+    Notes:
+        Beside the noise counted already a level's error adds v u u^T to the covariance of the whitened residuals, u the
+        level's unit error, whitened. What the fit absorbs is projected out (Patterson and Thompson, 1971). The scoring
+        is Fisher's, in the space of the levels.
+    """
+    columns, which, before = _columns(data_sets)
+    nothing = LevelErrors(before, 0, 0.0, matters=False)
+    if not columns.size:
+        return nothing
+    span, size, _ = np.linalg.svd(absorbed.T, full_matrices=False)
+    span = span[:, size > _LEFT * size.max(initial=0.0)]
+    left = columns - (columns @ span) @ span.T
+    values, vectors = np.linalg.eigh(left @ left.T)
+    seen = values > _LEFT * np.square(np.linalg.norm(columns, axis=1)).max()
+    root = np.sqrt(values[seen, None]) * vectors[:, seen].T
+    along = (vectors[:, seen].T @ (left @ residual)) / np.sqrt(values[seen])
+    parts = np.array([root[:, which == kind] @ root[:, which == kind].T for kind in (0, 1)])
+    scale = np.array([np.mean(np.square(columns[which == kind]).sum(axis=1)) for kind in (0, 1)])
+    counted = np.square(before)
+    added, most_added = np.zeros(2), np.maximum(np.square(most) - counted, 0.0)
+
+    def at(added: Array) -> tuple[Array, Array, float]:
+        """Slope and curvature of the logarithm of the likelihood, and minus twice itself."""
+        covariance = np.eye(along.size) + np.tensordot(added, parts, 1)
+        solved = np.linalg.solve(covariance, parts)
+        white = np.linalg.solve(covariance, along)
+        slope = 0.5 * (np.einsum("i,kij,j->k", white, parts, white) - np.trace(solved, axis1=1, axis2=2))
+        curvature = 0.5 * np.einsum("kij,lji->kl", solved, solved)
+        return slope, curvature, float(np.linalg.slogdet(covariance)[1] + along @ white)
+
+    for _ in range(40):  # of Fisher scoring; chosen: more than it takes
+        slope, curvature, _ = at(added)
+        step = slope / np.maximum(np.diag(curvature), np.finfo(float).tiny)
+        moved = np.clip(added + step, 0.0, most_added)
+        if np.all(np.abs(moved - added) <= _SETTLED * (added + 1.0 / scale)):
+            break
+        added = moved
+    _, curvature, least = at(added)
+    freedoms = (2.0 * np.diag(curvature) * np.square(added + 1.0 / scale))[added < most_added]
+    if freedoms.min(initial=np.inf) < 1.0:
+        return nothing
+    measured = any(sweep.noise.freedom for sweep in parted(data_sets)[1])
+    fall = at(np.zeros(2))[2] - least
+    matters = fall > (_MATTERS if measured else _MATTERS_UNREPEATED)
+    gain, phase = np.sqrt(counted + added).tolist()
+    return LevelErrors((gain, phase), int(freedoms.min()) if freedoms.size else 0, fall, matters)
+
+
+def _columns(data_sets: Sequence[DataSet]) -> tuple[Array, Array, tuple[float, float]]:
+    """Whitened unit error of each level in gain and in phase, (c, n), which of the two it is, (c,), and the error that
+    is counted already."""
+    ends = np.cumsum([0, *(data_set.size for data_set in data_sets)])
+    rows, which, before = [], [], (0.0, 0.0)
+    for sweep in parted(data_sets)[1]:
+        begin, before = int(ends[list(data_sets).index(sweep)]), sweep.noise.level
+        for held in np.unique(sweep.held):
+            for kind, column in enumerate(sweep.moved_together(sweep.held == held)):
+                row = np.zeros(ends[-1])
+                row[begin : begin + sweep.size] = column
+                rows.append(row)
+                which.append(kind)
+    return np.array(rows), np.array(which), before
