@@ -169,7 +169,8 @@ def probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> 
     frequencies = np.concatenate([data_set.frequency for data_set in data_sets])
     match parameter.scale:
         case "period":
-            low, high = 0.1 / (2.0 * np.pi * frequencies.max()), 2.0 / (2.0 * np.pi * np.median(frequencies))
+            swept = np.concatenate([sweep.frequency for sweep in parted(data_sets)[1]] or [frequencies])
+            low, high = 0.1 / (2.0 * np.pi * swept.max()), 1.0 / (2.0 * np.pi * swept.min())
         case "frequency":
             low, high = 0.7 * frequencies.max(), 4.0 * frequencies.max()
         case "displacement":
