@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from commandline import Done
 
@@ -39,3 +41,21 @@ def test_the_paper_s_order_by_hand(bushfit: Run, tmp_path: Path) -> None:
     assert [file.name for file in Path(p).glob("[!.]*")] == ["torsion.csv"]
     again = bushfit("fit-static", CAMPAIGN, "--dynamic", f"{d}/dynamic.json", "-o", str(tmp_path / "s2"), "--no-plots")
     assert "left out" not in again.stderr
+
+
+def test_a_bar_in_tension_and_a_coupon_in_shear_of_one_rubber_have_one_fit(typed: Run, tmp_path: Path) -> None:
+    """By hand: a bar has three times the modulus, and the same energy at a strain sqrt(3) times smaller."""
+    frequency, strain = (axis.ravel() for axis in np.meshgrid([5, 10, 20, 40, 80], [0.2, 0.7, 2.0, 6.0]))
+    modulus = 1.0 + 0.1 * frequency**0.24 + 0.6 / (1.0 + strain / 1.5)
+    loss = 0.05 + 0.007 * np.log(frequency) + 0.15 * strain / (1.5 + strain) ** 2
+    fitted = {}
+    for symbol, factor, stretched in (("E", 3.0, np.sqrt(3.0)), ("G", 1.0, 1.0)):
+        columns = (frequency, strain / stretched, factor * modulus, loss)
+        rows = "\n".join(",".join(f"{cell:.7g}" for cell in row) for row in zip(*columns, strict=True))
+        header = f"Frequency [Hz],Strain [%],Storage Modulus {symbol}' [MPa],tan delta [-]"
+        (tmp_path / f"{symbol}.csv").write_text(f"{header}\n{rows}\n", encoding="utf-8")
+        assert typed("init", f"{symbol}.csv", "-o", f"{symbol}.toml").returncode == 0
+        done = typed("fit", f"{symbol}.toml", "-o", symbol, "--no-plots", "--json")
+        assert done.returncode == 0, done.stderr
+        fitted[symbol] = {name: each["value"] for name, each in json.loads(done.stdout)["parameters"].items()}
+    assert fitted["E"] == pytest.approx(fitted["G"], rel=1e-3)
