@@ -112,8 +112,13 @@ def test_what_is_unknown_by_100_per_cent_is_said_first(bushfit: Run, work: Path,
     ("directions", "hidden", "sets"),
     [
         (("axial", "radial"), "rig_compliance.radial=2e-8", ["sleeve_compliance", "sleeve_compliance.radial"]),
-        (("axial", "radial", "torsion"), "rig_compliance.radial=3e-8", ["sleeve_compliance.radial"]),
-        (("axial",), "rig_compliance.compliance=1e-6", ["sleeve_compliance", "sleeve_compliance.axial"]),
+        *(
+            pytest.param(*more, marks=pytest.mark.slow)
+            for more in (
+                (("axial", "radial", "torsion"), "rig_compliance.radial=3e-8", ["sleeve_compliance.radial"]),
+                (("axial",), "rig_compliance.compliance=1e-6", ["sleeve_compliance", "sleeve_compliance.axial"]),
+            )
+        ),
     ],
 )
 def test_what_gives_way_in_one_direction_or_in_all_is_a_set_where_it_is_equal(
