@@ -175,6 +175,7 @@ TURNED = replace(
 )
 
 
+@pytest.mark.slow
 def test_compliance_in_one_direction_alone_is_never_a_bold_name(measured: Measured) -> None:
     """A softer rig and a softer rubber look alike in one direction; two leave open which gives way, torsion tells."""
     campaign = measured(SOFT_RIG, TURNED)
