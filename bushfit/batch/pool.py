@@ -67,7 +67,7 @@ class LocalPool:
             kind = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
             context = multiprocessing.get_context(kind)
             if kind == "forkserver":
-                context.set_forkserver_preload(["bushfit.batch.work", "bushfit.jobs.fits"])
+                context.set_forkserver_preload(["bushfit.batch.work", "bushfit.jobs.fits", "lmfit", "pandas"])
             self._executor = futures.ProcessPoolExecutor(self._jobs, context, initializer=_begin_worker)
         return self._executor
 
@@ -224,7 +224,7 @@ def _alone(row: T, work: Callable[[Sequence[T]], Sequence[R]], give_up: Callable
         _submit(pool, work, []).result()  # a worker that dies over nothing was not brought down by the row
     except (futures.BrokenExecutor, OSError, EOFError) as error:
         raise _no_worker(error) from error
-    return give_up(f"its worker process died twice, the second time over it alone; out of memory, most likely ({cause})")
+    return give_up(f"its worker process died twice, then over it alone; out of memory, most likely ({cause})")
 
 
 def _no_worker(cause: BaseException) -> BatchError:
