@@ -38,8 +38,8 @@ def test_every_row_once(tmp_path: Path) -> None:
 
 
 def test_a_worker_that_dies_costs_a_second_try(tmp_path: Path) -> None:
-    assert results(40, tmp_path, once=(100, 117, 118, 139)) == {n: str(2 * (100 + n)) for n in range(40)}
-    assert len(list(tmp_path.iterdir())) == 4
+    assert results(40, tmp_path, once=(100, 117)) == {n: str(2 * (100 + n)) for n in range(40)}
+    assert len(list(tmp_path.iterdir())) == 2
 
 
 def test_workers_that_die_before_they_are_given_more_are_replaced(tmp_path: Path) -> None:
