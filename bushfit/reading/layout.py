@@ -136,7 +136,7 @@ def find_layout(
     if not lines:
         return Layout(delimiter or ",", (), 1, (), None)
     delimiters = tuple(DELIMITERS.values()) if delimiter is None else (delimiter,)
-    end = _first_rows(lines, delimiters)
+    end, delimiters = _first_rows(lines, delimiters)
     before = [index for index in range(end) if header_line in (None, lines[index].number)]
     if header_line is not None and not before:
         before = [index for index, line in enumerate(lines) if line.number == header_line]
@@ -197,14 +197,17 @@ def _is_row(cells: Sequence[str]) -> bool:
     return numbers > 1 and 2 * numbers >= len(cells)
 
 
-def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> int:
-    """Index of the first of three rows of numbers in a row; else the number of lines."""
+def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> tuple[int, Sequence[str]]:
+    """Index of the first of three rows of numbers in a row, and the delimiters that part all three.
+
+    Else the number of lines, and all delimiters.
+    """
     inside = [index for index, line in enumerate(lines) if not is_comment(line.content, ";")]
     for start, *others in zip(inside, inside[1:], inside[2:], strict=False):
         three = [lines[index].content for index in (start, *others)]
-        if all(any(_is_row(split(content, delimiter)) for delimiter in delimiters) for content in three):
-            return start
-    return len(lines)
+        if parting := [mark for mark in delimiters if all(_is_row(split(content, mark)) for content in three)]:
+            return start, parting
+    return len(lines), delimiters
 
 
 def _likeliest(
@@ -231,13 +234,19 @@ def _likeliest(
 
 
 def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence[str]) -> Layout:
-    """The layout of a header, with the units row that may follow it."""
-    units_line, row = None, ("",) * len(headers)
-    if line := next(_below(lines, index, delimiter), None):
-        cells = [cell.strip("[]() ") for cell in split(line.content, delimiter)]
-        if fits(cells, len(headers)) and _is_units_row(cells):
-            units_line, row = line.number, tuple(cells[: len(headers)])
-    return Layout(delimiter, tuple(headers), lines[index].number, row, units_line)
+    """The layout of a header, with the units row that may follow it.
+
+    Empty cells at the end of the units row may be left out; then the rows may lack these columns, too.
+    """
+    width, units_line, row = len(headers), None, [""] * len(headers)
+    below = [(line.number, split(line.content, delimiter)) for line in _below(lines, index, delimiter)]
+    for number, cells in below[:1]:
+        cells = [cell.strip("[]() ") for cell in cells]
+        if (len(cells) < width or fits(cells, width)) and _is_units_row(cells):
+            units_line, row = number, (cells + row)[:width]
+            filled = max(at for at, cell in enumerate(row, start=1) if cell)
+            width = next((len(own) for _, own in below if _is_row(own) and filled <= len(own) < width), width)
+    return Layout(delimiter, tuple(headers[:width]), lines[index].number, tuple(row[:width]), units_line)
 
 
 def _is_units_row(cells: Sequence[str]) -> bool:
