@@ -130,7 +130,7 @@ def _usable(files: Sequence[Path], stated: Mapping[str, Any], *, is_sized: bool)
     from bushfit.inspection.recognition import BLOCK_KEYS
 
     sources, left_out = gather(files, stated)
-    places = [(source.file.resolve(), source.sheet) for source in sources]
+    places = [(source.file.resolve(), str(source.stated)) for source in sources]
     if twice := [source for source, place in zip(sources, places, strict=True) if places.count(place) > 1]:
         raise CampaignError("a file is given twice", found=str(twice[0]), expected="each file once")
     seen: list[Inspected] = []

@@ -5,8 +5,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from bushfit.campaign.campaign import TEST_FILES
 from bushfit.errors import BushfitError, NoColumnError, NoTestError
+from bushfit.geometry import Direction
 from bushfit.inspection.opening import inspect
 from bushfit.inspection.outside import temperatures_of
 from bushfit.inspection.recognition import open_table, recognised
@@ -79,7 +82,43 @@ def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Sourc
                 hint="bushfit inspect FILE says what it makes of one",
             )
         sources += found
-    return stated_of_each(sources, stated), tuple(left_out)
+    tests: list[Source] = []
+    for source in stated_of_each(sources, stated):
+        found, others = _by_rows(source)
+        tests += found
+        left_out += others
+    return tests, tuple(left_out)
+
+
+def _by_rows(source: Source) -> tuple[list[Source], list[str]]:
+    """The tests of a file that its columns tell apart, by direction, part and run, and which rows are left out.
+
+    The runs of a sweep are repeats; so are tests those of a loop alone, where time does not go on from one to the next.
+    """
+    stated = source.stated or {}
+    own = {key: value for key, value in stated.items() if key not in ("direction", "specimen_number")}
+    try:
+        table, _ = recognised(source.file, own)
+        told = {**table.labels}
+        if "run" in told and "time" in table.roles:
+            time = table.read({"time": table.roles["time"]}, fewest_rows=1)["time"]
+            told = told if np.any(np.diff(time) <= 0.0) else {key: told[key] for key in told if key != "run"}
+    except BushfitError:  # which the inspection of the file tells
+        return [source], []
+    tests: list[Source] = []
+    left_out: list[str] = []
+    for texts in dict.fromkeys(zip(*(label.texts for label in told.values()), strict=True)):
+        keys = dict(zip(told, texts, strict=True))
+        if any(key in stated and not told[key].has(str(stated[key]), text) for key, text in keys.items()):
+            left_out.append(f"{source}: its rows of {', '.join(texts)}, by what is stated")
+        elif keys.get("direction", "axial") not in [*Direction]:
+            left_out.append(f"{source}: its rows of {', '.join(texts)}, which is no direction that is known")
+        else:
+            run = keys.pop("run", None)
+            rows = {} if run is None else {"rows": {table.headers[told["run"].index]: run}}
+            keys |= {"direction": Direction(keys["direction"])} if "direction" in keys else {}
+            tests.append(replace(source, stated={**stated, **keys, **rows}))
+    return (tests, left_out) if tests else ([source], [])
 
 
 def stated_of_each(sources: Sequence[Source], stated: Mapping[str, Any]) -> list[Source]:

@@ -10,6 +10,7 @@ from bushfit.campaign.schema import SpecimenTable
 from bushfit.errors import BushfitError, NoTestError, typed
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
 from bushfit.reading.headers import Vocabulary
+from bushfit.reading.labels import Rows
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.names import direction_of_file
 from bushfit.reading.resonance import is_resonance
@@ -108,6 +109,16 @@ def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Directi
         MeasurementError: units of torsion where the user states another direction.
     """
     turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
+    told = table.labels["direction"].values if "direction" in table.labels else []
+    if "direction" not in stated and told:
+        if len(told) > 1:
+            raise table.header_error(
+                "this file holds tests in several directions",
+                found=", ".join(told),
+                expected="one direction",
+                hint=f"state one: --direction {told[0]}",
+            )
+        return Direction(told[0])
     if "direction" not in stated:
         return direction_of_file(file, table.layout.written or table.headers, turns=turns, sheet=stated.get("sheet"))
     if turns and not Direction(stated["direction"]).is_rotation:
@@ -141,4 +152,5 @@ def open_table(
         key: {role: text for role, text in stated.get(key, {}).items() if role in names} for key in ("columns", "units")
     }
     written = FileFormat(**{field.name: stated.get(field.name) for field in fields(FileFormat)})
-    return Table.open(file, names, own["columns"], own["units"], written, motion)
+    rows = Rows(stated.get("direction"), stated.get("specimen_number"), stated.get("rows", {}))
+    return Table.open(file, names, own["columns"], own["units"], written, motion, rows)

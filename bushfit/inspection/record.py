@@ -113,9 +113,16 @@ class Inspected:
 
     @property
     def label(self) -> str:
-        """The name of the file, with the sheet where it has several."""
-        sheet = self.entry.get("sheet")
-        return f"{self.file.name}, sheet {sheet}" if sheet else self.file.name
+        """The name of the file, with the sheet where it has several, and with what columns tell of the test."""
+        sheet, roles = self.entry.get("sheet"), [column.role for column in self.columns]
+        told = [f"sheet {sheet}"] * bool(sheet) + [str(self.direction)] * ("direction" in roles)
+        return ", ".join([self.file.name, *told, *filter(None, [self.part]), *self.entry.get("rows", {}).values()])
+
+    @property
+    def part(self) -> str | None:
+        """The number of its specimen as a column tells it; None where none does."""
+        is_told = any(column.role == "specimen number" for column in self.columns)
+        return self.entry.get("specimen_number") if is_told else None
 
     @property
     def assumed(self) -> str | None:

@@ -15,7 +15,7 @@ from bushfit.errors import MeasurementError
 from bushfit.reading.headers import Column
 from bushfit.reading.layout import FileFormat, Layout, fits
 from bushfit.reading.measurement import Floats
-from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, weigh
+from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, is_like_number, weigh
 from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, RowSource, rows
 
 #: Rows that are taken apart at a time where a library cannot; chosen: their texts fill some MiB.
@@ -61,6 +61,23 @@ class Columns:
                     yield line, cells
         except csv.Error as error:
             raise self.error("the table cannot be read", found=str(error)) from error
+
+    def texts(self, index: int, most: int | None = None) -> list[str]:
+        """The text of each row in a column, or of the first ones, (n,); an empty cell, as merged ones are, goes on.
+
+        A sign # before a number does not count.
+        """
+        found, last = [], ""
+        for _, cells in islice(self.rows(), most):
+            cell = cells[index] if index < len(cells) else ""
+            last = (cell.strip(" #") if isinstance(cell, str) else f"{cell:.12g}") or last
+            found.append(last)
+        return found
+
+    def holds_numbers(self, index: int) -> bool:
+        """Whether a column begins with a number."""
+        cells = next(self.rows(), (0, ()))[1]
+        return index < len(cells) and is_like_number(str(cells[index]))
 
     def error(
         self,

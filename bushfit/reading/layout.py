@@ -34,6 +34,8 @@ _LONGEST_HEADER = 10_000
 _LINES_BELOW_HEADER = 8
 #: Signs with which a comment begins.
 _COMMENT_SIGNS = ("#", "%", "//")
+#: A number that a # marks as such: "#1".
+_NUMBERED = re.compile(r"#\s?\d+\b")
 #: Blanks between a name and the bracket of its unit, which part no columns.
 _BLANK_BEFORE_BRACKET = re.compile(r"\s+(?=[\[(])")
 #: What parts columns of which the headers have single blanks.
@@ -80,6 +82,7 @@ class Layout:
         headers, header_line: cells and line of the header.
         units, units_line: cells of the units row, "" where a column has none, and its line; None where there is none.
         written: cells of the header of a wide table that name a quantity, of which `headers` are those of the long one.
+        numbered: whether all rows begin with a number behind a # ("#1"), which then begins no comment.
     """
 
     delimiter: str
@@ -88,6 +91,7 @@ class Layout:
     units: tuple[str, ...]
     units_line: int | None
     written: tuple[str, ...] = ()
+    numbered: bool = False
 
     @property
     def lines_before_data(self) -> int:
@@ -157,7 +161,7 @@ def _candidates(
             if is_comment(content, delimiter) != commented:
                 continue
             if commented and isinstance(content, str):
-                content = content.lstrip().lstrip("#%/; ")
+                content = content.lstrip().lstrip("#%/ " if delimiter == ";" else "#%/; ")
             for cells in _header_cells(content, delimiter):
                 roles = vocabulary.roles(cells)
                 if len(roles) > 1 and not any(is_like_number(cell) for cell in cells):
@@ -246,7 +250,11 @@ def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence
             units_line, row = number, (cells + row)[:width]
             filled = max(at for at, cell in enumerate(row, start=1) if cell)
             width = next((len(own) for _, own in below if _is_row(own) and filled <= len(own) < width), width)
-    return Layout(delimiter, tuple(headers[:width]), lines[index].number, tuple(row[:width]), units_line)
+    cells = [split(line.content, delimiter) for line in lines[index + 1 :] if line.number != units_line]
+    numbered = bool(cells) and all(_NUMBERED.match(next(filter(None, own), "")) for own in cells)
+    return Layout(
+        delimiter, tuple(headers[:width]), lines[index].number, tuple(row[:width]), units_line, numbered=numbered
+    )
 
 
 def _is_units_row(cells: Sequence[str]) -> bool:

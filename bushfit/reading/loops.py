@@ -9,6 +9,7 @@ import numpy as np
 
 from bushfit.geometry import Place, stated_strain
 from bushfit.reading.headers import Column
+from bushfit.reading.labels import Rows, not_understood
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Floats, Loop, Waveform, rebuild_time, source_of
 from bushfit.reading.parallel import by_chunks
@@ -37,6 +38,7 @@ def read_loop(
     weight: float = 1.0,
     temperature: float | None = None,
     conditions: Mapping[str, str | float] | None = None,
+    rows: Rows = Rows(),
 ) -> Loop:
     """Read a hysteresis loop.
 
@@ -54,11 +56,13 @@ def read_loop(
         waveform: course of the displacement in time.
         noise, weight: of the loop, see `Loop`.
         temperature, conditions: at which it was tested [K], and what else is stated of the test, for provenance.
+        rows: of the file that make the test.
 
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
     """
-    table = Table.open(file, LOOP_COLUMNS, columns, units, written, direction.motion)
+    table = Table.open(file, LOOP_COLUMNS, columns, units, written, direction.motion, rows)
+    table.check_one_part()
     _check_not_swapped(table, direction)
     wanted = _loop_columns(table, direction, force_sign, has_clock=rate is not None or frequency is not None)
     values = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
@@ -71,7 +75,7 @@ def read_loop(
         time = rebuild_time(displacement, rate=rate, frequency=frequency, waveform=waveform)
     else:
         _check_increases(table, wanted["time"], time)
-    source = source_of(file, listed_as, table.sha256, temperature, conditions)
+    source = source_of(file, listed_as, table.sha256, temperature, conditions, not_understood(table))
     timed = "time" in values
     return Loop(
         name or file.stem, direction, time, displacement, force, noise, source, timed, weight, temperature=temperature
