@@ -116,7 +116,8 @@ class Inspected:
         """The name of the file, with the sheet where it has several, and with what columns tell of the test."""
         sheet, roles = self.entry.get("sheet"), [column.role for column in self.columns]
         told = [f"sheet {sheet}"] * bool(sheet) + [str(self.direction)] * ("direction" in roles)
-        return ", ".join([self.file.name, *told, *filter(None, [self.part]), *self.entry.get("rows", {}).values()])
+        told += [f"part {self.part}"] * bool(self.part)
+        return ", ".join([self.file.name, *told, *(" ".join(one) for one in self.entry.get("rows", {}).items())])
 
     @property
     def part(self) -> str | None:

@@ -110,10 +110,11 @@ def not_understood(table: Columns, rows: NDArray[np.intp] | None = None, *settle
             and not any(all(np.ptp(place[alike]) == 0 for alike in rows_alike(*keys)) for keys in goes_with)
         ):
             listed = ", ".join([*values[:_MOST_LISTED], *["..."] * (values.size > _MOST_LISTED)])
-            name = header or f"column {index + 1}"
+            name = f'"{header}"' if header else f"column {index + 1}"
+            way = f'rows = {{ "{header}" = "{values[0]}" }} in the campaign takes those alone' if header else "name it"
             yield (
-                f'"{name}" varies from row to row ({listed}) and is not understood: all rows count as one test; '
-                f'rows = {{ "{name}" = "{values[0]}" }} in the campaign takes those alone'
+                f"{name} varies from row to row ({listed}) and is not "
+                f"understood: all rows count as one test; {way}"
             )
 
 

@@ -133,6 +133,9 @@ def _check_increases(table: Table, column: Column, time: Floats) -> None:
     """Refuse a time that does not increase from row to row."""
     after, before = time[1:], time[:-1]
     if any(by_chunks(lambda rows: bool((after[rows] <= before[rows]).any()), after.size)):
-        table.refuse(np.append(False, after <= before), column, "time does not increase", "a later time on every row")
+        run = table.labels.get("run")
+        way = f'rows = {{ "{table.headers[run.index]}" = "{run.values[0]}" }} in the campaign takes one run' if run else ""
+        expected = "a later time on every row"
+        table.refuse(np.append(False, after <= before), column, "time does not increase", expected, way or None)
     if time[-1] - time[0] < LEAST_VALUE:
         raise table.error("the record takes no time", column=column, expected=f"{LEAST_VALUE:g} s or more")

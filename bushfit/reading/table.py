@@ -147,7 +147,7 @@ class Table(Columns):
                 "no row is of this test",
                 found="; ".join(found),
                 expected=" and ".join(text for _, text in wanted),
-                hint="state what one of these columns holds, or nothing of it",
+                hint="state what was found, or leave it out",
             )
         if rows.shared and not wanted:
             raise self.header_error(
