@@ -24,7 +24,7 @@ from bushfit.effects import effect_of, place_of, with_base
 from bushfit.errors import CampaignError, naming, typed
 from bushfit.geometry import Bushing, Specimen, place_named
 from bushfit.model.model import FIVE, Model
-from bushfit.reading.labels import Rows
+from bushfit.reading.columns import Rows
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep

@@ -54,13 +54,13 @@ def command(
     seen = named_apart(seen)
     if bushing is None and not all(isinstance(one.direction, Specimen) for one in seen):
         bushing = _bushing(name, sizes)
-    sizes = bushing and bushing[1]
+    table = bushing and bushing[1]
     if len({one.part for one in seen if one.part}) > 1:
         target = target if options.output and options.output.suffix == ".toml" else "batch.toml"
-        written = campaigns_of_parts(name, sizes, seen, folder, target)
+        written = campaigns_of_parts(name, table, seen, folder, target)
         options.require_free(folder, list(written))
     else:
-        written = {target: campaign_text(name, sizes, seen, folder)}
+        written = {target: campaign_text(name, table, seen, folder)}
     if bushing:
         _tell_bushing(options, bushing[0])
     for one in seen:

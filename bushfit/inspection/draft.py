@@ -38,23 +38,21 @@ def campaigns_of_parts(
     Raises:
         CampaignError: a file of which nothing tells the part.
     """
-    by_part: dict[str, list[Inspected]] = {}
-    for seen in files:
-        if (part := seen.entry.get("specimen_number")) is None:
+    of_parts = [seen.entry.get("specimen_number") for seen in files]
+    for part, seen in zip(of_parts, files, strict=True):
+        if part is None:
             raise CampaignError(
                 "nothing says of which part this is",
                 file=seen.file,
-                found=f"parts {', '.join(dict.fromkeys(filter(None, (other.part for other in files))))} in others",
+                found=f"parts {', '.join(dict.fromkeys(filter(None, of_parts)))} in others",
                 expected="a column for the part in every file, or the tests of one part",
                 hint="--specimen-number takes the tests of one part, and counts for files without such a column",
             )
-        by_part.setdefault(part, []).append(seen)
     texts = {listed_in: f"# a campaign of each part: bushfit batch {listed_in}\n"}
-    taken = {listed_in.casefold()}
-    for part, tests in by_part.items():
-        names = (f"{folder_name(part)}{number}.toml" for number in chain([""], (f"_{n}" for n in count(2))))
-        file = next(own for own in names if own.casefold() not in taken)
-        taken.add(file.casefold())
+    for number, part in enumerate(dict.fromkeys(filter(None, of_parts)), start=1):
+        file = f"{folder_name(part)}.toml"
+        file = f"{number}_{file}" if file.casefold() in map(str.casefold, texts) else file
+        tests = [seen for own, seen in zip(of_parts, files, strict=True) if own == part]
         texts[file] = campaign_text(f"{name} {part}", bushing, tests, folder)
         entry = _lines({"campaign": file, "name": f"{name} {part}"})
         texts[listed_in] += "\n".join(["", "[[bushings]]", *entry, ""])

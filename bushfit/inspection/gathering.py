@@ -14,6 +14,7 @@ from bushfit.inspection.opening import inspect
 from bushfit.inspection.outside import temperatures_of
 from bushfit.inspection.recognition import open_table, recognised
 from bushfit.inspection.record import Inspected
+from bushfit.reading.columns import same_text
 from bushfit.reading.names import Said, stated_above
 from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.workbook import sheets
@@ -82,12 +83,9 @@ def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Sourc
                 hint="bushfit inspect FILE says what it makes of one",
             )
         sources += found
-    tests: list[Source] = []
-    for source in stated_of_each(sources, stated):
-        found, others = _by_rows(source)
-        tests += found
-        left_out += others
-    return tests, tuple(left_out)
+    by_rows = [_by_rows(source) for source in stated_of_each(sources, stated)]
+    left_out += [sentence for _, others in by_rows for sentence in others]
+    return [test for tests, _ in by_rows for test in tests], tuple(left_out)
 
 
 def _by_rows(source: Source) -> tuple[list[Source], list[str]]:
@@ -108,16 +106,15 @@ def _by_rows(source: Source) -> tuple[list[Source], list[str]]:
     tests: list[Source] = []
     left_out: list[str] = []
     for texts in dict.fromkeys(zip(*(label.texts for label in told.values()), strict=True)):
-        keys = dict(zip(told, texts, strict=True))
-        if any(key in stated and not told[key].has(str(stated[key]), text) for key, text in keys.items()):
-            left_out.append(f"{source}: its rows of {', '.join(texts)}, by what is stated")
-        elif keys.get("direction", "axial") not in [*Direction]:
-            left_out.append(f"{source}: its rows of {', '.join(texts)}, which is no direction that is known")
+        keys: dict[str, Any] = dict(zip(told, texts, strict=True))
+        run = {table.headers[told["run"].column]: keys.pop("run")} if "run" in keys else {}
+        known = keys.get("direction", "axial") in [*Direction]
+        if known and all(same_text(str(stated.get(key, text)), text) for key, text in keys.items()):
+            tests.append(replace(source, stated={**stated, **keys, **({"rows": run} if run else {})}))
         else:
-            run = keys.pop("run", None)
-            rows = {} if run is None else {"rows": {table.headers[told["run"].index]: run}}
-            keys |= {"direction": Direction(keys["direction"])} if "direction" in keys else {}
-            tests.append(replace(source, stated={**stated, **keys, **rows}))
+            left_out.append(
+                f"{source}: its rows of {', '.join(texts)}, {'as stated' if known else 'no known direction'}"
+            )
     return (tests, left_out) if tests else ([source], [])
 
 

@@ -9,8 +9,8 @@ from typing import Any
 from bushfit.campaign.schema import SpecimenTable
 from bushfit.errors import BushfitError, NoTestError, typed
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
+from bushfit.reading.columns import Rows
 from bushfit.reading.headers import Vocabulary
-from bushfit.reading.labels import Rows
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.names import direction_of_file
 from bushfit.reading.resonance import is_resonance
@@ -109,18 +109,16 @@ def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Directi
         MeasurementError: units of torsion where the user states another direction.
     """
     turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
-    told = table.labels["direction"].values if "direction" in table.labels else []
-    if "direction" not in stated and told:
-        if len(told) > 1:
-            raise table.header_error(
-                "this file holds tests in several directions",
-                found=", ".join(told),
-                expected="one direction",
-                hint=f"state one: --direction {told[0]}",
-            )
-        return Direction(told[0])
+    told = dict.fromkeys(table.labels["direction"].texts if "direction" in table.labels else ())
+    if len(told) > 1 and "direction" not in stated:
+        problem, hint = "this file holds tests in several directions", "state one: --direction axial"
+        raise table.header_error(problem, found=", ".join(told), expected="one direction", hint=hint)
     if "direction" not in stated:
-        return direction_of_file(file, table.layout.written or table.headers, turns=turns, sheet=stated.get("sheet"))
+        return (
+            Direction(*told)
+            if told
+            else direction_of_file(file, table.layout.written or table.headers, turns=turns, sheet=stated.get("sheet"))
+        )
     if turns and not Direction(stated["direction"]).is_rotation:
         raise table.header_error(
             "the units say torsion",
@@ -153,4 +151,4 @@ def open_table(
     }
     written = FileFormat(**{field.name: stated.get(field.name) for field in fields(FileFormat)})
     rows = Rows(stated.get("direction"), stated.get("specimen_number"), stated.get("rows", {}))
-    return Table.open(file, names, own["columns"], own["units"], written, motion, rows)
+    return Table.open(file, names, own["columns"], own["units"], written, motion, rows if any(rows) else None)

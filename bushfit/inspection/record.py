@@ -114,16 +114,19 @@ class Inspected:
     @property
     def label(self) -> str:
         """The name of the file, with the sheet where it has several, and with what columns tell of the test."""
-        sheet, roles = self.entry.get("sheet"), [column.role for column in self.columns]
-        told = [f"sheet {sheet}"] * bool(sheet) + [str(self.direction)] * ("direction" in roles)
-        told += [f"part {self.part}"] * bool(self.part)
-        return ", ".join([self.file.name, *told, *(" ".join(one) for one in self.entry.get("rows", {}).items())])
+        direction = self.direction if "direction" in [one.role for one in self.columns] else None
+        told = {
+            "sheet": self.entry.get("sheet"),
+            "direction": direction,
+            "part": self.part,
+            **self.entry.get("rows", {}),
+        }
+        return ", ".join([self.file.name, *(f"{key} {value}" for key, value in told.items() if value)])
 
     @property
     def part(self) -> str | None:
         """The number of its specimen as a column tells it; None where none does."""
-        is_told = any(column.role == "specimen number" for column in self.columns)
-        return self.entry.get("specimen_number") if is_told else None
+        return self.entry["specimen_number"] if "specimen number" in [one.role for one in self.columns] else None
 
     @property
     def assumed(self) -> str | None:

@@ -139,8 +139,7 @@ def find_layout(
     """
     if not lines:
         return Layout(delimiter or ",", (), 1, (), None)
-    delimiters = tuple(DELIMITERS.values()) if delimiter is None else (delimiter,)
-    end, delimiters = _first_rows(lines, delimiters)
+    end, delimiters = _first_rows(lines, tuple(DELIMITERS.values()) if delimiter is None else (delimiter,))
     before = [index for index in range(end) if header_line in (None, lines[index].number)]
     if header_line is not None and not before:
         before = [index for index, line in enumerate(lines) if line.number == header_line]
@@ -202,10 +201,7 @@ def _is_row(cells: Sequence[str]) -> bool:
 
 
 def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> tuple[int, Sequence[str]]:
-    """Index of the first of three rows of numbers in a row, and the delimiters that part all three.
-
-    Else the number of lines, and all delimiters.
-    """
+    """Index of the first of three rows of numbers in a row, and what parts them; else the number of lines, and all."""
     inside = [index for index, line in enumerate(lines) if not is_comment(line.content, ";")]
     for start, *others in zip(inside, inside[1:], inside[2:], strict=False):
         three = [lines[index].content for index in (start, *others)]
@@ -238,23 +234,15 @@ def _likeliest(
 
 
 def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence[str]) -> Layout:
-    """The layout of a header, with the units row that may follow it.
-
-    Empty cells at the end of the units row may be left out; then the rows may lack these columns, too.
-    """
-    width, units_line, row = len(headers), None, [""] * len(headers)
-    below = [(line.number, split(line.content, delimiter)) for line in _below(lines, index, delimiter)]
-    for number, cells in below[:1]:
-        cells = [cell.strip("[]() ") for cell in cells]
-        if (len(cells) < width or fits(cells, width)) and _is_units_row(cells):
-            units_line, row = number, (cells + row)[:width]
-            filled = max(at for at, cell in enumerate(row, start=1) if cell)
-            width = next((len(own) for _, own in below if _is_row(own) and filled <= len(own) < width), width)
-    cells = [split(line.content, delimiter) for line in lines[index + 1 :] if line.number != units_line]
-    numbered = bool(cells) and all(_NUMBERED.match(next(filter(None, own), "")) for own in cells)
-    return Layout(
-        delimiter, tuple(headers[:width]), lines[index].number, tuple(row[:width]), units_line, numbered=numbered
-    )
+    """The layout of a header, with the units row that may follow it; this may lack empty cells at its end."""
+    units_line, row = None, ("",) * len(headers)
+    if line := next(_below(lines, index, delimiter), None):
+        cells = [cell.strip("[]() ") for cell in split(line.content, delimiter)]
+        if (len(cells) < len(headers) or fits(cells, len(headers))) and _is_units_row(cells):
+            units_line, row = line.number, tuple([*cells, *row][: len(headers)])
+    rows = [split(line.content, delimiter) for line in lines[index + 1 :] if line.number != units_line]
+    numbered = bool(rows) and all(_NUMBERED.match(next(filter(None, cells), "")) for cells in rows)
+    return Layout(delimiter, tuple(headers), lines[index].number, row, units_line, numbered=numbered)
 
 
 def _is_units_row(cells: Sequence[str]) -> bool:

@@ -7,7 +7,7 @@ import io
 import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING
 
@@ -46,11 +46,6 @@ class Text:
         stream = io.BytesIO(self.data)
         stream.seek(self._offset(after))
         return _lines(stream, after)
-
-    def without(self, numbers: Set[int]) -> Text:
-        """The same with empty lines in place of some, by their numbers from 1."""
-        lines = self.data.splitlines(keepends=True)
-        return replace(self, data=b"".join(b"\n" if n in numbers else line for n, line in enumerate(lines, start=1)))
 
     def lacks_values(self) -> bool:
         """Whether it has formulas without values, as a sheet may."""
@@ -166,10 +161,6 @@ class Sheet:
         for number, cells in enumerate(islice(self.content, after, None), start=after + 1):
             if any(cell != "" for cell in cells):
                 yield Line(number, cells)
-
-    def without(self, numbers: Set[int]) -> Sheet:
-        """The same with empty rows in place of some, by their numbers from 1."""
-        return replace(self, content=[[] if n in numbers else row for n, row in enumerate(self.content, start=1)])
 
     def may_have_comma(self, _: Layout) -> bool:
         """Whether cells may be texts with commas."""

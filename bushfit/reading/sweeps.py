@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from bushfit import units as si
 from bushfit.geometry import Place, stated_strain
+from bushfit.reading.columns import ALL_ROWS, Rows
 from bushfit.reading.headers import AmplitudeConvention, Column
-from bushfit.reading.labels import Rows, not_understood
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Complex, Floats, Stepped, Sweep, source_of
 from bushfit.reading.runs import runs_of
@@ -73,7 +73,7 @@ def read_sweep(
     weight: float = 1.0,
     temperature: float | None = None,
     conditions: Mapping[str, str | float] | None = None,
-    rows: Rows = Rows(),
+    rows: Rows = ALL_ROWS,
 ) -> Sweep:
     """Read a sweep.
 
@@ -94,7 +94,6 @@ def read_sweep(
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
     """
     table = Table.open(file, SWEEP_COLUMNS, columns, units, written, direction.motion, rows)
-    table.check_one_part()
     pair = _stiffness_pair(table)
     stated = {"frequency": at_frequency, "amplitude": at_amplitude}
     at = {role: value for role, value in stated.items() if value is not None}
@@ -113,11 +112,14 @@ def read_sweep(
     repeat = _repeats(table, wanted, values)
     taken, temperature, degrees = _of_temperature(table, values, temperature)
     frequency, level = values["frequency"][taken], to_peak * values["amplitude"][taken]
-    reached = to_peak * values["amplitude_reached"][taken] if "amplitude_reached" in values else None
+    reached = values["amplitude_reached"][taken] if "amplitude_reached" in values else None
+    if reached is not None:
+        own = wanted["amplitude_reached"].convention
+        reached = reached * (_ZERO_TO_PEAK[own] if own else to_peak)
     runs = runs_of(frequency, level, None if repeat is None else repeat[taken], stepped)
     if reached is None and not np.array_equal(runs.amplitude, level):
         reached = level
-    odd = not_understood(table, taken, frequency, runs.amplitude)
+    odd = table.not_understood(taken, frequency, runs.amplitude)
     source = source_of(file, listed_as, table.sha256, temperature, conditions, odd)
     return Sweep(
         name or file.stem,
@@ -163,8 +165,7 @@ def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str], at: Ma
     needed = [role for role in ("frequency", "amplitude") if role in table.roles or role not in at]
     degrees = table.roles.get("temperature")
     optional = [role for role in ("amplitude_reached", "repeat", "relative_error") if role in table.roles]
-    if "repeat" in optional and not table.holds_numbers(table.roles["repeat"].index):
-        optional.remove("repeat")
+    optional = [role for role in optional if role != "repeat" or table.holds_numbers(table.roles[role].index)]
     optional += ["temperature"] if degrees and degrees.unit else []
     again = [role for other in STIFFNESS_PAIRS if set(other) <= set(table.roles) for role in other]
     again = [role for role in again if units[role] == "1" or table.agrees(role, units[role])]
@@ -307,8 +308,7 @@ def _repeats(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Fl
     """Number of each row's repeat as its column has it, (n,), texts by their order; None where there is none."""
     if "repeat" in table.roles and "repeat" not in values:
         texts = table.texts(table.roles["repeat"].index)
-        numbers = {text: number for number, text in enumerate(dict.fromkeys(texts), start=1)}
-        return np.array([int(text) if text.isdecimal() else numbers[text] for text in texts], dtype=np.int64)
+        return np.array([*map([*dict.fromkeys(texts)].index, texts)], dtype=np.int64) + 1
     if (repeat := values.get("repeat")) is None:
         return None
     is_count = (repeat == np.round(repeat)) & (repeat >= 0) & (repeat < _MOST_REPEATS)

@@ -6,19 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from functools import cached_property
 from pathlib import Path
-
-import numpy as np
 
 from bushfit import units
 from bushfit.errors import MeasurementError, NoColumnError, UnitError, naming
 from bushfit.geometry import STRAINING, TRANSLATION, Motion
-from bushfit.reading.columns import Columns
+from bushfit.reading.columns import Columns, Rows
 from bushfit.reading.encoding import to_utf8
 from bushfit.reading.files import sha256, view_bytes
 from bushfit.reading.headers import Column, Heading, Vocabulary, is_angular, plain, split_convention
-from bushfit.reading.labels import Label, Rows, labels
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.source import RowSource, Text
@@ -29,8 +25,6 @@ from bushfit.reading.workbook import is_workbook, open_sheet
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
 #: Likeness, from 0 to 1, from which a header is suggested for one that is not there; chosen: one word of two suffices.
 _ALIKE = 0.4
-#: Where nothing parts the rows.
-_ALL_ROWS = Rows()
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +49,7 @@ class Table(Columns):
         stated_units: Mapping[str, str] | None = None,
         stated: FileFormat | None = None,
         motion: Motion = TRANSLATION,
-        rows: Rows = _ALL_ROWS,
+        rows: Rows | None = None,
     ) -> "Table":
         """Read a file and understand its header.
 
@@ -66,7 +60,7 @@ class Table(Columns):
             columns, stated_units: header and unit of roles, where it is no usual one, or the file does not tell it.
             stated: what the file does not tell of its format.
             motion: of what was tested, by which a test of strain and modulus goes by other headers.
-            rows: that make the test.
+            rows: that make the test; all of them where none are stated.
 
         Raises:
             MeasurementError: no such file, no text, no header, a header that does not settle which column is which, or
@@ -100,64 +94,13 @@ class Table(Columns):
         table = cls(file, source, layout, stated, {}, checksum, names, motion)
         table._check_header()
         named = columns or {} if understood is vocabulary else {}
-        return replace(table, roles=table._recognise(understood, named, stated_units or {}))._of(rows)
+        table = replace(table, roles=table._recognise(understood, named, stated_units or {}))
+        return table if rows is None else table.taking(rows)
 
     @property
     def sha256(self) -> str:
         """SHA-256 of the file."""
         return self.checksum.result()
-
-    @cached_property
-    def labels(self) -> Mapping[str, Label]:
-        """See `labels`."""
-        return labels(self)
-
-    def check_one_part(self) -> None:
-        """Refuse rows of several parts.
-
-        Raises:
-            MeasurementError: there are.
-        """
-        label = self.labels.get("specimen_number")
-        if label and len(label.values) > 1:
-            raise self.header_error(
-                "this file holds tests of several parts",
-                found=f'{", ".join(label.values)} in column "{self.headers[label.index]}"',
-                expected="one part",
-                hint=f'state specimen_number = "{label.values[0]}" in the campaign; bushfit init makes one of each part',
-            )
-
-    def _of(self, rows: Rows) -> "Table":
-        """The table of some rows alone.
-
-        Raises:
-            MeasurementError: no such row, no such column, or none that tells tests of a shared file apart.
-        """
-        for header in rows.texts:
-            if header not in self.headers:
-                raise self._no_column("rows", header)
-        columns = [(self.headers.index(header), text) for header, text in rows.texts.items()]
-        wanted = [(Label(index, self.texts(index)), text) for index, text in columns]
-        stated = {"direction": rows.direction, "specimen_number": rows.specimen_number}
-        wanted += [(self.labels[key], text) for key, text in stated.items() if text and key in self.labels]
-        kept = np.logical_and.reduce([label.rows(text) for label, text in wanted]) if wanted else np.ones(1, dtype=bool)
-        if not kept.any():
-            found = (f'{", ".join(label.values)} in column "{self.headers[label.index]}"' for label, _ in wanted)
-            raise self.header_error(
-                "no row is of this test",
-                found="; ".join(found),
-                expected=" and ".join(text for _, text in wanted),
-                hint="state what was found, or leave it out",
-            )
-        if rows.shared and not wanted:
-            raise self.header_error(
-                "a file is listed twice", expected="each file once, or a column that tells its tests apart"
-            )
-        if kept.all():
-            return self
-        lines = (line for line, _ in self.rows())
-        left_out = {line for line, is_kept in zip(lines, kept, strict=True) if not is_kept}
-        return replace(self, source=self.source.without(left_out))
 
     def column(self, role: str, expected: str, hint: str | None = None) -> Column:
         """The column of a role, with the factor from its unit to the SI unit `expected`; a ratio needs no unit.
@@ -258,17 +201,23 @@ class Table(Columns):
                 known = role in roles and not _is_k(roles[role].header)  # K* says more than K
                 if known or not any(units.agrees(column.unit or "", si) for si in ("N/m", "N*m/rad")):
                     continue
+            if role in roles and self.texts(index) == self.texts(roles[role].index):
+                continue
             if role in roles:
                 raise self.header_error(
                     f"more than one column could be the {_label(role)}",
                     found=f"{roles[role].header}, {header}",
                     expected="one",
-                    hint=f'choose it in the campaign: columns = {{ {role} = "{header}" }}',
+                    hint="give each a header of its own"
+                    if header == roles[role].header
+                    else f'choose it in the campaign: columns = {{ {role} = "{header}" }}',
                 )
             roles[role] = column
         for role in columns:
             if role not in roles:
                 raise self._no_column(role, columns[role])
+        if "amplitude_reached" in roles and "amplitude" not in roles:
+            roles["amplitude"] = replace(roles.pop("amplitude_reached"), role="amplitude")
         return roles
 
     def _column_of(self, heading: Heading, index: int, stated_unit: str | None) -> Column:
@@ -289,18 +238,14 @@ class Table(Columns):
         return column
 
     def _no_column(self, role: str, named: str) -> MeasurementError:
-        """The error for a role, or the key `rows`, whose column was named by a header that is not there."""
+        """The error for a role whose column was named by a header that is not there."""
         near = next(iter(get_close_matches(named, self.headers, n=1, cutoff=_ALIKE)), "")
         return self.header_error(
             f'there is no column "{named}"',
             kind=NoColumnError,
             expected=f"the header that was named for the {_label(role)}",
             hint=(f'did you mean "{near}"? ' if near else "name one of this file: ")
-            + (
-                f'rows = {{ "{near or "..."}" = "..." }} in the campaign'
-                if role == "rows"
-                else f'columns = {{ {role} = "{near or "..."}" }} in the campaign'
-            ),
+            + f'columns = {{ {role} = "{near or "..."}" }} in the campaign',
         )
 
 
