@@ -38,18 +38,17 @@ def campaigns_of_parts(
     Raises:
         CampaignError: a file of which nothing tells the part.
     """
-    of_parts = [seen.entry.get("specimen_number") for seen in files]
-    for part, seen in zip(of_parts, files, strict=True):
-        if part is None:
-            raise CampaignError(
-                "nothing says of which part this is",
-                file=seen.file,
-                found=f"parts {', '.join(dict.fromkeys(filter(None, of_parts)))} in others",
-                expected="a column for the part in every file, or the tests of one part",
-                hint="--specimen-number takes the tests of one part, and counts for files without such a column",
-            )
+    of_parts: list[Any] = [seen.entry.get("specimen_number") for seen in files]
+    if None in of_parts:
+        raise CampaignError(
+            "nothing says of which part this is",
+            file=files[of_parts.index(None)].file,
+            found=f"parts {', '.join(dict.fromkeys(filter(None, of_parts)))} in others",
+            expected="a column for the part in every file, or the tests of one part",
+            hint="--specimen-number takes the tests of one part, and counts for files without such a column",
+        )
     texts = {listed_in: f"# a campaign of each part: bushfit batch {listed_in}\n"}
-    for number, part in enumerate(dict.fromkeys(filter(None, of_parts)), start=1):
+    for number, part in enumerate(dict.fromkeys(of_parts), start=1):
         file = f"{folder_name(part)}.toml"
         file = f"{number}_{file}" if file.casefold() in map(str.casefold, texts) else file
         tests = [seen for own, seen in zip(of_parts, files, strict=True) if own == part]

@@ -97,24 +97,23 @@ def _by_rows(source: Source) -> tuple[list[Source], list[str]]:
     own = {key: value for key, value in stated.items() if key not in ("direction", "specimen_number")}
     try:
         table, _ = recognised(source.file, own)
-        told = {**table.labels}
+        told = dict(table.labels)
         if "run" in told and "time" in table.roles:
             time = table.read({"time": table.roles["time"]}, fewest_rows=1)["time"]
-            told = told if np.any(np.diff(time) <= 0.0) else {key: told[key] for key in told if key != "run"}
+            told.pop("run" if np.all(np.diff(time) > 0.0) else "", None)
     except BushfitError:  # which the inspection of the file tells
         return [source], []
     tests: list[Source] = []
     left_out: list[str] = []
-    for texts in dict.fromkeys(zip(*(label.texts for label in told.values()), strict=True)):
+    for texts in dict.fromkeys(zip(*(texts for _, texts in told.values()), strict=True)):
         keys: dict[str, Any] = dict(zip(told, texts, strict=True))
-        run = {table.headers[told["run"].column]: keys.pop("run")} if "run" in keys else {}
+        run = {"rows": {table.headers[told["run"][0]]: keys.pop("run")}} if "run" in keys else {}
         known = keys.get("direction", "axial") in [*Direction]
         if known and all(same_text(str(stated.get(key, text)), text) for key, text in keys.items()):
-            tests.append(replace(source, stated={**stated, **keys, **({"rows": run} if run else {})}))
+            tests.append(replace(source, stated={**stated, **keys, **run}))
         else:
-            left_out.append(
-                f"{source}: its rows of {', '.join(texts)}, {'as stated' if known else 'no known direction'}"
-            )
+            why = "as stated" if known else "no direction that is known"
+            left_out.append(f"{source}: its rows of {', '.join(texts)}, {why}")
     return (tests, left_out) if tests else ([source], [])
 
 

@@ -109,16 +109,14 @@ def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Directi
         MeasurementError: units of torsion where the user states another direction.
     """
     turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
-    told = dict.fromkeys(table.labels["direction"].texts if "direction" in table.labels else ())
+    told = dict.fromkeys(table.labels.get("direction", (0, ()))[1])
     if len(told) > 1 and "direction" not in stated:
         problem, hint = "this file holds tests in several directions", "state one: --direction axial"
         raise table.header_error(problem, found=", ".join(told), expected="one direction", hint=hint)
     if "direction" not in stated:
-        return (
-            Direction(*told)
-            if told
-            else direction_of_file(file, table.layout.written or table.headers, turns=turns, sheet=stated.get("sheet"))
-        )
+        headers = table.layout.written or table.headers
+        named = direction_of_file(file, headers, turns=turns, sheet=stated.get("sheet"))
+        return Direction(*told) if told else named
     if turns and not Direction(stated["direction"]).is_rotation:
         raise table.header_error(
             "the units say torsion",

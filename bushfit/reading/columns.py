@@ -38,24 +38,12 @@ _LABELS = Vocabulary(ROW_COLUMNS, {})
 
 class Rows(NamedTuple):
     """The rows of a file that make a test: of a direction and a specimen number, where columns tell them, and with
-    `texts` in the columns of these headers; where tests share a file, a column has to tell them apart.
-    """
+    `texts` in the columns of these headers; where tests share a file, a column has to tell them apart."""
 
     direction: str | None = None
     specimen_number: str | None = None
     texts: Mapping[str, str] = {}
     shared: bool = False
-
-
-#: Those of a file that holds one test.
-ALL_ROWS = Rows()
-
-
-class Label(NamedTuple):
-    """A column, from 0, that says which test a row belongs to, and its text in each row, (n,)."""
-
-    column: int
-    texts: Sequence[str]
 
 
 def same_text(text: str, other: str) -> bool:
@@ -101,16 +89,16 @@ class Columns:
             raise self.error("the table cannot be read", found=str(error)) from error
 
     @cached_property
-    def labels(self) -> Mapping[str, Label]:
-        """The columns that tell direction, specimen_number and run, by these keys; directions go by their names."""
-        found: dict[str, Label] = {}
+    def labels(self) -> Mapping[str, tuple[int, Sequence[str]]]:
+        """Index and texts, (n,), of columns that tell direction, specimen_number and run; directions by their names."""
+        found: dict[str, tuple[int, Sequence[str]]] = {}
         for index, header in enumerate(self.headers):
             heading = _LABELS.heading(header)
             if heading and heading.role not in found and (texts := self._parting(index)):
                 if heading.role == "direction":
                     known = {text: named_direction([text], short=True) for text in set(texts)}
                     texts = [str(known[text] or text) for text in texts] if any(known.values()) else []
-                found |= {heading.role: Label(index, texts)} if texts else {}
+                found |= {heading.role: (index, texts)} if texts else {}
         return found
 
     def taking(self, wanted: Rows) -> Self:
@@ -126,22 +114,23 @@ class Columns:
                 raise self.header_error(f'there is no column "{header}"', expected="headers, as keys of rows")
             told.append((self.headers.index(header), self.texts(self.headers.index(header)), text))
         if wanted.shared and not told:
-            problem, expected = "a file is listed twice", "each file once, or a column that tells its tests apart"
-            raise self.header_error(problem, expected=expected)
-        parts = self.labels.get("specimen_number")
-        if parts and not wanted.specimen_number and len(set(parts.texts)) > 1:
-            told = [(*parts, "one part")]
-        rows = [line for line, _ in self.rows()] if told else []
-        kept = {n for n, line in enumerate(rows) if all(same_text(texts[n], text) for _, texts, text in told)}
-        if told and not kept:
-            found = (f'{", ".join(dict.fromkeys(texts))} in column "{self.headers[index]}"' for index, texts, _ in told)
+            expected = "each file once, or a column that tells its tests apart"
+            raise self.header_error("a file is listed twice", expected=expected)
+        column, parts = self.labels.get("specimen_number", (0, ()))
+        rows = [line for line, _ in self.rows()] if told or parts else []
+        kept = [n for n in range(len(rows)) if all(same_text(texts[n], text) for _, texts, text in told)]
+        several = len({parts[n] for n in kept}) > 1 if parts else False
+        if several or (told and not kept):
+            found = [(column, parts, "one part")] if several else told
             raise self.header_error(
-                "no row is of this test" if told[0][2] != "one part" else "this file holds tests of several parts",
-                found="; ".join(found),
-                expected=" and ".join(text for *_, text in told),
+                "this file holds tests of several parts" if several else "no row is of this test",
+                found="; ".join(
+                    f'{", ".join([*dict.fromkeys(own)])} in column "{self.headers[i]}"' for i, own, _ in found
+                ),
+                expected=" and ".join(text for *_, text in found),
                 hint='state one that was found, as specimen_number = "..."; bushfit init writes all tests of a file',
             )
-        return replace(self, left_out=frozenset(line for n, line in enumerate(rows) if n not in kept))
+        return replace(self, left_out=frozenset(rows).difference(rows[n] for n in kept))
 
     def not_understood(self, rows: NDArray[np.intp] | None = None, *settled: Floats) -> Iterator[str]:
         """A sentence for each column that may part tests, and of which nothing says what it means.
@@ -149,16 +138,16 @@ class Columns:
         Of a sweep, `settled` are frequency and level of its `rows`, (n,): a number that goes with them is measured, and
         a text that goes with one of them names it. Of a loop, numbers are channels.
         """
-        known = [label.column for key, label in self.labels.items() if key != "direction" or len({*label.texts}) == 1]
-        for index, header in enumerate(self.headers):
-            is_number = self.holds_numbers(index)
-            if index in known or (is_number and not settled) or not (texts := self._parting(index)):
+        known = {column.index for column in self.roles.values()}
+        known |= {index for key, (index, texts) in self.labels.items() if key != "direction" or len({*texts}) == 1}
+        for index in (index for index in range(len(self.headers)) if index not in known):
+            is_number, header = self.holds_numbers(index), self.headers[index]
+            if (is_number and not settled) or not (texts := self._parting(index)):
                 continue
-            values, place, counts = np.unique(
-                np.array(texts)[slice(None) if rows is None else rows], return_inverse=True, return_counts=True
-            )
+            own = np.array(texts)[slice(None) if rows is None else rows]
+            values, place, counts = np.unique(own, return_inverse=True, return_counts=True)
             goes_with = [settled] if is_number else [(one,) for one in settled]
-            explained = any(all(np.ptp(place[own]) == 0 for own in rows_alike(*keys)) for keys in goes_with)
+            explained = any(all(np.ptp(place[alike]) == 0 for alike in rows_alike(*keys)) for keys in goes_with)
             if values.size > 1 and not explained and not (is_number and counts.min() < _FEWEST_ROWS):
                 listed = ", ".join(values[:4]) + ", ..." * (values.size > 4)
                 yield (

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from bushfit.geometry import Place, stated_strain
-from bushfit.reading.columns import ALL_ROWS, Rows
+from bushfit.reading.columns import Rows
 from bushfit.reading.headers import Column
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Floats, Loop, Waveform, rebuild_time, source_of
@@ -38,7 +38,7 @@ def read_loop(
     weight: float = 1.0,
     temperature: float | None = None,
     conditions: Mapping[str, str | float] | None = None,
-    rows: Rows = ALL_ROWS,
+    rows: Rows | None = None,
 ) -> Loop:
     """Read a hysteresis loop.
 
@@ -61,7 +61,7 @@ def read_loop(
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
     """
-    table = Table.open(file, LOOP_COLUMNS, columns, units, written, direction.motion, rows)
+    table = Table.open(file, LOOP_COLUMNS, columns, units, written, direction.motion, rows or Rows())
     _check_not_swapped(table, direction)
     wanted = _loop_columns(table, direction, force_sign, has_clock=rate is not None or frequency is not None)
     values = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)

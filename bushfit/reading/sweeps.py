@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bushfit import units as si
 from bushfit.geometry import Place, stated_strain
-from bushfit.reading.columns import ALL_ROWS, Rows
+from bushfit.reading.columns import Rows
 from bushfit.reading.headers import AmplitudeConvention, Column
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Complex, Floats, Stepped, Sweep, source_of
@@ -73,7 +73,7 @@ def read_sweep(
     weight: float = 1.0,
     temperature: float | None = None,
     conditions: Mapping[str, str | float] | None = None,
-    rows: Rows = ALL_ROWS,
+    rows: Rows | None = None,
 ) -> Sweep:
     """Read a sweep.
 
@@ -93,7 +93,7 @@ def read_sweep(
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
     """
-    table = Table.open(file, SWEEP_COLUMNS, columns, units, written, direction.motion, rows)
+    table = Table.open(file, SWEEP_COLUMNS, columns, units, written, direction.motion, rows or Rows())
     pair = _stiffness_pair(table)
     stated = {"frequency": at_frequency, "amplitude": at_amplitude}
     at = {role: value for role, value in stated.items() if value is not None}
