@@ -220,6 +220,7 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
 
 def _of_the_record(loop: Loop) -> Iterator[str]:
     """What is to be said of the record that a loop was taken from, and of its first cycle."""
+    yield from loop.source.notes if loop.source else ()
     if loop.part and loop.part.left_out:
         yield loop.part.left_out
     if loop.softening is not None:

@@ -9,6 +9,7 @@ from typing import Any
 from bushfit.campaign.schema import SpecimenTable
 from bushfit.errors import BushfitError, NoTestError, typed
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
+from bushfit.reading.columns import Rows
 from bushfit.reading.headers import Vocabulary
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.names import direction_of_file
@@ -109,10 +110,14 @@ def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Directi
     """
     turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
     headers = table.layout.written or table.headers
-    found = direction_of_file(file, headers, turns=turns, sheet=table.source.sheet)
+    told = dict.fromkeys(table.labels.get("direction", (0, ()))[1])
+    found = Direction(*told) if len(told) == 1 else direction_of_file(file, headers, turns=turns, sheet=table.source.sheet)
     if "direction" not in stated:
+        if len(told) > 1:
+            problem, hint = "this file holds tests in several directions", "state one: --direction axial"
+            raise table.header_error(problem, found=", ".join(told), expected="one direction", hint=hint)
         return found
-    if found and found != stated["direction"]:
+    if found and found != stated["direction"] and len(told) < 2:
         raise table.header_error(
             f"{'the units say' if turns else 'the file says'} {found}, and --direction {stated['direction']}",
             found=", ".join([*filter(None, [file.name, table.source.sheet]), *headers]),
@@ -143,4 +148,5 @@ def open_table(
         key: {role: text for role, text in stated.get(key, {}).items() if role in names} for key in ("columns", "units")
     }
     written = FileFormat(**{field.name: stated.get(field.name) for field in fields(FileFormat)})
-    return Table.open(file, names, own["columns"], own["units"], written, motion)
+    rows = Rows(stated.get("direction"), stated.get("specimen_number"), stated.get("rows", {}))
+    return Table.open(file, names, own["columns"], own["units"], written, motion, rows if any(rows) else None)
