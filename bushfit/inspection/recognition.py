@@ -111,7 +111,8 @@ def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Directi
     turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
     headers = table.layout.written or table.headers
     told = dict.fromkeys(table.labels.get("direction", (0, ()))[1])
-    found = Direction(*told) if len(told) == 1 else direction_of_file(file, headers, turns=turns, sheet=table.source.sheet)
+    named = direction_of_file(file, headers, turns=turns, sheet=table.source.sheet)
+    found = Direction(*told) if len(told) == 1 else named
     if "direction" not in stated:
         if len(told) > 1:
             problem, hint = "this file holds tests in several directions", "state one: --direction axial"
