@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import click
 from rich import box
 from rich.markup import escape
 from rich.table import Table
@@ -93,8 +94,10 @@ def tell_sources(options: Options, result: Result) -> None:
 
 
 def warn(options: Options, lines: Sequence[str]) -> None:
-    """A line for each warning."""
-    for line in lines:
+    """A line for each warning that this command has not given yet."""
+    given = click.get_current_context().meta.setdefault(__name__, set())
+    for line in (line for line in lines if line not in given):
+        given.add(line)
         options.console.print(f"[yellow]warning:[/yellow] {escape(line)}")
 
 

@@ -22,8 +22,8 @@ from bushfit.effects import effect_named, qualified
 from bushfit.effects.mistakes import candidate_named, mistake_named
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import parted
-from bushfit.fitting.levels import LevelErrors, class_words, largest_level_error, level_errors
-from bushfit.fitting.noise import words_of
+from bushfit.fitting.levels import LevelErrors, level_errors
+from bushfit.fitting.rig_class import class_words, largest_error, words_of
 from bushfit.fitting.robust import estimate, outliers_at, told
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
@@ -105,7 +105,7 @@ def _search(
     data: Data, begun: _Begun, model: Model | None, settings: Settings, earlier: Search | None = None
 ) -> _Searched:
     """Look for effects and mistakes in tests whose noise is known."""
-    most = _NO_RIG * max(largest_level_error(data.campaign.rig))
+    most = _NO_RIG * max(largest_error(data.campaign.rig))
     fitted, start, held = begun.evidence, begun.start, begun.held
     search = Search.begin(fitted, settings, start, held, data.bounds, earlier, most_of_level=most)
     if is_consistent(search):
@@ -144,7 +144,7 @@ def _errors_beside(searched: _Searched, data: Data) -> LevelErrors | None:
 def _level_errors(evidence: Evidence, search: Search, data: Data) -> LevelErrors:
     """Errors of each level that would explain what a model leaves, but for what the worst single level makes of it
     where that is more than such errors do."""
-    absorbed, most = evidence.solution.jacobian, largest_level_error(data.campaign.rig)
+    absorbed, most = evidence.solution.jacobian, largest_error(data.campaign.rig)
     levels = [fault for fault in search.faults(evidence).places if fault.suspect.kind != "repeat"]
     worst = max(levels, key=lambda fault: fault.worth, default=None)
     if worst and worst.size > _MOST_ERRORS * max(most):

@@ -60,6 +60,11 @@ class Data:
         return replace(self, loops=loops, sweeps=tuple(replace(sweep, under=next(under)) for sweep in self.sweeps))
 
     @property
+    def notes(self) -> list[str]:
+        """What is odd about the tests themselves, whatever is fitted to them."""
+        return [f"{test.name}: {note}" for test in (*self.loops, *self.sweeps) for note in test.notes]
+
+    @property
     def robust(self) -> bool:
         """Whether outliers are left out."""
         return self.campaign.fit.loss != "linear"

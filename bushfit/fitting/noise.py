@@ -15,13 +15,12 @@ from scipy.special import chdtrc, fdtrc
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
 from bushfit.fitting.outliers import least_absolute
+from bushfit.fitting.rig_class import ASSUMED, class_words, largest_error, of_class, words_of
 from bushfit.reading.measurement import Sweep
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 
 #: Least noise of any rig, relative to the largest force or to |K|.
 FLOOR = 1e-4
-#: Errors that a run shares where nothing was repeated, relative gain and phase [rad]; chosen: those of most rigs.
-ASSUMED_SHARED = (5e-3, float(np.radians(0.25)))
 #: Degrees of freedom from which on repeats alone tell what a run shares; chosen: those of three repeats at two
 #: levels; with fewer, 95 % intervals were too narrow.
 _ENOUGH = 4
@@ -74,6 +73,7 @@ class SweepNoise:
         level_freedom: degrees of freedom behind it; 0 where it counts as known.
         slopes: of sweeps whose random part grows along what is stepped, the exponent, and the step at which it is as
             `random` has it.
+        beyond: what is said of sweeps whose runs differ by more than a rig of the class makes, which no noise excuses.
     """
 
     random: dict[LineKey, tuple[float, float]]
@@ -84,6 +84,7 @@ class SweepNoise:
     slopes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     level: tuple[float, float] = (0.0, 0.0)
     level_freedom: int = 0
+    beyond: Mapping[str, str] = field(default_factory=dict)
 
     def scatter(self, name: str, held: Array, step: Array) -> Array:
         """Standard deviation from point to point of gain and phase at points of a sweep, (2, n)."""
@@ -98,11 +99,6 @@ class SweepNoise:
             shared += f", {words_of(self.level)} by all repeats of a level"
         point = 100.0 * np.sqrt(np.mean(np.square(list(self.random.values()))))
         return f"{point:.2g} % from point to point, {shared} ({_ORIGINS[self.origin]})"
-
-
-def words_of(error: tuple[float, float]) -> str:
-    """A gain and a phase error [rad] in words."""
-    return f"{100.0 * error[0]:.2g} % gain and {np.degrees(error[1]):.2g} deg phase"
 
 
 @dataclass(frozen=True)
@@ -135,15 +131,15 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     """Noise of the sweeps of one rig, estimated from their repeats.
 
     Without repeats the random part is the scatter about a smooth curve in the logarithm of what is stepped, and the
-    shared part is what the rig's class states, else ASSUMED_SHARED. With repeats, what is stated is an error of each
-    level, which they cannot show. A `noise` stated in the campaign, or in the file for each point, replaces the random
-    part.
+    shared part is what the rig's class states, else ASSUMED. With repeats, what is stated is an error of each level,
+    which they cannot show. A `noise` stated in the campaign, or in the file for each point, replaces the random part.
 
     Notes:
-        With D the difference of ln K between two repeats at one step, the variance of D over the steps is twice the
-        random variance, and the square of its mean estimates twice (shared variance + random variance / number of
-        steps). Pairs are pooled within a line and over lines; lines keep a random part of their own where Bartlett's
-        test finds them unequal. Where the squares of D grow along what is stepped, so does the random part.
+        With D the difference of ln K between two repeats at one step, the mean square of what D changes by from one
+        step to the next is four times the random variance, whatever repeats differ by along the run (von Neumann,
+        1941), and the square of its mean estimates twice (shared variance + random variance / number of steps). Pairs
+        are pooled within a line and over lines; lines keep a random part of their own where Bartlett's test finds them
+        unequal. Where the squares of D grow along what is stepped, so does the random part.
     """
     lines = {
         (sweep.name, float(held)): _line(sweep, log_stiffness, held)
@@ -166,19 +162,15 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
         for key, variance in variances.items()
     }
     if repeated:
-        shared_freedom = round(sum(line.shared_freedom for line in repeated))
-        shared, level = _shared(repeated, shared_freedom, rig), of_class(rig, (0.0, 0.0))
-        return SweepNoise(random, shared, "repeats", max(shared_freedom, _ENOUGH), scatter_freedom, slopes, level)
+        shared, level = _shared(repeated, rig), of_class(rig, (0.0, 0.0))
+        freedom = max(round(_freedom(repeated)), _ENOUGH)
+        of_each = {sweep.name: [line for key, line in lines.items() if key[0] == sweep.name] for sweep in sweeps}
+        beyond = {name: words for name, own in of_each.items() if (words := _beyond(own, rig))}
+        return SweepNoise(random, shared, "repeats", freedom, scatter_freedom, slopes, level, beyond=beyond)
     if all(sweep.noise is not None for sweep in sweeps):
         return SweepNoise(random, of_class(rig, (0.0, 0.0)), "stated", 0, scatter_freedom)
     origin = "assumed" if rig.stated == (None, None) else "rig"
-    return SweepNoise(random, of_class(rig, ASSUMED_SHARED), origin, 0, scatter_freedom)
-
-
-def of_class(rig: RigSettings, unstated: tuple[float, float]) -> tuple[float, float]:
-    """Gain and phase error [rad] that a rig's class states, else the one given."""
-    gain, phase = (default if one is None else one for one, default in zip(rig.stated, unstated, strict=True))
-    return gain, phase
+    return SweepNoise(random, of_class(rig), origin, 0, scatter_freedom)
 
 
 def _stated(sweep: Sweep) -> float | None:
@@ -243,7 +235,8 @@ def _slope(lines: Sequence[_Line]) -> tuple[float, float] | None:
         return None
     centred = np.concatenate([log - log.mean() for log in logs])
     ratio = np.concatenate(squares)
-    along = float(centred @ (ratio - 1.0)) ** 2 / max(float(centred @ centred) * float(np.var(ratio)), FLOOR**2)
+    scale = float(np.var(ratio)) * centred.size / _free(centred.size)
+    along = float(centred @ (ratio - 1.0)) ** 2 / max(float(centred @ centred) * scale, FLOOR**2)
     if chdtrc(1, along) > _LEVEL_SCATTER_P:
         return None
 
@@ -277,7 +270,23 @@ def _pooled(lines: Mapping[LineKey, _Line], measured: Sequence[_Line]) -> tuple[
     return own, round(min(line.freedom for line in told))
 
 
-def _shared(repeated: Sequence[_Line], freedom: int, rig: RigSettings) -> tuple[float, float]:
+def _freedom(lines: Sequence[_Line]) -> float:
+    """Degrees of freedom behind what the runs of some lines share."""
+    return sum(line.shared_freedom for line in lines)
+
+
+def _beyond(lines: Sequence[_Line], rig: RigSettings) -> str:
+    """What is said of a sweep whose repeats differ as a whole by more than a rig of the class makes; else ""."""
+    error = _shared(lines, rig) if _freedom(lines) else (0.0, 0.0)
+    return (
+        f"repeats differ as a whole by an error of {words_of(error)}, more than a rig of this class makes "
+        f"({class_words(rig)}): measure again, or state the class under [rig]"
+        if any(np.greater(error, largest_error(rig)))
+        else ""
+    )
+
+
+def _shared(repeated: Sequence[_Line], rig: RigSettings) -> tuple[float, float]:
     """Standard deviation of what a run shares in gain and phase, outlying pairs of repeats left out.
 
     Few repeats often show none by chance: what they lack to _ENOUGH degrees of freedom, the rig's class makes up.
@@ -286,7 +295,7 @@ def _shared(repeated: Sequence[_Line], freedom: int, rig: RigSettings) -> tuple[
     usual = np.abs(pairs) <= _OUTLYING_PAIR * np.median(np.abs(pairs), axis=0)
     usual |= len(pairs) < _FEWEST_SOUGHT
     variance = np.where(usual.any(axis=0), np.mean(pairs, axis=0, where=usual), 0.0)
-    measured, assumed = min(freedom / _ENOUGH, 1.0), of_class(rig, ASSUMED_SHARED)
+    measured, assumed = min(_freedom(repeated) / _ENOUGH, 1.0), of_class(rig)
     return _pair(np.sqrt(measured * np.maximum(variance, 0.0) + (1.0 - measured) * np.square(assumed)))
 
 
@@ -308,19 +317,24 @@ def _line(sweep: Sweep, log_stiffness: Array, held: float) -> _Line:
     pairs = [(difference[usual], steps[usual]) for difference, usual in kept if usual.sum() >= FEWEST_STEPS]
     if not pairs:
         return _about_smooth_curve(np.log(steps), np.nanmean(table, axis=0))
-    scatter = [_parts(difference - difference.mean()) for difference, _ in pairs]
+    scatter = [_parts(np.diff(difference)) / np.sqrt(2.0) for difference, _ in pairs]
     shared = [
-        (_parts(difference).mean(axis=0) ** 2 - np.square(spread).sum(axis=0) / (len(spread) - 1) / len(spread)) / 2.0
+        (_parts(difference).mean(axis=0) ** 2 - np.square(spread).mean(axis=0) / len(difference)) / 2.0
         for (difference, _), spread in zip(pairs, scatter, strict=True)
     ]
     independent = 2.0 / numbers.size  # of each pair: m repeats have m (m - 1)/2 pairs, and m - 1 of them are free
     return _Line(
-        np.concatenate(scatter) / np.sqrt(numbers.size),
-        independent * sum(len(spread) - 1 for spread in scatter),
+        np.concatenate([spread * np.sqrt(_free(len(spread)) / len(spread) / numbers.size) for spread in scatter]),
+        independent * sum(_free(len(spread)) for spread in scatter),
         np.array(shared),
         independent * len(pairs),
-        steps=np.concatenate([at for _, at in pairs]),
+        steps=np.concatenate([np.sqrt(at[1:] * at[:-1]) for _, at in pairs]),
     )
+
+
+def _free(steps: int) -> float:
+    """Degrees of freedom behind the squares of so many steps from one value to the next, which share the values."""
+    return 2.0 * steps**2 / (3.0 * steps - 1.0)
 
 
 def _usual(difference: Array, log_step: Array) -> Array:
@@ -345,7 +359,7 @@ def _about_smooth_curve(log_step: Array, log_stiffness: Array) -> _Line:
     """What a line without repeats tells: its scatter about a smooth curve; of one or two points this is assumed."""
     degree = min(_SMOOTH_DEGREE, log_step.size - 2)
     if degree < 1:
-        return _Line(np.full((1, 2), ASSUMED_SHARED[0]), 1, np.empty((0, 2)))
+        return _Line(np.full((1, 2), ASSUMED[0]), 1, np.empty((0, 2)))
     values = _parts(log_stiffness)
     basis = np.polynomial.legendre.legvander(unit(log_step), degree)
     residual = np.abs(values - basis @ least_absolute(basis, values, FLOOR**2))

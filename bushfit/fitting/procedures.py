@@ -23,9 +23,9 @@ from bushfit.fitting.assess import (
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, parted, sources, with_level_errors
 from bushfit.fitting.identify import left_open
-from bushfit.fitting.levels import largest_level_error, level_errors
-from bushfit.fitting.noise import words_of
+from bushfit.fitting.levels import level_errors
 from bushfit.fitting.profile import profile95
+from bushfit.fitting.rig_class import largest_error, words_of
 from bushfit.fitting.robust import Estimate, estimate, told
 from bushfit.fitting.solve import Bounds, Coordinates, Solution
 from bushfit.geometry import place_named
@@ -89,7 +89,7 @@ def fit_joint(
     left: list[DataSet] = [data_set for data_set in (*data.loops, *data.sweeps) if data_set not in data_sets]
     effects = data.effects if effects is None else effects
     found = _solve(data, data_sets, effects, {})
-    most = largest_level_error(data.campaign.rig)
+    most = largest_error(data.campaign.rig)
     errors = level_errors(found.minimised, found.solution.residual, found.solution.jacobian, most)
     at_limit = any(error >= _AT_LIMIT * limit for error, limit in zip(errors.error, most, strict=True))
     if errors.freedom and any(errors.error) and not at_limit:  # an error that would have to be larger is a gap
