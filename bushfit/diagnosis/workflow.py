@@ -72,7 +72,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
         searched = _search(data, begun, model, settings, searched.search)
     fewer += _left_out_of_fewer(whole, data, begun.outliers)
     found = searched.finding
-    shared = [_level_words(data, found)] if errors is not None else _class_words(data)
+    shared = [_level_words(data, found)] if errors is not None else data.assumed
     of_loops = outliers_at(found.result.model, data.loops)
     outliers = (*told(of_loops, robust=data.robust), *told(left, robust=True))
     notes = (*said, *fewer, *found.notes, *shared, *outliers)
@@ -164,14 +164,6 @@ def _level_words(data: Data, found: Diagnosis) -> str:
     }.get(found.verdict, "counts as noise beside what was found")
     limit = f"3 times the class of the rig at most: {class_words(data.campaign.rig)}"
     return f"an error of {words_of(noise.level)} of {whose} {does} ({limit})"
-
-
-def _class_words(data: Data) -> list[str]:
-    """What is said of the class of the rig where nothing was repeated and not all of it is stated."""
-    if None not in data.campaign.rig.stated or not {"assumed", "rig"} & {sweep.noise.origin for sweep in data.sweeps}:
-        return []
-    shared = class_words(data.campaign.rig)
-    return [f"nothing was repeated at three points or more: errors shared by a run are the rig's class, {shared}"]
 
 
 def _left_out_of_fewer(whole: Data, fewer: Data, outliers: Sequence[Outlier]) -> tuple[str, ...]:

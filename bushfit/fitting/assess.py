@@ -10,7 +10,7 @@ import numpy as np
 
 from bushfit.effects import temperature
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.solve import Coordinates, jacobian, residual
 from bushfit.geometry import Bushing, Direction, stiffness_per_modulus
 from bushfit.model.covariance import Covariance
@@ -154,6 +154,7 @@ def quality(model: Model, data_sets: Sequence[DataSet], parameters: int) -> Qual
         reduced_chi_square=_reduced(model, data_sets, parameters)[0],
         points=sum(data_set.counted for data_set in data_sets),
         noise=float(np.sqrt(np.mean(noise**2))),
+        loop_gain_error=max((loop.gain_error for loop in parted(data_sets)[0]), default=None),
     )
 
 

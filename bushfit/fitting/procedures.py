@@ -237,7 +237,7 @@ def _result(
     cov = covariance(model, stages, held) if stages else held or Covariance()
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
     of_tests = (*implausible(data.campaign.bushing, data_sets), *apart_in_temperature(model, data_sets))
-    doubts = [*of_tests, *_assumed(data_sets)]
+    doubts = [*of_tests, *data.assumed]
     odd = [note for step in steps for note in cautions(model, step.solution, step.data_sets, data.bounds, cov, _NEXT)]
     return Result(
         model,
@@ -293,15 +293,3 @@ def _at_edge(name: str, end: End, bounds: Bounds) -> str:
     if bounds.get(name, (None, None))[end == "max"] is not None:
         return f"{name} rests on the {end} given in [fit]"
     return f"{name} ended at the edge of what is possible: the data do not determine it"
-
-
-def _assumed(data_sets: Sequence[DataSet]) -> list[str]:
-    """What was assumed of the noise because nothing was repeated."""
-    _, sweeps = parted(data_sets)
-    noises = {id(sweep.noise): sweep.noise for sweep in sweeps}
-    return [
-        f"noise of the {' and '.join(dict.fromkeys(str(sweep.direction) for sweep in sweeps if sweep.noise is noise))} "
-        f"sweeps: {noise.describe()}"
-        for noise in noises.values()
-        if noise.origin == "assumed"
-    ]

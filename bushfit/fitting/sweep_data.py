@@ -12,8 +12,9 @@ from scipy.linalg import block_diag
 from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.fitting.data_set import DataSet, Freedoms, Suspect, keep, kept, shown_amplitude
-from bushfit.fitting.noise import FLOOR, SweepNoise, unit
+from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.outliers import outlying_points, unlike
+from bushfit.fitting.repeats import FLOOR, unit
 from bushfit.fitting.whitening import Whitening
 from bushfit.geometry import Place
 from bushfit.model.model import Model
@@ -95,18 +96,16 @@ class SweepData(DataSet):
     @cached_property
     def notes(self) -> list[str]:
         place = np.unique([self.frequency, self.amplitude], axis=1, return_inverse=True)[1]
-        points = unlike(self.measured, place)
+        apart = unlike(self.measured, place)
+        rows = [f"{one} and {other}" for _, *pair in apart for one, other in [sorted(self.order[pair] + 1)]]
         told = [
-            f"rows {one} and {other} ({self.frequency[first]:.4g} Hz, {shown_amplitude(self.direction, level)}), "
-            f"{number(100.0 * apart, 2)} %"
-            for apart, first, second in points[:_MOST_LISTED]
-            for level in [float(self.amplitude[first])]
-            for one, other in [sorted((self.order[[first, second]] + 1).tolist())]
+            f"{self.source.file if self.source else self.name}: points that repeat each other lie up to "
+            f"{number(100.0 * share, 2)} % apart, rows {', '.join(rows[:_MOST_LISTED])}"
+            + f" and {len(rows) - _MOST_LISTED} more pairs"
+            * (len(rows) > _MOST_LISTED)
+            for share, *_ in apart[:1]
         ]
-        more = [f"and {len(points) - len(told)} more points"] if len(points) > len(told) else []
-        file = f"{self.source.file}: " if self.source else ""
-        pairs = [f"{file}points that repeat each other lie far apart: {'; '.join([*told, *more])}"] if told else []
-        return [*pairs, *(words for name, words in self.noise.beyond.items() if name == self.name)]
+        return [*told, *(words for name, words in self.noise.beyond.items() if name == self.name)]
 
     @property
     def size(self) -> int:

@@ -163,7 +163,7 @@ def test_no_repeats_fall_back_to_a_smooth_curve_and_an_assumption(noisy_sweep: C
     np.testing.assert_allclose(scatter, 5e-3, rtol=0.1)
     assert {noise.shared for noise in found} == {ASSUMED}
     assert {noise.origin for noise in found} == {"assumed"}
-    assert "assumed" in found[0].describe()
+    assert "by the class of [rig]" in found[0].describe()
 
 
 def test_levels_without_repeats_are_pooled(noisy_sweep: Callable[..., Sweep]) -> None:
