@@ -45,7 +45,7 @@ def tell_result(options: Options, title: str, result: Result) -> None:
     if result.quality:
         quality = result.quality
         gain = quality.loop_gain_error
-        loops = f", gain of a loop known within {number(100 * gain, 2)} % ([rig] gain_error)" if gain else ""
+        loops = f", gain of a loop within {number(100 * gain, 2)} % ([rig] gain_error)" if gain else ""
         console.print(
             f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)} "
             f"over {quality.points} points, noise {number(100 * quality.noise, 2)} % a point{loops}",

@@ -35,7 +35,8 @@ def loop_data(
     stiffness = np.concatenate([np.empty(0), *(loop.measured for loop in found)])
     for apart, one, other in unlike(stiffness, np.argmax(repeats_of(found), axis=1)) if found else ():
         said = f"it repeats {found[one].name}, and their stiffness lies {number(100.0 * apart, 2)} % apart"
-        found[other] = replace(found[other], drive=replace(drives[other], notes=(*drives[other].notes, said)))
+        drive = found[other].drive
+        found[other] = replace(found[other], drive=replace(drive, notes=(*drive.notes, said)))
     return with_gain_errors(found, stated)
 
 

@@ -140,14 +140,14 @@ def _new_loops(model: Model, data_sets: Sequence[DataSet]) -> Iterator[tuple[str
         loop = new_loop(
             model, direction, _NEW_RATE, size, _FORCE_NOISE, cycles=_NEW_CYCLES, rows=_NEW_ROWS, from_rest=True
         )
-        yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", loop
+        yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", replace(loop, gain_error=ASSUMED[0])
 
 
 def _changed(loop: LoopData, model: Model, *, amplitude: float = 1.0, rate: float = 1.0) -> LoopData:
     """A loop of so many times the amplitude and rate, as the model would have it, with the same relative noise."""
     drive = loop.drive
     moved = replace(drive, coefficients=drive.coefficients * amplitude, frequency=drive.frequency * rate)
-    return LoopData(moved).noise_free(model).with_noise(loop.relative_noise)
+    return replace(loop, drive=moved).noise_free(model).with_noise(loop.relative_noise)
 
 
 def _new_sweeps(

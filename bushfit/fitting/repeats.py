@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
+from scipy.linalg import lapack, qr
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.outliers import least_absolute
@@ -134,13 +135,10 @@ def unit(values: Array) -> Array:
 
 def _freed(basis: Array, values: Array) -> Array:
     """What a curve, (n, k), leaves of values, (n, m) -> (n - k, m), in orthonormal coordinates: they scatter
-    independently. Householder's reflections are applied one by one, and no matrix of n by n is made."""
-    reflections, factors = np.linalg.qr(basis, mode="raw")
-    turned = values.astype(float)
-    for place, (column, factor) in enumerate(zip(reflections, factors, strict=True)):
-        mirror = np.append(1.0, column[place + 1 :])
-        turned[place:] -= np.outer(factor * mirror, mirror @ turned[place:])
-    return turned[basis.shape[1] :]
+    independently. No matrix of n by n is made."""
+    (reflections, factors), _ = qr(basis, mode="raw")
+    turned, *_ = lapack.dormqr("L", "T", reflections, factors, values, lwork=values.shape[1])
+    return np.asarray(turned[basis.shape[1] :])
 
 
 def _parts(values: Array) -> Array:
