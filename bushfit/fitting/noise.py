@@ -122,7 +122,10 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
         level, freedom = of_class(rig, (0.0, 0.0)), max(round(sum(line.shared_freedom for line in repeated)), _ENOUGH)
         of_each = {key[0]: [line for own, line in lines.items() if own[0] == key[0]] for key in lines}
         told = {name: _shared(own, rig) for name, own in of_each.items()}
-        beyond = {name: _beyond(error, rig) for name, error in told.items() if np.any(error > largest_error(rig))}
+        most = np.maximum(
+            largest_error(rig), largest_error(UNSTATED)
+        )  # [rig] states what repeats share
+        beyond = {name: _beyond(error, rig) for name, error in told.items() if np.any(error > most)}
         shared = _pair(_shared(repeated, rig))
         return SweepNoise(random, shared, "repeats", freedom, scatter_freedom, slopes, level, beyond=beyond)
     if all(sweep.noise is not None for sweep in sweeps):
@@ -205,10 +208,8 @@ def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -
 
 
 def _beyond(error: Array, rig: RigSettings) -> str:
-    return (
-        f"repeats differ as a whole by an error of {words_of(_pair(error))}, more than a rig of this class makes "
-        f"({class_words(rig)}): measure again, or state the class under [rig]"
-    )
+    words = f"more than a rig of this class makes ({class_words(rig)}): measure again, or state the class under [rig]"
+    return f"repeats differ as a whole by an error of {words_of(_pair(error))}, {words}"
 
 
 def _shared(lines: Sequence[LineNoise], rig: RigSettings) -> Array:
