@@ -122,9 +122,7 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
         level, freedom = of_class(rig, (0.0, 0.0)), max(round(sum(line.shared_freedom for line in repeated)), _ENOUGH)
         of_each = {key[0]: [line for own, line in lines.items() if own[0] == key[0]] for key in lines}
         told = {name: _shared(own, rig) for name, own in of_each.items()}
-        most = np.maximum(
-            largest_error(rig), largest_error(UNSTATED)
-        )  # [rig] states what repeats share
+        most = np.maximum(largest_error(rig), largest_error(UNSTATED))  # [rig] states what repeats share
         beyond = {name: _beyond(error, rig) for name, error in told.items() if np.any(error > most)}
         shared = _pair(_shared(repeated, rig))
         return SweepNoise(random, shared, "repeats", freedom, scatter_freedom, slopes, level, beyond=beyond)
