@@ -22,6 +22,7 @@ from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.search import CHANCE_LEVEL, SAME, Search, Step
 from bushfit.effects import effect_named, effect_of, qualified
 from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.fitting.data_sets import parted
 from bushfit.units import number
 
 #: Held-out gap, in units of noise, up to which little is left (`partly`): chosen, wrong names leave more.
@@ -239,10 +240,14 @@ def is_consistent(search: Search) -> bool:
 
 
 def find_remainder(search: Search, evidence: Evidence, share: float = 1.0) -> Remainder | None:
-    """What is left beyond noise and tolerance: a fault at one place, or something smooth beyond a share of it."""
+    """What is left beyond noise and tolerance: a fault at one place, repeats that disagree by more than a rig makes, or
+    something smooth beyond a share of it."""
     fault = worst_fault(search, evidence)
     if fault:
         return Remainder(_fault_words(fault), fault)
+    for sweep in parted(evidence.data_sets)[1]:
+        if sweep.name in sweep.noise.beyond:
+            return Remainder(f"{sweep.name}: {sweep.noise.beyond[sweep.name]}", None)
     columns = contrasts(evidence)
     smooth = ScoreTest(evidence, columns, [np.arange(len(columns))], PATTERN_LEFT)
     if (

@@ -22,8 +22,8 @@ from bushfit.effects import effect_named, qualified
 from bushfit.effects.mistakes import candidate_named, mistake_named
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import parted
-from bushfit.fitting.levels import LevelErrors, class_words, largest_level_error, level_errors
-from bushfit.fitting.noise import words_of
+from bushfit.fitting.levels import LevelErrors, level_errors
+from bushfit.fitting.rig_class import class_words, largest_error, words_of
 from bushfit.fitting.robust import estimate, outliers_at, told
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
@@ -72,7 +72,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
         searched = _search(data, begun, model, settings, searched.search)
     fewer += _left_out_of_fewer(whole, data, begun.outliers)
     found = searched.finding
-    shared = [_level_words(data, found)] if errors is not None else _class_words(data)
+    shared = [_level_words(data, found)] if errors is not None else data.assumed
     of_loops = outliers_at(found.result.model, data.loops)
     outliers = (*told(of_loops, robust=data.robust), *told(left, robust=True))
     notes = (*said, *fewer, *found.notes, *shared, *outliers)
@@ -105,7 +105,7 @@ def _search(
     data: Data, begun: _Begun, model: Model | None, settings: Settings, earlier: Search | None = None
 ) -> _Searched:
     """Look for effects and mistakes in tests whose noise is known."""
-    most = _NO_RIG * max(largest_level_error(data.campaign.rig))
+    most = _NO_RIG * max(largest_error(data.campaign.rig))
     fitted, start, held = begun.evidence, begun.start, begun.held
     search = Search.begin(fitted, settings, start, held, data.bounds, earlier, most_of_level=most)
     if is_consistent(search):
@@ -144,7 +144,7 @@ def _errors_beside(searched: _Searched, data: Data) -> LevelErrors | None:
 def _level_errors(evidence: Evidence, search: Search, data: Data) -> LevelErrors:
     """Errors of each level that would explain what a model leaves, but for what the worst single level makes of it
     where that is more than such errors do."""
-    absorbed, most = evidence.solution.jacobian, largest_level_error(data.campaign.rig)
+    absorbed, most = evidence.solution.jacobian, largest_error(data.campaign.rig)
     levels = [fault for fault in search.faults(evidence).places if fault.suspect.kind != "repeat"]
     worst = max(levels, key=lambda fault: fault.worth, default=None)
     if worst and worst.size > _MOST_ERRORS * max(most):
@@ -164,14 +164,6 @@ def _level_words(data: Data, found: Diagnosis) -> str:
     }.get(found.verdict, "counts as noise beside what was found")
     limit = f"3 times the class of the rig at most: {class_words(data.campaign.rig)}"
     return f"an error of {words_of(noise.level)} of {whose} {does} ({limit})"
-
-
-def _class_words(data: Data) -> list[str]:
-    """What is said of the class of the rig where nothing was repeated and not all of it is stated."""
-    if None not in data.campaign.rig.stated or not {"assumed", "rig"} & {sweep.noise.origin for sweep in data.sweeps}:
-        return []
-    shared = class_words(data.campaign.rig)
-    return [f"nothing was repeated at three points or more: errors shared by a run are the rig's class, {shared}"]
 
 
 def _left_out_of_fewer(whole: Data, fewer: Data, outliers: Sequence[Outlier]) -> tuple[str, ...]:

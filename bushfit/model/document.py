@@ -167,7 +167,7 @@ class FitTable(Quality):
 
     @property
     def quality(self) -> Quality:
-        return Quality(self.nrmse, self.reduced_chi_square, self.points, self.noise)
+        return Quality(self.nrmse, self.reduced_chi_square, self.points, self.noise, self.loop_gain_error)
 
     @property
     def measured(self) -> Range | None:
