@@ -27,7 +27,7 @@ from bushfit.diagnosis.rig_errors import blocks, nodes, scattering_alone
 from bushfit.effects import effect_named, qualified
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data import Data
-from bushfit.fitting.noise import ASSUMED_SHARED, of_class
+from bushfit.fitting.rig_class import ASSUMED, of_class
 from bushfit.fitting.solve import Bounds
 
 #: Probability of nothing from which on records are not doubted. For time: each claim is a fit.
@@ -318,7 +318,7 @@ class Search:
             Hypothesis(state.effects, claim, state.places, "", False, weighed.log_posterior, state.size, 0.0, weighed)
         )
         wide = state.log_prior + state.density + weighed.first.log_evidence_wide
-        size = max(state.size, LEVELS[-1][0] * max(of_class(state.tests.rig, ASSUMED_SHARED)))
+        size = max(state.size, LEVELS[-1][0] * max(of_class(state.tests.rig, ASSUMED)))
         self._note(Hypothesis(state.effects, claim, state.places, "", True, wide, size, 0.0, weighed))
 
     def _note(self, hypothesis: Hypothesis) -> None:
