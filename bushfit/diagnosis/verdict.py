@@ -178,6 +178,12 @@ class Told:
         if spots:
             next_test = f"measure again: {spots[0].name}"
         where = (*(_place_where(base, each, places) for each in spots if places), *locate(base))
+        told = self.finding.told
+        odds = Odds(
+            self.finding.nothing,
+            tuple((self.label(each), each.probability) for each in told),
+            tuple(each.best.weighed.state.evidence.model.values if each.best.refitted else {} for each in told),
+        )
         return Diagnosis(
             verdict,
             summary,
@@ -189,10 +195,10 @@ class Told:
             tuple(self.candidates),
             base,
             after,
-            result_of(after, bounds, {*base.model.effects} - {*self.unresolved}),
+            odds.averaged(result_of(after, bounds, {*base.model.effects} - {*self.unresolved})),
             self._notes(),
             description,
-            Odds(self.finding.nothing, tuple((self.label(each), each.probability) for each in self.finding.told)),
+            odds,
         )
 
     @cached_property
