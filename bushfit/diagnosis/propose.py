@@ -184,7 +184,8 @@ def probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> 
             high = max((float(np.max(np.abs(each.measured) * each.amplitude)) for each in along), default=1.0)
             low, high = 0.3 * high, 0.95 * high
         case "order":
-            low, high = _ORDERS
+            low, high = _ORDERS  # steeper than the first, which without it lies between the two
+            low = min(max(low, model.values.get("alpha", low)), high)
         case None:
             return np.array([parameter.typical])
     return np.clip(np.geomspace(low, high, _PROBES), *parameter.bounds)
