@@ -19,7 +19,7 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim, Screen, claims
 from bushfit.diagnosis.currency import Block, Ledger, Node, Worth
 from bushfit.diagnosis.evidence import Evidence, fit
-from bushfit.diagnosis.explanations import Explanation, effects, places, unnamed
+from bushfit.diagnosis.explanations import Explanation, FaultyPlace, MissingEffect, effects, places, unnamed
 from bushfit.diagnosis.priors import BEAM, FAR, LEVELS, NAMED, ODDS, REFITS, ROUNDS, SIZES
 from bushfit.diagnosis.propose import probes
 from bushfit.diagnosis.refit import refitted, within_reach
@@ -38,6 +38,10 @@ _SETTLED = 8
 _CLAIMS, _PLACES = 4, 2
 #: Logarithm of odds behind its state within which an effect is refitted; for time.
 _SLIGHT = 3.0
+#: Sizes over which the prior of an amount is averaged, and the least relative error that they resolve.
+_FINE, _SHARPEST = 1000, 0.01
+#: What a mistake in the record changes, relative to |K|: never so little that it counts as nothing.
+_A_RECORD = 1.0
 #: Reduced chi-square beyond which a model has bent its parameters too far for a refit to start from its values.
 _BENT = 1.5
 
@@ -78,16 +82,18 @@ class Hypothesis:
         levels: whether errors of levels are larger than the class of the rig allows.
         log_posterior: logarithm of prior times evidence.
         size: of what it changes, relative to |K|.
+        last: of this, what its last explanation changes, where it was counted linearly; else 0.
         weighed: the state that it is, with its effects refitted, or to which its last explanation was added linearly.
     """
 
     effects: tuple[str, ...]
     claim: Claim | None
-    places: tuple[Explanation, ...]
+    places: tuple[FaultyPlace, ...]
     unnamed: str
     levels: bool
     log_posterior: float
     size: float
+    last: float
     weighed: Weighed
 
     @property
@@ -109,11 +115,22 @@ class Hypothesis:
 
 @dataclass(frozen=True, eq=False)
 class Tests:
-    """Tests as they are recorded, or with a record put right, and the model as it came fitted to them."""
+    """Tests as they are recorded, or with a record put right, and the model as it came fitted to them.
+
+    Args:
+        log_odds: of these beforehand, with nothing else missing.
+        size: of what a record that is put right changes; 0 of the tests as they are.
+    """
 
     base: Evidence
     rig: RigSettings
+    log_odds: float
     claim: Claim | None = None
+    size: float = 0.0
+
+    @property
+    def state(self) -> State:
+        return State(self, (), (), self.base, self.log_odds, size=self.size)
 
     @cached_property
     def bare(self) -> Evidence:
@@ -145,7 +162,7 @@ class State:
 
     tests: Tests
     effects: tuple[str, ...]
-    places: tuple[Explanation, ...]
+    places: tuple[FaultyPlace, ...]
     evidence: Evidence
     log_prior: float
     precision: Mapping[str, float] = field(default_factory=dict)
@@ -194,7 +211,7 @@ class Weighed:
         return self.state.log_prior + self.state.density + self.first.log_evidence
 
     @cached_property
-    def effects(self) -> list[Explanation]:
+    def effects(self) -> list[MissingEffect]:
         return effects(self.bare, (*self.asked.without, *self.state.effects), self.asked.held)
 
     @cached_property
@@ -211,12 +228,10 @@ class Weighed:
         """This state with an explanation more, counted linearly."""
         state = self.state
         names = (*state.effects, each.name) if each.kind == "effect" else state.effects
-        spots = (*state.places, each) if each.kind == "place" else state.places
+        spots = (*state.places, each) if isinstance(each, FaultyPlace) else state.places
         curve = each.name if each.kind == "unnamed" else ""
-        posterior = state.log_prior + state.density + log_odds + worth.log_evidence
-        return Hypothesis(
-            names, state.tests.claim, spots, curve, False, posterior, max(state.size, worth.size), self
-        )
+        posterior, size = state.log_prior + state.density + log_odds + worth.log_evidence, max(state.size, worth.size)
+        return Hypothesis(names, state.tests.claim, spots, curve, False, posterior, size, worth.size, self)
 
 
 class Search:
@@ -226,8 +241,8 @@ class Search:
         self.asked = asked
         self.found: dict[frozenset[Hashable], Hypothesis] = {}
         self._seen: set[frozenset[Hashable]] = set()
-        tests = Tests(asked.base, asked.data.campaign.rig)
-        self.root = self._weigh(State(tests, (), (), asked.base, log(1.0 - sum(ODDS.values()))))
+        tests = Tests(asked.base, asked.data.campaign.rig, log(1.0 - sum(ODDS.values())))
+        self.root = self._weigh(tests.state)
         self._odds = _odds([*self.root.effects, *tests.fixed])
 
     def run(self) -> list[Hypothesis]:
@@ -266,7 +281,11 @@ class Search:
             every = self.ordered
             share = np.exp([each.log_posterior - every[0].log_posterior for each in every])
             ahead = np.cumsum(share) - share
-            open_ = [each for each, before in zip(every, ahead / share.sum(), strict=True) if before < NAMED and not each.refitted]
+            open_ = [
+                each
+                for each, before in zip(every, ahead / share.sum(), strict=True)
+                if before < NAMED and not each.refitted
+            ]
             if not open_:
                 return
             first = open_[0]
@@ -296,11 +315,11 @@ class Search:
     def _note_state(self, weighed: Weighed) -> None:
         state, claim = weighed.state, weighed.state.tests.claim
         self._note(
-            Hypothesis(state.effects, claim, state.places, "", False, weighed.log_posterior, state.size, weighed)
+            Hypothesis(state.effects, claim, state.places, "", False, weighed.log_posterior, state.size, 0.0, weighed)
         )
         wide = state.log_prior + state.density + weighed.first.log_evidence_wide
         size = max(state.size, LEVELS[-1][0] * max(of_class(state.tests.rig, ASSUMED_SHARED)))
-        self._note(Hypothesis(state.effects, claim, state.places, "", True, wide, size, weighed))
+        self._note(Hypothesis(state.effects, claim, state.places, "", True, wide, size, 0.0, weighed))
 
     def _note(self, hypothesis: Hypothesis) -> None:
         """Keep the better of two ways to the same; what was refitted counts before what was not."""
@@ -326,15 +345,19 @@ class Search:
             if each.kind == "effect"
         }
         first = [name for name in sorted(evidence, key=lambda name: -evidence[name]) if name in new]
-        scores = {each.name: each.proposal.score for each in weighed.effects if each.proposal}  # the best first
-        second = [name for name in scores if name in new and 0.5 * scores[name] + self._prior("effect", name) > -_SLIGHT]
-        return list(dict.fromkeys([*(name for name in first[:by_evidence] if evidence[name] > -_SLIGHT), *second[:by_score]]))
+        scores = {each.name: each.proposal.score for each in weighed.effects}  # the best first
+        second = [
+            name for name in scores if name in new and 0.5 * scores[name] + self._prior("effect", name) > -_SLIGHT
+        ]
+        return list(
+            dict.fromkeys([*(name for name in first[:by_evidence] if evidence[name] > -_SLIGHT), *second[:by_score]])
+        )
 
     def _with_effects(self, weighed: Weighed, names: Sequence[str], depth: int) -> list[Weighed]:
         state, asked = weighed.state, self.asked
         if not names or len(state.effects) >= asked.most:
             return []
-        proposed = [each.proposal for each in weighed.effects if each.name in names and each.proposal]
+        proposed = [each.proposal for each in weighed.effects if each.name in names]
         start = asked.start if not state.effects and state.evidence.reduced > _BENT else {}
         return [
             self._weigh(self._with_effect(state, name, evidence, depth))
@@ -355,7 +378,7 @@ class Search:
 
     def _with_places(self, weighed: Weighed, depth: int) -> list[Weighed]:
         state, grown = weighed.state, []
-        own = [(each, worth) for each, worth in weighed.worths if each.kind == "place"]
+        own = [(each, worth) for each, worth in weighed.worths if isinstance(each, FaultyPlace)]
         own.sort(key=lambda pair: -(self._prior("place", pair[0].name) + pair[1].log_evidence))
         for each, worth in own[:_PLACES]:
             odds = self._prior("place", each.name) - log(depth + 1)
@@ -382,7 +405,7 @@ class Search:
             with suppress(FitError, ModelError):  # no response without it
                 model = state.evidence.model.without(name)
                 evidence = fit(model, data_sets, held, {**within_reach(model, data_sets), **bounds})
-                less = replace(self.root.state, tests=state.tests, evidence=state.tests.base)
+                less = state.tests.state
                 for order, other in enumerate(each for each in state.effects if each != name):
                     less = self._with_effect(less, other, evidence, order)
                 yield self._weigh(less)
@@ -395,13 +418,8 @@ class Search:
             with suppress(FitError, ModelError):  # tests that nothing can be fitted to as mended
                 evidence = self.asked.fitted(claim.mended(data))
                 if [each.size for each in evidence.data_sets] == [each.size for each in base.data_sets]:
-                    tests = Tests(evidence, data.campaign.rig, claim)
-                    size = max(
-                        abs(float(np.max(np.abs(one.measured / other.measured - 1.0))))
-                        for one, other in zip(base.data_sets, evidence.data_sets, strict=True)
-                    )
                     odds = log(ODDS["record"]) - log(len(listed))
-                    found.append(self._weigh(State(tests, (), (), evidence, odds, size=max(size, 1.0))))
+                    found.append(self._weigh(Tests(evidence, data.campaign.rig, odds, claim, _A_RECORD).state))
         return found
 
 
@@ -428,16 +446,18 @@ def _laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, di
     """Of an effect that was refitted: ln of the prior density of its own coordinates with the factor of Laplace's
     method, their precision, and what it changes, relative to |K|.
 
-    An amount is log-uniform over two decades, and so is what it changes between the least and the largest size; a shape
-    is uniform over what the tests could show; at rest on an end of that, the fall of the likelihood away from the end
-    tells how much of it counts, and it moves no further. Of an effect in place of a branch each parameter beyond the branch's two
-    is uniform over a factor of 20.
+    What an amount changes is log-uniform between the least and the largest size. A shape is uniform over what the tests
+    could show; at rest on an end of that it moves no further, and the fall of the likelihood away from the end tells
+    how much of it counts. Of an effect in place of a branch each parameter beyond the branch's two is uniform over a
+    factor of 20.
     """
     effect, names = effect_named(name), evidence.solution.coordinates.names
     data_sets, model = evidence.data_sets, evidence.model
     other = model.without(name) if effect.replaces is None else before.model
     size = max(each.change(model, other) for each in data_sets)
     density, precision, count = 0.0, {}, 0
+    jacobian = evidence.solution.jacobian
+    variances = np.diag(np.linalg.pinv(jacobian @ jacobian.T, rcond=1e-12, hermitian=True))
     if effect.replaces is not None:
         count = max(len(effect.parameters) - 2, 0)
         own = {qualified(effect, parameter): 0.5 for parameter in effect.parameters}
@@ -449,11 +469,10 @@ def _laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, di
         count += 1
         if parameter is effect.amount:
             amount = max(abs(model.values[coordinate] - (parameter.neutral or 0.0)) / parameter.typical, 1e-12)
-            precision[coordinate] = 0.25 if parameter.log else 0.25 / max(amount, 1e-6) ** 2
-            density -= log(log(100.0)) + (0.0 if parameter.log else log(amount))
+            precision[coordinate] = 0.25 if parameter.log else 0.25 / amount**2
+            error = (1.0 if parameter.log else 1.0 / amount) * np.sqrt(variances[names.index(coordinate)])
+            density += _of_amount(size, float(error)) - (0.0 if parameter.log else log(amount))
             density -= 0.0 if parameter.neutral == parameter.bounds[0] else log(2.0)
-            beyond = max(log(max(size, 1e-9) / SIZES[-1]), log(SIZES[0] / max(size, 1e-9)), 0.0)
-            density -= 0.5 * (beyond / 0.7) ** 2
             continue
         tried = probes(data_sets, model, parameter)
         if parameter.log:
@@ -469,3 +488,16 @@ def _laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, di
         else:
             precision[coordinate] = 12.0 / wide**2
     return density + 0.5 * count * log(2.0 * np.pi), precision, size
+
+
+def _of_amount(size: float, error: float) -> float:
+    """Logarithm of the mean prior density of an amount, per relative change, over its likelihood.
+
+    Args:
+        size: of what it changes as fitted, relative to |K|.
+        error: standard error of the amount, relative to it.
+    """
+    times = np.geomspace(SIZES[0], SIZES[-1], _FINE) / max(size, 1e-12)
+    error = max(error, _SHARPEST)
+    exponent = -0.5 * np.square((times - 1.0) / error)
+    return float(logsumexp(exponent)) - log(_FINE) - 0.5 * log(2.0 * np.pi) - log(error)

@@ -213,7 +213,7 @@ class Ledger:
     def likely(self, far: float) -> list[Node]:
         """The nodes that nothing missing, or one of the groups, brings so near the best in ln evidence."""
         alone = self._solved.base
-        best = np.maximum.reduce([alone, *(worth.by_node for worth in self.worths)])
+        best = np.max(np.array([alone, *(worth.by_node for worth in self.worths)]), axis=0)
         within = self._within
         kept = (alone > alone[within].max() - far) | (best > best[within].max() - far)
         return [node for node, near in zip(self.nodes, kept.tolist(), strict=True) if near]
@@ -229,8 +229,8 @@ class Ledger:
         Notes: a posterior predictive check on r^T P r (Gelman, Meng and Stern, 1996).
         """
         base = np.where(self._within, self._solved.base, -np.inf)
-        freedom = self.residual.size - np.count_nonzero(self.precision == 0.0)
-        return float(np.exp(base - logsumexp(base)) @ chdtrc(max(freedom, 1), self._solved.misfit))
+        freedom = max(self.residual.size - int(np.count_nonzero(self.precision == 0.0)), 1)
+        return float(np.exp(base - logsumexp(base)) @ chdtrc(freedom, self._solved.misfit))
 
     @cached_property
     def worths(self) -> list[Worth]:
@@ -261,7 +261,7 @@ class Ledger:
 
 
 def _of_one(group: Group, size: Array, along: Array) -> tuple[Array, Array]:
-    """Gain in ln evidence, and square of the change relative to |K|, of one column of a group, (nodes, columns, sizes)."""
+    """Gain in ln evidence, and square of the change relative to |K|, of one of a group's columns, (nodes, c, sizes)."""
     seen = group.unit > _UNSEEN
     v2 = np.square(SIZES * np.where(seen, 1.0 / np.where(seen, group.unit, 1.0), 0.0)[:, None])
     grown = 1.0 + v2 * size

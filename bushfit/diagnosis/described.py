@@ -92,9 +92,7 @@ def _span(values: Sequence[float], factor: float = 1.0) -> str:
     return " to ".join(number(factor * end, 2) for end in (min(values), max(values)))
 
 
-def describe(
-    evidence: Evidence, start: Mapping[str, float], held: Sequence[str], bounds: Bounds
-) -> Described | None:
+def describe(evidence: Evidence, start: Mapping[str, float], held: Sequence[str], bounds: Bounds) -> Described | None:
     """A smooth correction of a fitted model and its fingerprint; None where no correction stands the hold-out.
 
     The parameters are fitted again with each loop standing on its first harmonic, because nothing is known of the law

@@ -10,9 +10,8 @@ from scipy.special import ndtri
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.holdout import HoldOut
-
-from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.priors import TELLS
+from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
 from bushfit.diagnosis.terms import Measure, Terms, end_parts, halves, inner_parts, predicted
 from bushfit.effects.contract import Array
 from bushfit.fitting.solve import Bounds, Solution, coordinate_bounds, jacobian, residual

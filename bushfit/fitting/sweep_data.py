@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 
 from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
-from bushfit.fitting.data_set import DataSet, Freedoms, Suspect, keep, kept, shown_amplitude
+from bushfit.fitting.data_set import DataSet, Freedoms, keep, kept, shown_amplitude
 from bushfit.fitting.noise import FLOOR, SweepNoise, unit
 from bushfit.fitting.outliers import outlying_points
 from bushfit.fitting.whitening import Whitening
@@ -328,18 +328,6 @@ class SweepData(DataSet):
     def smooth_misfit(self, model: Model) -> float:
         return max(float(np.abs(line.smooth).max()) for line in self.lines(model))
 
-    def suspects(self) -> Iterator[Suspect]:
-        """One line wrong as a whole, and one repeat of one."""
-        every = np.unique(self.held)
-        for held in every:
-            here = self.held == held
-            words = self.line_words(int(np.argmax(here)))
-            if every.size > 1:
-                yield self._suspect(words, "level", here)
-            numbers = np.unique(self.repeat[here])
-            for number in numbers if numbers.size > 2 else ():
-                yield self._suspect(f"repeat {number} of {words}", "repeat", here & (self.repeat == number))
-
     def line_words(self, point: int) -> str:
         """The line that a point belongs to, for people."""
         if self.sweep.stepped == "frequency":
@@ -348,12 +336,8 @@ class SweepData(DataSet):
             return f"the {self.direction} sweep of amplitudes at {self.frequency[point]:.4g} Hz"
         return f"run {self.repeat[point]} of {self.name}, {self.direction}"
 
-    def _suspect(self, words: str, kind: str, chosen: Array) -> Suspect:
-        ends = [(float(each[chosen].min()), float(each[chosen].max())) for each in (self.frequency, self.amplitude)]
-        return Suspect(words, kind, self.moved_together(chosen), self.direction, ends[0], ends[1])
-
     def moved_together(self, chosen: Array) -> list[Array]:
-        """Whitened residuals of some points, (n,) bool, off by one unit of gain, and off by one of phase."""
+        """Whitened residuals of some points, (n,) shares, off by one unit of gain, and off by one of phase."""
         return [self.whiten(unit * chosen.astype(complex)) for unit in (1.0, 1.0j)]
 
     def columns(self) -> dict[str, Any]:
