@@ -134,12 +134,12 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
     added = {name for name in task.hidden if name in result.model.effects}
     asked = [name for name in truth.values if task.kind == "swept" or effect_of(name) in added]
     intervals = {name: result.interval(name) for name in asked}
+    leader, odds = max(diagnosis.odds.told, key=lambda pair: pair[1], default=("", 0.0))
     covered = [ends[0] <= truth.values[name] <= ends[1] for name, ends in intervals.items() if ends is not None]
     return Outcome(
         task,
         truth,
         diagnosis.verdict,
-        tuple(effect.label for effect in diagnosis.effects),
         tuple((effect.label, *_names(effect.alternatives)) for effect in diagnosis.effects),
         max((judged.gain or 0.0 for judged in diagnosis.candidates if not mistake_named(judged.name)), default=0.0),
         heldout["after"],
@@ -153,6 +153,9 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
             for effect in diagnosis.effects
         ),
         before=heldout["before"],
+        nothing=diagnosis.odds.nothing,
+        leader=leader,
+        odds=odds,
     )
 
 
