@@ -17,7 +17,7 @@ from bushfit.diagnosis.explanations import FaultyPlace
 from bushfit.diagnosis.holdout import HoldOut, hold_out
 from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.next_test import deciding_test
-from bushfit.diagnosis.record import Diagnosis, Judged, Named, Odds, Where
+from bushfit.diagnosis.record import Diagnosis, Judged, Named, Odds, Where, chances
 from bushfit.diagnosis.words import Composition, Finding
 from bushfit.effects import effect_named
 from bushfit.effects.unnamed import NAME as UNNAMED
@@ -138,13 +138,18 @@ class Told:
         return self._finished("unexplained", words, self.base, places=spot)
 
     def label(self, each: Composition) -> str:
-        """A composition in words: its effects, or what else it is."""
+        """A composition by the names of its effects, or what else it is."""
         best = each.best
-        parts = [*best.effects, *(f"fault: {place.name}" for place in best.places)]
-        parts = ([" + ".join(best.claim.labels(self.data))] if best.claim else []) + parts
-        parts += ["errors of levels beyond the rig's class"] if best.levels else []
-        parts += ["something without a name"] if best.unnamed else []
-        return " + ".join(parts)
+        names = [*(best.claim.labels(self.data) if best.claim else ()), *best.effects]
+        return " + ".join((*names, *(f"fault: {place.name}" for place in best.places), *_nameless(best)))
+
+    def _in_words(self, each: Composition) -> str:
+        """A composition as it is told to people: what each of its parts is, with its name."""
+        best = each.best
+        parts = [best.claim.words(self.data)] if best.claim else []
+        parts += [f"{effect_named(name).phrase} ({name})" for name in best.effects]
+        parts += [f"the tests are off: {place.name}" for place in best.places]
+        return ", and ".join((*parts, *_nameless(best)))
 
     def _evidence(self) -> str:
         """Why effects were named."""
@@ -156,8 +161,8 @@ class Told:
 
     def _probability(self, each: Composition) -> str:
         others = [other for other in self.finding.told if other is not each]
-        words = f"{number(each.probability, 3)} probable"
-        return words + (f", next {self.label(others[0])} {number(others[0].probability, 2)}" if others else "")
+        words = chances(each.probability)
+        return words + (f", next {self.label(others[0])} {chances(others[0].probability)}" if others else "")
 
     def _finished(
         self,
@@ -192,7 +197,7 @@ class Told:
             result_of(after, bounds, {*base.model.effects} - {*self.unresolved}),
             self._notes(),
             description,
-            Odds(self.finding.nothing, tuple((self.label(each), each.probability) for each in self.finding.told)),
+            Odds(self.finding.nothing, tuple((self._in_words(each), each.probability) for each in self.finding.told)),
         )
 
     @cached_property
@@ -229,6 +234,12 @@ class Told:
         unseen = [each.name for each in self.search.root.effects if not each.proposal.visible]
         blind = [name for name in unseen if not effect_named(name).under]  # what no test states is not asked for
         return (f"not identifiable from these tests: {', '.join(blind)}",) if blind else ()
+
+
+def _nameless(best: Hypothesis) -> list[str]:
+    """What a hypothesis holds beside effects, places and mistakes."""
+    levels = ["errors of levels beyond the rig's class"] if best.levels else []
+    return [*levels, *(["something without a name"] if best.unnamed else [])]
 
 
 def _all(names: Sequence[str]) -> str:
