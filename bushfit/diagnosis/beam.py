@@ -82,6 +82,7 @@ class Hypothesis:
         levels: whether errors of levels are larger than the class of the rig allows.
         log_posterior: logarithm of prior times evidence.
         size: of what it changes, relative to |K|.
+        last: of this, what its last explanation changes, where it was counted linearly; else 0.
         weighed: the state that it is, with its effects refitted, or to which its last explanation was added linearly.
     """
 
@@ -92,6 +93,7 @@ class Hypothesis:
     levels: bool
     log_posterior: float
     size: float
+    last: float
     weighed: Weighed
 
     @property
@@ -228,8 +230,8 @@ class Weighed:
         names = (*state.effects, each.name) if each.kind == "effect" else state.effects
         spots = (*state.places, each) if isinstance(each, FaultyPlace) else state.places
         curve = each.name if each.kind == "unnamed" else ""
-        posterior = state.log_prior + state.density + log_odds + worth.log_evidence
-        return Hypothesis(names, state.tests.claim, spots, curve, False, posterior, max(state.size, worth.size), self)
+        posterior, size = state.log_prior + state.density + log_odds + worth.log_evidence, max(state.size, worth.size)
+        return Hypothesis(names, state.tests.claim, spots, curve, False, posterior, size, worth.size, self)
 
 
 class Search:
@@ -313,11 +315,11 @@ class Search:
     def _note_state(self, weighed: Weighed) -> None:
         state, claim = weighed.state, weighed.state.tests.claim
         self._note(
-            Hypothesis(state.effects, claim, state.places, "", False, weighed.log_posterior, state.size, weighed)
+            Hypothesis(state.effects, claim, state.places, "", False, weighed.log_posterior, state.size, 0.0, weighed)
         )
         wide = state.log_prior + state.density + weighed.first.log_evidence_wide
         size = max(state.size, LEVELS[-1][0] * max(of_class(state.tests.rig, ASSUMED_SHARED)))
-        self._note(Hypothesis(state.effects, claim, state.places, "", True, wide, size, weighed))
+        self._note(Hypothesis(state.effects, claim, state.places, "", True, wide, size, 0.0, weighed))
 
     def _note(self, hypothesis: Hypothesis) -> None:
         """Keep the better of two ways to the same; what was refitted counts before what was not."""

@@ -229,8 +229,8 @@ class Ledger:
         Notes: a posterior predictive check on r^T P r (Gelman, Meng and Stern, 1996).
         """
         base = np.where(self._within, self._solved.base, -np.inf)
-        freedom = self.residual.size - np.count_nonzero(self.precision == 0.0)
-        return float(np.exp(base - logsumexp(base)) @ chdtrc(max(freedom, 1), self._solved.misfit))
+        freedom = max(self.residual.size - int(np.count_nonzero(self.precision == 0.0)), 1)
+        return float(np.exp(base - logsumexp(base)) @ chdtrc(freedom, self._solved.misfit))
 
     @cached_property
     def worths(self) -> list[Worth]:

@@ -31,7 +31,7 @@ NOTHING = 0.15
 NAMED, MOST_TOLD = 0.97, 4
 #: Difference of chi-square that makes such odds between two.
 TELLS = 2.0 * float(np.log(NAMED / (1.0 - NAMED)))
-#: Share of what names and the unnamed bring together, that names bring alone where they may stand: `partly`.
+#: Share of what is missing, by its change of |K|, that names make where they may stand beside the unnamed: `partly`.
 MOSTLY = 0.9
 #: Probability of what the leader leaves, below which it does not fit.
 DOES_NOT_FIT = 0.002

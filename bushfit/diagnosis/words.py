@@ -77,7 +77,7 @@ def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
     compositions = _compositions(left)
     first = compositions[0]
     if first.probability >= NAMED:
-        return _of_one(first, nothing, hypotheses)
+        return _of_one(first, nothing)
     told, together = list[Composition](), 0.0
     for each in compositions:
         if together < NAMED:
@@ -86,7 +86,7 @@ def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
     common = frozenset.intersection(*(each.parts for each in told))
     sure = next((each for each in told if each.parts == common), None)
     if sure:  # all that is probable has these parts; what else there is is not shown
-        found = _of_one(sure, nothing, hypotheses)
+        found = _of_one(sure, nothing)
         return replace(found, told=(sure, *(each for each in told if each is not sure)))
     unnamed = sum(each.probability for each in told if "unnamed" in each.kinds)
     if len(told) <= MOST_TOLD and unnamed < 0.5:
@@ -98,12 +98,12 @@ def _is_nothing(each: Hypothesis, tolerance: float) -> bool:
     return each.size <= tolerance or not each.key
 
 
-def _of_one(first: Composition, nothing: float, hypotheses: Sequence[Hypothesis]) -> Finding:
+def _of_one(first: Composition, nothing: float) -> Finding:
     """The verdict where one composition is all but sure."""
     kinds, best = first.kinds, first.best
     names = best.effects
     if "unnamed" in kinds:
-        if names and _share_of_names(names, hypotheses) > MOSTLY:
+        if names and best.last < (1.0 - MOSTLY) * best.size:
             return Finding("partly", nothing, (first,))
         return Finding("described", nothing, (first,), names)
     if not names and "record" not in kinds:
@@ -113,24 +113,6 @@ def _of_one(first: Composition, nothing: float, hypotheses: Sequence[Hypothesis]
     if best.chance < DOES_NOT_FIT:
         return Finding("described", nothing, (first,), names)
     return Finding("named", nothing, (first,))
-
-
-def _share_of_names(names: tuple[str, ...], hypotheses: Sequence[Hypothesis]) -> float:
-    """Share of what names and something unnamed bring together in ln evidence, that the names bring alone."""
-
-    def best(effects: tuple[str, ...], *, unnamed: bool) -> float:
-        own = [
-            each.log_posterior
-            for each in hypotheses
-            if set(each.effects) == set(effects)
-            and bool(each.unnamed) is unnamed
-            and not each.places
-            and not each.claim
-        ]
-        return max(own, default=-np.inf)
-
-    nothing = best((), unnamed=False)
-    return (best(names, unnamed=False) - nothing) / max(best(names, unnamed=True) - nothing, 1e-9)
 
 
 def _leads(compositions: Sequence[Composition]) -> tuple[str, ...]:

@@ -35,12 +35,12 @@ def _loop(evidence: Evidence, loop: LoopData) -> FaultyPlace:
     return FaultyPlace("place", "loop", f"the loop {loop.name}", _group(columns), loop.direction, *ends)
 
 
-def _group(columns: Sequence[Array]) -> Group:
+def _group(columns: Sequence[Array] | Array) -> Group:
     return Group(np.array(columns), np.ones(len(columns)), together=True)
 
 
 def _place(
-    words: str, kind: str, sweeps: Sequence[SweepData], chosen: Sequence[Array], columns: Sequence[Array]
+    words: str, kind: str, sweeps: Sequence[SweepData], chosen: Sequence[Array], columns: Sequence[Array] | Array
 ) -> FaultyPlace:
     """Chosen points of sweeps, (n,) bool each."""
     pairs = list(zip(sweeps, chosen, strict=True))
