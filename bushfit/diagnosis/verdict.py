@@ -132,16 +132,26 @@ class Told:
             held = found.correction.held
             return self._finished("described", words, found.after, names, description=found.description, held=held)
         words = "a real gap stays that no known effect closes" + lead
-        if spot:
-            words = f"{self.label(self.finding.told[0])} stands out from all other tests"
-            words += ": measure it again before looking for physics"
-        return self._finished("unexplained", words, self.base, places=spot)
+        advice = ""
+        if spot and spot.places:
+            words = f"{_all([place.name for place in spot.places])}: this stands out from all other tests; "
+            words += "measure it again before looking for physics"
+        elif spot:
+            words = "the levels disagree by more than the rig's class allows, and by nothing else"
+            advice = "measure the levels again in another session; or state the rig's class, gain_error under [rig]"
+        return self._finished("unexplained", words, self.base, places=spot, next_test=advice)
 
     def label(self, each: Composition) -> str:
         """A composition by the names of its effects, or what else it is."""
         best = each.best
         names = [*(best.claim.labels(self.data) if best.claim else ()), *best.effects]
         return " + ".join((*names, *(f"fault: {place.name}" for place in best.places), *_nameless(best)))
+
+    @property
+    def _odds(self) -> tuple[tuple[str, float], ...]:
+        """What is told, in words with its probability, the most probable first."""
+        told = sorted(self.finding.told, key=lambda each: -each.probability)
+        return tuple((self._in_words(each), each.probability) for each in told)
 
     def _in_words(self, each: Composition) -> str:
         """A composition as it is told to people: what each of its parts is, with its name."""
@@ -179,7 +189,7 @@ class Told:
         base, bounds = self.base, self.search.asked.bounds
         spots = list(places.places) if places else []
         if not next_test and names:
-            next_test = effect_named(names[0].name).confirmed_by if verdict != "described" else ""
+            next_test = effect_named(names[0].name).confirmed_by
         if spots:
             next_test = f"measure again: {spots[0].name}"
         where = (*(_place_where(base, each, places) for each in spots if places), *locate(base))
@@ -197,7 +207,7 @@ class Told:
             result_of(after, bounds, {*base.model.effects} - {*self.unresolved}),
             self._notes(),
             description,
-            Odds(self.finding.nothing, tuple((self._in_words(each), each.probability) for each in self.finding.told)),
+            Odds(self.finding.nothing, self._odds),
         )
 
     @cached_property
