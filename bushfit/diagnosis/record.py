@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 from bushfit.diagnosis.document import (
     Description,
@@ -242,7 +242,7 @@ def chances(probability: float) -> str:
     return "all but sure" if probability > 0.5 else "less than 1 in 100"
 
 
-def odds_in_words(found: DiagnosisFile) -> list[str]:
+def odds_in_words(found: Mapping[str, Any]) -> list[str]:
     """What a diagnosis tells of probabilities, a line each: what may be missing, the most probable first, and whether
     nothing is."""
     lines = [f"{each['chances']}: {each['words']}" for each in found["odds"]]
