@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.geometry import Place
 from bushfit.model.result import Result
 from bushfit.validation import plain
+
+#: Probability below which nothing is told of what may be else.
+_LEAST_TOLD = 0.01
 
 
 @dataclass(frozen=True)
@@ -252,6 +255,22 @@ def chances(probability: float) -> str:
         if 0 < least < of:
             return f"{least} in {of}"
     return "all but sure" if probability > 0.5 else "less than 1 in 100"
+
+
+def odds_in_words(found: Mapping[str, Any]) -> list[str]:
+    """What a diagnosis tells of probabilities, a line each: what may be missing, the most probable first, and whether
+    nothing is."""
+    lines = [f"{each['chances']}: {each['words']}" for each in found["odds"]]
+    rest = 1.0 - sum(each["probability"] for each in found["odds"])
+    if lines and rest > _LEAST_TOLD:
+        lines.append(f"{chances(rest)}: something else")
+    if lines and found["nothing"] > _LEAST_TOLD:
+        lines.append(f"{chances(found['nothing'])} that nothing is missing after all")
+    if found["verdict"] == "consistent":
+        lines = [f"{chances(found['nothing'])}: nothing is missing"]
+        if 1.0 - found["nothing"] > _LEAST_TOLD:
+            lines.append(f"{chances(1.0 - found['nothing'])}: something is, but these tests do not show it")
+    return lines
 
 
 def level_of(name: str) -> str:

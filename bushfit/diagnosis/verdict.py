@@ -17,7 +17,7 @@ from bushfit.diagnosis.explanations import FaultyPlace
 from bushfit.diagnosis.holdout import HoldOut, hold_out
 from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.next_test import deciding_test
-from bushfit.diagnosis.record import Diagnosis, Judged, Named, Odds, Where
+from bushfit.diagnosis.record import Diagnosis, Judged, Named, Odds, Where, chances
 from bushfit.diagnosis.words import Composition, Finding
 from bushfit.effects import effect_named
 from bushfit.effects.unnamed import NAME as UNNAMED
@@ -132,19 +132,36 @@ class Told:
             held = found.correction.held
             return self._finished("described", words, found.after, names, description=found.description, held=held)
         words = "a real gap stays that no known effect closes" + lead
-        if spot:
-            words = f"{self.label(self.finding.told[0])} stands out from all other tests"
-            words += ": measure it again before looking for physics"
-        return self._finished("unexplained", words, self.base, places=spot)
+        advice = ""
+        if spot and spot.places:
+            words = f"{_all([place.name for place in spot.places])}: this stands out from all other tests; "
+            words += "measure it again before looking for physics"
+        elif spot:
+            words = "the levels disagree by more than the rig's class allows, and by nothing else"
+            advice = "measure the levels again in another session; or state the rig's class, gain_error under [rig]"
+        return self._finished("unexplained", words, self.base, places=spot, next_test=advice)
 
     def label(self, each: Composition) -> str:
-        """A composition in words: its effects, or what else it is."""
+        """A composition by the names of its effects, or what else it is."""
         best = each.best
-        parts = [*best.effects, *(f"fault: {place.name}" for place in best.places)]
-        parts = ([" + ".join(best.claim.labels(self.data))] if best.claim else []) + parts
-        parts += ["errors of levels beyond the rig's class"] if best.levels else []
-        parts += ["something without a name"] if best.unnamed else []
-        return " + ".join(parts)
+        names = [*(best.claim.labels(self.data) if best.claim else ()), *best.effects]
+        return " + ".join((*names, *(f"fault: {place.name}" for place in best.places), *_nameless(best)))
+
+    @cached_property
+    def odds(self) -> Odds:
+        """What is told, the most probable first."""
+        told = sorted(self.finding.told, key=lambda each: -each.probability)
+        values = (each.best.weighed.state.evidence.model.values if each.best.refitted else {} for each in told)
+        pairs = ((self._in_words(each), each.probability) for each in told)
+        return Odds(self.finding.nothing, tuple(pairs), tuple(values))
+
+    def _in_words(self, each: Composition) -> str:
+        """A composition as it is told to people: what each of its parts is, with its name."""
+        best = each.best
+        parts = [best.claim.words(self.data)] if best.claim else []
+        parts += [f"{effect_named(name).phrase} ({name})" for name in best.effects]
+        parts += [f"the tests are off: {place.name}" for place in best.places]
+        return ", and ".join((*parts, *_nameless(best)))
 
     def _evidence(self) -> str:
         """Why effects were named."""
@@ -156,8 +173,8 @@ class Told:
 
     def _probability(self, each: Composition) -> str:
         others = [other for other in self.finding.told if other is not each]
-        words = f"{number(each.probability, 3)} probable"
-        return words + (f", next {self.label(others[0])} {number(others[0].probability, 2)}" if others else "")
+        words = chances(each.probability)
+        return words + (f", next {self.label(others[0])} {chances(others[0].probability)}" if others else "")
 
     def _finished(
         self,
@@ -174,16 +191,10 @@ class Told:
         base, bounds = self.base, self.search.asked.bounds
         spots = list(places.places) if places else []
         if not next_test and names:
-            next_test = effect_named(names[0].name).confirmed_by if verdict != "described" else ""
+            next_test = effect_named(names[0].name).confirmed_by
         if spots:
             next_test = f"measure again: {spots[0].name}"
         where = (*(_place_where(base, each, places) for each in spots if places), *locate(base))
-        told = self.finding.told
-        odds = Odds(
-            self.finding.nothing,
-            tuple((self.label(each), each.probability) for each in told),
-            tuple(each.best.weighed.state.evidence.model.values if each.best.refitted else {} for each in told),
-        )
         return Diagnosis(
             verdict,
             summary,
@@ -195,10 +206,10 @@ class Told:
             tuple(self.candidates),
             base,
             after,
-            odds.averaged(result_of(after, bounds, {*base.model.effects} - {*self.unresolved})),
+            self.odds.averaged(result_of(after, bounds, {*base.model.effects} - {*self.unresolved})),
             self._notes(),
             description,
-            odds,
+            self.odds,
         )
 
     @cached_property
@@ -235,6 +246,12 @@ class Told:
         unseen = [each.name for each in self.search.root.effects if not each.proposal.visible]
         blind = [name for name in unseen if not effect_named(name).under]  # what no test states is not asked for
         return (f"not identifiable from these tests: {', '.join(blind)}",) if blind else ()
+
+
+def _nameless(best: Hypothesis) -> list[str]:
+    """What a hypothesis holds beside effects, places and mistakes."""
+    levels = ["errors of levels beyond the rig's class"] if best.levels else []
+    return [*levels, *(["something without a name"] if best.unnamed else [])]
 
 
 def _all(names: Sequence[str]) -> str:
