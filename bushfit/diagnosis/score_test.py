@@ -88,25 +88,20 @@ class ScoreTest:
         triples = zip(self.groups, self._roots, self._along, strict=True)
         return [-(root @ along) / self._lengths[group] for group, root, along in triples]
 
-    def largest_by_chance(self, level: float, senses: Sequence[int] | None = None, *, known: bool = False) -> float:
+    def largest_by_chance(self, level: float) -> float:
         """The gain that the best pattern exceeds by chance with probability 1 - level.
 
         Args:
             level: probability, such as 0.995.
-            senses: per pattern +1 where only positive amounts are physical, 0 where both signs are.
-            known: whether to take errors of levels as known, however few levels tell them.
         """
-        drawn = _draw(self.evidence, self._left, known=known)
+        drawn = _draw(self.evidence, self._left)
         best = np.zeros(DRAWS)
-        for number, (group, root) in enumerate(zip(self.groups, self._roots, strict=True)):
-            amounts = root.T @ drawn[group]
-            if root.size and senses is not None and senses[number]:
-                amounts = np.maximum(-senses[number] * np.sign(root[0, 0]) * amounts, 0.0)
-            best = np.maximum(best, np.sum(np.square(amounts), axis=0))
+        for group, root in zip(self.groups, self._roots, strict=True):
+            best = np.maximum(best, np.sum(np.square(root.T @ drawn[group]), axis=0))
         return float(np.quantile(best, level)) if best.any() else np.inf
 
 
-def _draw(evidence: Evidence, rows: Array, *, known: bool) -> Array:
+def _draw(evidence: Evidence, rows: Array) -> Array:
     """Amounts of noise along rows, (c, DRAWS): what levels share, what blocks share, what scatters from point to
     point."""
     drawn = np.zeros((len(rows), DRAWS))
@@ -116,8 +111,7 @@ def _draw(evidence: Evidence, rows: Array, *, known: bool) -> Array:
         in_levels = _rest(of_blocks, of_levels) if levels else of_blocks
         drawn += in_levels @ _normals(in_levels.shape[1], 6 * number) * _unknown(freedoms.shared, 6 * number + 2)
         drawn += of_points @ _normals(of_points.shape[1], 6 * number + 1) * _unknown(freedoms.scatter, 6 * number + 3)
-        of_level = 0 if known else freedoms.level
-        drawn += of_levels @ _normals(of_levels.shape[1], 6 * number + 4) * _unknown(of_level, 6 * number + 5)
+        drawn += of_levels @ _normals(of_levels.shape[1], 6 * number + 4) * _unknown(freedoms.level, 6 * number + 5)
     return drawn
 
 
