@@ -20,14 +20,14 @@ from bushfit.diagnosis.claims import Claim, Screen, claims
 from bushfit.diagnosis.currency import Block, Ledger, Node, Worth
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.explanations import Explanation, FaultyPlace, MissingEffect, effects, places, unnamed
-from bushfit.diagnosis.priors import BEAM, FAR, LEVELS, NAMED, ODDS, REFITS, ROUNDS, SIZES
+from bushfit.diagnosis.priors import BEAM, FAR, LARGEST, LEVELS, NAMED, ODDS, REFITS, ROUNDS, SIZES
 from bushfit.diagnosis.propose import probes
 from bushfit.diagnosis.refit import refitted, within_reach
 from bushfit.diagnosis.rig_errors import blocks, nodes, scattering_alone
 from bushfit.effects import effect_named, qualified
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data import Data
-from bushfit.fitting.noise import ASSUMED_SHARED, of_class
+from bushfit.fitting.rig_class import ASSUMED, of_class
 from bushfit.fitting.solve import Bounds
 
 #: Probability of nothing from which on records are not doubted. For time: each claim is a fit.
@@ -318,7 +318,7 @@ class Search:
             Hypothesis(state.effects, claim, state.places, "", False, weighed.log_posterior, state.size, 0.0, weighed)
         )
         wide = state.log_prior + state.density + weighed.first.log_evidence_wide
-        size = max(state.size, LEVELS[-1][0] * max(of_class(state.tests.rig, ASSUMED_SHARED)))
+        size = max(state.size, LEVELS[-1][0] * max(of_class(state.tests.rig, ASSUMED)))
         self._note(Hypothesis(state.effects, claim, state.places, "", True, wide, size, 0.0, weighed))
 
     def _note(self, hypothesis: Hypothesis) -> None:
@@ -446,7 +446,7 @@ def _laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, di
     """Of an effect that was refitted: ln of the prior density of its own coordinates with the factor of Laplace's
     method, their precision, and what it changes, relative to |K|.
 
-    What an amount changes is log-uniform between the least and the largest size. A shape is uniform over what the tests
+    What an amount changes is log-uniform from the least size on. A shape is uniform over what the tests
     could show; at rest on an end of that it moves no further, and the fall of the likelihood away from the end tells
     how much of it counts. Of an effect in place of a branch each parameter beyond the branch's two is uniform over a
     factor of 20.
@@ -497,7 +497,7 @@ def _of_amount(size: float, error: float) -> float:
         size: of what it changes as fitted, relative to |K|.
         error: standard error of the amount, relative to it.
     """
-    times = np.geomspace(SIZES[0], SIZES[-1], _FINE) / max(size, 1e-12)
+    times = np.geomspace(SIZES[0], LARGEST, _FINE) / max(size, 1e-12)
     error = max(error, _SHARPEST)
     exponent = -0.5 * np.square((times - 1.0) / error)
     return float(logsumexp(exponent)) - log(_FINE) - 0.5 * log(2.0 * np.pi) - log(error)

@@ -7,6 +7,8 @@ import numpy as np
 ODDS = {"effect": 0.22, "place": 0.15, "record": 0.03, "unnamed": 0.10}
 #: Sizes of what may be missing, relative to |K|, each as likely: from what no test shows to what no one overlooks.
 SIZES = np.geomspace(0.004, 0.4, 7)
+#: What an effect that is refitted changes at the most, relative to |K|: some make a bushing several times as stiff.
+LARGEST = 4.0
 #: Sizes of errors of the rig in units of its class, with their weights: what a run shares, ...
 RUNS = ((0.15, 0.2), (0.5, 0.3), (1.0, 0.25), (2.0, 0.2), (4.0, 0.05))
 #: ... what all runs of a level share, and each loop by itself, ...

@@ -1,8 +1,10 @@
 """What a diagnosis found, frozen, and as the document that diagnosis.json holds."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
+
+import numpy as np
 
 from bushfit.diagnosis.document import (
     Description,
@@ -97,10 +99,23 @@ class Odds:
     Args:
         nothing: probability that nothing is missing beyond noise and tolerance.
         told: explanations in words with their probabilities, if anything is missing; the most probable first.
+        values: of the parameters under each of these, as far as it was fitted; else none.
     """
 
     nothing: float
     told: tuple[tuple[str, float], ...] = ()
+    values: tuple[Mapping[str, float], ...] = ()
+
+    def averaged(self, result: Result) -> Result:
+        """A result whose covariance counts that another explanation may hold: each adds the square of how far its
+        parameters lie off, times its probability."""
+        cov = result.covariance
+        here = np.array([result.model.values[name] for name in cov.names])
+        matrix = cov.matrix.copy()
+        for (_, probability), values in zip(self.told, self.values, strict=True):
+            off = np.array([values.get(name, own) for name, own in zip(cov.names, here, strict=True)]) - here
+            matrix += (1.0 - self.nothing) * probability * np.outer(off, off)
+        return replace(result, covariance=replace(cov, matrix=matrix))
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ from bushfit.model.model import Model
 _FAR = 60.0
 #: Fall of chi-square that a fit may yet make, over the fall that a linear model expects.
 _MOST_FALL = 4.0
-#: Evaluations of the model before which no refit is left.
-_FIRST = 6
+#: Evaluations of the model before which no refit is left: a model that the gap has bent needs some to unbend.
+_FIRST = 16
 
 
 def refitted(

@@ -147,11 +147,13 @@ class Told:
         names = [*(best.claim.labels(self.data) if best.claim else ()), *best.effects]
         return " + ".join((*names, *(f"fault: {place.name}" for place in best.places), *_nameless(best)))
 
-    @property
-    def _odds(self) -> tuple[tuple[str, float], ...]:
-        """What is told, in words with its probability, the most probable first."""
+    @cached_property
+    def odds(self) -> Odds:
+        """What is told, the most probable first."""
         told = sorted(self.finding.told, key=lambda each: -each.probability)
-        return tuple((self._in_words(each), each.probability) for each in told)
+        values = (each.best.weighed.state.evidence.model.values if each.best.refitted else {} for each in told)
+        pairs = ((self._in_words(each), each.probability) for each in told)
+        return Odds(self.finding.nothing, tuple(pairs), tuple(values))
 
     def _in_words(self, each: Composition) -> str:
         """A composition as it is told to people: what each of its parts is, with its name."""
@@ -204,10 +206,10 @@ class Told:
             tuple(self.candidates),
             base,
             after,
-            result_of(after, bounds, {*base.model.effects} - {*self.unresolved}),
+            self.odds.averaged(result_of(after, bounds, {*base.model.effects} - {*self.unresolved})),
             self._notes(),
             description,
-            Odds(self.finding.nothing, self._odds),
+            self.odds,
         )
 
     @cached_property

@@ -76,7 +76,7 @@ class DataSet(ABC):
     @property
     def notes(self) -> Sequence[str]:
         """What is odd about the record, for the user."""
-        return ()
+        return self.source.notes if self.source else ()
 
     @property
     @abstractmethod

@@ -29,7 +29,7 @@ class LoopData(DataSet):
     Args:
         fundamental_only: whether all but the first harmonic of its residuals is left out, so that it counts as one
             operating point, with two residuals: of an addition without a law in time nothing else is known.
-        gain_error: standard deviation of the gain of the whole record, where the class of its rig is stated.
+        gain_error: standard deviation of the gain of the whole record, by the class of its rig.
     """
 
     drive: Drive

@@ -12,17 +12,21 @@ from scipy.linalg import block_diag
 from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.fitting.data_set import DataSet, Freedoms, keep, kept, shown_amplitude
-from bushfit.fitting.noise import FLOOR, SweepNoise, unit
-from bushfit.fitting.outliers import outlying_points
+from bushfit.fitting.noise import SweepNoise
+from bushfit.fitting.outliers import outlying_points, unlike
+from bushfit.fitting.repeats import FLOOR, unit
 from bushfit.fitting.whitening import Whitening
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.reading.measurement import Stepped, Sweep
+from bushfit.units import number
 
 #: Degree, in the logarithm of what is stepped, of the Legendre polynomials that count as smooth misfit.
 _SMOOTH_DEGREE = 3
+#: Points that a sentence lists one by one; chosen: more make it long.
+_MOST_LISTED = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +92,20 @@ class SweepData(DataSet):
     @property
     def test(self) -> Sweep:
         return self.sweep
+
+    @cached_property
+    def notes(self) -> list[str]:
+        place = np.unique([self.frequency, self.amplitude], axis=1, return_inverse=True)[1]
+        apart = unlike(self.measured, place)
+        rows = [f"{one} and {other}" for _, *pair in apart for one, other in [sorted(self.order[pair] + 1)]]
+        told = [
+            f"{self.source.file if self.source else self.name}: points that repeat each other lie up to "
+            f"{number(100.0 * share, 2)} % apart, rows {', '.join(rows[:_MOST_LISTED])}"
+            + f" and {len(rows) - _MOST_LISTED} more pairs"
+            * (len(rows) > _MOST_LISTED)
+            for share, *_ in apart[:1]
+        ]
+        return [*told, *(words for name, words in self.noise.beyond.items() if name == self.name)]
 
     @property
     def size(self) -> int:
