@@ -217,6 +217,12 @@ class Ledger:
         kept = (alone > alone[within].max() - far) | (best > best[within].max() - far)
         return [node for node, near in zip(self.nodes, kept.tolist(), strict=True) if near]
 
+    @property
+    def likeliest(self) -> Node:
+        """The node, within the class of the rig, at which one of the groups makes the tests likeliest."""
+        best = np.maximum.reduce([self._solved.base, *(worth.by_node for worth in self.worths)])
+        return self.nodes[int(np.argmax(np.where(self._within, best, -np.inf)))]
+
     @cached_property
     def _within(self) -> Array:
         return np.array([not node.wide for node in self.nodes])

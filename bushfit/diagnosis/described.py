@@ -1,13 +1,19 @@
 """What has no name, described: a smooth correction where it stands, and the power law that it is like."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.correction import Correction, correct
+from bushfit.diagnosis.currency import Ledger
 from bushfit.diagnosis.document import Description
 from bushfit.diagnosis.evidence import Evidence, fit_from
+from bushfit.diagnosis.explanations import unnamed
 from bushfit.diagnosis.fingerprint import Fingerprint, fingerprint
-from bushfit.diagnosis.locate import contrasts, locate
+from bushfit.diagnosis.locate import locate
+from bushfit.diagnosis.rig_errors import blocks, nodes, scattering_alone
 from bushfit.effects.unnamed import NAME
 from bushfit.errors import FitError
 from bushfit.fitting.data_sets import parted
@@ -17,8 +23,8 @@ from bushfit.units import number
 
 #: Evaluations of the model in its refit at most: a correction is of what the best parameters leave, so it has to end.
 _EVALUATIONS = 400
-#: Probability with which noise alone stays below the threshold of what a power law leaves.
-_CHANCE = 0.998
+#: Logarithm of odds below which a size of the rig's errors does not count; chosen for time: a twentieth of the best.
+_NEAR = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,16 +98,13 @@ def _span(values: Sequence[float], factor: float = 1.0) -> str:
     return " to ".join(number(factor * end, 2) for end in (min(values), max(values)))
 
 
-def describe(
-    evidence: Evidence, start: Mapping[str, float], held: Sequence[str], bounds: Bounds
-) -> Described | None:
-    """A smooth correction of a fitted model and its fingerprint; None where no correction stands the hold-out.
+def describe(evidence: Evidence, rig: RigSettings, held: Sequence[str], bounds: Bounds) -> Described | None:
+    """A smooth correction of a fitted model and its fingerprint; None where the tests are no likelier with it.
 
     The parameters are fitted again with each loop standing on its first harmonic, because nothing is known of the law
     in time of what has no name.
 
     Args:
-        start: values of the model's parameters read off the data, for a model that the gap has bent too far.
         held, bounds: parameters that do not move, and limits of the others inside their own.
     """
     if NAME in evidence.model.effects:
@@ -111,8 +114,12 @@ def describe(
         base = _refitted(base, (*held, *base.solution.at_bound), bounds)
     except FitError:  # too few points are left for the parameters
         return None
-    correction = correct(base)
-    if correction is None or not correction.kept:
+    bare = scattering_alone(base)
+    rows, curves = bare.solution.jacobian, [each.group for each in unnamed(bare) if each.group]
+    plain = Ledger(bare.residual, rows, np.zeros(len(rows)), blocks(bare, rig), curves, nodes(bare))
+    plain = replace(plain, nodes=plain.likely(_NEAR))
+    correction = correct(base, bare, plain)
+    if correction is None:
         return None
     effects = (*base.model.effects, NAME)
     model, names = replace(base.model, effects=effects, unnamed=correction.data), base.solution.coordinates.names
@@ -120,8 +127,7 @@ def describe(
     after = Evidence(replace(base.solution, model=model, residual=left, jacobian=rows), base.data_sets)
     whole = replace(after.solution, residual=residual(model, evidence.data_sets))
     forms = [where.excess for where in locate(Evidence(whole, evidence.data_sets)) if where.kind == "loop"]
-    like = fingerprint(base, contrasts(base), _CHANCE, start, bounds)
-    return Described(after, correction, like, max(forms, default=0.0))
+    return Described(after, correction, fingerprint(base, bare, plain, bounds), max(forms, default=0.0))
 
 
 def _refitted(evidence: Evidence, held: Sequence[str], bounds: Bounds) -> Evidence:

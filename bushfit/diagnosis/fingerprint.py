@@ -32,8 +32,11 @@ from bushfit.units import number
 _MOST = 4.0
 #: Pairs of powers along an axis of the grid, and standard errors that it reaches to either side of the likeliest.
 _GRID, _REACH = 13, 4.0
-#: Times that the grid is made anew about the likeliest pair and the parameters beside it; chosen: both then rest.
-_ROUNDS = 5
+#: Times at most that the grid is made anew about the likeliest pair and the parameters beside it, and the step of a
+#: power, in standard errors, with which both rest.
+_ROUNDS, _RESTS = 12, 0.1
+#: Longest step of a parameter between these, in coordinates, and how far inside its limits one stays: usual for fits.
+_LONGEST, _INSIDE = 1.0, 1e-6
 #: Draws of the posterior; chosen: they tell the ends of an interval within a fiftieth of its length.
 _DRAWS = 10_000
 #: Half width of a power's interval beyond which nothing is said of it.
@@ -156,10 +159,9 @@ class _Grid:
         """The grid that the likeliest pairs fill, around the parameters and the term that go best with one another."""
         about = bare.points - bare.points.mean(axis=0)
         changes = np.ptp(about, axis=0) > 0.0
-        ends, model, value = np.outer((-_MOST, _MOST), changes), bare.evidence.model, np.zeros(len(about), dtype=complex)
-        for again in range(_ROUNDS):
-            if again:
-                model, value = _stepped(fitted, model, value, np.exp(middle @ about.T), bounds)
+        model, value = bare.evidence.model, np.zeros(len(about), dtype=complex)
+        ends, middle = np.outer((-_MOST, _MOST), changes), np.full(2, np.inf)
+        for _ in range(_ROUNDS):
             axes = [np.linspace(*pair, _GRID if moves else 1) for pair, moves in zip(ends.T, changes, strict=True)]
             powers, step = np.array(list(product(*axes))), np.ptp(ends, axis=0) / (_GRID - 1)
             left, rows = _around(bare, model, value)
@@ -167,9 +169,13 @@ class _Grid:
             columns = bare.columns(np.concatenate((shapes, 1j * shapes)), model, value)
             groups = [Group(columns[[k, k + len(powers)]], np.ones(2), together=True) for k in range(len(powers))]
             grid = cls(bare, replace(plain, residual=left, jacobian=rows, groups=groups), powers, step)
-            middle = grid.share @ powers
-            reach = _REACH * np.sqrt(grid.share @ np.square(powers - middle)) + step
+            before, middle = middle, grid.share @ powers
+            spread = np.sqrt(grid.share @ np.square(powers - middle))
+            if (np.abs(middle - before) <= _RESTS * spread).all():
+                break
+            reach = _REACH * spread + step
             ends = np.clip((middle - reach, middle + reach), -_MOST * changes, _MOST * changes)
+            model, value = _stepped(fitted, model, value, np.exp(middle @ about.T), bounds)
         return grid
 
     @cached_property
@@ -213,7 +219,9 @@ def _stepped(terms: Terms, model: Model, value: Array, shape: Array, bounds: Bou
     (shape,) = terms.of_size_one(shape[None], model)
     columns = np.concatenate((rows, terms.columns(np.array((shape, 1j * shape)), model, value)))
     step = -np.linalg.lstsq(columns.T, left, rcond=None)[0]
-    point = np.clip(coordinates.point(model.values) + step[:-2], *coordinate_bounds(coordinates, bounds))
+    moved = np.clip(step[:-2], -_LONGEST, _LONGEST)
+    low, high = coordinate_bounds(coordinates, bounds)
+    point = np.clip(coordinates.point(model.values) + moved, low + _INSIDE, high - _INSIDE)
     return model.with_values(coordinates.values(point)), (step[-2] + 1j * step[-1]) * shape
 
 
