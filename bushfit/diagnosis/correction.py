@@ -18,6 +18,7 @@ from math import log
 
 import numpy as np
 from scipy.linalg import block_diag
+from scipy.special import logsumexp
 
 from bushfit.diagnosis.currency import Group, Ledger, Worth
 from bushfit.diagnosis.evidence import Evidence
@@ -27,7 +28,6 @@ from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import Unnamed, correlation, in_lengths, kernel, nodes_among, patches_of, peak_at
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.data_sets import DataSet, parted
-from bushfit.model.covariance import Z95
 
 #: Nodes of a patch at most; chosen: all points of the paper's plan, and little time.
 _MOST_NODES = 100
@@ -67,7 +67,7 @@ class Correction:
 
 def correct(fitted: Evidence, bare: Evidence, plain: Ledger) -> Correction | None:
     """The correction of a fitted model that has most evidence, common to the directions or of each its own; None where
-    none has more than no correction, or its 95 % band is wider than the gap.
+    corrections have no more than none, or its error is larger than the gap.
 
     Args:
         bare: the same fit with residuals in units of what scatters from point to point.
@@ -79,21 +79,26 @@ def correct(fitted: Evidence, bare: Evidence, plain: Ledger) -> Correction | Non
     likeliest = replace(plain, groups=(), nodes=[plain.likeliest])
     names = tuple(dict.fromkeys(map(str, both[0].directions)))
     shared = [[names], [(name,) for name in names]][: len(names)]
-    found = max((_of_most_evidence(both, likeliest, each) for each in shared), key=lambda process: process.log_evidence)
+    found, worth = _of_most_evidence(both, likeliest, shared)
     if (peak := _peak(both[1], likeliest)) is not None:
-        peaked = _of_most_evidence(both, likeliest, found.directions, peak)
-        found = peaked if peaked.log_evidence - log(_PEAKS**2) > found.log_evidence else found
+        peaked, worth_of_it = _of_most_evidence(both, likeliest, [found.directions], peak)
+        if worth_of_it - log(_PEAKS**2) > worth:  # as likely beforehand as all peaks that are tried
+            found, worth = peaked, worth_of_it
+    if worth < likeliest.log_evidence:
+        return None
     correction = replace(found, ledger=replace(plain, groups=())).correction()
-    return correction if found.log_evidence > likeliest.log_evidence and Z95 * correction.band < 1.0 else None
+    return correction if correction.band < 1.0 else None
 
 
 def _of_most_evidence(
-    both: tuple[Terms, Terms], ledger: Ledger, directions: Sequence[tuple[str, ...]], peak: Peak = None
-) -> _Process:
-    """The process of the lengths, then of the tilt, that have most evidence."""
-    every = [_Process(both, ledger, directions, lengths, 0.0, peak) for lengths in product(_LENGTHS, _LENGTHS)]
+    both: tuple[Terms, Terms], ledger: Ledger, shared: Sequence[Sequence[tuple[str, ...]]], peak: Peak = None
+) -> tuple[_Process, float]:
+    """The process of the lengths, then of the tilt, that have most evidence, and the logarithm of that of all lengths."""
+    every = [_Process(both, ledger, each, pair, 0.0, peak) for each in shared for pair in product(_LENGTHS, _LENGTHS)]
+    whole = logsumexp([process.log_evidence for process in every]) - log(len(every))
     straight = max(every, key=lambda process: process.log_evidence)
-    return max((replace(straight, tilt=tilt) for tilt in _TILTS), key=lambda process: process.log_evidence)
+    tilted = [replace(straight, tilt=tilt) for tilt in _TILTS]
+    return max(tilted, key=lambda process: process.log_evidence), float(whole)
 
 
 def _peak(terms: Terms, ledger: Ledger) -> Peak:
