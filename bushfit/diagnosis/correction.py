@@ -17,15 +17,14 @@ from itertools import product
 from math import log
 
 import numpy as np
-from scipy.linalg import block_diag
 from scipy.special import logsumexp
 
-from bushfit.diagnosis.currency import Group, Ledger, Worth
+from bushfit.diagnosis.currency import Group, Ledger
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.holdout import HoldOut, Part
 from bushfit.diagnosis.terms import Terms
 from bushfit.effects.contract import Array
-from bushfit.effects.unnamed import Unnamed, correlation, in_lengths, kernel, nodes_among, patches_of, peak_at
+from bushfit.effects.unnamed import Patch, Unnamed, correlation, in_lengths, kernel, nodes_among, peak_at
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.data_sets import DataSet, parted
 
@@ -36,7 +35,7 @@ _LENGTHS = (0.4, 0.9, 2.0, 4.5)
 #: Tilts tried, of ln frequency by ln motion: what goes by the rate of strain moves so, and a time that strain changes.
 _TILTS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 #: Patterns over the nodes at most, and the variance of one, relative to the largest, that counts; chosen for time.
-_MOST_PATTERNS, _LEAST_VARIANCE = 30, 1e-5
+_MOST, _LEAST_VARIANCE = 30, 1e-5
 #: Digits of the logarithms of points that tell them apart.
 _DIGITS = 6
 #: Frequencies of the sweeps between which a peak is looked for, at least; chosen.
@@ -93,7 +92,7 @@ def correct(fitted: Evidence, bare: Evidence, plain: Ledger) -> Correction | Non
 def _of_most_evidence(
     both: tuple[Terms, Terms], ledger: Ledger, shared: Sequence[Sequence[tuple[str, ...]]], peak: Peak = None
 ) -> tuple[_Process, float]:
-    """The process of the lengths, then of the tilt, that have most evidence, and the logarithm of that of all lengths."""
+    """The process of the lengths, then of the tilt, of most evidence, and the logarithm of that of all lengths."""
     every = [_Process(both, ledger, each, pair, 0.0, peak) for each in shared for pair in product(_LENGTHS, _LENGTHS)]
     whole = logsumexp([process.log_evidence for process in every]) - log(len(every))
     straight = max(every, key=lambda process: process.log_evidence)
@@ -109,7 +108,7 @@ def _peak(terms: Terms, ledger: Ledger) -> Peak:
         return None
     model, ends = terms.evidence.model, np.log(((steps[0], 0.01), (steps[-1], 1.0)))
     for _ in range(1 + _CLOSER):
-        tried = np.array(list(product(*(np.linspace(*pair, _PEAKS) for pair in ends.T))))
+        tried = np.array(list(product(*np.linspace(ends[0], ends[1], _PEAKS).T)))
         shapes = [peak_at((np.exp(m), np.exp(m + w)), terms.points, terms.points).T for m, w in tried]
         columns = terms.columns(np.concatenate([each for shape in shapes for each in (shape, 1j * shape)]), model)
         groups = [Group(each, np.ones(len(each)), together=True) for each in np.split(columns, len(tried))]
@@ -142,32 +141,23 @@ class _Process:
     peak: Peak = None
 
     @cached_property
-    def nodes(self) -> list[Array]:
-        """Logarithms of frequency and motion of each patch's nodes: the points, or some that lie farthest apart."""
+    def _patches(self) -> list[tuple[Array, Array]]:
+        """Of each patch the points that are its nodes, all or those farthest apart, and the correction at all points by
+        its amounts, those of the peak last, complex, (m,) and (p, q)."""
         terms, found = self.both[0], []
         for group in self.directions:
-            distinct = np.unique(terms.points[np.isin(terms.directions, group)].round(_DIGITS), axis=0)
-            found.append(distinct[nodes_among(distinct, _MOST_NODES)])
+            inside = np.flatnonzero(np.isin(terms.directions, group))
+            distinct = inside[np.unique(terms.points[inside].round(_DIGITS), axis=0, return_index=True)[1]]
+            own = distinct[nodes_among(terms.points[distinct], _MOST_NODES)]
+            places = in_lengths(terms.points, self.lengths, self.tilt)
+            size, vectors = np.linalg.eigh(correlation(places[own]))
+            kept = (size > _LEAST_VARIANCE * size[-1]) & (np.arange(size.size) >= size.size - _MOST)  # the largest last
+            near = kernel(places[inside], places[own]) @ vectors[:, kept] / np.sqrt(size[kept])
+            peak = peak_at(self.peak, terms.points[own], terms.points[inside])
+            here = np.zeros((len(places), near.shape[1] + peak.shape[1]), dtype=complex)
+            here[inside] = np.concatenate((near, peak), axis=1)
+            found.append((own, here))
         return found
-
-    @cached_property
-    def _patterns(self) -> tuple[Array, Array, Array]:
-        """By its amounts: values at the nodes and strengths of the peak, patch by patch, the correction at the nodes,
-        complex, and at the points, complex, (m, q), (nodes, q) and (p, q)."""
-        terms, blocks = self.both[0], list[tuple[Array, Array, Array]]()
-        for group, own in zip(self.directions, self.nodes, strict=True):
-            at, points = (in_lengths(each, self.lengths, self.tilt) for each in (own, terms.points))
-            size, vectors = np.linalg.eigh(correlation(at))
-            kept = np.argsort(-size)[:_MOST_PATTERNS]
-            kept = kept[size[kept] > _LEAST_VARIANCE * size.max()]
-            root, per = vectors[:, kept] * np.sqrt(size[kept]), vectors[:, kept] / np.sqrt(size[kept])
-            peak_there, peak_here = (peak_at(self.peak, own, each) for each in (own, terms.points))
-            inside = np.isin(terms.directions, group)[:, None]
-            here = np.concatenate((kernel(points, at) @ per, peak_here), axis=1) * inside
-            values = block_diag(root, np.eye(peak_there.shape[1]))
-            blocks.append((values, np.concatenate((root, peak_there), axis=1), here))
-        values, there, here = zip(*blocks, strict=True)
-        return block_diag(*values), block_diag(*there), np.concatenate(here, axis=1)
 
     @cached_property
     def _free(self) -> Array:
@@ -177,7 +167,7 @@ class _Process:
 
     def _columns(self, which: int) -> Array:
         """Whitened residuals by the amounts, as they were fitted or as they are weighed, (2 q, n)."""
-        here = self._patterns[2].T
+        here = np.concatenate([here for _, here in self._patches], axis=1).T
         return self.both[which].columns(np.concatenate((here, 1j * here)), self.both[which].evidence.model)
 
     @cached_property
@@ -186,25 +176,28 @@ class _Process:
         return replace(self.ledger, groups=[Group(columns, np.ones(len(columns)), together=True)])
 
     @property
-    def worth(self) -> Worth:
-        return self._with_it.worths[0]
-
-    @property
     def log_evidence(self) -> float:
-        return self.worth.log_evidence
+        """Of the tests with it."""
+        return self._with_it.worths[0].log_evidence
 
     def correction(self) -> Correction:
         """As the tests leave it."""
         mean, covariance = self._with_it.amounts(0)
-        mean, covariance = self._free @ mean, self._free @ covariance @ self._free.T
-        values, there, here = self._patterns
-        parts, errors = mean.reshape(2, -1), np.sqrt(np.maximum(_variances(there, covariance), 0.0))
-        patches = patches_of(self.directions, self.nodes, 2 if self.peak else 0, parts @ values.T, errors)
-        size = self.worth.likeliest
-        data = Unnamed(size, self.lengths, patches, self.tilt, self.peak)
-        gap = np.mean(np.square(np.abs(here @ (parts[0] + 1j * parts[1]))))
-        band = float(np.sqrt(_variances(here, covariance).sum(axis=0).mean() / gap))
-        return Correction(data, self._held_out(size), band)
+        mean, covariance = (self._free @ mean).reshape(2, -1), self._free @ covariance @ self._free.T
+        here = np.concatenate([here for _, here in self._patches], axis=1)
+        rows = np.array([np.concatenate((turned.real, -turned.imag), axis=1) for turned in (here, -1j * here)])
+        errors = np.sqrt(np.maximum(np.sum(rows @ covariance * rows, axis=-1), 0.0))  # in phase, in quadrature, (2, p)
+        gap, size = here @ (mean[0] + 1j * mean[1]), self._with_it.worths[0].likeliest
+        patches, strengths = [], 2 if self.peak else 0
+        own = np.split(mean, np.cumsum([each.shape[1] for _, each in self._patches])[:-1], axis=1)
+        for names, (nodes, each), amounts in zip(self.directions, self._patches, own, strict=True):
+            smooth, peak = np.split(amounts, [each.shape[1] - strengths], axis=1)
+            values = smooth @ each[nodes, : smooth.shape[1]].real.T
+            lists = (*np.exp(self.both[0].points[nodes].T), *values, *errors[:, nodes], *peak)
+            patches.append(Patch(names, *(tuple(one.tolist()) for one in lists)))
+        data = Unnamed(size, self.lengths, tuple(patches), self.tilt, self.peak)
+        band = np.linalg.norm(errors) / np.linalg.norm(gap)
+        return Correction(data, self._held_out(size), float(band))
 
     def _held_out(self, size: float) -> HoldOut:
         """Whole runs inside the range, in turn predicted from the others, without it and with it."""
@@ -219,12 +212,6 @@ class _Process:
             pairs = [each.predicted(rows, np.arange(rows.size)) for each, rows in zip(both, held, strict=True)]
             told[part.name] = np.array(pairs)
         return HoldOut.of(told)
-
-
-def _variances(points: Array, covariance: Array) -> Array:
-    """Variances of the two parts of a correction, (2, p), by what it is of its amounts, complex (p, q), and these."""
-    rows = np.array([np.concatenate((turned.real, -turned.imag), axis=-1) for turned in (points, -1j * points)])
-    return np.sum(rows @ covariance * rows, axis=-1)
 
 
 def _inside(data_sets: Sequence[DataSet]) -> Iterator[Part]:

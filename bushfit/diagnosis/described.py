@@ -34,14 +34,15 @@ class Described:
     Args:
         after: the model with its correction, and the tests as far as it can answer them.
         fingerprint: the nearest power law; None where these tests show none.
-        form_excess: misfit of the loop that it meets worst beyond noise, in units of noise, all harmonics counted; 0
-            where it meets them all.
+        words: how large the gap is and what it is like, for people.
+        evidence: where the correction may be trusted, for people.
     """
 
     after: Evidence
     correction: Correction
     fingerprint: Fingerprint | None
-    form_excess: float
+    words: str
+    evidence: str
 
     @property
     def description(self) -> Description | None:
@@ -50,52 +51,6 @@ class Described:
         if found is None or not found.is_power_law:
             return None
         return Description(found.phase_deg, found.frequency_power, found.amplitude_power, found.words)
-
-    @property
-    def words(self) -> str:
-        """What the gap is like, for people."""
-        if self.fingerprint is None:
-            return "nothing is told of its form"
-        no_law = "" if self.fingerprint.is_power_law else "it is no power law of frequency and amplitude; nearest: "
-        return no_law + self.fingerprint.words + self._peak
-
-    @property
-    def _peak(self) -> str:
-        """Its peak, where it has one."""
-        if self.correction.data.peak is None:
-            return ""
-        middle, width = (number(each, 2) for each in self.correction.data.peak)
-        return f"; with a peak, as of a resonance, at {middle} Hz, {width} Hz wide"
-
-    @property
-    def size(self) -> str:
-        """How large the gap is, for people."""
-        shares = self.correction.data.largest, Z95 * self.correction.band
-        largest, band = (number(100.0 * share, 2) for share in shares)
-        return f"up to {largest} % of |K|, known within {band} % of itself"
-
-    @property
-    def evidence(self) -> str:
-        """Where the correction may be trusted, for people."""
-        where = "; ".join(
-            f"{', '.join(patch.directions)} {_span(patch.frequency_Hz)} Hz, {_span(patch.strain, 100.0)} % strain"
-            for patch in self.correction.data.patches
-        )
-        return f"to be trusted between these tests alone ({where}){self._of_loops}, and of this bushing"
-
-    @property
-    def _of_loops(self) -> str:
-        """What the correction does not say of loops, and by how much their form stays off."""
-        if not parted(self.after.data_sets)[0]:
-            return ""
-        off = self.form_excess
-        stays = f" (their form stays off by {number(off, 2)} times the noise)" if off else ""
-        return f", of loops the first harmonic only{stays}"
-
-
-def _span(values: Sequence[float], factor: float = 1.0) -> str:
-    """The least and the largest value."""
-    return " to ".join(number(factor * end, 2) for end in (min(values), max(values)))
 
 
 def describe(evidence: Evidence, rig: RigSettings, held: Sequence[str], bounds: Bounds) -> Described | None:
@@ -125,12 +80,47 @@ def describe(evidence: Evidence, rig: RigSettings, held: Sequence[str], bounds: 
     model, names = replace(base.model, effects=effects, unnamed=correction.data), base.solution.coordinates.names
     left, rows = residual(model, base.data_sets), jacobian(model, base.data_sets, names)
     after = Evidence(replace(base.solution, model=model, residual=left, jacobian=rows), base.data_sets)
-    whole = replace(after.solution, residual=residual(model, evidence.data_sets))
-    forms = [where.excess for where in locate(Evidence(whole, evidence.data_sets)) if where.kind == "loop"]
-    return Described(after, correction, fingerprint(base, bare, plain, bounds), max(forms, default=0.0))
+    like = fingerprint(base, bare, plain, bounds)
+    whole = Evidence(replace(after.solution, residual=residual(model, evidence.data_sets)), evidence.data_sets)
+    return Described(after, correction, like, _words(correction, like), _trusted(correction, whole))
 
 
 def _refitted(evidence: Evidence, held: Sequence[str], bounds: Bounds) -> Evidence:
     """The model fitted to each sweep and to the first harmonic of each loop, to the end."""
     data_sets = tuple(data_set.timeless() for data_set in evidence.data_sets)
     return Evidence(fit_from(evidence.model, data_sets, held, bounds).finished(_EVALUATIONS).solution, data_sets)
+
+
+def _words(correction: Correction, like: Fingerprint | None) -> str:
+    """How large it is and what it is like."""
+    largest, band = (number(100.0 * share, 2) for share in (correction.data.largest, Z95 * correction.band))
+    said = [f"up to {largest} % of |K|, known within {band} % of itself"]
+    if like is None:
+        said.append("nothing is told of its form")
+    elif like.is_power_law:
+        said.append(like.words)
+    else:
+        said.append(
+            "it is no power law of frequency and amplitude" + (f"; nearest: {like.words}" if like.is_told else "")
+        )
+    if correction.data.peak:
+        middle, width = (number(each, 2) for each in correction.data.peak)
+        said.append(f"with a peak, as of a resonance, at {middle} Hz, {width} Hz wide")
+    return "; ".join(said)
+
+
+def _trusted(correction: Correction, whole: Evidence) -> str:
+    """Where it may be trusted, and by how much the form of the worst loop stays off, all harmonics counted."""
+    patches = [
+        f"{', '.join(patch.directions)} {_span(patch.frequency_Hz)} Hz, {_span(patch.strain, 100.0)} % strain"
+        for patch in correction.data.patches
+    ]
+    off = max((where.excess for where in locate(whole) if where.kind == "loop"), default=0.0)
+    stays = f" (their form stays off by {number(off, 2)} times the noise)" if off else ""
+    loops = f", of loops the first harmonic only{stays}" if parted(whole.data_sets)[0] else ""
+    return f"to be trusted between these tests alone ({'; '.join(patches)}){loops}, and of this bushing"
+
+
+def _span(values: Sequence[float], factor: float = 1.0) -> str:
+    """The least and the largest value."""
+    return " to ".join(number(factor * end, 2) for end in (min(values), max(values)))

@@ -9,7 +9,6 @@ Notes:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -87,22 +86,27 @@ class Fingerprint:
     is_power_law: bool
 
     @property
+    def is_told(self) -> bool:
+        """Whether these tests tell its phase and both powers."""
+        found = np.array([self.phase_deg, self.frequency_power, self.amplitude_power])
+        return bool((found[:, 2] - found[:, 1] < 2.0 * np.array([_PHASE_TOLD, _TOLD, _TOLD])).all())
+
+    @property
     def words(self) -> str:
         """The term for people: "in quadrature, grows as f^0.8, independent of amplitude: acts like a damper"."""
         measures = " or ".join(_IN_WORDS[each] for each in (self.measure, *self.alike))
-        said = (
-            f"{_phase_words(self.phase_deg)}, {_power_words(self.frequency_power, 'f', 'frequency')}, "
-            f"{_power_words(self.amplitude_power, 'X', 'amplitude')}, as {measures}"
+        powers = (
+            _power_words(self.frequency_power, "f", "frequency"),
+            _power_words(self.amplitude_power, "X", "amplitude"),
         )
-        like = self._like()
+        said = ", ".join((_phase_words(self.phase_deg), *powers, f"as {measures}"))
+        like = self._like() if self.is_told else ""
         return f"{said}: acts like {like}" if like else said
 
-    def _like(self) -> str | None:
-        """The known laws that lie nearest to the middle of the intervals, where that is near enough in all three."""
+    def _like(self) -> str:
+        """The known laws that lie nearest, where that is near enough in phase and powers; else ""."""
         found = np.array([self.phase_deg, self.frequency_power, self.amplitude_power])
         middle, errors = found[:, 1:].mean(axis=1), np.maximum(np.ptp(found[:, 1:], axis=1) / 2.0 / Z95, 1e-9)
-        if not (errors * Z95 < (_PHASE_TOLD, _TOLD, _TOLD)).all():
-            return None
         distances = {}
         for *law, measures, words in _LAWS:
             if {self.measure, *self.alike} & {*measures}:
@@ -110,7 +114,7 @@ class Fingerprint:
                 off[0] = (off[0] + 180.0) % 360.0 - 180.0
                 distances[words] = float(np.max(np.abs(off) / errors))
         nearest = min(distances.values())
-        return " or ".join(words for words in distances if distances[words] == nearest) if nearest < _LIKE else None
+        return " or ".join(words for words in distances if distances[words] == nearest) if nearest < _LIKE else ""
 
 
 def fingerprint(fitted: Evidence, bare: Evidence, plain: Ledger, bounds: Bounds) -> Fingerprint | None:
@@ -162,8 +166,8 @@ class _Grid:
         model, value = bare.evidence.model, np.zeros(len(about), dtype=complex)
         ends, middle = np.outer((-_MOST, _MOST), changes), np.full(2, np.inf)
         for _ in range(_ROUNDS):
-            axes = [np.linspace(*pair, _GRID if moves else 1) for pair, moves in zip(ends.T, changes, strict=True)]
-            powers, step = np.array(list(product(*axes))), np.ptp(ends, axis=0) / (_GRID - 1)
+            powers = np.array(list(product(*map(np.unique, np.linspace(ends[0], ends[1], _GRID).T))))
+            step = np.ptp(ends, axis=0) / (_GRID - 1)
             left, rows = _around(bare, model, value)
             shapes = bare.of_size_one(np.exp(powers @ about.T), model)
             columns = bare.columns(np.concatenate((shapes, 1j * shapes)), model, value)
@@ -174,7 +178,7 @@ class _Grid:
             if (np.abs(middle - before) <= _RESTS * spread).all():
                 break
             reach = _REACH * spread + step
-            ends = np.clip((middle - reach, middle + reach), -_MOST * changes, _MOST * changes)
+            ends = np.clip(np.stack((middle - reach, middle + reach)), -_MOST * changes, _MOST * changes)
             model, value = _stepped(fitted, model, value, np.exp(middle @ about.T), bounds)
         return grid
 
