@@ -32,6 +32,8 @@ _LEAST_EIGENVALUE = 1e-10
 _NOTHING = 1e-9
 #: Digits of a difference at most, however small its error.
 _MOST_DIGITS = 4
+#: Logarithm of the ratio of two quantities beyond which nothing is known of it: no parameter has bounds further apart.
+_FURTHEST = float(np.log(1e10))
 #: Decimals of a difference without an error at most: those that follow are rounding.
 _MOST_DECIMALS = 6
 #: The parameter that the unit of another has as its exponent: alpha in Pa*s^alpha.
@@ -139,7 +141,7 @@ class Comparison:
         said = []
         for each in self.contrasts:
             stiffness, loss = self.widened(each.stiffness), self.widened(each.loss_factor)
-            percent = replace(stiffness, **{end: 100.0 * np.expm1(getattr(stiffness, end)) for end in _ENDS})
+            percent = replace(stiffness, **{end: 100.0 * relative(getattr(stiffness, end)) for end in _ENDS})
             resisted = each.place.motion.words[2]
             said.append(f"{each.place}: {resisted} {_told(percent, ' %', each)}; loss factor {_told(loss, '', each)}")
         return said
@@ -196,6 +198,11 @@ def _logarithm(band: Band) -> Band:
     return Band(np.log(band.value), **ends, root=band.root / band.value)
 
 
+def relative(logarithm: Array) -> Array:
+    """How far a quantity is off another, relative, from the logarithm of their ratio, which is cut where it is open."""
+    return np.expm1(np.clip(logarithm, -_FURTHEST, _FURTHEST))
+
+
 def _less(one: Band, other: Band) -> Band:
     """One quantity less another whose errors are independent."""
     value = one.value - other.value
@@ -225,7 +232,7 @@ def _parameters(
     found, tested = list[ParameterContrast](), list[int]()
     for i, (name, exponent) in enumerate(rows):
         parameter, note = reference.model.parameters[name], _untested(name, reference, other)
-        relative = parameter.log or exponent is not None
+        of_ratio = parameter.log or exponent is not None
         if not note and not np.isfinite(difference[i]):
             note = "zero in one"
         if not note and not error[i]:
@@ -236,11 +243,11 @@ def _parameters(
             note = f"only at equal {_exponent(name, parameter)}"
         shown = f"{name} at {number(frequency, 3)} Hz" if exponent else name
         unit = _EXPONENT.sub("", parameter.unit).removesuffix("*s") if exponent else parameter.unit
-        values = [float(np.exp(value) if relative else value) for value in (one[i], two[i])]
-        row = ParameterContrast(shown, unit, values[0], values[1], relative, note=note)
+        values = [float(np.exp(value) if of_ratio else value) for value in (one[i], two[i])]
+        row = ParameterContrast(shown, unit, values[0], values[1], of_ratio, note=note)
         if not note:
             ends = difference[i] - half[i], difference[i], difference[i] + half[i]
-            low, value, high = (float(np.expm1(end) if relative else end) for end in ends)
+            low, value, high = (float(relative(end) if of_ratio else end) for end in ends)
             p = 2.0 * float(stdtr(freedom[i], -abs(difference[i]) / error[i]))
             row = replace(row, difference=value, interval=(low, high), p=p)
         found.append(row)

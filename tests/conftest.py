@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from commandline import Done, call
+from commandline import Done, Shared, call
 from hypothesis import HealthCheck, settings
 
 from bushfit.campaign.campaign import Campaign, load_campaign
@@ -97,3 +97,12 @@ def other_models() -> dict[str, Model]:
 def typed(tmp_path: Path) -> Callable[..., Done]:
     """Run a command line in `tmp_path`."""
     return partial(call, tmp_path)
+
+
+@pytest.fixture(scope="session")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Shared:
+    """Commands that run once a session, for all its workers."""
+    base = tmp_path_factory.getbasetemp()
+    store = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "shared"
+    store.mkdir(exist_ok=True)
+    return Shared(store)

@@ -80,11 +80,12 @@ def test_torsion_has_its_own_units(result: Result) -> None:
     assert table["stiffness [N m/rad]"].tolist() == pytest.approx([expected])
 
 
-def test_bands_cover(paper_model: Model) -> None:
+@pytest.mark.parametrize(("seeds", "widest"), [(20, 0.06), pytest.param(150, 0.03, marks=pytest.mark.slow)])
+def test_bands_cover(paper_model: Model, seeds: int, widest: float) -> None:
     """95 % bands of all four quantities, axial and radial, over campaigns that differ in their noise only."""
     plan = SimulateSettings(repeats=3, noise=5e-3, force_noise=3e-3, displacement_noise=2e-4)
     clean, inside = undisturbed(paper_model, plan), []
-    for seed in range(150):
+    for seed in range(seeds):
         found = fit_joint(Data.of(measure(clean, replace(plan, seed=seed)).campaign()))
         for direction in (Direction.AXIAL, Direction.RADIAL):
             prediction = predict(found, direction, FREQUENCIES, AMPLITUDES)
@@ -98,7 +99,7 @@ def test_bands_cover(paper_model: Model) -> None:
             inside.append([np.mean((band.low <= true) & (true <= band.high)) for band, true in quantities])
     each = np.mean(inside, axis=0)
     print(f"95 % bands cover: stiffness {each[0]:.3f}, loss factor {each[1]:.3f}, K' {each[2]:.3f}, K'' {each[3]:.3f}")
-    np.testing.assert_allclose(each, 0.95, atol=0.03)
+    np.testing.assert_allclose(each, 0.95, atol=widest)
 
 
 def test_bands_carry_the_correlation(result: Result) -> None:

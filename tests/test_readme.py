@@ -13,7 +13,7 @@ from pathlib import Path
 
 import click
 import pytest
-from commandline import Done, call
+from commandline import Done, Shared
 
 from bushfit.cli import cli
 
@@ -79,30 +79,41 @@ def shown_commands(page: str) -> list[tuple[str, list[str]]]:
     return [(command, shown) for command, shown in examples(text) if COMMAND.match(command)]
 
 
-def as_typed(folder: Path, arguments: list[str], shown: list[str]) -> Done:
+#: Commands of which some page shows that they draw.
+DRAWING = {
+    command
+    for page in PAGES
+    for command, shown in shown_commands(page)
+    if re.search(r"\.(png|svg|pdf)\b", " ".join(shown))
+}
+
+
+def as_typed(_: Shared, folder: Path, command: str) -> Done:
     program = str(Path(sys.executable).with_name("bushfit"))
-    done = subprocess.run([program, *arguments], cwd=folder, capture_output=True, check=False, encoding="utf-8")
+    words = shlex.split(command, comments=True)[1:]
+    done = subprocess.run([program, *words], cwd=folder, capture_output=True, check=False, encoding="utf-8")
     return Done(done.returncode, done.stdout, done.stderr)
 
 
-def without_pictures(folder: Path, arguments: list[str], shown: list[str]) -> Done:
-    """In this process, and without the pictures that the page does not speak of: they take most of the time."""
-    known = cli.get_command(click.Context(cli), arguments[0])
+def without_pictures(shared: Shared, folder: Path, command: str) -> Done:
+    """In this process, once for all pages, and without pictures that no page speaks of: they take most of the time."""
+    words = shlex.split(command, comments=True)[1:]
+    known = cli.get_command(click.Context(cli), words[0])
     draws = known is not None and "no_plots" in {option.name for option in known.params}
-    return call(folder, *arguments, *["--no-plots"] * (draws and not re.search(r"\.(png|svg|pdf)\b", "".join(shown))))
+    return shared.call(folder, *words, *["--no-plots"] * (draws and command not in DRAWING))
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if shown_commands(page)])
 @pytest.mark.parametrize("run", [without_pictures, pytest.param(as_typed, marks=pytest.mark.slow)])
 def test_every_command_of_a_page_runs_and_says_what_is_shown(
-    page: str, run: Callable[[Path, list[str], list[str]], Done], tmp_path: Path
+    page: str, run: Callable[[Shared, Path, str], Done], shared: Shared, tmp_path: Path
 ) -> None:
     """In order, in a folder that holds the data and campaigns and nothing that another page has made."""
     for name in ("data", "configs"):
         shutil.copytree(ROOT / name, tmp_path / name)
     stale = []
     for command, shown in shown_commands(page):
-        done = run(tmp_path, shlex.split(command, comments=True)[1:], shown)
+        done = run(shared, tmp_path, command)
         print(f"$ {command} -> {done.returncode}")
         assert done.returncode == status(command), f"$ {command}\n{done.stderr}"
         stale += [f"$ {command}\n{line}" for line in shown if not says(line, done.stdout + done.stderr)]

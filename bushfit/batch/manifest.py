@@ -206,7 +206,7 @@ def _csv_entries(path: Path) -> Iterator[Entry]:
     for column in header:
         if column not in (known := _keys(Entry)):
             error = unknown_key(column, known)
-            error.file, error.place = path, "header"
+            error.file, error.place, error.hint = path, "header", error.hint or _OF_TESTS
             raise error
     for cells in reader:
         filled = {key: cell.strip() for key, cell in zip(header, cells, strict=False) if cell.strip()}

@@ -24,6 +24,7 @@ from bushfit.effects import effect_of, place_of, with_base
 from bushfit.errors import CampaignError, naming, typed
 from bushfit.geometry import Bushing, Specimen, place_named
 from bushfit.model.model import FIVE, Model
+from bushfit.reading.columns import Rows
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
@@ -210,23 +211,26 @@ def reader_keywords(
     """The keywords of `read_loop` or `read_sweep` for each test of a campaign.
 
     A test is named by the stem of its file; where two files have one stem, by the file as the campaign lists it. Tests
-    of one file are told apart by its sheet, or by temperature.
+    of one file are told apart by its sheet, by temperature, or by rows of which columns tell them.
 
     Raises:
         CampaignError: a test that is listed twice, or one of no body.
     """
     seen = set()
-    for test, name in zip(tests, _test_names(tests), strict=True):
+    places = [(os.path.normpath(campaign.parent / test.file), test.sheet, test.temperature) for test in tests]
+    for test, place, name in zip(tests, places, _test_names(tests), strict=True):
         file = campaign.parent / test.file
-        if (place := (os.path.normpath(file), test.sheet, test.temperature)) in seen:
+        rows = Rows(test.direction, test.specimen_number, test.rows, shared=places.count(place) > 1)
+        if (own := (*place, *rows[:2], *test.rows.items())) in seen:
             raise CampaignError(
                 "a file is listed twice", file=campaign, found=test.file, expected="each file once, or each sheet of it"
             )
-        seen.add(place)
+        seen.add(own)
         stated = {key: value for key, value in vars(test).items() if value is not None}
         written = FileFormat(**{entry.name: stated.pop(entry.name, None) for entry in fields(FileFormat)})
         conditions = {key: stated.pop(key) for key in _CONDITIONS if key in stated}
         stated.pop("specimen", None)
+        stated["rows"] = rows
         with naming(campaign, place=test.file):
             stated["direction"] = place_tested(test.specimen, test.direction, specimens)
             if amplitude := stated.pop("at_amplitude", None):
@@ -245,6 +249,8 @@ def _test_names(tests: Sequence[LoopFile | SweepFile]) -> list[str]:
     for test in tests:
         stem = Path(test.file).stem
         at = None if test.temperature is None else f"{test.temperature - CELSIUS:.4g} degC"
-        in_file = " ".join(filter(None, (stem, test.sheet, at)))
-        names.append(in_file if files[test.file] > 1 else test.file if stems[stem] > 1 else stem)
+        others = [other for other in tests if other.file == test.file] if files[test.file] > 1 else []
+        keys = [key for key in ("direction", "specimen_number") if len({getattr(one, key) for one in others}) > 1]
+        told = (stem, test.sheet, at, *(getattr(test, key) for key in keys), *test.rows.values())
+        names.append(" ".join(filter(None, told)) if others else test.file if stems[stem] > 1 else stem)
     return names

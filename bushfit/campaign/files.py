@@ -44,7 +44,9 @@ class TestFile(FileFormat):
         specimen: by its name in [[specimens]]; the bushing unless stated.
         noise: relative standard deviation of a point, where it is known.
         weight: of the test in the fit, a share of the weight that its noise gives it.
-        temperature: [K]; it selects the rows of a file that has several.
+        temperature: [K]; it selects the rows of a file that has several, as direction and specimen_number do where a
+            column tells them.
+        rows: that make the test: for columns by their headers, the text there.
         order: number of the test in the session; its place among all [[loops]], then all [[sweeps]], unless stated.
         preload, date, operator, specimen_number: carried on to results as they are written.
     """
@@ -57,6 +59,7 @@ class TestFile(FileFormat):
     noise: Share | None = None
     weight: Annotated[float, Field(gt=0, le=1)] = 1.0
     temperature: Temperature | None = None
+    rows: Mapping[str, Text] = field(default_factory=dict)
     order: Count | None = None
     preload: Text | None = None
     date: Text | None = None

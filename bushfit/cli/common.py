@@ -123,6 +123,7 @@ class Task:
         `tell` is given the campaign's name; `last_line`, said below the files written, their folder.
         """
         from bushfit.campaign.campaign import load_campaign
+        from bushfit.cli.show import warn
         from bushfit.fitting.data import Data
 
         options, loaded = self.options, load_campaign(self.campaign)
@@ -130,7 +131,9 @@ class Task:
             loaded = replace(loaded, fit=replace(loaded.fit, loss=cast("Loss", self.loss)))
         folder = options.folder(loaded.name)
         options.require_free(folder, options.formats.names(job.kinds(loaded)))
-        outcome = job.run(Data.of(loaded))
+        data = Data.of(loaded)
+        warn(options, data.notes)
+        outcome = job.run(data)
         tell(options, loaded.name, outcome)
         options.write(folder, options.formats.files(outcome.contents), outcome.document)
         if last_line:

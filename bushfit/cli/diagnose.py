@@ -73,17 +73,18 @@ def tell_diagnosis(options: Options, name: str, outcome: Diagnosed) -> None:
 
 
 def tell_verdict(options: Options, name: str, outcome: Diagnosed) -> None:
-    """The verdict in a word, with what stays unknown, and in a sentence."""
+    """The verdict in a word, with what stays unknown, in a sentence, and how probable what may be missing is."""
+    from bushfit.diagnosis.record import odds_in_words
+
     colour = _COLOURS.get(outcome.headline, "yellow")
     options.console.print(f"[bold]{escape(name)}:[/bold] [bold {colour}]{escape(outcome.headline)}[/]")
-    options.console.print(f"  {escape(outcome.diagnosis.summary)}")
+    for line in (outcome.diagnosis.summary, *odds_in_words(outcome.document)):
+        options.console.print(f"  {escape(line)}")
 
 
 def tell_findings(options: Options, outcome: Diagnosed) -> None:
     """The effects named with their sizes, the gap before and after, what is usable, where it is, and the next test."""
     console, diagnosis, document = options.console, outcome.diagnosis, outcome.document
-    for each in document["odds"]:
-        console.print(f"  {escape(each['chances'])}: {escape(each['words'])}")
     for effect in document["effects"]:
         _tell_effect(options, effect)
     _tell_gap(options, document)

@@ -35,14 +35,16 @@ def command(
     FILE may be a folder, or a workbook with several tests; what holds no test is told and left out. The columns tell
     what a test is; names of file and sheet, or columns, its direction, and names an amplitude or frequency without a
     column (Dyn_axial_A0,05mm.csv). What only you can know, such as a unit, is asked for in an error that names the
-    option. An option holds for all files of its kind, and goes before names; numbers have a decimal point. Where files
-    differ otherwise, edit the campaign. Raw stepped-sine histories go through `bushfit reduce` first. Tests of a
-    modulus, or with --area and --thickness of a stiffness, are of a specimen and need no size of a bushing.
+    option. An option holds for all files of its kind, and but for a direction goes before names; numbers have a decimal
+    point. Where files differ, edit the campaign. Raw histories go through `bushfit reduce` first. Tests of a modulus,
+    or with --area and --thickness of a stiffness, are of a specimen and need no size of a bushing.
 
-    Writes campaign.toml, which names the files as seen from its folder; -o may name it: -o my_bushing.toml.
+    Writes campaign.toml, which names the files as seen from its folder; -o may name it: -o my_bushing.toml. Where a
+    column tells of several parts, it writes a campaign of each, and batch.toml, their list for bushfit batch;
+    --specimen-number takes one part.
     """
     from bushfit.geometry import Specimen
-    from bushfit.inspection.draft import campaign_text, named_apart
+    from bushfit.inspection.draft import campaign_text, campaigns_of_parts, named_apart
 
     name = name or (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name
     folder, target = _place(options, name)
@@ -52,19 +54,25 @@ def command(
     seen = named_apart(seen)
     if bushing is None and not all(isinstance(one.direction, Specimen) for one in seen):
         bushing = _bushing(name, sizes)
-    text = campaign_text(name, bushing and bushing[1], seen, folder)
+    table = bushing and bushing[1]
+    if len({one.part for one in seen if one.part}) > 1:
+        target = target if options.output and options.output.suffix == ".toml" else "batch.toml"
+        written = campaigns_of_parts(name, table, seen, folder, target)
+        options.require_free(folder, list(written))
+    else:
+        written = {target: campaign_text(name, table, seen, folder)}
     if bushing:
         _tell_bushing(options, bushing[0])
     for one in seen:
         _tell(options, one)
     tell_left_out(options, left_out)
     document: InspectionDocument = {
-        "campaign": text,
+        "campaign": written[target],
         "files": [one.to_document() for one in seen],
         "left_out": left_out,
     }
-    options.write(folder, {target: text.encode()}, document)
-    options.say(f"next: bushfit run {typed(folder / target)}")
+    options.write(folder, {file: text.encode() for file, text in written.items()}, document)
+    options.say(f"next: bushfit {'batch' if len(written) > 1 else 'run'} {typed(folder / target)}")
 
 
 def _radius(side: str, sizes: Mapping[str, str | None]) -> str:
@@ -130,7 +138,7 @@ def _usable(files: Sequence[Path], stated: Mapping[str, Any], *, is_sized: bool)
     from bushfit.inspection.recognition import BLOCK_KEYS
 
     sources, left_out = gather(files, stated)
-    places = [(source.file.resolve(), source.sheet) for source in sources]
+    places = [(source.file.resolve(), str(source.stated)) for source in sources]
     if twice := [source for source, place in zip(sources, places, strict=True) if places.count(place) > 1]:
         raise CampaignError("a file is given twice", found=str(twice[0]), expected="each file once")
     seen: list[Inspected] = []

@@ -35,10 +35,10 @@ def command(
     size). Laws of effects in time are shared with the fit, those of outside are not. The truth is sealed in files that
     the workflow does not read, and opened afterwards.
 
-    A rate is met where it lies within its target and its 95 % interval ends within 3 % (targets of 1 and 2 %) or 8 %
-    (of 5 %); targets of at least so much go by the rate alone. With -o each outcome is written down as it comes: the
-    same command goes on where it was stopped, and ends with scorecard.json. Seeds from 77000 on are kept for cards that
-    are shown; try and tune with others.
+    A target is met where the whole 95 % interval of the rate lies within it; told odds are true where the interval of
+    the share right holds them. With -o each outcome is written down as it comes: the same command goes on where it was
+    stopped, and ends with scorecard.json. Seeds from 77000 on are kept for cards that are shown; try and tune with
+    others.
     """
     from bushfit.report.folder import to_json
     from bushfit.scorecard.card import card, confusion
@@ -52,7 +52,7 @@ def command(
         raise click.UsageError("--keep needs a folder: -o/--output")
     chosen = {each: tasks(campaigns, seed, each) for each in FAMILIES if family in (each, "all")}
     asked: Asked = {
-        "schema": "bushfit/scorecard/1",
+        "schema": "bushfit/scorecard/2",
         "version": __version__,
         "families": list(chosen),
         "campaigns": campaigns,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import click
 from rich import box
 from rich.markup import escape
 from rich.table import Table
@@ -43,9 +44,12 @@ def tell_result(options: Options, title: str, result: Result) -> None:
     console.print(parameter_table(title, result))
     if result.quality:
         quality = result.quality
+        gain = quality.loop_gain_error
+        loops = f", gain of a loop within {number(100 * gain, 2)} % ([rig] gain_error)" if gain else ""
         console.print(
             f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)} "
-            f"over {quality.points} points, noise {number(100 * quality.noise, 2)} % a point"
+            f"over {quality.points} points, noise {number(100 * quality.noise, 2)} % a point{loops}",
+            markup=False,
         )
     tell_tests(options, result.tests, result.usable)
     shown = [pair for pair in result.covariance.correlations() if options.verbose or abs(pair[2]) > _CLOSE]
@@ -93,8 +97,10 @@ def tell_sources(options: Options, result: Result) -> None:
 
 
 def warn(options: Options, lines: Sequence[str]) -> None:
-    """A line for each warning."""
-    for line in lines:
+    """A line for each warning that this command has not given yet."""
+    given = click.get_current_context().meta.setdefault(__name__, set())
+    for line in (line for line in lines if line not in given):
+        given.add(line)
         options.console.print(f"[yellow]warning:[/yellow] {escape(line)}")
 
 

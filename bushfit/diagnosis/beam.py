@@ -19,15 +19,15 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim, Screen, claims
 from bushfit.diagnosis.currency import Block, Ledger, Node, Worth
 from bushfit.diagnosis.evidence import Evidence, fit
-from bushfit.diagnosis.explanations import Explanation, effects, places, unnamed
-from bushfit.diagnosis.priors import BEAM, FAR, LEVELS, NAMED, ODDS, REFITS, ROUNDS, SIZES
+from bushfit.diagnosis.explanations import Explanation, FaultyPlace, MissingEffect, effects, places, unnamed
+from bushfit.diagnosis.priors import BEAM, FAR, LARGEST, LEVELS, NAMED, ODDS, REFITS, ROUNDS, SIZES
 from bushfit.diagnosis.propose import probes
 from bushfit.diagnosis.refit import refitted, within_reach
 from bushfit.diagnosis.rig_errors import blocks, nodes, scattering_alone
 from bushfit.effects import effect_named, qualified
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.data import Data
-from bushfit.fitting.noise import ASSUMED_SHARED, of_class
+from bushfit.fitting.rig_class import ASSUMED, of_class
 from bushfit.fitting.solve import Bounds
 
 #: Probability of nothing from which on records are not doubted. For time: each claim is a fit.
@@ -82,16 +82,18 @@ class Hypothesis:
         levels: whether errors of levels are larger than the class of the rig allows.
         log_posterior: logarithm of prior times evidence.
         size: of what it changes, relative to |K|.
+        last: of this, what its last explanation changes, where it was counted linearly; else 0.
         weighed: the state that it is, with its effects refitted, or to which its last explanation was added linearly.
     """
 
     effects: tuple[str, ...]
     claim: Claim | None
-    places: tuple[Explanation, ...]
+    places: tuple[FaultyPlace, ...]
     unnamed: str
     levels: bool
     log_posterior: float
     size: float
+    last: float
     weighed: Weighed
 
     @property
@@ -160,7 +162,7 @@ class State:
 
     tests: Tests
     effects: tuple[str, ...]
-    places: tuple[Explanation, ...]
+    places: tuple[FaultyPlace, ...]
     evidence: Evidence
     log_prior: float
     precision: Mapping[str, float] = field(default_factory=dict)
@@ -209,7 +211,7 @@ class Weighed:
         return self.state.log_prior + self.state.density + self.first.log_evidence
 
     @cached_property
-    def effects(self) -> list[Explanation]:
+    def effects(self) -> list[MissingEffect]:
         return effects(self.bare, (*self.asked.without, *self.state.effects), self.asked.held)
 
     @cached_property
@@ -226,12 +228,10 @@ class Weighed:
         """This state with an explanation more, counted linearly."""
         state = self.state
         names = (*state.effects, each.name) if each.kind == "effect" else state.effects
-        spots = (*state.places, each) if each.kind == "place" else state.places
+        spots = (*state.places, each) if isinstance(each, FaultyPlace) else state.places
         curve = each.name if each.kind == "unnamed" else ""
-        posterior = state.log_prior + state.density + log_odds + worth.log_evidence
-        return Hypothesis(
-            names, state.tests.claim, spots, curve, False, posterior, max(state.size, worth.size), self
-        )
+        posterior, size = state.log_prior + state.density + log_odds + worth.log_evidence, max(state.size, worth.size)
+        return Hypothesis(names, state.tests.claim, spots, curve, False, posterior, size, worth.size, self)
 
 
 class Search:
@@ -281,7 +281,11 @@ class Search:
             every = self.ordered
             share = np.exp([each.log_posterior - every[0].log_posterior for each in every])
             ahead = np.cumsum(share) - share
-            open_ = [each for each, before in zip(every, ahead / share.sum(), strict=True) if before < NAMED and not each.refitted]
+            open_ = [
+                each
+                for each, before in zip(every, ahead / share.sum(), strict=True)
+                if before < NAMED and not each.refitted
+            ]
             if not open_:
                 return
             first = open_[0]
@@ -311,11 +315,11 @@ class Search:
     def _note_state(self, weighed: Weighed) -> None:
         state, claim = weighed.state, weighed.state.tests.claim
         self._note(
-            Hypothesis(state.effects, claim, state.places, "", False, weighed.log_posterior, state.size, weighed)
+            Hypothesis(state.effects, claim, state.places, "", False, weighed.log_posterior, state.size, 0.0, weighed)
         )
         wide = state.log_prior + state.density + weighed.first.log_evidence_wide
-        size = max(state.size, LEVELS[-1][0] * max(of_class(state.tests.rig, ASSUMED_SHARED)))
-        self._note(Hypothesis(state.effects, claim, state.places, "", True, wide, size, weighed))
+        size = max(state.size, LEVELS[-1][0] * max(of_class(state.tests.rig, ASSUMED)))
+        self._note(Hypothesis(state.effects, claim, state.places, "", True, wide, size, 0.0, weighed))
 
     def _note(self, hypothesis: Hypothesis) -> None:
         """Keep the better of two ways to the same; what was refitted counts before what was not."""
@@ -341,15 +345,19 @@ class Search:
             if each.kind == "effect"
         }
         first = [name for name in sorted(evidence, key=lambda name: -evidence[name]) if name in new]
-        scores = {each.name: each.proposal.score for each in weighed.effects if each.proposal}  # the best first
-        second = [name for name in scores if name in new and 0.5 * scores[name] + self._prior("effect", name) > -_SLIGHT]
-        return list(dict.fromkeys([*(name for name in first[:by_evidence] if evidence[name] > -_SLIGHT), *second[:by_score]]))
+        scores = {each.name: each.proposal.score for each in weighed.effects}  # the best first
+        second = [
+            name for name in scores if name in new and 0.5 * scores[name] + self._prior("effect", name) > -_SLIGHT
+        ]
+        return list(
+            dict.fromkeys([*(name for name in first[:by_evidence] if evidence[name] > -_SLIGHT), *second[:by_score]])
+        )
 
     def _with_effects(self, weighed: Weighed, names: Sequence[str], depth: int) -> list[Weighed]:
         state, asked = weighed.state, self.asked
         if not names or len(state.effects) >= asked.most:
             return []
-        proposed = [each.proposal for each in weighed.effects if each.name in names and each.proposal]
+        proposed = [each.proposal for each in weighed.effects if each.name in names]
         start = asked.start if not state.effects and state.evidence.reduced > _BENT else {}
         return [
             self._weigh(self._with_effect(state, name, evidence, depth))
@@ -370,7 +378,7 @@ class Search:
 
     def _with_places(self, weighed: Weighed, depth: int) -> list[Weighed]:
         state, grown = weighed.state, []
-        own = [(each, worth) for each, worth in weighed.worths if each.kind == "place"]
+        own = [(each, worth) for each, worth in weighed.worths if isinstance(each, FaultyPlace)]
         own.sort(key=lambda pair: -(self._prior("place", pair[0].name) + pair[1].log_evidence))
         for each, worth in own[:_PLACES]:
             odds = self._prior("place", each.name) - log(depth + 1)
@@ -438,9 +446,10 @@ def _laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, di
     """Of an effect that was refitted: ln of the prior density of its own coordinates with the factor of Laplace's
     method, their precision, and what it changes, relative to |K|.
 
-    What an amount changes is log-uniform between the least and the largest size; a shape is uniform over what the tests could show; at rest on an end of that, the fall of the likelihood away from the end
-    tells how much of it counts, and it moves no further. Of an effect in place of a branch each parameter beyond the branch's two
-    is uniform over a factor of 20.
+    What an amount changes is log-uniform from the least size on. A shape is uniform over what the tests
+    could show; at rest on an end of that it moves no further, and the fall of the likelihood away from the end tells
+    how much of it counts. Of an effect in place of a branch each parameter beyond the branch's two is uniform over a
+    factor of 20.
     """
     effect, names = effect_named(name), evidence.solution.coordinates.names
     data_sets, model = evidence.data_sets, evidence.model
@@ -488,7 +497,7 @@ def _of_amount(size: float, error: float) -> float:
         size: of what it changes as fitted, relative to |K|.
         error: standard error of the amount, relative to it.
     """
-    times = np.geomspace(SIZES[0], SIZES[-1], _FINE) / max(size, 1e-12)
+    times = np.geomspace(SIZES[0], LARGEST, _FINE) / max(size, 1e-12)
     error = max(error, _SHARPEST)
     exponent = -0.5 * np.square((times - 1.0) / error)
     return float(logsumexp(exponent)) - log(_FINE) - 0.5 * log(2.0 * np.pi) - log(error)

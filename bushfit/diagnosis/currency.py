@@ -177,12 +177,13 @@ class Ledger:
         size, along = np.empty((2, len(self.nodes), count))
         grams: list[list[Array]] = [[] for _ in self._alike]
         k, products, known = len(self.jacobian), self._products, self.precision > 0.0
+        told = np.diag((products.rows[0] + products.rows[1])[1:, 1 : 1 + k]) + self.precision  # the same at every node
+        scale = np.sqrt(np.maximum(told, np.finfo(float).tiny))
         for number, node in enumerate(self.nodes):
             left, log_size = products.beside(node)
             share = 1.0 / node.scatter**2
             gram = share * products.rows[0] + products.rows[1] - left[:, : 1 + k].T @ left
             information = gram[1:, 1 : 1 + k] + np.diag(self.precision)
-            scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
             root = np.linalg.cholesky(information / np.outer(scale, scale) + _ROUNDING * np.eye(k))
             free = solve_triangular(root, gram[1:] / scale[:, None], lower=True)
             rest = gram[0] - free[:, 0] @ free
@@ -212,7 +213,7 @@ class Ledger:
     def likely(self, far: float) -> list[Node]:
         """The nodes that nothing missing, or one of the groups, brings so near the best in ln evidence."""
         alone = self._solved.base
-        best = np.maximum.reduce([alone, *(worth.by_node for worth in self.worths)])
+        best = np.max(np.array([alone, *(worth.by_node for worth in self.worths)]), axis=0)
         within = self._within
         kept = (alone > alone[within].max() - far) | (best > best[within].max() - far)
         return [node for node, near in zip(self.nodes, kept.tolist(), strict=True) if near]
@@ -220,7 +221,7 @@ class Ledger:
     @property
     def likeliest(self) -> Node:
         """The node, within the class of the rig, at which one of the groups makes the tests likeliest."""
-        best = np.maximum.reduce([self._solved.base, *(worth.by_node for worth in self.worths)])
+        best = np.max(np.array([self._solved.base, *(worth.by_node for worth in self.worths)]), axis=0)
         return self.nodes[int(np.argmax(np.where(self._within, best, -np.inf)))]
 
     @cached_property
@@ -234,8 +235,8 @@ class Ledger:
         Notes: a posterior predictive check on r^T P r (Gelman, Meng and Stern, 1996).
         """
         base = np.where(self._within, self._solved.base, -np.inf)
-        freedom = self.residual.size - np.count_nonzero(self.precision == 0.0)
-        return float(np.exp(base - logsumexp(base)) @ chdtrc(max(freedom, 1), self._solved.misfit))
+        freedom = max(self.residual.size - int(np.count_nonzero(self.precision == 0.0)), 1)
+        return float(np.exp(base - logsumexp(base)) @ chdtrc(freedom, self._solved.misfit))
 
     @cached_property
     def worths(self) -> list[Worth]:
@@ -282,7 +283,7 @@ class Ledger:
 
 
 def _of_one(group: Group, size: Array, along: Array) -> tuple[Array, Array]:
-    """Gain in ln evidence, and square of the change relative to |K|, of one column of a group, (nodes, columns, sizes)."""
+    """Gain in ln evidence, and square of the change relative to |K|, of one of a group's columns, (nodes, c, sizes)."""
     seen = group.unit > _UNSEEN
     v2 = np.square(SIZES * np.where(seen, 1.0 / np.where(seen, group.unit, 1.0), 0.0)[:, None])
     grown = 1.0 + v2 * size

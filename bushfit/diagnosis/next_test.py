@@ -1,12 +1,10 @@
-"""The measurement that would decide: for a set of look-alikes, the menu's entry that parts them best per effort."""
+"""The measurement that would decide: of a menu, the entry that tells most of several explanations per effort."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
-from bushfit.effects import effect_named
 from bushfit.effects.contract import Array, Level
 from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.geometry import Direction, Place
@@ -14,6 +12,8 @@ from bushfit.model.model import Model
 
 #: Relative noise of one point of a test that does not exist yet: that of a good servo-hydraulic rig.
 _NOISE = 5e-3
+#: Information below which a test tells nothing [nats].
+_TELLS_SOMETHING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -54,32 +54,36 @@ MENU = (
 )
 
 
-def deciding_test(models: Sequence[Model], data_sets: Sequence[DataSet]) -> str:
-    """The entry with the largest predicted distance between any two of the models, in noise per effort.
+def deciding_test(models: Sequence[Model], odds: Sequence[float], data_sets: Sequence[DataSet]) -> str:
+    """The entry that is expected to tell most of which model is true, per effort; "" where none tells anything.
 
-    The distance is that of complex stiffness over the test's points, less what a common gain could explain; a test
-    without the rig parts an instrument effect from any other by all of its size.
+    Args:
+        models: that explain the tests so far, each with its probability in `odds`.
+
+    Notes: of mixtures of normal distributions with the distances d the information is at least
+        -sum_i p_i ln sum_j p_j exp(-d_ij/8) (Kolchinsky and Tracey, 2017), and never more than the entropy of the odds.
+        A distance is that of complex stiffness over the test's points, in units of noise.
     """
     if len(models) < 2:
         return ""
+    p = np.array(odds) / np.sum(odds)
     swept = {sweep.direction for sweep in parted(data_sets)[1]}
     menu = [entry for entry in MENU if entry.direction not in swept]
-    scored = [(_distance(entry, models, data_sets) / entry.effort, entry.words) for entry in menu]
-    best, words = max(scored)
-    return words if best > 0.0 else ""
+    told = [-float(p @ np.log(np.exp(-_distances(entry, models, data_sets) / 8.0) @ p)) for entry in menu]
+    best = max(range(len(menu)), key=lambda place: told[place] / menu[place].effort)
+    return menu[best].words if told[best] > _TELLS_SOMETHING else ""
 
 
-def _distance(entry: MenuEntry, models: Sequence[Model], data_sets: Sequence[DataSet]) -> float:
+def _distances(entry: MenuEntry, models: Sequence[Model], data_sets: Sequence[DataSet]) -> Array:
+    """Between the responses of any two models to a test, squared, in units of noise, (models, models)."""
     frequency, amplitude, direction = _points(entry, data_sets)
     if entry.without_rig:
-        kinds = [{effect_named(name).level for name in model.effects} for model in models]
-        if len({Level.INSTRUMENT in kind for kind in kinds}) < 2:
-            return 0.0
         frequency, amplitude, direction = _points(MenuEntry("", 1.0), data_sets)
         responses = [_rig_share(model, direction, frequency, amplitude) for model in models]
     else:
         responses = [np.log(model.stiffness(direction, frequency, amplitude)) for model in models]
-    return min(float(np.sum(np.abs(one - other) ** 2)) for one, other in combinations(responses, 2)) / _NOISE**2
+    each = np.array(responses)
+    return np.sum(np.square(np.abs(each[:, None] - each)), axis=-1) / _NOISE**2
 
 
 def _rig_share(model: Model, direction: Place, frequency: Array, amplitude: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Every constant that moves a verdict, in one table: odds beforehand, sizes, errors of rigs, and when a word is said."""
+"""Every constant that moves a verdict: odds beforehand, sizes, errors of rigs, and when a word is said."""
 
 import numpy as np
 
@@ -7,6 +7,8 @@ import numpy as np
 ODDS = {"effect": 0.22, "place": 0.15, "record": 0.03, "unnamed": 0.10}
 #: Sizes of what may be missing, relative to |K|, each as likely: from what no test shows to what no one overlooks.
 SIZES = np.geomspace(0.004, 0.4, 7)
+#: What an effect that is refitted changes at the most, relative to |K|: some make a bushing several times as stiff.
+LARGEST = 4.0
 #: Sizes of errors of the rig in units of its class, with their weights: what a run shares, ...
 RUNS = ((0.15, 0.2), (0.5, 0.3), (1.0, 0.25), (2.0, 0.2), (4.0, 0.05))
 #: ... what all runs of a level share, and each loop by itself, ...
@@ -31,7 +33,7 @@ NOTHING = 0.15
 NAMED, MOST_TOLD = 0.97, 4
 #: Difference of chi-square that makes such odds between two.
 TELLS = 2.0 * float(np.log(NAMED / (1.0 - NAMED)))
-#: Share of what names and the unnamed bring together, that names bring alone where they may stand: `partly`.
+#: Share of what is missing, by its change of |K|, that names make where they may stand beside the unnamed: `partly`.
 MOSTLY = 0.9
 #: Probability of what the leader leaves, below which it does not fit.
 DOES_NOT_FIT = 0.002

@@ -181,7 +181,8 @@ def probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> 
     frequencies = np.concatenate([data_set.frequency for data_set in data_sets])
     match parameter.scale:
         case "period":
-            low, high = 0.1 / (2.0 * np.pi * frequencies.max()), 2.0 / (2.0 * np.pi * np.median(frequencies))
+            swept = np.concatenate([sweep.frequency for sweep in parted(data_sets)[1]] or [frequencies])
+            low, high = 0.1 / (2.0 * np.pi * swept.max()), 1.0 / (2.0 * np.pi * swept.min())
         case "frequency":
             low, high = 0.7 * frequencies.max(), 4.0 * frequencies.max()
         case "displacement":
@@ -195,7 +196,8 @@ def probes(data_sets: Sequence[DataSet], model: Model, parameter: Parameter) -> 
             high = max((float(np.max(np.abs(each.measured) * each.amplitude)) for each in along), default=1.0)
             low, high = 0.3 * high, 0.95 * high
         case "order":
-            low, high = _ORDERS
+            low, high = _ORDERS  # steeper than the first, which without it lies between the two
+            low = min(max(low, model.values.get("alpha", low)), high)
         case None:
             return np.array([parameter.typical])
     return np.clip(np.geomspace(low, high, _PROBES), *parameter.bounds)

@@ -1,8 +1,10 @@
 """What a diagnosis found, frozen, and as the document that diagnosis.json holds."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import cast
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
 
 from bushfit.diagnosis.document import (
     Description,
@@ -22,6 +24,9 @@ from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.geometry import Place
 from bushfit.model.result import Result
 from bushfit.validation import plain
+
+#: Probability below which nothing is told of what may be else.
+_LEAST_TOLD = 0.01
 
 
 @dataclass(frozen=True)
@@ -94,10 +99,23 @@ class Odds:
     Args:
         nothing: probability that nothing is missing beyond noise and tolerance.
         told: explanations in words with their probabilities, if anything is missing; the most probable first.
+        values: of the parameters under each of these, as far as it was fitted; else none.
     """
 
     nothing: float
     told: tuple[tuple[str, float], ...] = ()
+    values: tuple[Mapping[str, float], ...] = ()
+
+    def averaged(self, result: Result) -> Result:
+        """A result whose covariance counts that another explanation may hold: each adds the square of how far its
+        parameters lie off, times its probability."""
+        cov = result.covariance
+        here = np.array([result.model.values[name] for name in cov.names])
+        matrix = cov.matrix.copy()
+        for (_, probability), values in zip(self.told, self.values, strict=True):
+            off = np.array([values.get(name, own) for name, own in zip(cov.names, here, strict=True)]) - here
+            matrix += (1.0 - self.nothing) * probability * np.outer(off, off)
+        return replace(result, covariance=replace(cov, matrix=matrix))
 
 
 @dataclass(frozen=True)
@@ -237,6 +255,22 @@ def chances(probability: float) -> str:
         if 0 < least < of:
             return f"{least} in {of}"
     return "all but sure" if probability > 0.5 else "less than 1 in 100"
+
+
+def odds_in_words(found: Mapping[str, Any]) -> list[str]:
+    """What a diagnosis tells of probabilities, a line each: what may be missing, the most probable first, and whether
+    nothing is."""
+    lines = [f"{each['chances']}: {each['words']}" for each in found["odds"]]
+    rest = 1.0 - sum(each["probability"] for each in found["odds"])
+    if lines and rest > _LEAST_TOLD:
+        lines.append(f"{chances(rest)}: something else")
+    if lines and found["nothing"] > _LEAST_TOLD:
+        lines.append(f"{chances(found['nothing'])} that nothing is missing after all")
+    if found["verdict"] == "consistent":
+        lines = [f"{chances(found['nothing'])}: nothing is missing"]
+        if 1.0 - found["nothing"] > _LEAST_TOLD:
+            lines.append(f"{chances(1.0 - found['nothing'])}: something is, but these tests do not show it")
+    return lines
 
 
 def level_of(name: str) -> str:

@@ -18,8 +18,8 @@ from bushfit.model.model import Model
 _FAR = 60.0
 #: Fall of chi-square that a fit may yet make, over the fall that a linear model expects.
 _MOST_FALL = 4.0
-#: Evaluations of the model before which no refit is left.
-_FIRST = 6
+#: Evaluations of the model before which no refit is left: a model that the gap has bent needs some to unbend.
+_FIRST = 16
 
 
 def refitted(
@@ -57,6 +57,8 @@ def _goes_on(fit: Descent, best: float) -> bool:
     if _ended(fit):
         return False
     return fit.evaluations < _FIRST or fit.chi_square - _MOST_FALL * fit.expected_fall < best + _FAR
+
+
 def within_reach(model: Model, data_sets: Sequence[DataSet]) -> Bounds:
     """Limits of the shapes of a model's effects to what the tests can show: a stop that is always met is no stop, and a
     resonance far above all frequencies is a mass."""

@@ -14,7 +14,7 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import KNOWN, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import LoopData, SweepData, parted, repeats_of
-from bushfit.fitting.noise import ASSUMED_SHARED, of_class
+from bushfit.fitting.rig_class import ASSUMED, of_class
 from bushfit.fitting.solve import jacobian, residual
 
 #: Kinds of errors, by their place in `Node.errors`.
@@ -55,7 +55,7 @@ def nodes(evidence: Evidence) -> list[Node]:
 def blocks(evidence: Evidence, rig: RigSettings) -> list[Block]:
     """What shares errors: of each level of a sweep its gains, and its phases; loops that repeat one another."""
     loops, sweeps = parted(evidence.data_sets)
-    gain = of_class(rig, ASSUMED_SHARED)
+    gain = of_class(rig, ASSUMED)
     found = [block for sweep in sweeps for block in _of_sweep(evidence, sweep, gain)]
     groups = {tuple(np.flatnonzero(row).tolist()) for row in repeats_of(loops)} if loops else set()
     for group in sorted(groups):

@@ -1,4 +1,4 @@
-"""The finding as an engineer needs it: what is missing, how large, where, how far it closes the gap, and what to test."""
+"""The finding as an engineer needs it: what is missing, how large, where, and what to test."""
 
 from __future__ import annotations
 
@@ -13,15 +13,19 @@ from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.described import describe
 from bushfit.diagnosis.document import Description, Verdict
 from bushfit.diagnosis.evidence import Evidence, result_of
+from bushfit.diagnosis.explanations import FaultyPlace
 from bushfit.diagnosis.holdout import HoldOut, hold_out
 from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.next_test import deciding_test
-from bushfit.diagnosis.record import Diagnosis, Judged, Named, Odds, Where
+from bushfit.diagnosis.record import Diagnosis, Judged, Named, Odds, Where, chances
 from bushfit.diagnosis.words import Composition, Finding
 from bushfit.effects import effect_named
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.data import Data
 from bushfit.units import number
+
+#: What is said where there is no gap.
+_NOTHING = "nothing is missing beyond noise and tolerance"
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +58,7 @@ class Told:
         """The whole finding."""
         match self.finding.verdict:
             case "consistent":
-                return self._finished("consistent", _nothing(self.finding), self.base)
+                return self._finished("consistent", _NOTHING, self.base)
             case "named" | "partly":
                 return self._named()
             case "ambiguous":
@@ -66,7 +70,7 @@ class Told:
         best = self.first.best
         if best.claim:
             return self._of_record(best.claim)
-        names = [Named(name, self._evidence(name)) for name in best.effects]
+        names = [Named(name, self._evidence()) for name in best.effects]
         beside = [place.name for place in best.places] + (["something without a name"] if best.unnamed else [])
         words = f"{_all(best.effects)} {'closes' if len(best.effects) == 1 else 'close'} "
         words += f"part of the gap; the rest: {', '.join(beside)}" if beside else "the gap"
@@ -103,19 +107,22 @@ class Told:
         others = tuple(labels[id(each)] for each in told if each is not led)
         names: list[Named] = []
         if led and led.best.claim:
-            names = [replace(each, alternatives=others) for each in _entries(self.data, led.best.claim, self._of_claim(led))]
+            names = [
+                replace(each, alternatives=others) for each in _entries(self.data, led.best.claim, self._of_claim(led))
+            ]
         elif led:
             names = [Named(name, self._probability(led), others) for name in led.best.effects]
         words = f"these tests cannot tell {' from '.join(labels.values())}"
-        models = [each.best.weighed.state.evidence.model for each in told if each.best.effects and each.best.refitted]
-        advice = deciding_test(models, self.base.data_sets)
+        fitted = [each for each in told if each.best.effects and each.best.refitted]
+        models = [each.best.weighed.state.evidence.model for each in fitted]
+        advice = deciding_test(models, [each.probability for each in fitted], self.base.data_sets)
         if led and led.best.claim:
             advice = f"look into the records of the tests; {'; '.join(led.best.claim.corrections(self.data))}"
         spot = next((each.best for each in told if each.best.places), None)
         return self._finished("ambiguous", words, self.base, names, places=spot, next_test=advice)
 
     def _without_name(self) -> Diagnosis:
-        """A gap that is described, where a correction stands; else unexplained, with the place at fault if there is one."""
+        """A gap that is described where a correction stands, else unexplained, with the place at fault if one is."""
         asked, finding = self.search.asked, self.finding
         lead = f"; no more than leads: {_all(finding.leads)}" if finding.leads else ""
         spot = self.first.best if self.first and finding.verdict == "unexplained" else None
@@ -126,22 +133,39 @@ class Told:
             held = found.correction.held
             return self._finished("described", words, found.after, names, description=found.description, held=held)
         words = "a real gap stays that no known effect closes" + lead
-        if spot:
-            words = f"{self.label(self.finding.told[0])} stands out from all other tests: measure it again before looking for physics"
-        return self._finished("unexplained", words, self.base, places=spot)
+        advice = ""
+        if spot and spot.places:
+            words = f"{_all([place.name for place in spot.places])}: this stands out from all other tests; "
+            words += "measure it again before looking for physics"
+        elif spot:
+            words = "the levels disagree by more than the rig's class allows, and by nothing else"
+            advice = "measure the levels again in another session; or state the rig's class, gain_error under [rig]"
+        return self._finished("unexplained", words, self.base, places=spot, next_test=advice)
 
     def label(self, each: Composition) -> str:
-        """A composition in words: its effects, or what else it is."""
+        """A composition by the names of its effects, or what else it is."""
         best = each.best
-        parts = [*best.effects, *(f"fault: {place.name}" for place in best.places)]
-        parts = ([" + ".join(best.claim.labels(self.data))] if best.claim else []) + parts
-        parts += ["errors of levels beyond the rig's class"] if best.levels else []
-        parts += ["something without a name"] if best.unnamed else []
-        return " + ".join(parts)
+        names = [*(best.claim.labels(self.data) if best.claim else ()), *best.effects]
+        return " + ".join((*names, *(f"fault: {place.name}" for place in best.places), *_nameless(best)))
 
-    def _evidence(self, name: str) -> str:
-        """Why an effect was named."""
-        gain = self.base.chi_square - self.search.root.state.evidence.chi_square
+    @cached_property
+    def odds(self) -> Odds:
+        """What is told, the most probable first."""
+        told = sorted(self.finding.told, key=lambda each: -each.probability)
+        values = (each.best.weighed.state.evidence.model.values if each.best.refitted else {} for each in told)
+        pairs = ((self._in_words(each), each.probability) for each in told)
+        return Odds(self.finding.nothing, tuple(pairs), tuple(values))
+
+    def _in_words(self, each: Composition) -> str:
+        """A composition as it is told to people: what each of its parts is, with its name."""
+        best = each.best
+        parts = [best.claim.words(self.data)] if best.claim else []
+        parts += [f"{effect_named(name).phrase} ({name})" for name in best.effects]
+        parts += [f"the tests are off: {place.name}" for place in best.places]
+        return ", and ".join((*parts, *_nameless(best)))
+
+    def _evidence(self) -> str:
+        """Why effects were named."""
         assert self.first
         after = self.first.best.weighed.state.evidence
         gain = self.base.chi_square - after.chi_square
@@ -150,8 +174,8 @@ class Told:
 
     def _probability(self, each: Composition) -> str:
         others = [other for other in self.finding.told if other is not each]
-        words = f"{number(each.probability, 3)} probable"
-        return words + (f", next {self.label(others[0])} {number(others[0].probability, 2)}" if others else "")
+        words = chances(each.probability)
+        return words + (f", next {self.label(others[0])} {chances(others[0].probability)}" if others else "")
 
     def _finished(
         self,
@@ -168,10 +192,10 @@ class Told:
         base, bounds = self.base, self.search.asked.bounds
         spots = list(places.places) if places else []
         if not next_test and names:
-            next_test = effect_named(names[0].name).confirmed_by if verdict != "described" else ""
+            next_test = effect_named(names[0].name).confirmed_by
         if spots:
             next_test = f"measure again: {spots[0].name}"
-        where = (*(_place_where(base, each.suspect, places) for each in spots if places), *locate(base))
+        where = (*(_place_where(base, each, places) for each in spots if places), *locate(base))
         return Diagnosis(
             verdict,
             summary,
@@ -183,10 +207,10 @@ class Told:
             tuple(self.candidates),
             base,
             after,
-            result_of(after, bounds, {*base.model.effects} - {*self.unresolved}),
+            self.odds.averaged(result_of(after, bounds, {*base.model.effects} - {*self.unresolved})),
             self._notes(),
             description,
-            Odds(self.finding.nothing, tuple((self.label(each), each.probability) for each in self.finding.told)),
+            self.odds,
         )
 
     @cached_property
@@ -195,11 +219,17 @@ class Told:
         chance = self.hypotheses[0].log_posterior
         weight = {id(each): float(np.exp(each.log_posterior - chance)) for each in self.hypotheses}
         whole = sum(weight.values())
-        alone = {each.effects[0]: each for each in self.hypotheses if each.refitted and len(each.effects) == 1 and len(each.key) == 1}
+        alone = {
+            each.effects[0]: each
+            for each in self.hypotheses
+            if each.refitted and len(each.effects) == 1 and len(each.key) == 1
+        }
         found = []
         for each in self.search.root.effects:
             share = sum(weight[id(other)] for other in self.hypotheses if each.name in other.effects) / whole
-            found.append(self._judged(each.name, each.proposal.score, each.proposal.visible, alone.get(each.name), share))
+            found.append(
+                self._judged(each.name, each.proposal.score, each.proposal.visible, alone.get(each.name), share)
+            )
         return found
 
     def _judged(self, name: str, score: float, visible: bool, alone: Hypothesis | None, share: float) -> Judged:
@@ -219,8 +249,10 @@ class Told:
         return (f"not identifiable from these tests: {', '.join(blind)}",) if blind else ()
 
 
-def _nothing(finding: Finding) -> str:
-    return "nothing is missing beyond noise and tolerance"
+def _nameless(best: Hypothesis) -> list[str]:
+    """What a hypothesis holds beside effects, places and mistakes."""
+    levels = ["errors of levels beyond the rig's class"] if best.levels else []
+    return [*levels, *(["something without a name"] if best.unnamed else [])]
 
 
 def _all(names: Sequence[str]) -> str:
@@ -230,16 +262,28 @@ def _all(names: Sequence[str]) -> str:
 def _entries(data: Data, claim: Claim, evidence: str) -> list[Named]:
     """An entry for each test of a claim."""
     return [
-        Named(one.mistake.name, evidence, test=one.test(data), sentence=one.words(data), correction=one.corrections(data)[0])
+        Named(
+            one.mistake.name,
+            evidence,
+            test=one.test(data),
+            sentence=one.words(data),
+            correction=one.corrections(data)[0],
+        )
         for one in claim.each
     ]
 
 
-def _place_where(base, suspect, best: Hypothesis) -> Where:
-    kind, component = ("loop", "force") if suspect.kind == "loop" else ("sweep", "storage")
-    columns = np.array(suspect.columns)
+def _place_where(base: Evidence, place: FaultyPlace, best: Hypothesis) -> Where:
+    kind, component = ("loop", "force") if place.family == "loop" else ("sweep", "storage")
+    columns = place.columns
     left = columns @ base.residual / np.maximum(np.linalg.norm(columns, axis=1), 1e-300)
-    reading = f"{suspect.words} departs by {number(100 * best.size, 2)} % from what all other tests say"
+    reading = f"{place.name} departs by {number(100 * best.size, 2)} % from what all other tests say"
     return Where(
-        suspect.direction, kind, suspect.frequency, suspect.amplitude, component, float(np.sqrt(np.mean(left**2))), reading
+        place.direction,
+        kind,
+        place.frequency,
+        place.amplitude,
+        component,
+        float(np.sqrt(np.mean(left**2))),
+        reading,
     )

@@ -38,7 +38,12 @@ class Composition:
     def kinds(self) -> frozenset[str]:
         """Of what parts it is made."""
         best = self.best
-        parts = {"effects": best.effects, "places": best.places or best.levels, "unnamed": best.unnamed, "record": best.claim}
+        parts = {
+            "effects": best.effects,
+            "places": best.places or best.levels,
+            "unnamed": best.unnamed,
+            "record": best.claim,
+        }
         return frozenset(kind for kind, there in parts.items() if there)
 
 
@@ -60,7 +65,9 @@ class Finding:
 
 def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
     """The verdict on hypotheses, the most probable first; what changes less than the tolerance counts as nothing."""
-    weights = np.exp([each.log_posterior for each in hypotheses] - logsumexp([each.log_posterior for each in hypotheses]))
+    weights = np.exp(
+        [each.log_posterior for each in hypotheses] - logsumexp([each.log_posterior for each in hypotheses])
+    )
     pairs = list(zip(hypotheses, weights.tolist(), strict=True))
     small = [_is_nothing(each, tolerance) for each in hypotheses]
     nothing = sum(weight for (_, weight), is_small in zip(pairs, small, strict=True) if is_small)
@@ -70,7 +77,7 @@ def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
     compositions = _compositions(left)
     first = compositions[0]
     if first.probability >= NAMED:
-        return _of_one(first, nothing, hypotheses)
+        return _of_one(first, nothing)
     told, together = list[Composition](), 0.0
     for each in compositions:
         if together < NAMED:
@@ -79,7 +86,7 @@ def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
     common = frozenset.intersection(*(each.parts for each in told))
     sure = next((each for each in told if each.parts == common), None)
     if sure:  # all that is probable has these parts; what else there is is not shown
-        found = _of_one(sure, nothing, hypotheses)
+        found = _of_one(sure, nothing)
         return replace(found, told=(sure, *(each for each in told if each is not sure)))
     unnamed = sum(each.probability for each in told if "unnamed" in each.kinds)
     if len(told) <= MOST_TOLD and unnamed < 0.5:
@@ -91,12 +98,12 @@ def _is_nothing(each: Hypothesis, tolerance: float) -> bool:
     return each.size <= tolerance or not each.key
 
 
-def _of_one(first: Composition, nothing: float, hypotheses: Sequence[Hypothesis]) -> Finding:
+def _of_one(first: Composition, nothing: float) -> Finding:
     """The verdict where one composition is all but sure."""
     kinds, best = first.kinds, first.best
     names = best.effects
     if "unnamed" in kinds:
-        if names and _share_of_names(names, hypotheses) > MOSTLY:
+        if names and best.last < (1.0 - MOSTLY) * best.size:
             return Finding("partly", nothing, (first,))
         return Finding("described", nothing, (first,), names)
     if not names and "record" not in kinds:
@@ -108,27 +115,10 @@ def _of_one(first: Composition, nothing: float, hypotheses: Sequence[Hypothesis]
     return Finding("named", nothing, (first,))
 
 
-def _share_of_names(names: tuple[str, ...], hypotheses: Sequence[Hypothesis]) -> float:
-    """Share of what names and something unnamed bring together in ln evidence, that the names bring alone."""
-
-    def best(effects: tuple[str, ...], *, unnamed: bool) -> float:
-        own = [
-            each.log_posterior
-            for each in hypotheses
-            if set(each.effects) == set(effects) and bool(each.unnamed) is unnamed and not each.places and not each.claim
-        ]
-        return max(own, default=-np.inf)
-
-    nothing = best((), unnamed=False)
-    return (best(names, unnamed=False) - nothing) / max(best(names, unnamed=True) - nothing, 1e-9)
-
-
 def _leads(compositions: Sequence[Composition]) -> tuple[str, ...]:
     """Effects that nearly all that is probable has in common."""
     names = dict.fromkeys(name for each in compositions[:MOST_TOLD] for name in each.best.effects)
-    share = {
-        name: sum(each.probability for each in compositions if name in each.best.effects) for name in names
-    }
+    share = {name: sum(each.probability for each in compositions if name in each.best.effects) for name in names}
     return tuple(name for name in names if share[name] >= MOSTLY)
 
 

@@ -64,7 +64,7 @@ def diagnose(data: Data, model: Model | None = None, settings: Settings | None =
     fewer += _left_out_of_fewer(whole, data, begun.outliers)
     of_loops = outliers_at(found.result.model, data.loops)
     outliers = (*told(of_loops, robust=data.robust), *told(left, robust=True))
-    notes = (*said, *fewer, *found.notes, *outliers)
+    notes = (*said, *fewer, *found.notes, *data.assumed, *outliers)
     warnings = (*said, *found.result.warnings, *outliers)
     result = replace(found.result, outliers=(*of_loops, *left), warnings=warnings, specimens=data.campaign.specimens)
     return replace(found, notes=notes, result=result)

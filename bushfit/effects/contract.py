@@ -16,6 +16,7 @@ Notes:
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
@@ -214,6 +215,12 @@ class Effect:
     after: str | None = None
     never_with: tuple[str, ...] = ()
     limit: str | None = None
+
+    @property
+    def phrase(self) -> str:
+        """Its sentence up to the first colon or semicolon, to stand within another."""
+        short = re.split("[:;]", self.sentence.rstrip("."))[0]
+        return short[0].lower() + short[1:]
 
     def acts_at(self, place: Place) -> bool:
         """Whether it acts at a place: one that belongs to a place, by its name, acts there alone."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from bushfit.effects import temperature
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_sets import DataSet
+from bushfit.fitting.data_sets import DataSet, parted, repeats_of
 from bushfit.fitting.solve import Coordinates, jacobian, residual
 from bushfit.geometry import Bushing, Direction, stiffness_per_modulus
 from bushfit.model.covariance import Covariance
@@ -149,11 +149,14 @@ def quality(model: Model, data_sets: Sequence[DataSet], parameters: int) -> Qual
     """How well a model meets data sets: NRMSE, reduced chi-square, number of residuals, relative noise."""
     relative = np.concatenate([data_set.relative(model) for data_set in data_sets])
     noise = np.repeat([data_set.relative_noise for data_set in data_sets], [data_set.counted for data_set in data_sets])
+    loops, _ = parted(data_sets)
+    repeats = np.count_nonzero(repeats_of(loops), axis=1)
     return Quality(
         nrmse=float(np.sqrt(np.mean(relative**2))),
         reduced_chi_square=_reduced(model, data_sets, parameters)[0],
         points=sum(data_set.counted for data_set in data_sets),
         noise=float(np.sqrt(np.mean(noise**2))),
+        loop_gain_error=float(np.max([loop.gain_error for loop in loops] / np.sqrt(repeats))) if loops else None,
     )
 
 

@@ -13,6 +13,7 @@ from bushfit.effects import with_base
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, naming
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, loop_data, sweep_data, with_level_errors
+from bushfit.fitting.rig_class import class_words
 from bushfit.fitting.solve import Bounds
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction, Specimen, place_named
@@ -58,6 +59,19 @@ class Data:
         under = iter(measured_session(self.campaign.bushing, tests))
         loops = tuple(replace(loop, under=next(under).at(0)) for loop in self.loops)
         return replace(self, loops=loops, sweeps=tuple(replace(sweep, under=next(under)) for sweep in self.sweeps))
+
+    @property
+    def notes(self) -> list[str]:
+        """What is odd about the tests themselves, whatever is fitted to them."""
+        return [f"{test.name}: {note}" for test in (*self.loops, *self.sweeps) for note in test.notes]
+
+    @property
+    def assumed(self) -> list[str]:
+        """What is said of the class of the rig where nothing was repeated and not all of it is stated."""
+        if None not in self.campaign.rig.stated or all(sweep.noise.origin != "assumed" for sweep in self.sweeps):
+            return []
+        shared = class_words(self.campaign.rig)
+        return [f"nothing was repeated at three points or more: errors shared by a run are the rig's class, {shared}"]
 
     @property
     def robust(self) -> bool:

@@ -6,7 +6,6 @@ of `DataSet` and need not know which kind of test it is.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import wraps
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -17,27 +16,6 @@ from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model
 from bushfit.model.result import Outlier
 from bushfit.reading.measurement import Loop, Source, Sweep
-
-
-@dataclass(frozen=True, eq=False)
-class Suspect:
-    """Points of the tests that a fault of the rig would move together.
-
-    Args:
-        words: where, for the user: what to measure again.
-        kind: one of SUSPECT_KINDS.
-        columns: whitened residuals that a unit deviation of each kind makes, (n,) each.
-        direction: of the first test touched.
-        frequency: lowest and highest [Hz].
-        amplitude: lowest and highest, zero-to-peak [m or rad].
-    """
-
-    words: str
-    kind: str
-    columns: Sequence[Array]
-    direction: Place
-    frequency: tuple[float, float]
-    amplitude: tuple[float, float]
 
 
 class Freedoms(NamedTuple):
@@ -54,10 +32,6 @@ class Freedoms(NamedTuple):
     shared: int
     scatter: int
     level: int = 0
-
-
-#: Kinds of suspects, in the order in which they are listed.
-SUSPECT_KINDS = ("frequency", "level", "repeat", "loop")
 
 
 class DataSet(ABC):
@@ -102,7 +76,7 @@ class DataSet(ABC):
     @property
     def notes(self) -> Sequence[str]:
         """What is odd about the record, for the user."""
-        return ()
+        return self.source.notes if self.source else ()
 
     @property
     @abstractmethod
@@ -257,10 +231,6 @@ class DataSet(ABC):
     @abstractmethod
     def smooth_misfit(self, model: Model) -> float:
         """Largest smooth misfit, relative to |K| or to half a loop's force range."""
-
-    @abstractmethod
-    def suspects(self) -> Iterator[Suspect]:
-        """Points that a fault of the rig may have moved together."""
 
     @abstractmethod
     def columns(self) -> Mapping[str, Any]:

@@ -10,11 +10,14 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.data_set import DataSet
 from bushfit.fitting.drive import Drive, drive_of
 from bushfit.fitting.loop_data import LoopData
-from bushfit.fitting.noise import SweepNoise, of_class, sweep_noise
+from bushfit.fitting.noise import SweepNoise, sweep_noise
+from bushfit.fitting.outliers import unlike
+from bushfit.fitting.rig_class import of_class
 from bushfit.fitting.sweep_data import SweepData
 from bushfit.geometry import Place, Specimen
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Source, Sweep
+from bushfit.units import number
 
 __all__ = ["DataSet", "LoopData", "SweepData", "loop_data", "parted", "sources", "sweep_data"]
 
@@ -28,17 +31,23 @@ def loop_data(
 ) -> list[LoopData]:
     """One data set per loop; rows that are outliers carry no weight where they are to be left out."""
     drives = [drive_of(loop, without_outliers=without_outliers) for loop in loops]
-    return with_gain_errors([LoopData(drive).weighted(np.array(drive.loop.weight)) for drive in drives], stated)
+    found = [LoopData(drive).weighted(np.array(drive.loop.weight)) for drive in drives]
+    stiffness = np.concatenate([np.empty(0), *(loop.measured for loop in found)])
+    for apart, one, other in unlike(stiffness, np.argmax(repeats_of(found), axis=1)) if found else ():
+        said = f"it repeats {found[one].name}, and their stiffness lies {number(100.0 * apart, 2)} % apart"
+        drive = found[other].drive
+        found[other] = replace(found[other], drive=replace(drive, notes=(*drive.notes, said)))
+    return with_gain_errors(found, stated)
 
 
 def with_gain_errors(loops: Sequence[LoopData], stated: RigSettings) -> list[LoopData]:
-    """The same loops with the error of their gain that the class of the rig states.
+    """The same loops with the error of their gain that a rig of the class makes, stated or assumed.
 
     Notes:
         All repeats of a loop share it. Independent errors larger by the root of their number leave the mean of the
         repeats, all that tells of the bushing, just as unsure.
     """
-    errors = of_class(stated, (0.0, 0.0))[0] * np.sqrt(np.count_nonzero(repeats_of(loops), axis=1))
+    errors = of_class(stated)[0] * np.sqrt(np.count_nonzero(repeats_of(loops), axis=1))
     return [replace(loop, gain_error=error) for loop, error in zip(loops, errors.tolist(), strict=True)]
 
 
@@ -55,7 +64,8 @@ def sweep_data(
     """One data set per sweep; the noise of those of one rig, the bushing's or a specimen's, is estimated together."""
     rigs = [sweep.direction if isinstance(sweep.direction, Specimen) else None for sweep in sweeps]
     noises = {
-        rig: sweep_noise([sweep for sweep, own in zip(sweeps, rigs, strict=True) if own == rig], stated) for rig in rigs
+        rig: sweep_noise([sweep for sweep, own in zip(sweeps, rigs, strict=True) if own == rig], stated)
+        for rig in dict.fromkeys(rigs)
     }
     data_sets = [SweepData(sweep, noises[rig], residuals) for sweep, rig in zip(sweeps, rigs, strict=True)]
     return [data_set.weighted(np.array(data_set.sweep.weight)) for data_set in data_sets]

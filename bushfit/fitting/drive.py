@@ -17,7 +17,7 @@ from bushfit.errors import FitError
 from bushfit.fitting.clock import fundamental, steady_part, thinned, wrong_clock
 from bushfit.fitting.fourier import GRID, as_complex, basis, least_squares, phase_bins, series
 from bushfit.fitting.loop_harmonics import MOST_ROWS, LoopHarmonics, OutlierRows, less_slow, loop_harmonics
-from bushfit.fitting.noise import FLOOR
+from bushfit.fitting.repeats import FLOOR
 from bushfit.fitting.row_noise import RowNoise, of_a_lone_cycle, row_noise
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.cycles import HOLE
@@ -220,6 +220,7 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
 
 def _of_the_record(loop: Loop) -> Iterator[str]:
     """What is to be said of the record that a loop was taken from, and of its first cycle."""
+    yield from loop.source.notes if loop.source else ()
     if loop.part and loop.part.left_out:
         yield loop.part.left_out
     if loop.softening is not None:

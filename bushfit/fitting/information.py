@@ -12,7 +12,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.fitting.assess import measured_range
 from bushfit.fitting.data_sets import DataSet, LoopData, SweepData, new_loop, new_sweep, parted
-from bushfit.fitting.noise import ASSUMED_SHARED
+from bushfit.fitting.rig_class import ASSUMED
 from bushfit.fitting.solve import jacobian
 from bushfit.model.model import Model
 
@@ -140,14 +140,14 @@ def _new_loops(model: Model, data_sets: Sequence[DataSet]) -> Iterator[tuple[str
         loop = new_loop(
             model, direction, _NEW_RATE, size, _FORCE_NOISE, cycles=_NEW_CYCLES, rows=_NEW_ROWS, from_rest=True
         )
-        yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", loop
+        yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", replace(loop, gain_error=ASSUMED[0])
 
 
 def _changed(loop: LoopData, model: Model, *, amplitude: float = 1.0, rate: float = 1.0) -> LoopData:
     """A loop of so many times the amplitude and rate, as the model would have it, with the same relative noise."""
     drive = loop.drive
     moved = replace(drive, coefficients=drive.coefficients * amplitude, frequency=drive.frequency * rate)
-    return LoopData(moved).noise_free(model).with_noise(loop.relative_noise)
+    return replace(loop, drive=moved).noise_free(model).with_noise(loop.relative_noise)
 
 
 def _new_sweeps(
@@ -178,6 +178,6 @@ def _sweep(
     """A sweep as the model would have it, as noisy as the campaign's or most rigs', in its direction or `like`'s."""
     frequency, amplitude = (x.ravel() for x in np.meshgrid(np.geomspace(*band, _NEW_FREQUENCIES), amplitudes))
     direction = sweeps[0].direction if sweeps else like.direction
-    shared = sweeps[0].noise.shared if sweeps else ASSUMED_SHARED
-    random = sweeps[0].relative_noise if sweeps else ASSUMED_SHARED[0]
+    shared = sweeps[0].noise.shared if sweeps else ASSUMED
+    random = sweeps[0].relative_noise if sweeps else ASSUMED[0]
     return new_sweep(model, direction, frequency, amplitude, (random, random), shared)

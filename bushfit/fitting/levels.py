@@ -5,14 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bushfit.campaign.schema import RigSettings
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import DataSet, parted
-from bushfit.fitting.noise import ASSUMED_SHARED, of_class, words_of
 
-#: Error of a level, in units of the rig's class, up to which it counts as one of the rig; chosen: as for outliers of
-#: normal errors.
-_MOST_CLASSES = 3.0
 #: Relative change of the variances at which the scoring ends: far below their standard error.
 _SETTLED = 1e-3
 #: What an error must take off twice the negative logarithm of the likelihood to count; chosen on 40 simulated
@@ -38,19 +33,6 @@ class LevelErrors(NamedTuple):
     freedom: int
     gain: float
     matters: bool
-
-
-def largest_level_error(rig: RigSettings) -> tuple[float, float]:
-    """Largest standard deviation of errors of levels, in gain and phase [rad], that counts as the rig's."""
-    gain, phase = of_class(rig, ASSUMED_SHARED)
-    return _MOST_CLASSES * gain, _MOST_CLASSES * phase
-
-
-def class_words(rig: RigSettings) -> str:
-    """A rig's class as it counts, in words: gain and phase error, and which of them is assumed."""
-    unstated = [name for name, error in zip(("gain", "phase"), rig.stated, strict=True) if error is None]
-    whose = f"{' and '.join(unstated)} assumed" if unstated else "as [rig] states"
-    return f"{words_of(of_class(rig, ASSUMED_SHARED))}, {whose}"
 
 
 def level_errors(

@@ -9,7 +9,7 @@ import numpy as np
 
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.effects.history import History
-from bushfit.fitting.data_set import DataSet, Suspect, keep, kept
+from bushfit.fitting.data_set import DataSet, keep, kept
 from bushfit.fitting.drive import Drive
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
@@ -29,7 +29,7 @@ class LoopData(DataSet):
     Args:
         fundamental_only: whether all but the first harmonic of its residuals is left out, so that it counts as one
             operating point, with two residuals: of an addition without a law in time nothing else is known.
-        gain_error: standard deviation of the gain of the whole record, where the class of its rig is stated.
+        gain_error: standard deviation of the gain of the whole record, by the class of its rig.
     """
 
     drive: Drive
@@ -174,12 +174,10 @@ class LoopData(DataSet):
         sizes = np.linalg.lstsq(self.contrasts().T, self.residual(model), rcond=None)[0]
         return float(np.abs(sizes @ self._waves[:, self.weights > 0.0]).max())
 
-    def suspects(self) -> Iterator[Suspect]:
-        """The loop as a whole, wrong in gain or offset."""
+    def gain_and_offset(self) -> Array:
+        """What a unit of gain, and half the force range of offset, make of the whitened residuals, (2, n)."""
         offset = np.full(self.drive.force.size, self.drive.half_range)
-        ends = (self.drive.frequency,) * 2, (self.drive.amplitude,) * 2
-        columns = [self._less_gain(self.unit_gain), self._whitened(offset * self._per_noise)]
-        yield Suspect(f"the loop {self.name}", "loop", columns, self.direction, *ends)
+        return np.array([self._less_gain(self.unit_gain), self._whitened(offset * self._per_noise)])
 
     def columns(self) -> dict[str, Any]:
         unit, factor = self.direction.display.displacement

@@ -19,8 +19,8 @@ from bushfit.fitting.fourier import (
     series,
     spread_rows,
 )
-from bushfit.fitting.noise import FLOOR
 from bushfit.fitting.outliers import are_outliers, are_stuck, outlier_limit
+from bushfit.fitting.repeats import FLOOR
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 

@@ -7,34 +7,21 @@ gain errors are real and phase errors imaginary, both relative to |K|.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 
 import numpy as np
 from scipy.special import chdtrc, fdtrc
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
-from bushfit.fitting.outliers import least_absolute
+from bushfit.fitting.repeats import FEWEST_SOUGHT, FLOOR, LineNoise, at_nominal, free_of, told_by_line
+from bushfit.fitting.rig_class import class_words, largest_error, of_class, words_of
 from bushfit.reading.measurement import Sweep
-from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
 
-#: Least noise of any rig, relative to the largest force or to |K|.
-FLOOR = 1e-4
-#: Errors that a run shares where nothing was repeated, relative gain and phase [rad]; chosen: those of most rigs.
-ASSUMED_SHARED = (5e-3, float(np.radians(0.25)))
 #: Degrees of freedom from which on repeats alone tell what a run shares; chosen: those of three repeats at two
 #: levels; with fewer, 95 % intervals were too narrow.
 _ENOUGH = 4
 #: Probability of unequal variances by chance, below which levels get noise of their own.
 _EQUAL_NOISE_P = 1e-3
-#: Degree, in the logarithm of what is stepped, of the smooth curve that stands in for repeats; chosen: it follows
-#: stiffness over two decades.
-_SMOOTH_DEGREE = 4
-#: Degrees in ln f and ln X of the smooth surface that carries points to the amplitude of their level; chosen: it need
-#: only follow the slope over ln X.
-_SURFACE_DEGREES = (1, 3)
-#: Common steps of two repeats from which on their difference tells a variance and a mean.
-FEWEST_STEPS = 3
 #: Degrees of freedom from which on a line may have a scatter of its own, and phase another than gain: fewer tell it no
 #: better than within a quarter, and wrong weights cost a tenth of the accuracy.
 _OWN_SCATTER = 10
@@ -42,10 +29,6 @@ _OWN_SCATTER = 10
 _LEVEL_SCATTER_P = 1e-3
 #: Exponents of the variance along what is stepped at most, far beyond those of rigs.
 _STEEPEST = 6.0
-#: Differences from which on outliers are sought among them: of fewer, the median tells no scale.
-_FEWEST_SOUGHT = 6
-#: Distance of an outlier from the other points [robust standard deviations]: noise alone reaches it once in 1e9.
-_OUTLIER = 6.0
 #: Shared variance of an outlying pair of repeats over the median of all pairs: noise alone reaches it once in 500
 #: campaigns.
 _OUTLYING_PAIR = 100.0
@@ -55,8 +38,7 @@ LineKey = tuple[str, float]
 _ORIGINS = {
     "repeats": "from repeats",
     "stated": "stated in the campaign",
-    "rig": "no repeats of three points or more: points against a smooth curve, shared part as [rig] states",
-    "assumed": "no repeats of three points or more: points against a smooth curve, shared part assumed",
+    "assumed": "no repeats of three points or more: points against a smooth curve, shared part by the class of [rig]",
 }
 
 
@@ -74,6 +56,7 @@ class SweepNoise:
         level_freedom: degrees of freedom behind it; 0 where it counts as known.
         slopes: of sweeps whose random part grows along what is stepped, the exponent, and the step at which it is as
             `random` has it.
+        beyond: what is said of sweeps whose runs differ by more than a rig of the class makes, which no noise excuses.
     """
 
     random: dict[LineKey, tuple[float, float]]
@@ -84,6 +67,7 @@ class SweepNoise:
     slopes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     level: tuple[float, float] = (0.0, 0.0)
     level_freedom: int = 0
+    beyond: Mapping[str, str] = field(default_factory=dict)
 
     def scatter(self, name: str, held: Array, step: Array) -> Array:
         """Standard deviation from point to point of gain and phase at points of a sweep, (2, n)."""
@@ -100,54 +84,23 @@ class SweepNoise:
         return f"{point:.2g} % from point to point, {shared} ({_ORIGINS[self.origin]})"
 
 
-def words_of(error: tuple[float, float]) -> str:
-    """A gain and a phase error [rad] in words."""
-    return f"{100.0 * error[0]:.2g} % gain and {np.degrees(error[1]):.2g} deg phase"
-
-
-@dataclass(frozen=True)
-class _Line:
-    """What the repeats of one line of a sweep tell about the noise.
-
-    Args:
-        scatter: deviations of gain and phase from point to point, (k, 2).
-        freedom: degrees of freedom behind their sum of squares.
-        shared: variances of gain and phase that each pair of repeats shares, (pairs, 2).
-        shared_freedom: degrees of freedom behind their mean; 0 without repeats.
-        calmer: without repeats, the scatter less the point that adds most to it, (k - 1, 2).
-        steps: of repeats, what was stepped at each deviation, (k,).
-    """
-
-    scatter: Array
-    freedom: float
-    shared: Array
-    shared_freedom: float = 0.0
-    calmer: Array | None = None
-    steps: Array = field(default_factory=lambda: np.empty(0))
-
-    @property
-    def variance(self) -> Array:
-        """Of gain and phase from point to point, (2,)."""
-        return np.asarray(np.square(self.scatter).sum(axis=0) / max(self.freedom, 1))
-
-
 def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNoise:
     """Noise of the sweeps of one rig, estimated from their repeats.
 
     Without repeats the random part is the scatter about a smooth curve in the logarithm of what is stepped, and the
-    shared part is what the rig's class states, else ASSUMED_SHARED. With repeats, what is stated is an error of each
-    level, which they cannot show. A `noise` stated in the campaign, or in the file for each point, replaces the random
-    part.
+    shared part is what the rig's class states, else ASSUMED. With repeats, what is stated is an error of each level,
+    which they cannot show. A `noise` stated in the campaign, or in the file for each point, replaces the random part.
 
     Notes:
-        With D the difference of ln K between two repeats at one step, the variance of D over the steps is twice the
-        random variance, and the square of its mean estimates twice (shared variance + random variance / number of
-        steps). Pairs are pooled within a line and over lines; lines keep a random part of their own where Bartlett's
-        test finds them unequal. Where the squares of D grow along what is stepped, so does the random part.
+        With D the difference of ln K between two repeats at one step, the mean square of what D changes by from one
+        step to the next is four times the random variance, whatever repeats differ by along the run (von Neumann,
+        1941), and the square of its mean estimates twice (shared variance + random variance / number of steps). Pairs
+        are pooled within a line and over lines; lines keep a random part of their own where Bartlett's test finds them
+        unequal. Where the squares of D grow along what is stepped, so does the random part.
     """
     lines = {
-        (sweep.name, float(held)): _line(sweep, log_stiffness, held)
-        for sweep, log_stiffness in [(sweep, _at_nominal(sweep)) for sweep in sweeps]
+        (sweep.name, float(held)): told_by_line(sweep, log_stiffness, held)
+        for sweep, log_stiffness in [(sweep, at_nominal(sweep)) for sweep in sweeps]
         for held in np.unique(sweep.held)
     }
     slopes = _slopes(sweeps, lines)
@@ -166,19 +119,16 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
         for key, variance in variances.items()
     }
     if repeated:
-        shared_freedom = round(sum(line.shared_freedom for line in repeated))
-        shared, level = _shared(repeated, shared_freedom, rig), of_class(rig, (0.0, 0.0))
-        return SweepNoise(random, shared, "repeats", max(shared_freedom, _ENOUGH), scatter_freedom, slopes, level)
+        level, freedom = of_class(rig, (0.0, 0.0)), max(round(sum(line.shared_freedom for line in repeated)), _ENOUGH)
+        of_each = {key[0]: [line for own, line in lines.items() if own[0] == key[0]] for key in lines}
+        told = {name: _shared(own, rig) for name, own in of_each.items()}
+        most = np.maximum(largest_error(rig), largest_error(UNSTATED))  # [rig] states what repeats share
+        beyond = {name: _beyond(error, rig) for name, error in told.items() if np.any(error > most)}
+        shared = _pair(_shared(repeated, rig))
+        return SweepNoise(random, shared, "repeats", freedom, scatter_freedom, slopes, level, beyond=beyond)
     if all(sweep.noise is not None for sweep in sweeps):
         return SweepNoise(random, of_class(rig, (0.0, 0.0)), "stated", 0, scatter_freedom)
-    origin = "assumed" if rig.stated == (None, None) else "rig"
-    return SweepNoise(random, of_class(rig, ASSUMED_SHARED), origin, 0, scatter_freedom)
-
-
-def of_class(rig: RigSettings, unstated: tuple[float, float]) -> tuple[float, float]:
-    """Gain and phase error [rad] that a rig's class states, else the one given."""
-    gain, phase = (default if one is None else one for one, default in zip(rig.stated, unstated, strict=True))
-    return gain, phase
+    return SweepNoise(random, of_class(rig), "assumed", 0, scatter_freedom)
 
 
 def _stated(sweep: Sweep) -> float | None:
@@ -188,30 +138,7 @@ def _stated(sweep: Sweep) -> float | None:
     return float(np.sqrt(np.mean(np.square(sweep.relative_error))))
 
 
-def _at_nominal(sweep: Sweep) -> Array:
-    """ln K of each point as it would be at the amplitude of its level, complex (n,).
-
-    From the amplitude that was reached it is carried there along a smooth surface over ln f and ln X, which tells how K
-    goes with amplitude; without two levels or more there is none.
-    """
-    value = np.log(sweep.stiffness)
-    off = np.log(sweep.amplitude_reached / sweep.amplitude)
-    distinct = np.unique(sweep.amplitude).size
-    if distinct < 2 or not off.any():
-        return value
-    degrees = min(_SURFACE_DEGREES[0], np.unique(sweep.frequency).size - 1), min(_SURFACE_DEGREES[1], distinct - 1)
-    low, span = np.log(sweep.amplitude).min(), float(np.ptp(np.log(sweep.amplitude)))
-
-    def surface(amplitude: Array) -> Array:
-        over_range = 2.0 * (np.log(amplitude) - low) / span - 1.0
-        return np.polynomial.legendre.legvander2d(unit(np.log(sweep.frequency)), over_range, degrees)
-
-    reached = surface(sweep.amplitude_reached)
-    solution = np.linalg.lstsq(reached.astype(complex), value, rcond=None)[0]
-    return value - (reached - surface(sweep.amplitude)) @ solution
-
-
-def _slopes(sweeps: Sequence[Sweep], lines: Mapping[LineKey, _Line]) -> dict[str, tuple[float, float]]:
+def _slopes(sweeps: Sequence[Sweep], lines: Mapping[LineKey, LineNoise]) -> dict[str, tuple[float, float]]:
     """How the scatter of a rig goes with what is stepped, see `_slope`: one law for all sweeps that step the same."""
     found = dict[str, tuple[float, float]]()
     for stepped in {sweep.stepped for sweep in sweeps}:
@@ -221,7 +148,7 @@ def _slopes(sweeps: Sequence[Sweep], lines: Mapping[LineKey, _Line]) -> dict[str
     return found
 
 
-def _slope(lines: Sequence[_Line]) -> tuple[float, float] | None:
+def _slope(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
     """Exponent with which the scatter of lines goes with what is stepped, and a middle step; None where
     repeats show no growth.
 
@@ -236,14 +163,15 @@ def _slope(lines: Sequence[_Line]) -> tuple[float, float] | None:
     for line in lines:
         steps, place = np.unique(line.steps, return_inverse=True)
         square = np.bincount(place, (np.square(line.scatter) / np.maximum(line.variance, FLOOR**2)).sum(axis=1))
-        if steps.size >= _FEWEST_SOUGHT and square.any():
+        if steps.size >= FEWEST_SOUGHT and square.any():
             squares.append(square / square.mean())
             logs.append(np.log(steps))
     if not logs:
         return None
     centred = np.concatenate([log - log.mean() for log in logs])
     ratio = np.concatenate(squares)
-    along = float(centred @ (ratio - 1.0)) ** 2 / max(float(centred @ centred) * float(np.var(ratio)), FLOOR**2)
+    scale = float(np.var(ratio)) * centred.size / free_of(centred.size)
+    along = float(centred @ (ratio - 1.0)) ** 2 / max(float(centred @ centred) * scale, FLOOR**2)
     if chdtrc(1, along) > _LEVEL_SCATTER_P:
         return None
 
@@ -255,7 +183,7 @@ def _slope(lines: Sequence[_Line]) -> tuple[float, float] | None:
     return exponent / 2.0, float(np.exp(np.concatenate(logs).mean()))
 
 
-def _pooled(lines: Mapping[LineKey, _Line], measured: Sequence[_Line]) -> tuple[dict[LineKey, Array], int]:
+def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -> tuple[dict[LineKey, Array], int]:
     """Variance of gain and phase of each line, (2,), one for all where they agree, and its degrees of freedom.
 
     Of few degrees of freedom gain and phase have one, unless they deny it.
@@ -277,17 +205,22 @@ def _pooled(lines: Mapping[LineKey, _Line], measured: Sequence[_Line]) -> tuple[
     return own, round(min(line.freedom for line in told))
 
 
-def _shared(repeated: Sequence[_Line], freedom: int, rig: RigSettings) -> tuple[float, float]:
-    """Standard deviation of what a run shares in gain and phase, outlying pairs of repeats left out.
+def _beyond(error: Array, rig: RigSettings) -> str:
+    words = f"more than a rig of this class makes ({class_words(rig)}): measure again, or state the class under [rig]"
+    return f"repeats differ as a whole by an error of {words_of(_pair(error))}, {words}"
+
+
+def _shared(lines: Sequence[LineNoise], rig: RigSettings) -> Array:
+    """Standard deviation of what a run shares in gain and phase, (2,), outlying pairs of repeats left out.
 
     Few repeats often show none by chance: what they lack to _ENOUGH degrees of freedom, the rig's class makes up.
     """
-    pairs = np.concatenate([line.shared for line in repeated])
-    usual = np.abs(pairs) <= _OUTLYING_PAIR * np.median(np.abs(pairs), axis=0)
-    usual |= len(pairs) < _FEWEST_SOUGHT
+    pairs, freedom = np.concatenate([line.shared for line in lines]), sum(line.shared_freedom for line in lines)
+    usual = np.abs(pairs) <= _OUTLYING_PAIR * np.median(np.abs(pairs), axis=0) if len(pairs) else np.empty((0, 2), bool)
+    usual |= len(pairs) < FEWEST_SOUGHT
     variance = np.where(usual.any(axis=0), np.mean(pairs, axis=0, where=usual), 0.0)
-    measured, assumed = min(freedom / _ENOUGH, 1.0), of_class(rig, ASSUMED_SHARED)
-    return _pair(np.sqrt(measured * np.maximum(variance, 0.0) + (1.0 - measured) * np.square(assumed)))
+    measured = min(freedom / _ENOUGH, 1.0)
+    return np.sqrt(measured * np.maximum(variance, 0.0) + (1.0 - measured) * np.square(of_class(rig)))
 
 
 def _pair(values: Array) -> tuple[float, float]:
@@ -296,93 +229,7 @@ def _pair(values: Array) -> tuple[float, float]:
     return gain, phase
 
 
-def _line(sweep: Sweep, log_stiffness: Array, held: float) -> _Line:
-    """What one line of a sweep tells: by pairs of repeats, or about a smooth curve where there is no pair."""
-    chosen = sweep.held == held
-    steps, column = np.unique(sweep.step[chosen], return_inverse=True)
-    numbers, row = np.unique(sweep.repeat[chosen], return_inverse=True)
-    table = np.full((numbers.size, steps.size), np.nan + 0j)
-    table[row, column] = log_stiffness[chosen]
-    differences = (one - other for one, other in combinations(table, 2))
-    kept = [(difference, _usual(difference, np.log(steps))) for difference in differences]
-    pairs = [(difference[usual], steps[usual]) for difference, usual in kept if usual.sum() >= FEWEST_STEPS]
-    if not pairs:
-        return _about_smooth_curve(np.log(steps), np.nanmean(table, axis=0))
-    scatter = [_parts(difference - difference.mean()) for difference, _ in pairs]
-    shared = [
-        (_parts(difference).mean(axis=0) ** 2 - np.square(spread).sum(axis=0) / (len(spread) - 1) / len(spread)) / 2.0
-        for (difference, _), spread in zip(pairs, scatter, strict=True)
-    ]
-    independent = 2.0 / numbers.size  # of each pair: m repeats have m (m - 1)/2 pairs, and m - 1 of them are free
-    return _Line(
-        np.concatenate(scatter) / np.sqrt(numbers.size),
-        independent * sum(len(spread) - 1 for spread in scatter),
-        np.array(shared),
-        independent * len(pairs),
-        steps=np.concatenate([at for _, at in pairs]),
-    )
-
-
-def _usual(difference: Array, log_step: Array) -> Array:
-    """Where two repeats were both measured and differ as they do elsewhere, (n,) bool: single outliers are faults.
-
-    Elsewhere is all along the run, and nearby where differences grow along it: by Theil's (1950) median slope.
-    """
-    usual = ~np.isnan(difference)
-    if np.count_nonzero(usual) < _FEWEST_SOUGHT:
-        return usual
-    parts = _parts(difference)
-    off = np.abs(parts - np.median(parts[usual], axis=0))
-    scale = MEDIAN_TO_SIGMA * np.median(off[usual], axis=0)
-    lengths = np.log(np.maximum(np.hypot(*off.T), FLOOR))
-    x, y, half = log_step[usual], lengths[usual], np.count_nonzero(usual) // 2
-    slope = np.median((y[-half:] - y[:half]) / (x[-half:] - x[:half]))
-    scale = scale * np.exp(np.maximum(slope * (log_step - np.median(x)), 0.0))[:, None]
-    return usual & np.all((off <= _OUTLIER * scale) | (scale == 0.0), axis=1)
-
-
-def _about_smooth_curve(log_step: Array, log_stiffness: Array) -> _Line:
-    """What a line without repeats tells: its scatter about a smooth curve; of one or two points this is assumed."""
-    degree = min(_SMOOTH_DEGREE, log_step.size - 2)
-    if degree < 1:
-        return _Line(np.full((1, 2), ASSUMED_SHARED[0]), 1, np.empty((0, 2)))
-    values = _parts(log_stiffness)
-    basis = np.polynomial.legendre.legvander(unit(log_step), degree)
-    residual = np.abs(values - basis @ least_absolute(basis, values, FLOOR**2))
-    usual = np.median(np.sort(residual, axis=0)[degree + 1 :], axis=0)  # the curve goes through degree + 1 points
-    inliers = np.all(residual <= np.maximum(_OUTLIER * MEDIAN_TO_SIGMA * usual, FLOOR), axis=1)
-    inliers |= np.count_nonzero(inliers) < degree + 2  # too few would leave nothing free
-    scatter = _freed(basis[inliers], values[inliers])
-    curve = np.linalg.qr(basis)[0]
-    off, free = values - curve @ (curve.T @ values), 1.0 - np.square(curve).sum(axis=1)
-    falls = np.square(off).sum(axis=1) / np.maximum(free, FLOOR**2)
-    worst = int(np.argmax(falls))  # the point without which the sum of squares about the curve falls most
-    calmer = _freed(np.delete(basis, worst, axis=0), np.delete(values, worst, axis=0))
-    return _Line(scatter, len(scatter), np.empty((0, 2)), calmer=calmer)
-
-
-def unit(values: Array) -> Array:
-    """Values spread from -1 to 1, (n,); all -1 where they are one."""
-    return 2.0 * (values - values.min()) / max(float(np.ptp(values)), np.finfo(float).tiny) - 1.0
-
-
-def _freed(basis: Array, values: Array) -> Array:
-    """What a curve, (n, k), leaves of values, (n, m) -> (n - k, m), in orthonormal coordinates: they scatter
-    independently. Householder's reflections are applied one by one, and no matrix of n by n is made."""
-    reflections, factors = np.linalg.qr(basis, mode="raw")
-    turned = values.astype(float)
-    for place, (column, factor) in enumerate(zip(reflections, factors, strict=True)):
-        mirror = np.append(1.0, column[place + 1 :])
-        turned[place:] -= np.outer(factor * mirror, mirror @ turned[place:])
-    return turned[basis.shape[1] :]
-
-
-def _parts(values: Array) -> Array:
-    """Gain and phase of ln K, complex (n,) -> (n, 2)."""
-    return np.stack([np.real(values), np.imag(values)], axis=-1)
-
-
-def _of_equal_noise(lines: Sequence[_Line]) -> list[_Line]:
+def _of_equal_noise(lines: Sequence[LineNoise]) -> list[LineNoise]:
     """Lines of equal noise, those that a single outlier sets apart without it; none where they are unequal."""
     alike = sorted(lines, key=lambda line: -float(line.variance.sum()))
     for place, line in enumerate(alike):
@@ -391,7 +238,7 @@ def _of_equal_noise(lines: Sequence[_Line]) -> list[_Line]:
     return [] if _unequal(alike) else alike
 
 
-def _unequal(lines: Sequence[_Line]) -> bool:
+def _unequal(lines: Sequence[LineNoise]) -> bool:
     """Bartlett's test (1937) of the variances of lines, each with as many degrees of freedom in gain as in phase."""
     variance = np.array([line.variance.mean() for line in lines])
     freedom = np.array([2.0 * line.freedom for line in lines])

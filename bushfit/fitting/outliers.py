@@ -13,7 +13,7 @@ from scipy.ndimage import median_filter
 from scipy.special import chdtri, fdtri
 
 from bushfit.effects.contract import Array
-from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
+from bushfit.reduction.scatter import MEDIAN_TO_SIGMA, median
 
 #: Probability that noise alone makes an outlier among all rows of a test; chosen: one test in a hundred.
 _CHANCE = 0.01
@@ -35,6 +35,8 @@ _GROSS = 0.3
 _MOST_GROSS = 0.1
 #: Degrees of freedom of a noise that is as good as known.
 _KNOWN = 1e6
+#: Difference of two points from which on they are no repeats, relative to |K|: no noise of a rig goes that far.
+_UNLIKE = 0.1
 #: Points of a block that count as neighbours of one where a model was taken off: few, since stiffness that the model
 #: misses bends with frequency.
 _NEAR_NEIGHBOURS = 5
@@ -54,7 +56,7 @@ def from_neighbours(values: Array, rows: Array, window: int = NEIGHBOURS) -> Arr
     """Distance of some rows from the median over their neighbours and themselves, (len(rows),)."""
     width = min(window, values.size)
     first = np.clip(rows - width // 2, 0, values.size - width)
-    return values[rows] - np.median(sliding_window_view(values, width)[first], axis=1)
+    return values[rows] - median(sliding_window_view(values, width)[first], axis=1)
 
 
 def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
@@ -149,6 +151,20 @@ def outlying_points(
     return np.flatnonzero(
         np.where(repeats > 1, apart_from_repeats & (far | (agreed == farthest[place])), far & (alone > limit))
     )
+
+
+def unlike(stiffness: Array, place: Array) -> list[tuple[float, int, int]]:
+    """The two points of each place, (n,), that lie farthest apart in |K| or in phase, the worst first: how far, as a
+    share of |K|, from _UNLIKE on, and their numbers. Points of one `place` repeat each other."""
+    value, ends, found = np.log(stiffness), np.cumsum(np.bincount(place)), dict[int, tuple[float, int, int]]()
+    for part in (value.real, value.imag):
+        order = np.lexsort((part, place))
+        first, last = order[np.append(0, ends[:-1])], order[ends - 1]
+        apart = np.abs(stiffness[last] - stiffness[first]) / np.minimum(*np.abs(stiffness[[first, last]]))
+        for at in np.flatnonzero(apart >= _UNLIKE).tolist():
+            one, other = sorted((int(first[at]), int(last[at])))
+            found[at] = max(found.get(at, (0.0, 0, 0)), (float(apart[at]), one, other))
+    return sorted(found.values(), reverse=True)
 
 
 def misfit_scale(distance: Array, parts: int) -> float:

@@ -23,9 +23,9 @@ from bushfit.fitting.assess import (
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, parted, sources, with_level_errors
 from bushfit.fitting.identify import left_open
-from bushfit.fitting.levels import largest_level_error, level_errors
-from bushfit.fitting.noise import words_of
+from bushfit.fitting.levels import level_errors
 from bushfit.fitting.profile import profile95
+from bushfit.fitting.rig_class import largest_error, words_of
 from bushfit.fitting.robust import Estimate, estimate, told
 from bushfit.fitting.solve import Bounds, Coordinates, Solution
 from bushfit.geometry import place_named
@@ -89,7 +89,7 @@ def fit_joint(
     left: list[DataSet] = [data_set for data_set in (*data.loops, *data.sweeps) if data_set not in data_sets]
     effects = data.effects if effects is None else effects
     found = _solve(data, data_sets, effects, {})
-    most = largest_level_error(data.campaign.rig)
+    most = largest_error(data.campaign.rig)
     errors = level_errors(found.minimised, found.solution.residual, found.solution.jacobian, most)
     at_limit = any(error >= _AT_LIMIT * limit for error, limit in zip(errors.error, most, strict=True))
     if errors.freedom and any(errors.error) and not at_limit:  # an error that would have to be larger is a gap
@@ -237,7 +237,7 @@ def _result(
     cov = covariance(model, stages, held) if stages else held or Covariance()
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
     of_tests = (*implausible(data.campaign.bushing, data_sets), *apart_in_temperature(model, data_sets))
-    doubts = [*of_tests, *_assumed(data_sets)]
+    doubts = [*of_tests, *data.assumed]
     odd = [note for step in steps for note in cautions(model, step.solution, step.data_sets, data.bounds, cov, _NEXT)]
     return Result(
         model,
@@ -268,8 +268,8 @@ def cautions(
     if not names:
         return [*notes, _checked(model, data_sets)]
     return [
-        *notes,
         *filter(None, [covariance.restricted(names).left_open(model.values)]),
+        *notes,
         *([_STOPPED.format(solution.evaluations, _FLAT if solution.flat else _SLOPE)] if solution.stopped else []),
         *(_at_edge(name, end, bounds) for name, end in at_bound.items()),
         *left_open(model, data_sets, [name for name in names if name not in at_bound], covariance),
@@ -293,15 +293,3 @@ def _at_edge(name: str, end: End, bounds: Bounds) -> str:
     if bounds.get(name, (None, None))[end == "max"] is not None:
         return f"{name} rests on the {end} given in [fit]"
     return f"{name} ended at the edge of what is possible: the data do not determine it"
-
-
-def _assumed(data_sets: Sequence[DataSet]) -> list[str]:
-    """What was assumed of the noise because nothing was repeated."""
-    _, sweeps = parted(data_sets)
-    noises = {id(sweep.noise): sweep.noise for sweep in sweeps}
-    return [
-        f"noise of the {' and '.join(dict.fromkeys(str(sweep.direction) for sweep in sweeps if sweep.noise is noise))} "
-        f"sweeps: {noise.describe()}"
-        for noise in noises.values()
-        if noise.origin == "assumed"
-    ]

@@ -11,18 +11,22 @@ from scipy.linalg import block_diag
 
 from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
-from bushfit.fitting.data_set import DataSet, Freedoms, Suspect, keep, kept, shown_amplitude
-from bushfit.fitting.noise import FLOOR, SweepNoise, unit
-from bushfit.fitting.outliers import outlying_points
+from bushfit.fitting.data_set import DataSet, Freedoms, keep, kept, shown_amplitude
+from bushfit.fitting.noise import SweepNoise
+from bushfit.fitting.outliers import outlying_points, unlike
+from bushfit.fitting.repeats import FLOOR, unit
 from bushfit.fitting.whitening import Whitening
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.reading.measurement import Stepped, Sweep
+from bushfit.units import number
 
 #: Degree, in the logarithm of what is stepped, of the Legendre polynomials that count as smooth misfit.
 _SMOOTH_DEGREE = 3
+#: Points that a sentence lists one by one; chosen: more make it long.
+_MOST_LISTED = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +92,20 @@ class SweepData(DataSet):
     @property
     def test(self) -> Sweep:
         return self.sweep
+
+    @cached_property
+    def notes(self) -> list[str]:
+        place = np.unique([self.frequency, self.amplitude], axis=1, return_inverse=True)[1]
+        apart = unlike(self.measured, place)
+        rows = [f"{one} and {other}" for _, *pair in apart for one, other in [sorted(self.order[pair] + 1)]]
+        told = [
+            f"{self.source.file if self.source else self.name}: points that repeat each other lie up to "
+            f"{number(100.0 * share, 2)} % apart, rows {', '.join(rows[:_MOST_LISTED])}"
+            + f" and {len(rows) - _MOST_LISTED} more pairs"
+            * (len(rows) > _MOST_LISTED)
+            for share, *_ in apart[:1]
+        ]
+        return [*told, *(words for name, words in self.noise.beyond.items() if name == self.name)]
 
     @property
     def size(self) -> int:
@@ -328,18 +346,6 @@ class SweepData(DataSet):
     def smooth_misfit(self, model: Model) -> float:
         return max(float(np.abs(line.smooth).max()) for line in self.lines(model))
 
-    def suspects(self) -> Iterator[Suspect]:
-        """One line wrong as a whole, and one repeat of one."""
-        every = np.unique(self.held)
-        for held in every:
-            here = self.held == held
-            words = self.line_words(int(np.argmax(here)))
-            if every.size > 1:
-                yield self._suspect(words, "level", here)
-            numbers = np.unique(self.repeat[here])
-            for number in numbers if numbers.size > 2 else ():
-                yield self._suspect(f"repeat {number} of {words}", "repeat", here & (self.repeat == number))
-
     def line_words(self, point: int) -> str:
         """The line that a point belongs to, for people."""
         if self.sweep.stepped == "frequency":
@@ -348,12 +354,8 @@ class SweepData(DataSet):
             return f"the {self.direction} sweep of amplitudes at {self.frequency[point]:.4g} Hz"
         return f"run {self.repeat[point]} of {self.name}, {self.direction}"
 
-    def _suspect(self, words: str, kind: str, chosen: Array) -> Suspect:
-        ends = [(float(each[chosen].min()), float(each[chosen].max())) for each in (self.frequency, self.amplitude)]
-        return Suspect(words, kind, self.moved_together(chosen), self.direction, ends[0], ends[1])
-
     def moved_together(self, chosen: Array) -> list[Array]:
-        """Whitened residuals of some points, (n,) bool, off by one unit of gain, and off by one of phase."""
+        """Whitened residuals of some points, (n,) shares, off by one unit of gain, and off by one of phase."""
         return [self.whiten(unit * chosen.astype(complex)) for unit in (1.0, 1.0j)]
 
     def columns(self) -> dict[str, Any]:

@@ -8,7 +8,9 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
+from bushfit.campaign.naming import folder_name
 from bushfit.campaign.written import specimen_lines, toml_value
+from bushfit.errors import CampaignError
 from bushfit.geometry import Specimen
 from bushfit.inspection.record import Inspected
 
@@ -26,6 +28,34 @@ def campaign_text(name: str, bushing: Mapping[str, str] | None, files: Sequence[
     order = [seen for kind in _TABLES for seen in files if seen.kind == kind]
     tables = [*_specimens(files), *(file_text(seen, folder) for seen in order)]
     return "\n".join([*(["[bushing]"] if bushing else []), *head, "", *tables])
+
+
+def campaigns_of_parts(
+    name: str, bushing: Mapping[str, str] | None, files: Sequence[Inspected], folder: Path, listed_in: str
+) -> dict[str, str]:
+    """The text of a campaign of each part whose number a column tells, and of the manifest of them, by their files.
+
+    Raises:
+        CampaignError: a file of which nothing tells the part.
+    """
+    of_parts: list[Any] = [seen.entry.get("specimen_number") for seen in files]
+    if None in of_parts:
+        raise CampaignError(
+            "nothing says of which part this is",
+            file=files[of_parts.index(None)].file,
+            found=f"parts {', '.join(dict.fromkeys(filter(None, of_parts)))} in others",
+            expected="a column for the part in every file, or the tests of one part",
+            hint="--specimen-number takes the tests of one part, and counts for files without such a column",
+        )
+    texts = {listed_in: f"# a campaign of each part: bushfit batch {listed_in}\n"}
+    for number, part in enumerate(dict.fromkeys(of_parts), start=1):
+        file = f"{folder_name(part)}.toml"
+        file = f"{number}_{file}" if file.casefold() in map(str.casefold, texts) else file
+        tests = [seen for own, seen in zip(of_parts, files, strict=True) if own == part]
+        texts[file] = campaign_text(f"{name} {part}", bushing, tests, folder)
+        entry = _lines({"campaign": file, "name": f"{name} {part}"})
+        texts[listed_in] += "\n".join(["", "[[bushings]]", *entry, ""])
+    return texts
 
 
 def named_apart(files: Sequence[Inspected]) -> list[Inspected]:

@@ -5,12 +5,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from bushfit.campaign.campaign import TEST_FILES
 from bushfit.errors import BushfitError, NoColumnError, NoTestError
+from bushfit.geometry import Direction
 from bushfit.inspection.opening import inspect
 from bushfit.inspection.outside import temperatures_of
 from bushfit.inspection.recognition import open_table, recognised
 from bushfit.inspection.record import Inspected
+from bushfit.reading.columns import same_text
 from bushfit.reading.names import Said, stated_above
 from bushfit.reading.words import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.workbook import sheets
@@ -79,7 +83,38 @@ def gather(paths: Sequence[Path], stated: Mapping[str, Any]) -> tuple[list[Sourc
                 hint="bushfit inspect FILE says what it makes of one",
             )
         sources += found
-    return stated_of_each(sources, stated), tuple(left_out)
+    by_rows = [_by_rows(source) for source in stated_of_each(sources, stated)]
+    left_out += [sentence for _, others in by_rows for sentence in others]
+    return [test for tests, _ in by_rows for test in tests], tuple(left_out)
+
+
+def _by_rows(source: Source) -> tuple[list[Source], list[str]]:
+    """The tests of a file that its columns tell apart, by direction, part and run, and which rows are left out.
+
+    The runs of a sweep are repeats; so are tests those of a loop alone, where time does not go on from one to the next.
+    """
+    stated = source.stated or {}
+    own = {key: value for key, value in stated.items() if key not in ("direction", "specimen_number")}
+    try:
+        table, _ = recognised(source.file, own)
+        told = dict(table.labels)
+        if "run" in told and "time" in table.roles:
+            time = table.read({"time": table.roles["time"]}, fewest_rows=1)["time"]
+            told.pop("run" if np.all(np.diff(time) > 0.0) else "", None)
+    except BushfitError:  # which the inspection of the file tells
+        return [source], []
+    tests: list[Source] = []
+    left_out: list[str] = []
+    for texts in dict.fromkeys(zip(*(texts for _, texts in told.values()), strict=True)):
+        keys: dict[str, Any] = dict(zip(told, texts, strict=True))
+        run = {"rows": {table.headers[told["run"][0]]: keys.pop("run")}} if "run" in keys else {}
+        known = keys.get("direction", "axial") in [*Direction]
+        if known and all(same_text(str(stated.get(key, text)), text) for key, text in keys.items()):
+            tests.append(replace(source, stated={**stated, **keys, **run}))
+        else:
+            why = "as stated" if known else "no direction that is known"
+            left_out.append(f"{source}: its rows of {', '.join(texts)}, {why}")
+    return (tests, left_out) if tests else ([source], [])
 
 
 def stated_of_each(sources: Sequence[Source], stated: Mapping[str, Any]) -> list[Source]:

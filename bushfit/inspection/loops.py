@@ -96,6 +96,7 @@ def look_at_history(history: Loop, named: Said) -> Looked:
         "noise": f"{100 * max(step.gain_error for step in steps):.2g} % of |K| at most, a point",
     }
     odd = (
+        *(history.source.notes if history.source else ()),
         *wrong_labels(named, history.direction, levels, frequencies),
         *odd_channels(history),
         *reduction.warnings,

@@ -65,9 +65,6 @@ def inspect(file: Path, stated: Mapping[str, Any], beside: Said | None = None) -
         measured, entry, odd = _read_loop(file, read_as, entry, table)
         kind, looked = _look(measured, by_name, _keywords(file, read_as, entry, LoopFile))
     columns = _columns(table, is_sweep=is_sweep)
-    named = by_name.direction
-    if direction and named and not isinstance(direction, Specimen) and named is not direction:
-        odd.append(f"the name says {named}, it is taken for {direction} as stated")
     facts, counted = {**looked.facts, **outside.facts}, outside.is_counted
     if is_sweep and (amplitude := table.roles.get("amplitude")):
         counted = amplitude.convention is not None
@@ -168,9 +165,12 @@ def _columns(table: Table, *, is_sweep: bool) -> tuple[ColumnSeen, ...]:
     """All columns of a file in order, with the range of their values as the file has them."""
     of_sweeps = {*chain(*STIFFNESS_PAIRS), "frequency", "amplitude", "temperature", "repeat"}
     ranged = of_sweeps if is_sweep else set(table.roles)
+    ranged = {role for role in ranged if role in table.roles and table.holds_numbers(table.roles[role].index)}
     wanted = {role: column for role, column in table.roles.items() if role in ranged}
     values = table.read(wanted, fewest_rows=1)  # the scales of `roles` are 1: not in SI
     columns = [ColumnSeen(header, None, None) for header in table.headers]
+    for key, (index, _) in table.labels.items():
+        columns[index] = ColumnSeen(table.headers[index], key.replace("_", " "), None)
     for role, column in table.roles.items():
         low, high = (float(values[role].min()), float(values[role].max())) if role in values else (None, None)
         columns[column.index] = ColumnSeen(column.header, role.replace("_", " "), column.unit, low, high)

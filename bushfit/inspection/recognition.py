@@ -9,6 +9,7 @@ from typing import Any
 from bushfit.campaign.schema import SpecimenTable
 from bushfit.errors import BushfitError, NoTestError, typed
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
+from bushfit.reading.columns import Rows
 from bushfit.reading.headers import Vocabulary
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.names import direction_of_file
@@ -105,17 +106,24 @@ def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Directi
     """The direction of a test of the bushing as the user states it, or else as its file does; None where neither does.
 
     Raises:
-        MeasurementError: units of torsion where the user states another direction.
+        MeasurementError: a file that says another direction than the user.
     """
     turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
+    headers = table.layout.written or table.headers
+    told = dict.fromkeys(table.labels.get("direction", (0, ()))[1])
+    named = direction_of_file(file, headers, turns=turns, sheet=table.source.sheet)
+    found = Direction(*told) if len(told) == 1 else named
     if "direction" not in stated:
-        return direction_of_file(file, table.layout.written or table.headers, turns=turns, sheet=stated.get("sheet"))
-    if turns and not Direction(stated["direction"]).is_rotation:
+        if len(told) > 1:
+            problem, hint = "this file holds tests in several directions", "state one: --direction axial"
+            raise table.header_error(problem, found=", ".join(told), expected="one direction", hint=hint)
+        return found
+    if found and found != stated["direction"] and len(told) < 2:
         raise table.header_error(
-            "the units say torsion",
-            found=f"{', '.join(table.headers)}; stated: {stated['direction']}",
+            f"{'the units say' if turns else 'the file says'} {found}, and --direction {stated['direction']}",
+            found=", ".join([*filter(None, [file.name, table.source.sheet]), *headers]),
             expected="one direction",
-            hint="state --direction torsion, or none",
+            hint="leave --direction out; or give the file a name that says its direction, which goes before its header",
         )
     return Direction(stated["direction"])
 
@@ -141,4 +149,5 @@ def open_table(
         key: {role: text for role, text in stated.get(key, {}).items() if role in names} for key in ("columns", "units")
     }
     written = FileFormat(**{field.name: stated.get(field.name) for field in fields(FileFormat)})
-    return Table.open(file, names, own["columns"], own["units"], written, motion)
+    rows = Rows(stated.get("direction"), stated.get("specimen_number"), stated.get("rows", {}))
+    return Table.open(file, names, own["columns"], own["units"], written, motion, rows if any(rows) else None)

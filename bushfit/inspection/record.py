@@ -113,9 +113,16 @@ class Inspected:
 
     @property
     def label(self) -> str:
-        """The name of the file, with the sheet where it has several."""
-        sheet = self.entry.get("sheet")
-        return f"{self.file.name}, sheet {sheet}" if sheet else self.file.name
+        """The name of the file, with the sheet where it has several, and with what columns tell of the test."""
+        direction = self.direction if "direction" in [one.role for one in self.columns] else None
+        told = {"sheet": self.entry.get("sheet"), "direction": direction, "part": self.part}
+        told |= self.entry.get("rows", {})
+        return ", ".join([self.file.name, *(f"{key} {value}" for key, value in told.items() if value)])
+
+    @property
+    def part(self) -> str | None:
+        """The number of its specimen as a column tells it; None where none does."""
+        return self.entry["specimen_number"] if "specimen number" in [one.role for one in self.columns] else None
 
     @property
     def assumed(self) -> str | None:

@@ -57,6 +57,7 @@ def look_at_sweep(sweep: Sweep, named: Said) -> Looked:
         "noise": noise.describe(),
     }
     odd = [
+        *(sweep.source.notes if sweep.source else ()),
         *wrong_labels(named, sweep.direction, [float(x) for x in levels], [float(x) for x in frequencies]),
         *_copies(sweep, noise),
         *_untold_repeats(sweep),

@@ -73,7 +73,7 @@ class Diagnose:
             )
         found = with_plan(diagnose(data, self.model, self.settings), data.campaign.path)
         if not (found.changed or self.model or self.settings.adopt):  # then the model to use is that of `fit`
-            found = replace(found, result=(self.joint or Fit().run(data)).result)
+            found = replace(found, result=found.odds.averaged((self.joint or Fit().run(data)).result))
         return Diagnosed(about(data, "diagnose", self._options()), found)
 
     def _options(self) -> tuple[str, ...]:

@@ -25,8 +25,8 @@ class Covariance:
     Args:
         names: of the k parameters.
         matrix: (k, k).
-        spread: for each variance behind the matrix that was itself estimated, how far the matrix moves when that
-            variance moves by its own standard error, (k, k) each.
+        spread: for each figure of the noise behind the matrix that was itself estimated, how far the matrix moves, up
+            or down, when that figure moves up by its own standard error, (k, k) each.
     """
 
     names: tuple[str, ...] = ()

@@ -98,7 +98,8 @@ class CovarianceTable:
     Args:
         names: of the parameters that have errors.
         matrix: with a row and a column for each of them, in the order of the names, in their SI units.
-        spread: how far the matrix moves with the standard error of each variance of the noise.
+        spread: how far the matrix moves, up or down, when an estimated figure of the noise (a variance, a correlation
+            of rows) moves up by its own standard error: a change, not a covariance; a matrix for each figure.
     """
 
     names: tuple[str, ...]
@@ -120,29 +121,15 @@ class CovarianceTable:
             self._check_values()
 
     def _check_values(self) -> None:
-        """Refuse matrices that no variances and covariances of real quantities make."""
-        matrix = np.array(self.matrix)
-        spread = np.array([*self.spread, np.zeros_like(matrix)])
-        sigma = np.sqrt(np.diag(matrix))
+        """Refuse a matrix that no variances and covariances of real quantities make."""
+        sigma = np.sqrt(np.diag(self.matrix))
         with np.errstate(over="ignore"):
-            correlation = (matrix / np.outer(sigma, sigma).clip(np.finfo(float).tiny)).clip(-2.0, 2.0)
-        for place, bad, problem, expected in (
-            ("matrix", not np.allclose(correlation, correlation.T), "a covariance that is not symmetric", "C = C^T"),
-            (
-                "matrix",
-                not np.linalg.eigvalsh(correlation).min() > -_ROUNDING * len(self.names),
-                "a covariance that no quantities have",
-                "a positive semidefinite matrix",
-            ),
-            (
-                "spread",
-                (np.diagonal(spread, axis1=1, axis2=2) < -_ROUNDING * np.diag(matrix)).any(),
-                "a spread that no variance has",
-                "zero or more on the diagonals",
-            ),
-        ):
-            if bad:
-                raise ValueError(ModelError(problem, place=place, expected=expected))
+            correlation = (self.matrix / np.outer(sigma, sigma).clip(np.finfo(float).tiny)).clip(-2.0, 2.0)
+        if not np.allclose(correlation, correlation.T):
+            raise ValueError(ModelError("a covariance that is not symmetric", place="matrix", expected="C = C^T"))
+        if not np.linalg.eigvalsh(correlation).min() > -_ROUNDING * len(self.names):
+            expected = "a positive semidefinite matrix"
+            raise ValueError(ModelError("a covariance that no quantities have", place="matrix", expected=expected))
 
 
 @dataclass(frozen=True)
@@ -180,7 +167,7 @@ class FitTable(Quality):
 
     @property
     def quality(self) -> Quality:
-        return Quality(self.nrmse, self.reduced_chi_square, self.points, self.noise)
+        return Quality(self.nrmse, self.reduced_chi_square, self.points, self.noise, self.loop_gain_error)
 
     @property
     def measured(self) -> Range | None:

@@ -31,12 +31,15 @@ class Quality:
         reduced_chi_square: mean square residual in units of noise; 1 where noise is all that is left.
         points: number of residuals.
         noise: standard deviation of one point, relative, root mean square over all.
+        loop_gain_error: standard deviation of a loop's gain, relative, by the class of the rig; None without loops, and
+            where an older file does not say it.
     """
 
     nrmse: Number
     reduced_chi_square: Number
     points: WholeNumber
     noise: Number
+    loop_gain_error: Number | None = None
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
 from bushfit.effects.contract import Array
-from bushfit.fitting.noise import ASSUMED_SHARED
+from bushfit.fitting.rig_class import ASSUMED
 from bushfit.geometry import Place, Specimen
 from bushfit.model.model import Model
 
@@ -61,9 +61,9 @@ class Noise:
         rows_as_one: so many rows of a loop tell as much as an independent one.
     """
 
-    scatter: tuple[float, float] = (ASSUMED_SHARED[0], ASSUMED_SHARED[0])
-    shared: tuple[float, float] = ASSUMED_SHARED
-    level: tuple[float, float] = ASSUMED_SHARED
+    scatter: tuple[float, float] = (ASSUMED[0], ASSUMED[0])
+    shared: tuple[float, float] = ASSUMED
+    level: tuple[float, float] = ASSUMED
     force: float = ASSUMED_FORCE
     rows_as_one: float = ASSUMED_ROWS
 

@@ -16,7 +16,7 @@ from bushfit.errors import ModelError, did_you_mean
 from bushfit.fitting.data import Data
 from bushfit.fitting.data_sets import DataSet, parted
 from bushfit.fitting.information import relative_sizes
-from bushfit.fitting.noise import ASSUMED_SHARED, of_class
+from bushfit.fitting.rig_class import of_class
 from bushfit.fitting.solve import Bounds, Coordinates
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -141,7 +141,7 @@ def look_alikes(found: Diagnosis) -> list[tuple[str, ...]]:
 def noise_of(data: Data) -> Noise:
     """How well the rig of a campaign measures, as its tests show; what they do not show is assumed."""
     loops, sweeps = parted([*data.loops, *data.sweeps])
-    found = replace(Noise(), level=of_class(data.campaign.rig, ASSUMED_SHARED))
+    found = replace(Noise(), level=of_class(data.campaign.rig))
     if sweeps:
         noise = sweeps[0].noise
         gain, phase = np.sqrt(np.mean(np.square(list(noise.random.values())), axis=0)).tolist()

@@ -15,7 +15,7 @@ from bushfit.effects import qualified
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.fitting.data_sets import new_sweep
-from bushfit.fitting.noise import FEWEST_STEPS
+from bushfit.fitting.repeats import FEWEST_STEPS
 from bushfit.fitting.solve import residual
 from bushfit.geometry import Place, Specimen
 from bushfit.model.covariance import Z95

@@ -2,21 +2,24 @@
 
 import csv
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError
-from bushfit.reading.headers import Column
+from bushfit.reading.headers import Column, Vocabulary
 from bushfit.reading.layout import FileFormat, Layout, fits
 from bushfit.reading.measurement import Floats
-from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, weigh
+from bushfit.reading.names import named_direction
+from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, is_like_number, weigh
+from bushfit.reading.runs import rows_alike
 from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, RowSource, rows
+from bushfit.reading.words import ROW_COLUMNS
 
 #: Rows that are taken apart at a time where a library cannot; chosen: their texts fill some MiB.
 _CHUNK_ROWS = 1 << 16
@@ -25,6 +28,27 @@ _FIRST_CELLS = 1000
 
 #: Characters of what was found that an error quotes; chosen: two lines of a terminal.
 _LONGEST_FOUND = 200
+#: Rows of each value in the mean where a column parts tests; chosen: one that counts its rows parts none.
+_FEWEST_ROWS = 3
+#: Rows that tell whether a column may part tests; chosen: a long record is not read for one that counts its rows.
+_FIRST_ROWS = 1000
+#: What a column may say of the test that a row belongs to.
+_LABELS = Vocabulary(ROW_COLUMNS, {})
+
+
+class Rows(NamedTuple):
+    """The rows of a file that make a test: of a direction and a specimen number, where columns tell them, and with
+    `texts` in the columns of these headers; where tests share a file, a column has to tell them apart."""
+
+    direction: str | None = None
+    specimen_number: str | None = None
+    texts: Mapping[str, str] = {}
+    shared: bool = False
+
+
+def same_text(text: str, other: str) -> bool:
+    """Whether two texts of such columns are one, in upper or lower case: 17 and #17."""
+    return text.strip(" #").casefold() == other.strip(" #").casefold()
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +60,7 @@ class Columns:
         layout: its header, units row and delimiter.
         stated: what the user states of the file's format.
         roles: the recognised columns, by what they hold.
+        left_out: lines of rows that belong to other tests.
     """
 
     file: Path
@@ -43,6 +68,7 @@ class Columns:
     layout: Layout
     stated: FileFormat
     roles: Mapping[str, Column]
+    left_out: frozenset[int] = field(default=frozenset(), kw_only=True)
 
     @property
     def headers(self) -> tuple[str, ...]:
@@ -57,10 +83,98 @@ class Columns:
         """
         try:
             for line, cells in rows(self.source, self.layout):
-                if any(cell != "" for cell in cells):
+                if line not in self.left_out and any(cell != "" for cell in cells):
                     yield line, cells
         except csv.Error as error:
             raise self.error("the table cannot be read", found=str(error)) from error
+
+    @cached_property
+    def labels(self) -> Mapping[str, tuple[int, Sequence[str]]]:
+        """Index and texts, (n,), of columns that tell direction, specimen_number and run; directions by their names."""
+        found: dict[str, tuple[int, Sequence[str]]] = {}
+        for index, header in enumerate(self.headers):
+            heading = _LABELS.heading(header)
+            if heading and heading.role not in found and (texts := self._parting(index)):
+                if heading.role == "direction":
+                    known = {text: named_direction([text], short=True) for text in set(texts)}
+                    texts = [str(known[text] or text) for text in texts] if any(known.values()) else []
+                found |= {heading.role: (index, texts)} if texts else {}
+        return found
+
+    def taking(self, wanted: Rows) -> Self:
+        """The table of the rows of one test alone.
+
+        Raises:
+            MeasurementError: no such row or column, rows of several parts, or tests that no column tells apart.
+        """
+        stated = {"direction": wanted.direction, "specimen_number": wanted.specimen_number}
+        told = [(*self.labels[key], text) for key, text in stated.items() if text and key in self.labels]
+        for header, text in wanted.texts.items():
+            if header not in self.headers:
+                raise self.header_error(f'there is no column "{header}"', expected="headers, as keys of rows")
+            told.append((self.headers.index(header), self.texts(self.headers.index(header)), text))
+        if wanted.shared and not told:
+            expected = "each file once, or a column that tells its tests apart"
+            raise self.header_error("a file is listed twice", expected=expected)
+        column, parts = self.labels.get("specimen_number", (0, ()))
+        rows = [line for line, _ in self.rows()] if told or parts else []
+        kept = [n for n in range(len(rows)) if all(same_text(texts[n], text) for _, texts, text in told)]
+        several = len({parts[n] for n in kept}) > 1 if parts else False
+        if several or (told and not kept):
+            found = [(column, parts, "one part")] if several else told
+            raise self.header_error(
+                "this file holds tests of several parts" if several else "no row is of this test",
+                found="; ".join(
+                    f'{", ".join([*dict.fromkeys(own)])} in column "{self.headers[i]}"' for i, own, _ in found
+                ),
+                expected=" and ".join(text for *_, text in found),
+                hint='state one that was found, as specimen_number = "..."; bushfit init writes all tests of a file',
+            )
+        return replace(self, left_out=frozenset(rows).difference(rows[n] for n in kept))
+
+    def not_understood(self, rows: NDArray[np.intp] | None = None, *settled: Floats) -> Iterator[str]:
+        """A sentence for each column that may part tests, and of which nothing says what it means.
+
+        Of a sweep, `settled` are frequency and level of its `rows`, (n,): a number that goes with them is measured, and
+        a text that goes with one of them names it. Of a loop, numbers are channels.
+        """
+        known = {column.index for column in self.roles.values()}
+        known |= {index for key, (index, texts) in self.labels.items() if key != "direction" or len({*texts}) == 1}
+        for index in (index for index in range(len(self.headers)) if index not in known):
+            is_number, header = self.holds_numbers(index), self.headers[index]
+            if (is_number and not settled) or not (texts := self._parting(index)):
+                continue
+            own = np.array(texts)[slice(None) if rows is None else rows]
+            values, place, counts = np.unique(own, return_inverse=True, return_counts=True)
+            goes_with = [settled] if is_number else [(one,) for one in settled]
+            explained = any(all(np.ptp(place[alike]) == 0 for alike in rows_alike(*keys)) for keys in goes_with)
+            if values.size > 1 and not explained and not (is_number and counts.min() < _FEWEST_ROWS):
+                listed = ", ".join(values[:4]) + ", ..." * (values.size > 4)
+                yield (
+                    f'"{header}" (column {index + 1}) varies from row to row ({listed}) and is not understood: all '
+                    f'rows count as one test; rows = {{ "{header}" = "{values[0]}" }} in the campaign takes those alone'
+                )
+
+    def holds_numbers(self, index: int) -> bool:
+        """Whether a column begins with a number."""
+        cells = next(self.rows(), (0, ()))[1]
+        return index < len(cells) and is_like_number(str(cells[index]))
+
+    def texts(self, index: int, most: int | None = None) -> list[str]:
+        """The text of each row in a column, or of the first ones, (n,); an empty cell, as merged ones are, goes on."""
+        found, last = [], ""
+        for _, cells in islice(self.rows(), most):
+            cell = cells[index] if index < len(cells) else ""
+            last = (cell.strip(" #") if isinstance(cell, str) else f"{cell:.12g}") or last
+            found.append(last)
+        return found
+
+    def _parting(self, index: int) -> list[str]:
+        """The texts of a column without a role that may part tests; else none."""
+        if self.layout.written or index in {column.index for column in self.roles.values()}:
+            return []
+        first = self.texts(index, _FIRST_ROWS)
+        return self.texts(index) if _FEWEST_ROWS * len(set(first)) <= len(first) else []
 
     def error(
         self,
@@ -201,7 +315,7 @@ class Columns:
         """
         decimals = {way.decimal for way in weigh(islice(self._texts(), _FIRST_CELLS), self._open_ways()).ways}
         first = next(self.rows(), (0, ()))[1]
-        if len(decimals) > 1 or not fits(first, len(self.headers)):
+        if len(decimals) > 1 or self.left_out or not fits(first, len(self.headers)):
             return None
         numerals = Numerals(decimals.pop())
         cells = [first[column.index] for column in wanted.values()]

@@ -34,6 +34,8 @@ _LONGEST_HEADER = 10_000
 _LINES_BELOW_HEADER = 8
 #: Signs with which a comment begins.
 _COMMENT_SIGNS = ("#", "%", "//")
+#: A number that a # marks as such: "#1".
+_NUMBERED = re.compile(r"#\s?\d+\b")
 #: Blanks between a name and the bracket of its unit, which part no columns.
 _BLANK_BEFORE_BRACKET = re.compile(r"\s+(?=[\[(])")
 #: What parts columns of which the headers have single blanks.
@@ -80,6 +82,7 @@ class Layout:
         headers, header_line: cells and line of the header.
         units, units_line: cells of the units row, "" where a column has none, and its line; None where there is none.
         written: cells of the header of a wide table that name a quantity, of which `headers` are those of the long one.
+        numbered: whether all rows begin with a number behind a # ("#1"), which then begins no comment.
     """
 
     delimiter: str
@@ -88,6 +91,7 @@ class Layout:
     units: tuple[str, ...]
     units_line: int | None
     written: tuple[str, ...] = ()
+    numbered: bool = False
 
     @property
     def lines_before_data(self) -> int:
@@ -135,8 +139,7 @@ def find_layout(
     """
     if not lines:
         return Layout(delimiter or ",", (), 1, (), None)
-    delimiters = tuple(DELIMITERS.values()) if delimiter is None else (delimiter,)
-    end = _first_rows(lines, delimiters)
+    end, delimiters = _first_rows(lines, tuple(DELIMITERS.values()) if delimiter is None else (delimiter,))
     before = [index for index in range(end) if header_line in (None, lines[index].number)]
     if header_line is not None and not before:
         before = [index for index, line in enumerate(lines) if line.number == header_line]
@@ -157,7 +160,7 @@ def _candidates(
             if is_comment(content, delimiter) != commented:
                 continue
             if commented and isinstance(content, str):
-                content = content.lstrip().lstrip("#%/; ")
+                content = content.lstrip().lstrip("#%/ " if delimiter == ";" else "#%/; ")
             for cells in _header_cells(content, delimiter):
                 roles = vocabulary.roles(cells)
                 if len(roles) > 1 and not any(is_like_number(cell) for cell in cells):
@@ -197,14 +200,14 @@ def _is_row(cells: Sequence[str]) -> bool:
     return numbers > 1 and 2 * numbers >= len(cells)
 
 
-def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> int:
-    """Index of the first of three rows of numbers in a row; else the number of lines."""
+def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> tuple[int, Sequence[str]]:
+    """Index of the first of three rows of numbers in a row, and what parts them; else the number of lines, and all."""
     inside = [index for index, line in enumerate(lines) if not is_comment(line.content, ";")]
     for start, *others in zip(inside, inside[1:], inside[2:], strict=False):
         three = [lines[index].content for index in (start, *others)]
-        if all(any(_is_row(split(content, delimiter)) for delimiter in delimiters) for content in three):
-            return start
-    return len(lines)
+        if parting := [mark for mark in delimiters if all(_is_row(split(content, mark)) for content in three)]:
+            return start, parting
+    return len(lines), delimiters
 
 
 def _likeliest(
@@ -231,13 +234,15 @@ def _likeliest(
 
 
 def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence[str]) -> Layout:
-    """The layout of a header, with the units row that may follow it."""
+    """The layout of a header, with the units row that may follow it; this may lack empty cells at its end."""
     units_line, row = None, ("",) * len(headers)
     if line := next(_below(lines, index, delimiter), None):
         cells = [cell.strip("[]() ") for cell in split(line.content, delimiter)]
-        if fits(cells, len(headers)) and _is_units_row(cells):
-            units_line, row = line.number, tuple(cells[: len(headers)])
-    return Layout(delimiter, tuple(headers), lines[index].number, row, units_line)
+        if (len(cells) < len(headers) or fits(cells, len(headers))) and _is_units_row(cells):
+            units_line, row = line.number, tuple([*cells, *row][: len(headers)])
+    rows = [split(line.content, delimiter) for line in lines[index + 1 :] if line.number != units_line]
+    numbered = bool(rows) and all(_NUMBERED.match(next(filter(None, cells), "")) for cells in rows)
+    return Layout(delimiter, tuple(headers), lines[index].number, row, units_line, numbered=numbered)
 
 
 def _is_units_row(cells: Sequence[str]) -> bool:

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from bushfit.geometry import Place, stated_strain
+from bushfit.reading.columns import Rows
 from bushfit.reading.headers import Column
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Floats, Loop, Waveform, rebuild_time, source_of
@@ -37,6 +38,7 @@ def read_loop(
     weight: float = 1.0,
     temperature: float | None = None,
     conditions: Mapping[str, str | float] | None = None,
+    rows: Rows | None = None,
 ) -> Loop:
     """Read a hysteresis loop.
 
@@ -54,11 +56,12 @@ def read_loop(
         waveform: course of the displacement in time.
         noise, weight: of the loop, see `Loop`.
         temperature, conditions: at which it was tested [K], and what else is stated of the test, for provenance.
+        rows: of the file that make the test.
 
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
     """
-    table = Table.open(file, LOOP_COLUMNS, columns, units, written, direction.motion)
+    table = Table.open(file, LOOP_COLUMNS, columns, units, written, direction.motion, rows or Rows())
     _check_not_swapped(table, direction)
     wanted = _loop_columns(table, direction, force_sign, has_clock=rate is not None or frequency is not None)
     values = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
@@ -71,7 +74,7 @@ def read_loop(
         time = rebuild_time(displacement, rate=rate, frequency=frequency, waveform=waveform)
     else:
         _check_increases(table, wanted["time"], time)
-    source = source_of(file, listed_as, table.sha256, temperature, conditions)
+    source = source_of(file, listed_as, table.sha256, temperature, conditions, table.not_understood())
     timed = "time" in values
     return Loop(
         name or file.stem, direction, time, displacement, force, noise, source, timed, weight, temperature=temperature
@@ -129,6 +132,7 @@ def _check_increases(table: Table, column: Column, time: Floats) -> None:
     """Refuse a time that does not increase from row to row."""
     after, before = time[1:], time[:-1]
     if any(by_chunks(lambda rows: bool((after[rows] <= before[rows]).any()), after.size)):
-        table.refuse(np.append(False, after <= before), column, "time does not increase", "a later time on every row")
+        expected, hint = "a later time on every row", "if a column tells runs, bushfit init makes a loop of each"
+        table.refuse(np.append(False, after <= before), column, "time does not increase", expected, hint)
     if time[-1] - time[0] < LEAST_VALUE:
         raise table.error("the record takes no time", column=column, expected=f"{LEAST_VALUE:g} s or more")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -33,11 +33,13 @@ class Source:
         file: as the campaign names it.
         sha256: of its content.
         conditions: of the test that no fit uses, as the campaign states them, such as preload and date.
+        notes: a sentence for each of its columns that varies from row to row and was not understood.
     """
 
     file: Path
     sha256: str
     conditions: Mapping[str, str | float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 def source_of(
@@ -46,10 +48,11 @@ def source_of(
     sha256: str,
     temperature: float | None,
     conditions: Mapping[str, str | float] | None,
+    notes: Iterable[str] = (),
 ) -> Source:
     """The provenance of a test: its file as the campaign names it, and its conditions, a temperature [K] in degC."""
     degrees = {} if temperature is None else {"temperature_degC": round(temperature - CELSIUS, 6)}
-    return Source(listed_as or Path(file.name), sha256, {**(conditions or {}), **degrees})
+    return Source(listed_as or Path(file.name), sha256, {**(conditions or {}), **degrees}, tuple(notes))
 
 
 @dataclass(frozen=True)

@@ -186,7 +186,7 @@ def rows(source: RowSource, layout: Layout) -> Iterator[tuple[int, Sequence[str 
         csv.Error: a line or a quoted cell that is far too long.
     """
     for number, content in source.lines(layout.lines_before_data):
-        if not is_comment(content, layout.delimiter):
+        if layout.numbered or not is_comment(content, layout.delimiter):
             try:
                 yield number, split(content, layout.delimiter) if isinstance(content, str) else content
             except csv.Error as error:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bushfit import units as si
 from bushfit.geometry import Place, stated_strain
+from bushfit.reading.columns import Rows
 from bushfit.reading.headers import AmplitudeConvention, Column
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Complex, Floats, Stepped, Sweep, source_of
@@ -72,6 +73,7 @@ def read_sweep(
     weight: float = 1.0,
     temperature: float | None = None,
     conditions: Mapping[str, str | float] | None = None,
+    rows: Rows | None = None,
 ) -> Sweep:
     """Read a sweep.
 
@@ -85,13 +87,13 @@ def read_sweep(
         at_amplitude: of a file without a column for it [m or rad, or strain], counted as `amplitude` has it.
         at_frequency: of a file without a column for it [Hz].
         stepped: what was stepped while the other was held, where the order of the rows does not tell it.
-        noise, weight, conditions: as of `read_loop`.
+        noise, weight, conditions, rows: as of `read_loop`.
         temperature: at which it was tested [K], where it is stated; of a file with a column for it, the rows near it.
 
     Raises:
         MeasurementError, UnitError: a file, column, unit or value that cannot be used.
     """
-    table = Table.open(file, SWEEP_COLUMNS, columns, units, written, direction.motion)
+    table = Table.open(file, SWEEP_COLUMNS, columns, units, written, direction.motion, rows or Rows())
     pair = _stiffness_pair(table)
     stated = {"frequency": at_frequency, "amplitude": at_amplitude}
     at = {role: value for role, value in stated.items() if value is not None}
@@ -108,25 +110,29 @@ def read_sweep(
     _check_loss(table, wanted[pair[1]], loss_factor)
     _check_agreement(table, pair, values, stiffness)
     repeat = _repeats(table, wanted, values)
-    rows, temperature, degrees = _of_temperature(table, values, temperature)
-    frequency, level = values["frequency"][rows], to_peak * values["amplitude"][rows]
-    reached = to_peak * values["amplitude_reached"][rows] if "amplitude_reached" in values else None
-    runs = runs_of(frequency, level, None if repeat is None else repeat[rows], stepped)
+    taken, temperature, degrees = _of_temperature(table, values, temperature)
+    frequency, level = values["frequency"][taken], to_peak * values["amplitude"][taken]
+    reached = values["amplitude_reached"][taken] if "amplitude_reached" in values else None
+    if reached is not None:
+        own = wanted["amplitude_reached"].convention
+        reached = reached * (_ZERO_TO_PEAK[own] if own else to_peak)
+    runs = runs_of(frequency, level, None if repeat is None else repeat[taken], stepped)
     if reached is None and not np.array_equal(runs.amplitude, level):
         reached = level
-    source = source_of(file, listed_as, table.sha256, temperature, conditions)
+    odd = table.not_understood(taken, frequency, runs.amplitude)
+    source = source_of(file, listed_as, table.sha256, temperature, conditions, odd)
     return Sweep(
         name or file.stem,
         direction,
         frequency,
         runs.amplitude,
-        stiffness[rows],
+        stiffness[taken],
         runs.repeat,
         noise,
         source,
         reached,
         runs.stepped,
-        values["relative_error"][rows] if "relative_error" in values else None,
+        values["relative_error"][taken] if "relative_error" in values else None,
         weight=weight,
         temperature=degrees,
     )
@@ -159,6 +165,7 @@ def _sweep_columns(table: Table, direction: Place, pair: tuple[str, str], at: Ma
     needed = [role for role in ("frequency", "amplitude") if role in table.roles or role not in at]
     degrees = table.roles.get("temperature")
     optional = [role for role in ("amplitude_reached", "repeat", "relative_error") if role in table.roles]
+    optional = [role for role in optional if role != "repeat" or table.holds_numbers(table.roles[role].index)]
     optional += ["temperature"] if degrees and degrees.unit else []
     again = [role for other in STIFFNESS_PAIRS if set(other) <= set(table.roles) for role in other]
     again = [role for role in again if units[role] == "1" or table.agrees(role, units[role])]
@@ -298,7 +305,10 @@ def _tangent(phase: Floats) -> Floats:
 
 
 def _repeats(table: Table, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> NDArray[np.int64] | None:
-    """Number of each row's repeat as its column has it, (n,); None where there is none."""
+    """Number of each row's repeat as its column has it, (n,), texts by their order; None where there is none."""
+    if "repeat" in table.roles and "repeat" not in values:
+        texts = table.texts(table.roles["repeat"].index)
+        return np.array([*map([*dict.fromkeys(texts)].index, texts)], dtype=np.int64) + 1
     if (repeat := values.get("repeat")) is None:
         return None
     is_count = (repeat == np.round(repeat)) & (repeat >= 0) & (repeat < _MOST_REPEATS)

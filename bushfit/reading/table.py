@@ -11,7 +11,7 @@ from pathlib import Path
 from bushfit import units
 from bushfit.errors import MeasurementError, NoColumnError, UnitError, naming
 from bushfit.geometry import STRAINING, TRANSLATION, Motion
-from bushfit.reading.columns import Columns
+from bushfit.reading.columns import Columns, Rows
 from bushfit.reading.encoding import to_utf8
 from bushfit.reading.files import sha256, view_bytes
 from bushfit.reading.headers import Column, Heading, Vocabulary, is_angular, plain, split_convention
@@ -49,6 +49,7 @@ class Table(Columns):
         stated_units: Mapping[str, str] | None = None,
         stated: FileFormat | None = None,
         motion: Motion = TRANSLATION,
+        rows: Rows | None = None,
     ) -> "Table":
         """Read a file and understand its header.
 
@@ -59,9 +60,11 @@ class Table(Columns):
             columns, stated_units: header and unit of roles, where it is no usual one, or the file does not tell it.
             stated: what the file does not tell of its format.
             motion: of what was tested, by which a test of strain and modulus goes by other headers.
+            rows: that make the test; all of them where none are stated.
 
         Raises:
-            MeasurementError: no such file, no text, no header, or a header that does not settle which column is which.
+            MeasurementError: no such file, no text, no header, a header that does not settle which column is which, or
+                no such rows.
             UnitError: two different units for one column.
         """
         stated = stated or FileFormat()
@@ -91,7 +94,8 @@ class Table(Columns):
         table = cls(file, source, layout, stated, {}, checksum, names, motion)
         table._check_header()
         named = columns or {} if understood is vocabulary else {}
-        return replace(table, roles=table._recognise(understood, named, stated_units or {}))
+        table = replace(table, roles=table._recognise(understood, named, stated_units or {}))
+        return table if rows is None else table.taking(rows)
 
     @property
     def sha256(self) -> str:
@@ -197,17 +201,23 @@ class Table(Columns):
                 known = role in roles and not _is_k(roles[role].header)  # K* says more than K
                 if known or not any(units.agrees(column.unit or "", si) for si in ("N/m", "N*m/rad")):
                     continue
+            if role in roles and self.texts(index) == self.texts(roles[role].index):
+                continue
             if role in roles:
                 raise self.header_error(
                     f"more than one column could be the {_label(role)}",
                     found=f"{roles[role].header}, {header}",
                     expected="one",
-                    hint=f'choose it in the campaign: columns = {{ {role} = "{header}" }}',
+                    hint="give each a header of its own"
+                    if header == roles[role].header
+                    else f'choose it in the campaign: columns = {{ {role} = "{header}" }}',
                 )
             roles[role] = column
         for role in columns:
             if role not in roles:
                 raise self._no_column(role, columns[role])
+        if "amplitude_reached" in roles and "amplitude" not in roles:
+            roles["amplitude"] = replace(roles.pop("amplitude_reached"), role="amplitude")
         return roles
 
     def _column_of(self, heading: Heading, index: int, stated_unit: str | None) -> Column:

@@ -14,6 +14,8 @@ WORDS: Mapping[str, Mapping[str, Sequence[str]]] = tomllib.loads(
 LOOP_COLUMNS = WORDS["loop"]
 #: For each column of a sweep, the headers it goes by.
 SWEEP_COLUMNS = WORDS["sweep"]
+#: For each column that says which test a row belongs to, by key, the headers it goes by.
+ROW_COLUMNS = {**WORDS["rows"], "specimen_number": WORDS["above"]["specimen_number"], "run": SWEEP_COLUMNS["repeat"]}
 
 
 def _made_of(body: str, quantity: str) -> list[str]:

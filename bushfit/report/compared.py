@@ -25,6 +25,8 @@ from bushfit.validation import check_tables
 #: Digits of a parameter's value, and decimals of a difference at most.
 _DIGITS = 4
 _MOST_DECIMALS = 6
+#: Width of an interval from which on its numbers have an exponent: it is open.
+_OPEN = 1e7
 #: A probability below this is told as being below it.
 _LEAST_CHANCE = 1e-3
 #: Columns that say of a difference whether it is more than chance.
@@ -278,6 +280,8 @@ def parameter_cells(row: ParameterContrast) -> list[str]:
 
 def signed(value: float, width: float) -> str:
     """A difference with the decimals that two digits of its interval need."""
+    if width >= _OPEN:
+        return number(value, 2, "+")
     decimals = max(1 - math.floor(math.log10(width)), 0) if width > 0.0 else _DIGITS
     decimals = min(decimals, _MOST_DECIMALS)
     return f"{round(value, decimals) + 0.0:+.{decimals}f}"

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bushfit.comparison import Comparison, Contrast
+from bushfit.comparison import Comparison, Contrast, relative
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
@@ -260,7 +260,7 @@ def contrast_table(found: Comparison, each: Contrast) -> pd.DataFrame:
             for end, of in _ends(band).items():
                 values[f"{who} {what}{end}"] = of * scale
     differences = (
-        (f"relative difference of {words(each.place)[2]} [-]", each.stiffness, np.expm1),
+        (f"relative difference of {words(each.place)[2]} [-]", each.stiffness, relative),
         ("difference of loss factor [-]", each.loss_factor, np.asarray),
     )
     for what, band, shown in differences:
@@ -353,5 +353,5 @@ def required(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
 
 
 def complete(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
-    """The rows of a table in which all these numbers are known."""
-    return rows.iloc[np.flatnonzero(np.isfinite(numbers(rows, *headers)).all(axis=0))]
+    """The rows of a table in which all these numbers are known; none of none, whatever their columns."""
+    return rows if rows.empty else rows.iloc[np.flatnonzero(np.isfinite(numbers(rows, *headers)).all(axis=0))]

@@ -24,7 +24,7 @@ class Asked(TypedDict):
         session: hours of the session that is planned, and simulated, where effects are left open; null for none.
     """
 
-    schema: Literal["bushfit/scorecard/1"]
+    schema: Literal["bushfit/scorecard/2"]
     version: str
     families: list[str]
     campaigns: int

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from bushfit.effects import LIBRARY
+from bushfit.diagnosis.record import Settings
+from bushfit.effects import LIBRARY, twins_of
 from bushfit.scorecard.hidden import Sealed
 
 #: The verdict of the reader, where it does not take a file with a mistake.
@@ -12,6 +13,8 @@ REFUSED = "refused"
 _LARGEST_SET = 3
 #: Verdicts under which every name stays in the model.
 _KEEPING = ("named", "partly")
+#: Kinds of campaigns in which nothing is hidden.
+CLEAN = ("clean", "awkward", "swept")
 
 #: What came of the planned session: one true name for each set, a wrong name, no name; or the plan knows of no test.
 Settled = Literal["rightly", "wrongly", "open", "elsewhere"]
@@ -44,8 +47,7 @@ class Outcome:
         task: what was hidden.
         sealed: the truth; None where the campaign could not be made.
         verdict: of the diagnosis; "refused" where the reader does not take the file, "failed" where it went wrong.
-        named: effects it named or that lead a set.
-        sets: all members of each set, leader first.
+        sets: all members of each set, leader first; of a name alone that.
         gain: chi-square that the best single effect takes off, whether it was added or not.
         heldout: gap on held-out data after, in units of noise; None where nothing was held out.
         covered: per hidden effect that was added, or per parameter of a swept campaign: whether the 95 % interval of
@@ -58,12 +60,14 @@ class Outcome:
         before: gap on held-out data before, as `heldout`.
         settled: what came of the planned session, where effects of the library were left open and it was asked for.
         decides: the test on the rig that is asked for, where the virtual rig can make none that decides.
+        nothing: probability told of nothing; None where there is no diagnosis.
+        leader: what was told as likeliest, in words; "" where nothing was.
+        odds: probability told of the leader, if anything is missing.
     """
 
     task: Task
     sealed: Sealed | None
     verdict: str
-    named: tuple[str, ...] = ()
     sets: tuple[tuple[str, ...], ...] = ()
     gain: float = 0.0
     heldout: float | None = None
@@ -75,6 +79,40 @@ class Outcome:
     before: float | None = None
     settled: Settled | None = None
     decides: str = ""
+    nothing: float | None = None
+    leader: str = ""
+    odds: float = 0.0
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """What it named or what leads a set."""
+        return tuple(members[0] for members in self.sets)
+
+    @property
+    def seen(self) -> bool:
+        """Whether anything was said to be missing at all."""
+        return self.verdict != "consistent"
+
+    @property
+    def shows(self) -> bool:
+        """Whether there is more to see than the tolerance."""
+        if self.task.kind == "mistake":
+            return self.matters
+        return self.task.kind not in CLEAN and self.sealed is not None and self.sealed.visible > Settings().tolerance
+
+    @property
+    def leader_right(self) -> bool | None:
+        """Whether what was told as likeliest is so, all of it and nothing else; None where it tells of a place, or of
+        what has no name, and something is hidden that may be just that."""
+        parts = self.leader.split(" + ")
+        names = [part for part in parts if " " not in part]
+        if self.task.kind in CLEAN or any(not self._is_true(name, *twins_of(name)) for name in names):
+            return False
+        if len(names) < len(parts):
+            return None if self.task.outside or self.task.without else False
+        told = {alike for name in names for alike in twins_of(name)}
+        hidden = self.sealed.hidden if self.sealed and self.task.hidden else ()
+        return all({*twins_of(name), _limit(name)} & told for name in hidden)
 
     @property
     def left_open(self) -> bool:
@@ -93,7 +131,7 @@ class Outcome:
     def truths(self) -> set[str]:
         """All names that say what was done, with the simpler ones that these are at an end of their range."""
         done = {*self.task.hidden, *(self.sealed.hidden if self.sealed else ())}
-        return done | {limit for name in done if name in LIBRARY and (limit := LIBRARY[name].limit)}
+        return done | {limit for name in done if (limit := _limit(name))}
 
     def _is_true(self, *names: str) -> bool:
         """Whether one of the names says what was done; a family that is no effect itself says it for all its places."""
@@ -109,7 +147,7 @@ class Outcome:
     def truth_in_sets(self) -> bool:
         """Whether every hidden effect was named alone, or as a twin, or in a set of at most three."""
         told = {name for members, twins in self._claims if len(members) <= _LARGEST_SET for name in (*members, *twins)}
-        return all({name, LIBRARY[name].limit if name in LIBRARY else None} & told for name in self.task.hidden)
+        return all({name, _limit(name)} & told for name in self.task.hidden)
 
     @property
     def wrong_kept(self) -> tuple[str, ...]:
@@ -158,3 +196,8 @@ class Outcome:
     def exact(self) -> bool:
         """Exactly the hidden effects named, each alone."""
         return self.verdict == "named" and set(self.named) == set(self.task.hidden)
+
+
+def _limit(name: str) -> str | None:
+    """The simpler effect that one is at an end of its range."""
+    return LIBRARY[name].limit if name in LIBRARY else None

@@ -54,20 +54,14 @@ def run(
         hours: of the session that is planned where effects are left open; None for none.
 
     Notes:
-        A campaign that takes its worker down time after time is a failure of its own row.
+        A campaign that takes its worker down twice is a failure of its own row.
     """
-    if jobs == 1:
-        return [_noted(work(task, kept, hours), progress) for task in chosen]
     done: dict[int, Outcome] = {}
     for number, found in pool.run(chosen, partial(_in_worker, kept=kept, hours=hours), str, pool.LocalPool(jobs)):
         outcome = Outcome(chosen[number], None, "failed", error=found) if isinstance(found, str) else found
-        done[number] = _noted(outcome, progress)
+        progress(outcome)
+        done[number] = outcome
     return [done[number] for number in range(len(chosen))]
-
-
-def _noted(outcome: Outcome, progress: Callable[[Outcome], None]) -> Outcome:
-    progress(outcome)
-    return outcome
 
 
 def _in_worker(chosen: Sequence[Task], kept: Path | None, hours: float | None) -> list[Outcome | str]:
@@ -140,12 +134,12 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
     added = {name for name in task.hidden if name in result.model.effects}
     asked = [name for name in truth.values if task.kind == "swept" or effect_of(name) in added]
     intervals = {name: result.interval(name) for name in asked}
+    leader, odds = max(diagnosis.odds.told, key=lambda pair: pair[1], default=("", 0.0))
     covered = [ends[0] <= truth.values[name] <= ends[1] for name, ends in intervals.items() if ends is not None]
     return Outcome(
         task,
         truth,
         diagnosis.verdict,
-        tuple(effect.label for effect in diagnosis.effects),
         tuple((effect.label, *_names(effect.alternatives)) for effect in diagnosis.effects),
         max((judged.gain or 0.0 for judged in diagnosis.candidates if not mistake_named(judged.name)), default=0.0),
         heldout["after"],
@@ -153,10 +147,15 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
         seconds,
         task.kind == "mistake" and _matters(diagnosis.before, truth),
         twins=tuple(
-            tuple(twin for name in (effect.label, *_names(effect.alternatives)) for twin in twins_of(name) if twin != name)
+            tuple(
+                twin for name in (effect.label, *_names(effect.alternatives)) for twin in twins_of(name) if twin != name
+            )
             for effect in diagnosis.effects
         ),
         before=heldout["before"],
+        nothing=diagnosis.odds.nothing,
+        leader=leader,
+        odds=odds,
     )
 
 

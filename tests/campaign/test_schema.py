@@ -91,7 +91,7 @@ BAD: list[tuple[type[BushfitError], str, list[str]]] = [
     (CampaignError, BUSHING + TESTS.replace("loop.csv", ""), ["loops #1.file", "not empty"]),
     (MeasurementError, BUSHING + TESTS.replace("loop.csv", "lop.csv"), ["lop.csv", "no such file", 'mean "loop.csv"']),
     (MeasurementError, BUSHING + TESTS.replace("loop.csv", "sweep.csv"), ["sweep.csv, line 1", "no column"]),
-    (CampaignError, BUSHING + TESTS + TESTS.replace("loop.csv", "./loop.csv"), ["listed twice", "./loop.csv"]),
+    (MeasurementError, BUSHING + TESTS + TESTS.replace("loop.csv", "./loop.csv"), ["listed twice", "loop.csv"]),
     (MeasurementError, BUSHING + TESTS.replace("loop.csv", "x" * 5000), ["cannot be read", "too long"]),
     (MeasurementError, BUSHING + TESTS.replace("loop.csv", "\\u0000"), ["no such file"]),
     (CampaignError, BUSHING + TESTS + 'noice = "1 %"', ["sweeps #1.noice", 'mean "noise"']),

@@ -134,10 +134,15 @@ def test_options_reach_the_workflow(bushfit: Run, tmp_path: Path) -> None:
 
     assert document("--tolerance", "50 %")["verdict"] == "consistent"
     assert document("--max-effects", "0")["verdict"] == "unexplained"
-    without = document("--without", "inertia")
-    assert all(effect["name"] != "inertia" for effect in without["effects"])  # type: ignore[attr-defined]
     assert document("--adopt", "inertia")["verdict"] == "consistent"
     assert json.loads((tmp_path / "x" / "model.json").read_text())["effects"] == [*BASE, "inertia"]
+
+
+@pytest.mark.slow
+def test_an_effect_that_is_left_out_is_not_named(bushfit: Run, tmp_path: Path) -> None:
+    done = bushfit("diagnose", CAMPAIGN, "--without", "inertia", "-o", str(tmp_path / "x"), "--json", "--no-plots")
+    assert done.returncode == 0, done.stderr
+    assert all(effect["name"] != "inertia" for effect in json.loads(done.stdout)["effects"])
 
 
 def test_a_clean_campaign(bushfit: Run, tmp_path: Path) -> None:
@@ -221,6 +226,7 @@ def test_wrong_usage_of_the_score_card(bushfit: Run, options: tuple[str, ...]) -
     assert options[0] in run.stderr
 
 
+@pytest.mark.slow
 def test_the_gap_in_a_picture(bushfit: Run, tmp_path: Path) -> None:
     run = bushfit("diagnose", CAMPAIGN, "-o", str(tmp_path / "x"))
     assert run.returncode == 0, run.stderr

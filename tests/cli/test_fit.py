@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import json
+import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
-from commandline import Done
+from commandline import Done, call
 
 Run = Callable[..., Done]
 CAMPAIGN = "configs/cmp_15961.toml"
@@ -39,3 +44,86 @@ def test_the_paper_s_order_by_hand(bushfit: Run, tmp_path: Path) -> None:
     assert [file.name for file in Path(p).glob("[!.]*")] == ["torsion.csv"]
     again = bushfit("fit-static", CAMPAIGN, "--dynamic", f"{d}/dynamic.json", "-o", str(tmp_path / "s2"), "--no-plots")
     assert "left out" not in again.stderr
+
+
+@pytest.fixture
+def own(work: Path, tmp_path: Path) -> Path:
+    """A folder with a copy of the campaign, to be changed."""
+    for name in ("data", "configs"):
+        shutil.copytree(work / name, tmp_path / name)
+    return tmp_path
+
+
+REPEATS_OFF = "repeats differ as a whole by an error of"
+ROWS_APART = "points that repeat each other lie up to"
+
+
+@pytest.mark.parametrize(
+    ("off", "tilted", "told"),
+    [
+        (0.0, False, []),
+        (0.05, False, [REPEATS_OFF]),
+        (0.13, False, [ROWS_APART, REPEATS_OFF]),
+        (0.13, True, [ROWS_APART, REPEATS_OFF]),
+    ],
+)
+@pytest.mark.parametrize("command", ["fit", "diagnose"])
+def test_repeats_that_disagree_do_not_excuse_themselves(
+    own: Path, command: str, off: float, tilted: bool, told: list[str]
+) -> None:
+    """The second of two repeats is off, at all frequencies or more and more along them."""
+    file = own / "data/cmp_15961/sweep_axial.csv"
+    table = pd.read_csv(file).query("repeat <= 2")
+    share = np.log(table["frequency [Hz]"] / 5.0) / np.log(31.0) if tilted else 1.0
+    table["stiffness [N/mm]"] *= 1.0 + off * share * (table["repeat"] == 2)
+    table.to_csv(file, index=False)
+    done = call(own, command, CAMPAIGN, "-o", "out", "--no-plots")
+    assert done.returncode == 0, done.stderr
+    warnings = [line for line in done.stderr.splitlines() if line.startswith("warning:")]
+    assert [words for words in (ROWS_APART, REPEATS_OFF) if any(words in line for line in warnings)] == told
+    if ROWS_APART in told:
+        assert "sweep_axial.csv" in warnings[0]
+        assert re.search(r"rows \d+ and \d+", warnings[0])
+        assert done.stderr.startswith("warning:")  # before anything is fitted
+    if command == "diagnose":
+        assert ("consistent" in done.stderr) is not bool(told)
+
+
+def test_a_loop_that_repeats_another_and_lies_far_off_is_told(own: Path) -> None:
+    table = pd.read_csv(own / "data/cmp_15961/loop_axial_1.csv")
+    table["force [N]"] *= 1.15
+    table.to_csv(own / "data/cmp_15961/loop_again.csv", index=False)
+    with (own / CAMPAIGN).open("a", encoding="utf-8") as file:
+        file.write('\n[[loops]]\nfile = "../data/cmp_15961/loop_again.csv"\ndirection = "axial"\n')
+    done = call(own, "fit", CAMPAIGN, "-o", "out", "--no-plots")
+    assert "loop_again: it repeats loop_axial_1, and their stiffness lies 15 % apart" in " ".join(done.stderr.split())
+
+
+def test_the_gain_error_of_loops_is_said(own: Path) -> None:
+    errors, plain = {}, (own / CAMPAIGN).read_text(encoding="utf-8")
+    for stated in ("", "0.5 %", "0 %"):
+        campaign = plain + f'\n[rig]\ngain_error = "{stated}"\n' * bool(stated)
+        (own / CAMPAIGN).write_text(campaign, encoding="utf-8")
+        done = call(own, "fit", CAMPAIGN, "-o", "out", "--no-plots", "--force")
+        assert ("gain of a loop within 0.5 %" in done.stderr) is (stated != "0 %")
+        fit = json.loads((own / "out/model.json").read_text(encoding="utf-8"))
+        errors[stated] = fit["fit"]["loop_gain_error"]
+    assert errors == {"": 0.005, "0.5 %": 0.005, "0 %": 0.0}
+
+
+def test_a_bar_in_tension_and_a_coupon_in_shear_of_one_rubber_have_one_fit(typed: Run, tmp_path: Path) -> None:
+    """By hand: a bar has three times the modulus, and the same energy at a strain sqrt(3) times smaller."""
+    frequency, strain = (axis.ravel() for axis in np.meshgrid([5, 10, 20, 40, 80], [0.2, 0.7, 2.0, 6.0]))
+    modulus = 1.0 + 0.1 * frequency**0.24 + 0.6 / (1.0 + strain / 1.5)
+    loss = 0.05 + 0.007 * np.log(frequency) + 0.15 * strain / (1.5 + strain) ** 2
+    fitted = {}
+    for symbol, factor, stretched in (("E", 3.0, np.sqrt(3.0)), ("G", 1.0, 1.0)):
+        columns = (frequency, strain / stretched, factor * modulus, loss)
+        rows = "\n".join(",".join(f"{cell:.7g}" for cell in row) for row in zip(*columns, strict=True))
+        header = f"Frequency [Hz],Strain [%],Storage Modulus {symbol}' [MPa],tan delta [-]"
+        (tmp_path / f"{symbol}.csv").write_text(f"{header}\n{rows}\n", encoding="utf-8")
+        assert typed("init", f"{symbol}.csv", "-o", f"{symbol}.toml").returncode == 0
+        done = typed("fit", f"{symbol}.toml", "-o", symbol, "--no-plots", "--json")
+        assert done.returncode == 0, done.stderr
+        fitted[symbol] = {name: each["value"] for name, each in json.loads(done.stdout)["parameters"].items()}
+    assert fitted["E"] == pytest.approx(fitted["G"], rel=1e-3)

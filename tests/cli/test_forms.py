@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -55,10 +55,10 @@ ARGUMENTS = {
 QUICK = {"predict", "reduce", "export"}
 
 
-def having(option: str) -> list[Any]:
+def having(option: str, quick: Collection[str] = QUICK) -> list[Any]:
     commands = {name: cli.get_command(CONTEXT, name) for name in cli.list_commands(CONTEXT)}
     names = [name for name, found in commands.items() if found and option in {each.name for each in found.params}]
-    return [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in names]
+    return [name if name in quick else pytest.param(name, marks=pytest.mark.slow) for name in names]
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +94,7 @@ def test_tables_hold_the_same_in_every_form(place: Path, name: str) -> None:
             pd.testing.assert_frame_equal(found, plain, check_dtype=False, rtol=1e-6, atol=1e-300)
 
 
-@pytest.mark.parametrize("name", having("plot_format"))
+@pytest.mark.parametrize("name", having("plot_format", {"reduce"}))
 def test_pictures_are_of_every_form_asked_for(place: Path, name: str) -> None:
     draws = ["--format", "fmu"] if name == "export" else []  # of its formats, the one that draws
     files = written(place, name, "-o", f"{name}-drawn", *draws, "--plot-format", "svg", "--plot-format", "pdf")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +13,6 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulateSettings
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.record import Diagnosis, Settings
-from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE, effect_named
 from bushfit.fitting.data import Data
@@ -78,17 +76,3 @@ def fitted() -> Fitted:
         return fit(Model.started(campaign.bushing, (*kept, *effects), start), data_sets, (), {})
 
     return evidence
-
-
-@pytest.fixture
-def exchanged(monkeypatch: pytest.MonkeyPatch) -> list[Sequence[str]]:
-    """The effects that each exchange of a search began with, in the turn in which they were asked for."""
-    asked_for = list[Sequence[str]]()
-    exchange = Search.exchange
-
-    def counted(search: Search, current: Evidence, added: Sequence[str]) -> tuple[Evidence, list[str]]:
-        asked_for.append(added)
-        return exchange(search, current, added)
-
-    monkeypatch.setattr(Search, "exchange", counted)
-    return asked_for

@@ -13,7 +13,6 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.locate import contrasts
 from bushfit.diagnosis.propose import proposals
 from bushfit.diagnosis.score_test import PATTERN_LEFT, ScoreTest
-from bushfit.diagnosis.search import critical_gain
 from bushfit.effects.contract import Array
 from bushfit.fitting.data_sets import parted
 
@@ -75,20 +74,16 @@ def test_columns_that_the_model_absorbs_are_not_asked(clean: Evidence) -> None:
 def test_clean_campaigns_pass_the_thresholds_at_the_stated_rates(
     measured: Measured, fitted: Fitted, plan: SimulateSettings
 ) -> None:
-    """Whole campaigns, their noise estimated anew from each: smooth misfit, and the best of all candidates."""
-    smooth, candidates = [], []
+    """Whole campaigns, their noise estimated anew from each."""
+    smooth = []
     for seed in range(SEEDS):
         evidence = fitted(measured(plan=plan, seed=seed))
         columns = contrasts(evidence)
         questions = ScoreTest(evidence, columns, [np.arange(len(columns))], PATTERN_LEFT)
         smooth.append(questions.gains()[0] > questions.largest_by_chance(LEVEL))
-        proposed = proposals(evidence, (), ())
-        candidates.append(max(proposal.score for proposal in proposed) > critical_gain(evidence, proposed))
     print(f"{SEEDS} clean campaigns: smooth misfit above its {100 * LEVEL:.0f} % threshold in {np.mean(smooth):.1%}")
-    print(f"best candidate above its 99.5 % threshold in {np.mean(candidates):.1%}")
-    # counts over 300 seeds scatter: 15 +- 4 and 1.5 +- 1.2 are expected
+    # counts over 300 seeds scatter: 15 +- 4 are expected
     assert 0.0 < np.mean(smooth) < 0.09
-    assert np.mean(candidates) < 0.02
 
 
 def blocks(evidence: Evidence) -> list[Array]:
@@ -151,13 +146,6 @@ def test_the_sense_of_a_question_is_that_of_its_answer(clean: Evidence) -> None:
     two_sided = questions.largest_by_chance(LEVEL, [0, 0])
     one_sided = questions.largest_by_chance(LEVEL, [1, 1])
     assert one_sided == pytest.approx(two_sided, rel=1e-9)
-
-
-def test_more_candidates_cost_a_higher_threshold(clean: Evidence) -> None:
-    proposed = proposals(clean, (), ())
-    one, every = critical_gain(clean, proposed[:1]), critical_gain(clean, proposed)
-    print(f"one candidate {one:.1f}, all {len(proposed)} {every:.1f}")
-    assert every > one + 2.0
 
 
 def test_two_powers_that_would_follow_any_law_between_them_are_not_looked_for_together(clean: Evidence) -> None:

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 from asking import INERTIA, asked, no_loops, no_repeats, no_sweeps, one_direction, said
+from bushfit.diagnosis.again import Again
 from rigged import SHARED, Measured, changed
 
-from bushfit.campaign.schema import Loss, RigSettings
+from bushfit.campaign.schema import FitSettings, Loss, ParameterSetting, RigSettings
 from bushfit.diagnosis import verdict
-from bushfit.diagnosis.again import Again
 from bushfit.diagnosis.holdout import HoldOut
 from bushfit.diagnosis.next_test import MENU
 from bushfit.effects import BASE
@@ -47,6 +47,14 @@ def test_a_name_that_does_not_hold_out_is_taken_back(measured: Measured, monkeyp
     assert "inertia" in diagnosis.summary
     assert "taken back" in diagnosis.summary
     assert "no more than a lead: inertia" in diagnosis.summary
+
+
+def test_a_name_that_needs_the_largest_possible_amount_is_no_more_than_a_lead(measured: Measured) -> None:
+    """The mass may be 95 % of what it is: it closes the gap as far as noise shows, and rests on its bound."""
+    most = FitSettings(parameters={"inertia.mass": ParameterSetting(max=0.95 * INERTIA["inertia"]["mass"])})
+    diagnosis = asked(replace(measured(INERTIA, SHARED), fit=most), without=("fixture_resonance",))
+    assert said(diagnosis) == "described unnamed"
+    assert "only with inertia.mass at the edge of what is possible; no more than a lead: inertia" in diagnosis.summary
 
 
 @pytest.mark.slow
@@ -167,6 +175,7 @@ TURNED = replace(
 )
 
 
+@pytest.mark.slow
 def test_compliance_in_one_direction_alone_is_never_a_bold_name(measured: Measured) -> None:
     """A softer rig and a softer rubber look alike in one direction; two leave open which gives way, torsion tells."""
     campaign = measured(SOFT_RIG, TURNED)

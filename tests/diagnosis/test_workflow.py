@@ -25,12 +25,13 @@ from asking import (
     one_loop,
     said,
 )
+from bushfit.diagnosis.search import Search
 from rigged import PLAN, SHARED, Diagnosed, Measured, changed
+from tries import some
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, ParameterSetting, SimulateSettings
 from bushfit.diagnosis.record import Settings
-from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import Remainder
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE
@@ -67,8 +68,8 @@ def test_a_clean_campaign_is_consistent_and_its_model_stays(
         assert 0.75 * alike < stderr < 1.02 * alike
 
 
-@pytest.mark.parametrize("shape", [(10, 18, 68), (12, 30, 50), (20, 30, 30)], ids=str)
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("shape", some([(10, 18, 68), (12, 30, 50), (20, 30, 30)], [(10, 18, 68)]), ids=str)
+@pytest.mark.parametrize("seed", some(range(2), [0]))
 def test_a_radial_stiffness_off_the_formula_is_not_blamed_on_the_rig(
     reference_shapes: dict[tuple[float, ...], float], paper_model: Model, shape: tuple[float, ...], seed: int
 ) -> None:

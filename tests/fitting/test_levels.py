@@ -50,8 +50,9 @@ def test_what_the_class_of_the_rig_states_widens_intervals(
     rig: Callable[..., Campaign], paper_noise: SimulateSettings, paper_model: Model
 ) -> None:
     campaign = rig(paper_model, paper_noise, 1)
-    stated = replace(campaign, rig=RigSettings(gain_error=5e-3, phase_error=4e-3))
-    plain, wide = (fit_joint(Data.of(one), directions=BOTH).covariance.stderr("m") for one in (campaign, stated))
+    rigs = RigSettings(gain_error=0.0, phase_error=0.0), RigSettings(gain_error=5e-3, phase_error=4e-3)
+    stated = (Data.of(replace(campaign, rig=rig)) for rig in rigs)
+    plain, wide = (fit_joint(data, directions=BOTH).covariance.stderr("m") for data in stated)
     assert plain is not None
     assert wide is not None
     assert wide > 1.5 * plain

@@ -76,6 +76,17 @@ def test_a_clean_test_gives_the_stiffness_back(paper_model: Model, rows: int) ->
     assert found.warnings == ()
 
 
+def test_each_point_has_the_rows_that_it_is_the_mean_of(paper_model: Model) -> None:
+    """One or two of 170 for each of 100 points, also of those that stay where others are left out."""
+    random = np.random.default_rng(0)
+    test = shaken(paper_model, 170, lambda n: 0.06 * random.standard_normal(n))
+    found = reduce_resonance(test, MASS)
+    assert found.left_out.size % 10
+    parts = np.split(test.frequency, np.arange(1, MOST_POINTS) * 170 // MOST_POINTS)
+    means = {round(float(part.mean()), 6): part.size for part in parts}
+    assert found.rows.tolist() == [means[round(float(frequency), 6)] for frequency in found.frequency]
+
+
 def wandering(random: np.random.Generator, sigma: float) -> Callable[[int], Array]:
     """Noise that neighbouring rows share: white noise averaged over a thirtieth of the rows."""
 

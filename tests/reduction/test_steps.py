@@ -18,6 +18,7 @@ from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.result import Reduction
 from bushfit.reduction.steps import reduce
+from bushfit.report.tables import reduced_table
 
 FREQUENCIES = (5.0, 25.0, 100.0, 101.0, 155.0)
 #: The rig misses 0.1, 0.2 and 0.5 mm.
@@ -83,6 +84,18 @@ def test_other_directions(paper_model: Model, direction: Direction) -> None:
     reduction = reduce([made.history])
     assert len(reduction.steps) == 2
     assert worst(reduction, paper_model) < 1e-4
+
+
+def test_the_table_states_the_error_of_the_loss_factor_that_the_phase_has(clean: Stepped) -> None:
+    """Of tan(delta), by differences: with a loss factor of a tenth it is some per cent more than that of delta."""
+    reduction = reduce([clean.measured(np.random.default_rng(0), 1e-3, drift=0.01)])
+    table = reduced_table(reduction)
+    delta = np.arctan(table["loss factor [-]"].to_numpy())
+    order = np.lexsort([reduction.array(key) for key in ("nominal_frequency", "repeat", "level")])
+    error = reduction.array("phase_error")[order]
+    np.testing.assert_allclose(
+        table["loss factor std error [-]"], (np.tan(delta + error) - np.tan(delta - error)) / 2.0, rtol=1e-3
+    )
 
 
 def test_stated_errors_are_those_made(clean: Stepped, paper_model: Model) -> None:

@@ -55,16 +55,14 @@ def acceptable(answer: Answer, diagnosis: Mapping[str, Any]) -> Judged:
 
 
 class _Claim(NamedTuple):
-    """Names that an effect goes by: its own, its twins and what has it as a limit; and what it cannot be told from."""
+    """Names that an effect goes by: its own and its twins; and what it cannot be told from."""
 
     names: tuple[str, ...]
     others: tuple[str, ...]
 
 
 def _claim(effect: Mapping[str, Any]) -> _Claim:
-    return _Claim(
-        (effect["name"], *effect.get("twins", ()), *effect.get("richer", ())), tuple(effect.get("alternatives", ()))
-    )
+    return _Claim((effect["name"], *effect.get("twins", ())), tuple(effect.get("alternatives", ())))
 
 
 def _true(answer: Answer, names: Sequence[str]) -> bool:

@@ -62,7 +62,7 @@ KINDS: dict[str, Kind] = {
         "the stiffness of one file was rounded", False, made.rounded_stiffness, (), ("direction",)
     ),
     "adhesive": Kind("the adhesive flexes in series, with a springpot of its own", False, made.adhesive, _GIVES),
-    "buckling": Kind("in one sense the rubber softens beyond a strain", False, made.buckling),
+    "buckling": Kind("in one sense the rubber softens beyond a strain", False, made.buckling, ("asymmetry",)),
     "ageing": Kind(
         "the rubber aged before its second direction",
         False,

@@ -14,7 +14,7 @@ from bushfit.scorecard.outcome import Outcome, Task
 
 ASKED = {"families": ["awkward"], "campaigns": 5, "seed": 1}
 SEALED = Sealed(("delay",), {"mu": 1.1e6}, 0.05, True, 1)
-ONE = Outcome(Task("fault", 1, (), "preload"), SEALED, "named", ("delay",), (("delay", "viscous"),), heldout=1.01)
+ONE = Outcome(Task("fault", 1, (), "preload"), SEALED, "named", (("delay", "viscous"),), heldout=1.01)
 TWO = replace(ONE, task=replace(ONE.task, seed=2), error="FitError: no")
 
 

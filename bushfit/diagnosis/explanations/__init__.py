@@ -1,8 +1,8 @@
 """What may explain a gap: each kind proposes itself, as columns with a prior, and says what it is in words."""
 
-from bushfit.diagnosis.explanations.contract import Explanation
+from bushfit.diagnosis.explanations.contract import Explanation, FaultyPlace, MissingEffect
 from bushfit.diagnosis.explanations.effects import effects
 from bushfit.diagnosis.explanations.places import places
 from bushfit.diagnosis.explanations.unnamed import unnamed
 
-__all__ = ["Explanation", "effects", "places", "unnamed"]
+__all__ = ["Explanation", "FaultyPlace", "MissingEffect", "effects", "places", "unnamed"]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from bushfit.diagnosis.currency import Group
 from bushfit.diagnosis.propose import Proposal
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_set import Suspect
+from bushfit.geometry import Place
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,20 +17,37 @@ class Explanation:
         family: within which it shares them: an effect without its place, a kind of place.
         name: its own.
         group: what it does to the residuals; of an effect that replaces a branch none, its refit tells.
-        proposal: of an effect.
-        suspect: of a place.
     """
 
     kind: str
     family: str
     name: str
     group: Group | None
-    proposal: Proposal | None = None
-    suspect: Suspect | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class MissingEffect(Explanation):
+    """An effect of the library, with what it promises before any refit."""
+
+    proposal: Proposal
+
+
+@dataclass(frozen=True, eq=False)
+class FaultyPlace(Explanation):
+    """Points of the tests that are off together.
+
+    Args:
+        direction: of the first test touched.
+        frequency: lowest and highest [Hz].
+        amplitude: lowest and highest, zero-to-peak [m or rad].
+    """
+
+    direction: Place
+    frequency: tuple[float, float]
+    amplitude: tuple[float, float]
 
     @property
     def columns(self) -> Array:
-        """Of its group."""
-        if self.group is None:
-            raise ValueError(f"{self.name} has no columns")
+        """Whitened residuals that a unit deviation of each kind makes, (c, n)."""
+        assert self.group is not None
         return self.group.columns

@@ -6,12 +6,12 @@ import numpy as np
 
 from bushfit.diagnosis.currency import Group
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations.contract import Explanation
+from bushfit.diagnosis.explanations.contract import MissingEffect
 from bushfit.diagnosis.propose import proposals
 
 
-def effects(evidence: Evidence, excluded: Collection[str], held: Sequence[str]) -> list[Explanation]:
-    """Every effect that these tests could show, of which one shape is chosen; one that replaces a branch by its refit."""
+def effects(evidence: Evidence, excluded: Collection[str], held: Sequence[str]) -> list[MissingEffect]:
+    """Every effect that these tests could show, in one of its shapes; one in place of a branch is told by its refit."""
     share = np.empty(evidence.residual.size)
     for data_set, place in evidence.place.items():
         share[place] = data_set.relative_noise
@@ -21,5 +21,5 @@ def effects(evidence: Evidence, excluded: Collection[str], held: Sequence[str]) 
         if not proposal.together:
             unit = np.abs(proposal.columns * share).max(axis=1)
             group = Group(proposal.columns, unit, together=False, sense=proposal.sense)
-        found.append(Explanation("effect", proposal.name.partition(".")[0], proposal.name, group, proposal))
+        found.append(MissingEffect("effect", proposal.name.partition(".")[0], proposal.name, group, proposal))
     return found

@@ -6,10 +6,9 @@ import numpy as np
 
 from bushfit.diagnosis.currency import Group
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations.contract import Explanation
+from bushfit.diagnosis.explanations.contract import FaultyPlace
 from bushfit.effects.contract import Array
-from bushfit.fitting.data_set import Suspect
-from bushfit.fitting.data_sets import SweepData, parted
+from bushfit.fitting.data_sets import LoopData, SweepData, parted
 
 #: Neighbouring frequencies that one disturbance covers at most: mains hum and its sidebands.
 _WIDEST = 3
@@ -19,55 +18,55 @@ _FEWEST_FREQUENCIES = 5
 _MOST_FREQUENCIES = 100
 
 
-def places(evidence: Evidence) -> list[Explanation]:
+def places(evidence: Evidence) -> list[FaultyPlace]:
     """Every place whose points may be off together, in gain and phase; levels and repeats with a slope along them.
 
     What its points share does not depend on the model.
     """
     loops, sweeps = parted(evidence.data_sets)
     found = [*_frequencies(evidence, sweeps), *_levels(evidence, sweeps), *_repeats(evidence, sweeps)]
-    found += _loops(evidence) if len(loops) < len(evidence.data_sets) else []
-    return [
-        Explanation("place", suspect.kind, suspect.words, Group(columns, np.ones(len(columns)), together=True), suspect=suspect)
-        for suspect in found
-        for columns in [np.array(suspect.columns)]
-    ]
+    return found + ([_loop(evidence, loop) for loop in loops] if len(loops) < len(evidence.data_sets) else [])
 
 
-def _loops(evidence: Evidence) -> Iterator[Suspect]:
-    for loop in parted(evidence.data_sets)[0]:
-        for suspect in loop.suspects():
-            yield _suspect(evidence, suspect.words, "loop", [loop], [evidence.embedded(c, loop) for c in suspect.columns])
+def _loop(evidence: Evidence, loop: LoopData) -> FaultyPlace:
+    """A loop wrong as a whole, in gain or offset."""
+    columns = [evidence.embedded(column, loop) for column in loop.gain_and_offset()]
+    ends = (loop.drive.frequency,) * 2, (loop.drive.amplitude,) * 2
+    return FaultyPlace("place", "loop", f"the loop {loop.name}", _group(columns), loop.direction, *ends)
 
 
-def _suspect(
-    evidence: Evidence, words: str, kind: str, tests: Sequence, columns: Sequence[Array], chosen: Sequence[Array] = ()
-) -> Suspect:
-    rows = chosen or [slice(None)] * len(tests)
-    ends = [
-        np.concatenate([np.atleast_1d(getattr(test, axis))[mine] for test, mine in zip(tests, rows, strict=True)])
-        for axis in ("frequency", "amplitude")
-    ]
-    spans = [(float(each.min()), float(each.max())) for each in ends]
-    return Suspect(words, kind, columns, tests[0].direction, spans[0], spans[1])
+def _group(columns: Sequence[Array] | Array) -> Group:
+    return Group(np.array(columns), np.ones(len(columns)), together=True)
 
 
-def _levels(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[Suspect]:
+def _place(
+    words: str, kind: str, sweeps: Sequence[SweepData], chosen: Sequence[Array], columns: Sequence[Array] | Array
+) -> FaultyPlace:
+    """Chosen points of sweeps, (n,) bool each."""
+    pairs = list(zip(sweeps, chosen, strict=True))
+    frequency, amplitude = (
+        np.concatenate([getattr(sweep, axis)[mine] for sweep, mine in pairs]) for axis in ("frequency", "amplitude")
+    )
+    ends = (float(frequency.min()), float(frequency.max())), (float(amplitude.min()), float(amplitude.max()))
+    return FaultyPlace("place", kind, words, _group(columns), sweeps[0].direction, *ends)
+
+
+def _levels(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:
     for sweep in sweeps:
         every = np.unique(sweep.held)
         for held in every:
             here = sweep.held == held
             words = sweep.line_words(int(np.argmax(here)))
             if every.size > 1:
-                yield _suspect(evidence, words, "level", [sweep], _off(evidence, [sweep], [here], sloping=True), [here])
+                yield _place(words, "level", [sweep], [here], _off(evidence, [sweep], [here], sloping=True))
             numbers = np.unique(sweep.repeat[here])
             for number in numbers if numbers.size > 2 else ():
                 mine = here & (sweep.repeat == number)
                 columns = _off(evidence, [sweep], [mine])
-                yield _suspect(evidence, f"repeat {number} of {words}", "repeat", [sweep], columns, [mine])
+                yield _place(f"repeat {number} of {words}", "repeat", [sweep], [mine], columns)
 
 
-def _repeats(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[Suspect]:
+def _repeats(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:
     """A repeat as a whole, of one direction or of all."""
     for scope in _scopes(sweeps):
         if not all(np.unique(sweep.repeat).size > 1 for sweep in scope):
@@ -77,10 +76,10 @@ def _repeats(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[Suspec
             if all(rows.any() for rows in chosen):
                 where = "every sweep" if len(scope) > 1 else f"the {scope[0].direction} sweep {scope[0].name}"
                 columns = _off(evidence, scope, chosen, sloping=True)
-                yield _suspect(evidence, f"repeat {number} of {where}", "repeat", scope, columns, chosen)
+                yield _place(f"repeat {number} of {where}", "repeat", scope, chosen, columns)
 
 
-def _frequencies(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[Suspect]:
+def _frequencies(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[FaultyPlace]:
     """A disturbance at one frequency or a few neighbours, in one direction or in all."""
     steps = np.unique(np.concatenate([sweep.frequency for sweep in sweeps])) if sweeps else np.empty(0)
     if steps.size < _FEWEST_FREQUENCIES:
@@ -100,25 +99,19 @@ def _frequencies(evidence: Evidence, sweeps: Sequence[SweepData]) -> Iterator[Su
                 words = f"{span} Hz in {where}, at every amplitude"
                 rows = [np.any([chosen[place] for chosen in touched[window]], axis=0) for place in range(len(scope))]
                 own = [column for each in columns[window] for column in each]
-                yield _suspect(evidence, words, "frequency", scope, own, rows)
+                yield _place(words, "frequency", scope, rows, own)
 
 
 def _scopes(sweeps: Sequence[SweepData]) -> list[Sequence[SweepData]]:
     return [*([sweep] for sweep in sweeps), *([sweeps] if len(sweeps) > 1 else [])]
 
 
-def _off(
-    evidence: Evidence, sweeps: Sequence[SweepData], chosen: Sequence[Array], *, sloping: bool = False
-) -> list[Array]:
-    """Residuals of some points of sweeps that are off together: in gain, in phase, and with `sloping` along the step."""
-    columns = []
-    for slope in (False, True)[: 1 + sloping]:
-        for unit in (1.0, 1.0j):
-            column = np.zeros(evidence.residual.size)
-            for sweep, rows in zip(sweeps, chosen, strict=True):
-                value = rows * (_along(sweep.step) if slope else 1.0)
-                column[evidence.place[sweep]] = sweep.whiten(value * unit)
-            columns.append(column)
+def _off(evidence: Evidence, sweeps: Sequence[SweepData], chosen: Sequence[Array], *, sloping: bool = False) -> Array:
+    """Residuals of some points of sweeps that are off together: in gain, in phase, and if `sloping` along the step."""
+    columns = np.zeros((2 + 2 * sloping, evidence.residual.size))
+    for sweep, rows in zip(sweeps, chosen, strict=True):
+        values = [rows.astype(float), *([rows * _along(sweep.step)] if sloping else [])]
+        columns[:, evidence.place[sweep]] = [column for value in values for column in sweep.moved_together(value)]
     return columns
 
 

@@ -43,12 +43,23 @@ def _processes(evidence: Evidence, sweeps: Sequence[SweepData], how: str) -> Ite
     features = _features(np.concatenate(points))
     ends = np.cumsum([0, *(len(each) for each in points)])
     own = [
-        np.array([evidence.embedded(sweep.whiten(feature * unit), sweep) for feature in features[:, a:b] for unit in (1.0, 1.0j)])
+        np.array(
+            [
+                evidence.embedded(sweep.whiten(feature * unit), sweep)
+                for feature in features[:, a:b]
+                for unit in (1.0, 1.0j)
+            ]
+        )
         for sweep, a, b in zip(sweeps, ends[:-1], ends[1:], strict=True)
     ]
     directions = dict.fromkeys(str(sweep.direction) for sweep in sweeps)
     for direction in directions:
-        yield direction, np.concatenate([each for each, sweep in zip(own, sweeps, strict=True) if str(sweep.direction) == direction])
+        yield (
+            direction,
+            np.concatenate(
+                [each for each, sweep in zip(own, sweeps, strict=True) if str(sweep.direction) == direction]
+            ),
+        )
     if len(directions) > 1:
         yield "all", np.sum(own, axis=0)
 

@@ -190,8 +190,7 @@ def cells_at(place: Place, gap: pd.DataFrame, tests: Sequence[TestTable]) -> Ite
         ends = told(unit, float(x.min())), name, told(unit, float(x.max()))
         for part in ("storage", "loss"):
             yield _map(part, rows, held if stepped else "test", x, ends)
-    loops = mine[mine["kind"] == "loop"]
-    loops = complete(loops, "time [s]", "frequency [Hz]", moved_of(place)) if len(loops) else loops
+    loops = complete(mine[mine["kind"] == "loop"], "time [s]", "frequency [Hz]", moved_of(place))
     if len(loops):
         each = (loops[loops["test"] == test] for test in dict.fromkeys(loops["test"]))
         turned = np.concatenate([_phase(place, rows) for rows in each])

@@ -32,8 +32,9 @@ from bushfit.validation import LARGEST_NUMBER, check_tables
 MODELS = ("model", "dynamic", "static")
 #: The plain fit, beside a model with what was added.
 PLAIN = "joint"
-#: What "schema" of a diagnosis says.
+#: What "schema" of a diagnosis says, and what an older one lacks.
 DIAGNOSES = "bushfit/diagnosis/3", "bushfit/diagnosis/2"
+_ODDS = {"schema": DIAGNOSES[0], "nothing": 0.0, "odds": []}
 #: Documents of a result.
 _DOCUMENTS = (*MODELS, PLAIN, "diagnosis")
 #: Tables of a result beside those of the predictions, which are named after places.
@@ -49,12 +50,17 @@ class _Model:
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """All documents of a result: the model to use, the plain fit beside it, the campaign, and the diagnosis."""
+    """All documents of a result: the model to use, the plain fit beside it, the campaign, and the diagnosis.
+
+    Args:
+        has_odds: whether the diagnosis tells probabilities, as that of an older version does not.
+    """
 
     result: Result
     plain: Result | None
     about: CampaignTable | None
     diagnosis: DiagnosisFile | None
+    has_odds: bool
     versions: Mapping[str, str]
 
 
@@ -70,15 +76,18 @@ def checked(documents: Mapping[str, Mapping[str, Any]], files: Mapping[str, Path
         raise ModelError("there is no model among the results", expected=" or ".join(f"{name}.json" for name in MODELS))
     model, plain, diagnosis = documents[name], documents.get(PLAIN), documents.get("diagnosis")
     result = from_document(model, at.get(name))
+    has_odds = diagnosis is not None and diagnosis.get("schema") == DIAGNOSES[0]
     if diagnosis is not None:
         hint = "bushfit diagnose writes it anew"
         require_schema(diagnosis, at.get("diagnosis"), "a diagnosis", *DIAGNOSES, hint=hint)
+        diagnosis = diagnosis if has_odds else {**diagnosis, **_ODDS}
     provenance = model.get("provenance", {})
     return Checked(
         result,
         from_document(plain, at.get(PLAIN)) if plain else None,
         check_tables(model, at.get(name), _Model, kind=ModelError).campaign,
         check_tables(diagnosis, at.get("diagnosis"), DiagnosisFile, kind=ModelError) if diagnosis is not None else None,
+        has_odds,
         {"bushfit": str(provenance.get("bushfit", "")), **_texts(provenance.get("packages"))},
     )
 

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from bushfit.diagnosis.document import BeforeAfter, EffectEntry
+from bushfit.diagnosis.record import odds_in_words
 from bushfit.geometry import Bushing, Place, Specimen
 from bushfit.model.document import TestTable
 from bushfit.model.result import Misfit, Result, Usable
@@ -55,6 +56,8 @@ def story(found: Checked, tables: Tables) -> dict[str, Any]:
         "more_tests": max(0, len(tests) - MOST),
         "diagnosis": diagnosis,
         "tone": _TONES.get(diagnosis["verdict"], "fair") if diagnosis else "fair",
+        "has_odds": found.has_odds,
+        "odds": odds_in_words(diagnosis) if diagnosis and found.has_odds else [],
         "effects": [_effect(effect) for effect in diagnosis["effects"]] if diagnosis else [],
         "usable": [_usable(place) for place in result.usable],
         "rows": list(parameter_rows(result)),

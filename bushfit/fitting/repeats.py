@@ -1,0 +1,169 @@
+"""What one line of a sweep tells of its noise: by what repeats differ in, or about a smooth curve without repeats.
+
+A line is what was stepped through while one of frequency and amplitude was held. All is counted on ln K = ln|K| +
+i phase, so gain errors are real and phase errors imaginary, both relative to |K|.
+"""
+
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+from scipy.linalg import lapack, qr
+
+from bushfit.effects.contract import Array
+from bushfit.fitting.outliers import least_absolute
+from bushfit.fitting.rig_class import ASSUMED
+from bushfit.reading.measurement import Sweep
+from bushfit.reduction.scatter import MEDIAN_TO_SIGMA, median
+
+#: Least noise of any rig, relative to the largest force or to |K|.
+FLOOR = 1e-4
+#: Degree, in the logarithm of what is stepped, of the smooth curve that stands in for repeats; chosen: it follows
+#: stiffness over two decades.
+_SMOOTH_DEGREE = 4
+#: Degrees in ln f and ln X of the smooth surface that carries points to the amplitude of their level; chosen: it need
+#: only follow the slope over ln X.
+_SURFACE_DEGREES = (1, 3)
+#: Common steps of two repeats from which on their difference tells a variance and a mean.
+FEWEST_STEPS = 3
+#: Differences from which on outliers are sought among them: of fewer, the median tells no scale.
+FEWEST_SOUGHT = 6
+#: Distance of an outlier from the other points [robust standard deviations]: noise alone reaches it once in 1e9.
+_OUTLIER = 6.0
+
+
+@dataclass(frozen=True)
+class LineNoise:
+    """What the repeats of one line of a sweep tell about the noise.
+
+    Args:
+        scatter: deviations of gain and phase from point to point, (k, 2).
+        freedom: degrees of freedom behind their sum of squares.
+        shared: variances of gain and phase that each pair of repeats shares, (pairs, 2).
+        shared_freedom: degrees of freedom behind their mean; 0 without repeats.
+        calmer: without repeats, the scatter less the point that adds most to it, (k - 1, 2).
+        steps: of repeats, what was stepped at each deviation, (k,).
+    """
+
+    scatter: Array
+    freedom: float
+    shared: Array
+    shared_freedom: float = 0.0
+    calmer: Array | None = None
+    steps: Array = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def variance(self) -> Array:
+        """Of gain and phase from point to point, (2,)."""
+        return np.asarray(np.square(self.scatter).sum(axis=0) / max(self.freedom, 1))
+
+
+def told_by_line(sweep: Sweep, log_stiffness: Array, held: float) -> LineNoise:
+    """What one line of a sweep tells: by pairs of repeats, or about a smooth curve where there is no pair."""
+    chosen = sweep.held == held
+    steps, column = np.unique(sweep.step[chosen], return_inverse=True)
+    numbers, row = np.unique(sweep.repeat[chosen], return_inverse=True)
+    table = np.full((numbers.size, steps.size), np.nan + 0j)
+    table[row, column] = log_stiffness[chosen]
+    differences = (one - other for one, other in combinations(table, 2))
+    kept = [(difference, _usual(difference, np.log(steps))) for difference in differences]
+    pairs = [(difference[usual], steps[usual]) for difference, usual in kept if usual.sum() >= FEWEST_STEPS]
+    if not pairs:
+        return _about_smooth_curve(np.log(steps), np.nanmean(table, axis=0))
+    scatter = [_parts(np.diff(difference)) / np.sqrt(2.0) for difference, _ in pairs]
+    shared = [
+        (_parts(difference).mean(axis=0) ** 2 - np.square(spread).mean(axis=0) / len(difference)) / 2.0
+        for (difference, _), spread in zip(pairs, scatter, strict=True)
+    ]
+    independent = 2.0 / numbers.size  # of each pair: m repeats have m (m - 1)/2 pairs, and m - 1 of them are free
+    return LineNoise(
+        np.concatenate([spread * np.sqrt(free_of(len(spread)) / len(spread) / numbers.size) for spread in scatter]),
+        independent * sum(free_of(len(spread)) for spread in scatter),
+        np.array(shared),
+        independent * len(pairs),
+        steps=np.concatenate([np.sqrt(at[1:] * at[:-1]) for _, at in pairs]),
+    )
+
+
+def free_of(steps: int) -> float:
+    """Degrees of freedom behind the squares of so many steps from one value to the next, which share the values."""
+    return 2.0 * steps**2 / (3.0 * steps - 1.0)
+
+
+def _usual(difference: Array, log_step: Array) -> Array:
+    """Where two repeats were both measured and differ as they do elsewhere, (n,) bool: single outliers are faults.
+
+    Elsewhere is all along the run, and nearby where differences grow along it: by Theil's (1950) median slope.
+    """
+    usual = ~np.isnan(difference)
+    if np.count_nonzero(usual) < FEWEST_SOUGHT:
+        return usual
+    parts = _parts(difference)
+    off = np.abs(parts - median(parts[usual]))
+    scale = MEDIAN_TO_SIGMA * median(off[usual])
+    lengths = np.log(np.maximum(np.hypot(*off.T), FLOOR))
+    x, y, half = log_step[usual], lengths[usual], np.count_nonzero(usual) // 2
+    slope = median((y[-half:] - y[:half]) / (x[-half:] - x[:half]))
+    scale = scale * np.exp(np.maximum(slope * (log_step - median(x)), 0.0))[:, None]
+    return usual & np.all((off <= _OUTLIER * scale) | (scale == 0.0), axis=1)
+
+
+def _about_smooth_curve(log_step: Array, log_stiffness: Array) -> LineNoise:
+    """What a line without repeats tells: its scatter about a smooth curve; of one or two points this is assumed."""
+    degree = min(_SMOOTH_DEGREE, log_step.size - 2)
+    if degree < 1:
+        return LineNoise(np.full((1, 2), ASSUMED[0]), 1, np.empty((0, 2)))
+    values = _parts(log_stiffness)
+    basis = np.polynomial.legendre.legvander(unit(log_step), degree)
+    residual = np.abs(values - basis @ least_absolute(basis, values, FLOOR**2))
+    usual = np.median(np.sort(residual, axis=0)[degree + 1 :], axis=0)  # the curve goes through degree + 1 points
+    inliers = np.all(residual <= np.maximum(_OUTLIER * MEDIAN_TO_SIGMA * usual, FLOOR), axis=1)
+    inliers |= np.count_nonzero(inliers) < degree + 2  # too few would leave nothing free
+    scatter = _freed(basis[inliers], values[inliers])
+    curve = np.linalg.qr(basis)[0]
+    off, free = values - curve @ (curve.T @ values), 1.0 - np.square(curve).sum(axis=1)
+    falls = np.square(off).sum(axis=1) / np.maximum(free, FLOOR**2)
+    worst = int(np.argmax(falls))  # the point without which the sum of squares about the curve falls most
+    calmer = _freed(np.delete(basis, worst, axis=0), np.delete(values, worst, axis=0))
+    return LineNoise(scatter, len(scatter), np.empty((0, 2)), calmer=calmer)
+
+
+def unit(values: Array) -> Array:
+    """Values spread from -1 to 1, (n,); all -1 where they are one."""
+    return 2.0 * (values - values.min()) / max(float(np.ptp(values)), np.finfo(float).tiny) - 1.0
+
+
+def _freed(basis: Array, values: Array) -> Array:
+    """What a curve, (n, k), leaves of values, (n, m) -> (n - k, m), in orthonormal coordinates: they scatter
+    independently. No matrix of n by n is made."""
+    (reflections, factors), _ = qr(basis, mode="raw")
+    turned, *_ = lapack.dormqr("L", "T", reflections, factors, values, lwork=values.shape[1])
+    return np.asarray(turned[basis.shape[1] :])
+
+
+def _parts(values: Array) -> Array:
+    """Gain and phase of ln K, complex (n,) -> (n, 2)."""
+    return np.stack([np.real(values), np.imag(values)], axis=-1)
+
+
+def at_nominal(sweep: Sweep) -> Array:
+    """ln K of each point as it would be at the amplitude of its level, complex (n,).
+
+    From the amplitude that was reached it is carried there along a smooth surface over ln f and ln X, which tells how K
+    goes with amplitude; without two levels or more there is none.
+    """
+    value = np.log(sweep.stiffness)
+    off = np.log(sweep.amplitude_reached / sweep.amplitude)
+    distinct = np.unique(sweep.amplitude).size
+    if distinct < 2 or not off.any():
+        return value
+    degrees = min(_SURFACE_DEGREES[0], np.unique(sweep.frequency).size - 1), min(_SURFACE_DEGREES[1], distinct - 1)
+    low, span = np.log(sweep.amplitude).min(), float(np.ptp(np.log(sweep.amplitude)))
+
+    def surface(amplitude: Array) -> Array:
+        over_range = 2.0 * (np.log(amplitude) - low) / span - 1.0
+        return np.polynomial.legendre.legvander2d(unit(np.log(sweep.frequency)), over_range, degrees)
+
+    reached = surface(sweep.amplitude_reached)
+    solution = np.linalg.lstsq(reached.astype(complex), value, rcond=None)[0]
+    return value - (reached - surface(sweep.amplitude)) @ solution

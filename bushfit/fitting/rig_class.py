@@ -1,0 +1,35 @@
+"""The class of a rig: how large the errors are that a whole test shares, as [rig] states it or as it is assumed."""
+
+import numpy as np
+
+from bushfit.campaign.schema import RigSettings
+
+#: Class of a rig that states none, relative gain and phase [rad]; chosen: that of most rigs.
+ASSUMED = (5e-3, float(np.radians(0.25)))
+#: Error, in units of the rig's class, up to which it counts as one of the rig, whatever the tests seem to tell of it;
+#: chosen: as for outliers of normal errors.
+_MOST_CLASSES = 3.0
+
+
+def of_class(rig: RigSettings, unstated: tuple[float, float] = ASSUMED) -> tuple[float, float]:
+    """Gain and phase error [rad] that a rig's class states, else the one given."""
+    gain, phase = (default if one is None else one for one, default in zip(rig.stated, unstated, strict=True))
+    return gain, phase
+
+
+def largest_error(rig: RigSettings) -> tuple[float, float]:
+    """Largest standard deviation of errors that tests share, in gain and phase [rad], that counts as the rig's."""
+    gain, phase = of_class(rig)
+    return _MOST_CLASSES * gain, _MOST_CLASSES * phase
+
+
+def words_of(error: tuple[float, float]) -> str:
+    """A gain and a phase error [rad] in words."""
+    return f"{100.0 * error[0]:.2g} % gain and {np.degrees(error[1]):.2g} deg phase"
+
+
+def class_words(rig: RigSettings) -> str:
+    """A rig's class as it counts, in words: gain and phase error, and which of them is assumed."""
+    unstated = [name for name, error in zip(("gain", "phase"), rig.stated, strict=True) if error is None]
+    whose = f"{' and '.join(unstated)} assumed" if unstated else "as [rig] states"
+    return f"{words_of(of_class(rig))}, {whose}"

@@ -1,0 +1,237 @@
+"""Every model that a command writes is read back: by predict, plan, report, compare, diagnose --model and export."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from commandline import Done, call
+from jsonschema import Draft202012Validator
+
+from bushfit.model.file import load_result, to_document
+from bushfit.schemas import schema
+
+BUSHING = """
+[bushing]
+name = "Mount"
+inner_radius = "12 mm"
+outer_radius = "24 mm"
+length = "50 mm"
+"""
+SPECIMENS = """
+[[specimens]]
+name = "Dumbbell"
+kind = "modulus"
+[[specimens]]
+name = "Quad"
+kind = "shear"
+area = "500 mm^2"
+thickness = "6 mm"
+elements = 4
+"""
+RIG = """
+[simulate]
+seed = 629
+repeats = 2
+noise = "0.3 %"
+force_noise = "0.4 %"
+displacement_noise = "0.05 %"
+gain_error = "0.2 %"
+{}
+[simulate.parameters]
+mu = "0.78 MPa"
+m = "0.16 MPa*s^alpha"
+alpha = 0.27
+sigma_fmax = "11 kPa"
+eps_half = 0.014
+"""
+COLOURED = 'force_correlation = "90 %"'
+LOOP = """
+[[simulate.loops]]
+direction = "{}"
+amplitude = "{}"
+frequency = "{}"
+cycles = 2
+"""
+SWEEP = """
+[[simulate.sweeps]]
+{} = "{}"
+amplitudes = {}
+frequencies = ["5 Hz", "20 Hz", "50 Hz", "90 Hz", "150 Hz"]
+"""
+SHAKEN = """
+[[simulate.resonances]]
+direction = "axial"
+mass = "3 kg"
+base_acceleration = "4 m/s^2"
+frequencies = {}
+"""
+LEVELS = {"axial": '["0.1 mm", "0.2 mm", "0.5 mm"]', "torsion": '["0.3 deg", "0.6 deg", "1.5 deg"]'}
+LEVELS["radial"] = LEVELS["axial"]
+LOOPS = LOOP.format("axial", "0.5 mm", "0.1 Hz") + LOOP.format("axial", "1 mm", "0.1 Hz")
+SWEEPS = {place: SWEEP.format("direction", place, levels) for place, levels in LEVELS.items()}
+COUPONS = SWEEP.format("specimen", "Dumbbell", '["0.5 %", "1 %", "4 %"]') + SWEEP.format(
+    "specimen", "Quad", '["0.05 mm", "0.2 mm"]'
+)
+ONE_FREQUENCY = """
+[[simulate.sweeps]]
+direction = "axial"
+amplitudes = ["0.05 mm", "0.1 mm", "0.2 mm", "0.5 mm", "1 mm"]
+frequencies = ["15 Hz"]
+stepped = "amplitude"
+"""
+RISING = json.dumps([f"{frequency} Hz" for frequency in range(10, 250, 8)])
+WEAK = "rig_compliance.compliance=3e-8 m/N"
+
+#: What is tested, by the shape of the campaign, and what is hidden in it.
+SHAPES: dict[str, tuple[str, ...]] = {
+    "coloured loops": (BUSHING + RIG.format(COLOURED) + LOOPS + SWEEPS["axial"],),
+    "one coloured loop": (BUSHING + RIG.format(COLOURED) + LOOP.format("axial", "1 mm", "0.1 Hz"),),
+    "one loop in torsion": (BUSHING + RIG.format("") + LOOP.format("torsion", "2 deg", "0.1 Hz"),),
+    "amplitudes at one frequency": (BUSHING + RIG.format("") + ONE_FREQUENCY,),
+    "coupons alone": ('name = "Sheet"\n' + SPECIMENS + RIG.format("") + COUPONS,),
+    "coupons beside a bushing": (BUSHING + SPECIMENS + RIG.format("") + LOOPS + SWEEPS["axial"] + COUPONS,),
+    "all directions": (BUSHING + RIG.format("") + LOOPS + "".join(SWEEPS.values()),),
+    "radial alone": (BUSHING + RIG.format("") + LOOP.format("radial", "0.3 mm", "0.1 Hz") + SWEEPS["radial"],),
+    "a resonance": (BUSHING + RIG.format("") + LOOPS + SHAKEN.format(RISING),),
+    "twins": (BUSHING + RIG.format("") + LOOPS + SWEEPS["axial"] + SWEEPS["radial"], "--effect", WEAK),
+    "described": (BUSHING + RIG.format("") + LOOPS + SWEEPS["axial"] + SWEEPS["radial"],),
+}
+#: Commands that write a model, and its name in their folder.
+WRITERS = {
+    "fit-static": "static",
+    "fit-dynamic": "dynamic",
+    "fit": "model",
+    "fit --profile": "model",
+    "fit --effect inertia": "model",
+    "diagnose": "model",
+    "run": "model",
+    "batch": "model",
+}
+#: Formats of export for a bushing, and for specimens alone.
+FORMATS = ("nastran", "nastran --dialect optistruct", "abaqus", "adams", "csv", "xlsx", "fmu")
+TABLES = ("csv", "xlsx")
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The folder with the campaign of a shape, simulated once."""
+    made: dict[str, Path] = {}
+
+    def of(shape: str) -> Path:
+        if shape not in made:
+            made[shape] = simulated(tmp_path_factory.mktemp("shape"), shape)
+        return made[shape]
+
+    return of
+
+
+def well(folder: Path, *arguments: object) -> Done:
+    done = call(folder, *arguments)
+    assert done.returncode == 0, f"{shlex.join(map(str, arguments))}\n{done.stderr}"
+    return done
+
+
+def simulated(folder: Path, shape: str) -> Path:
+    text, *hidden = SHAPES[shape]
+    (folder / "rig.toml").write_text(text, encoding="utf-8")
+    well(folder, "simulate", "rig.toml", *hidden, "-o", "tests", "--no-plots")
+    tests = folder / "tests"
+    if shape == "a resonance":
+        reduced(tests)
+    if shape == "described":
+        bent(tests / "sweep_axial.csv")
+        bent(tests / "sweep_radial.csv")
+    return tests
+
+
+def reduced(tests: Path) -> None:
+    """The resonance test reduced, and added, as the comment in the campaign says."""
+    said = [line.removeprefix("# ") for line in (tests / "campaign.toml").read_text(encoding="utf-8").splitlines()]
+    (typed,) = (line for line in said if line.startswith("bushfit reduce"))
+    well(tests, *shlex.split(typed)[1:], "--no-plots")
+    (tests / "campaign.toml").write_text("\n".join(said).replace(typed, "").replace("A sweep comes", "# A sweep comes"))
+
+
+def bent(file: Path) -> None:
+    """A hump that no effect of the library has, over frequency and amplitude."""
+    table = pd.read_csv(file)
+    over = np.square(np.log(table["frequency [Hz]"] / 40.0)) + np.square(np.log(table["amplitude [mm]"] / 0.2))
+    table["stiffness [N/mm]"] *= 1.0 + 0.1 * np.exp(-2.0 * over)
+    table.to_csv(file, index=False)
+
+
+def written(tests: Path, writer: str, folder: Path) -> list[Path]:
+    """The models that a command writes of a campaign; none where its tests are missing, which it says."""
+    command, *options = shlex.split(writer)
+    if command == "batch":
+        (folder / "bushings.csv").write_text(f"campaign\n{tests / 'campaign.toml'}\n", encoding="utf-8")
+        well(folder, "batch", "bushings.csv", "--jobs", "1", "-o", "out", "--no-plots", "--report")
+    else:
+        done = call(folder, command, tests / "campaign.toml", *options, "-o", "out", "--no-plots")
+        if done.returncode == 2 and command in ("fit-static", "fit-dynamic"):
+            assert "bushfit: error: " in done.stderr
+            assert not (folder / "out").exists()
+            return []
+        assert done.returncode == 0, done.stderr
+    found = [file for file in (folder / "out").rglob("*.json") if is_model(file)]
+    assert any(file.stem == WRITERS[writer] for file in found)
+    return sorted(found)
+
+
+def is_model(file: Path) -> bool:
+    return str(json.loads(file.read_text(encoding="utf-8")).get("schema")).startswith("bushfit/model/")
+
+
+def taken(tests: Path, model: Path, folder: Path, formats: Sequence[str], *, whole: bool) -> None:
+    """A model taken by every command that reads one; a part of them unless `whole`."""
+    document: dict[str, Any] = json.loads(model.read_text(encoding="utf-8"))
+    assert list(Draft202012Validator(schema("model")).iter_errors(document)) == []
+    again = json.loads(json.dumps(to_document(load_result(model))))
+    assert again == {key: value for key, value in document.items() if key in again}
+    plain = ("--force", "--no-plots", "-q")
+    well(folder, "predict", model, "-o", "predicted", *plain)
+    well(folder, "compare", model, tests / "truth.json", model, "-o", "compared", *plain)
+    well(folder, "report", model.parent, "-o", "page", *plain)
+    if whole:
+        well(folder, "predict", model, "--campaign", tests / "campaign.toml", "--arms", "-o", "predicted", *plain)
+        well(folder, "plan", model, "--hours", "1", "-o", "planned", *plain)
+        well(folder, "diagnose", tests / "campaign.toml", "--model", model, "-o", "anew", *plain)
+    bushing = document["bushing"] is not None
+    for form in formats if bushing else [each for each in formats if each in TABLES]:
+        well(folder, "export", model, "--format", *shlex.split(form), "-o", "exported", *plain)
+
+
+@pytest.mark.parametrize(
+    ("shape", "writer"),
+    [
+        ("coloured loops", "fit"),
+        ("one loop in torsion", "run"),
+        ("amplitudes at one frequency", "fit"),
+        ("coupons alone", "fit"),
+    ],
+)
+def test_what_a_command_writes_is_read_by_those_that_take_it(
+    campaign: Callable[[str], Path], tmp_path: Path, shape: str, writer: str
+) -> None:
+    tests = campaign(shape)
+    for model in written(tests, writer, tmp_path):
+        taken(tests, model, tmp_path, ("nastran", "csv"), whole=False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("writer", WRITERS)
+@pytest.mark.parametrize("shape", SHAPES)
+def test_every_shape_of_campaign_by_every_command(
+    campaign: Callable[[str], Path], tmp_path: Path, shape: str, writer: str
+) -> None:
+    tests = campaign(shape)
+    models = written(tests, writer, tmp_path)
+    for model in models:
+        taken(tests, model, tmp_path, FORMATS, whole=model == models[-1])

@@ -1,0 +1,252 @@
+"""The evidence of groups of columns is that of integrals done outright, by sampling, and in any units and order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.special import logsumexp
+from scipy.stats import kstest, multivariate_normal, norm
+
+from bushfit.diagnosis.currency import Block, Group, Ledger, Node
+from bushfit.diagnosis.priors import SIZES
+from bushfit.effects.contract import Array
+
+#: Two errors of the rig within its class, and one of levels beyond it.
+NODES = (
+    Node(1.0, (0.5, 0.4), np.log(0.5)),
+    Node(1.4, (2.0, 0.0), np.log(0.3)),
+    Node(0.8, (1.0, 2.5), np.log(0.2), wide=True),
+)
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def ledger(seed: int, *, flat: int = 2, known: int = 1, rows: int = 10, groups: bool = True) -> Ledger:
+    """Random numbers of everything: two blocks of which one scatters, rows in none, and a group of each sort."""
+    random = np.random.default_rng(seed)
+    blocks = (
+        Block(np.array([6, 0, 3]), random.normal(size=(3, 3)), np.array([0, 1, 1]), scatters=True),
+        Block(np.array([1, 4, 7, 5]), random.normal(size=(1, 4)), np.array([0]), scatters=False),
+    )
+    columns = 10.0 * random.normal(size=(9, rows))
+    share = random.uniform(0.2, 2.0, size=9)
+    made = (
+        Group(columns[:2], np.ones(2), together=True),
+        Group(columns[2:4], np.ones(2), together=True),
+        Group(columns[4:7], share[4:7], together=False),
+        Group(columns[7:9], share[7:9], together=False, sense=1),
+        Group(columns[:3], np.ones(3), together=True),
+    )
+    precision = np.repeat([0.0, 0.5], [flat, known])
+    jacobian = random.normal(size=(flat + known, rows))
+    return Ledger(3.0 * random.normal(size=rows), jacobian, precision, blocks, made if groups else (), NODES)
+
+
+def covariance(of: Ledger, node: Node) -> Array:
+    """Of the residuals by noise, errors of the rig and parameters that are known, in full, (n, n)."""
+    variance = np.ones(of.residual.size)
+    whole = np.zeros((variance.size, variance.size))
+    for block in of.blocks:
+        variance[block.rows] = node.scatter**2 if block.scatters else 1.0
+        sized = np.array(node.errors)[block.kinds, None] * block.columns
+        whole[np.ix_(block.rows, block.rows)] += sized.T @ sized
+    known = of.precision > 0.0
+    return np.diag(variance) + whole + (of.jacobian[known].T / of.precision[known]) @ of.jacobian[known]
+
+
+def restricted(of: Ledger, whole: Array) -> float:
+    """Logarithm of the restricted likelihood of the residuals with this covariance, but for its power of 2 pi."""
+    own = of.jacobian[of.precision == 0.0]
+    inverse = np.linalg.inv(whole)
+    information = own @ inverse @ own.T
+    p = inverse - inverse @ own.T @ np.linalg.inv(information) @ own @ inverse
+    sizes = np.linalg.slogdet(whole)[1] + np.linalg.slogdet(information)[1]
+    return float(-0.5 * (of.residual @ p @ of.residual + sizes))
+
+
+def over_nodes(of: Ledger, values: Sequence[float], *, wide: bool = False) -> float:
+    own = [node.log_weight + value for node, value in zip(of.nodes, values, strict=True) if node.wide is wide]
+    return float(logsumexp(own))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_errors_of_the_rig_and_parameters_are_integrated_over(seed: int) -> None:
+    of = ledger(seed)
+    plain = [restricted(of, covariance(of, node)) for node in of.nodes]
+    assert of.log_evidence == pytest.approx(over_nodes(of, plain), abs=1e-6)
+    assert of.log_evidence_wide == pytest.approx(over_nodes(of, plain, wide=True), abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_groups_are_worth_what_their_covariance_is(seed: int) -> None:
+    """Of columns that move together, and of those of which one is chosen, over all sizes and nodes."""
+    of = ledger(seed)
+    for group, worth in zip(of.groups, of.worths, strict=True):
+        if group.sense:
+            continue
+        parts = (
+            [group.columns]
+            if group.together
+            else [column[None] / unit for column, unit in zip(group.columns, group.unit, strict=True)]
+        )
+        cases = [size * part for size in SIZES for part in parts]
+        by_node = [
+            logsumexp([restricted(of, covariance(of, node) + each.T @ each) for each in cases]) for node in of.nodes
+        ]
+        assert worth.log_evidence == pytest.approx(over_nodes(of, by_node) - np.log(len(cases)), abs=1e-6)
+
+
+@pytest.mark.parametrize("sense", [1, -1, 0])
+def test_an_amount_is_integrated_over_its_sense(sense: int) -> None:
+    """Numerically, and the free parameter with it: where an effect is missing, the model stays below the tests."""
+    of = ledger(4, flat=1, known=0)
+    column, unit, own = of.groups[0].columns[0], 0.7, of.jacobian[0]
+    of = replace(of, nodes=NODES[:1], groups=(Group(column[None], np.array([unit]), together=False, sense=sense),))
+    noise, spreads = multivariate_normal(cov=covariance(of, NODES[0])), SIZES / unit
+    low, high = {1: (0.0, 1.0), -1: (-1.0, 0.0), 0: (-1.0, 1.0)}[sense]
+    x, weight = np.polynomial.legendre.leggauss(300)
+    parameter, whole = 15.0 * x, 0.0
+    for spread in spreads:
+        amounts = 7.0 * spread * (0.5 * (high - low) * x + 0.5 * (high + low))
+        shifted = of.residual + amounts[:, None, None] * column - parameter[:, None] * own
+        density = noise.pdf(shifted) @ (15.0 * weight) * norm.pdf(amounts, scale=spread) * (2.0 if sense else 1.0)
+        whole += 3.5 * spread * (high - low) * weight @ density / spreads.size
+    power = 0.5 * (of.residual.size - 1) * np.log(2.0 * np.pi)
+    assert of.worths[0].log_evidence == pytest.approx(np.log(whole) + power + NODES[0].log_weight, abs=1e-4)
+
+
+def test_a_sampler_finds_the_same() -> None:
+    """Mean likelihood of white noise over sizes, errors, parameters and amounts drawn as they are beforehand."""
+    of, random, draws = ledger(5, flat=0, known=2, rows=8), np.random.default_rng(1), 200_000
+    of = replace(of, nodes=NODES[:2], residual=0.5 * of.residual, groups=of.groups[2:4])
+    for group, worth in zip(of.groups, of.worths, strict=True):
+        total = []
+        for node in of.nodes:
+            mean = (random.normal(size=(draws, 2)) / np.sqrt(of.precision)) @ of.jacobian
+            sigma = np.ones(of.residual.size)
+            for block in of.blocks:
+                errors = random.normal(size=(draws, len(block.kinds))) * np.array(node.errors)[block.kinds]
+                mean[:, block.rows] += errors @ block.columns
+                sigma[block.rows] = node.scatter if block.scatters else 1.0
+            chosen = random.integers(len(group.columns), size=draws)
+            amount = random.choice(SIZES, draws) / group.unit[chosen] * random.normal(size=draws)
+            mean -= (np.abs(amount) if group.sense else amount)[:, None] * group.columns[chosen]
+            off = (of.residual - mean) / sigma
+            total.append(np.exp(node.log_weight - 0.5 * np.sum(off**2, axis=1) - np.log(sigma).sum()))
+        likelihood = np.sum(total, axis=0)
+        error = likelihood.std() / likelihood.mean() / np.sqrt(draws)
+        print(f"{np.log(likelihood.mean()):.4f} +- {error:.4f}, {worth.log_evidence:.4f}")
+        assert error < 0.05
+        assert worth.log_evidence == pytest.approx(float(np.log(likelihood.mean())), abs=4.0 * error)
+
+
+def worth(of: Ledger) -> Array:
+    """All that it says."""
+    said = [(each.log_evidence - of.log_evidence, each.size, each.likeliest) for each in of.worths]
+    return np.array([(of.log_evidence_wide - of.log_evidence, of.chance, 0.0), *said])
+
+
+@given(SEEDS)
+def test_the_order_of_tests_does_not_matter(seed: int) -> None:
+    of = ledger(seed)
+    order = np.random.default_rng(seed).permutation(of.residual.size)
+    place = np.argsort(order)
+    turned = replace(
+        of,
+        residual=of.residual[order],
+        jacobian=of.jacobian[:, order],
+        blocks=[replace(block, rows=place[block.rows]) for block in reversed(of.blocks)],
+        groups=[replace(group, columns=group.columns[:, order]) for group in of.groups],
+        nodes=of.nodes[::-1],
+    )
+    assert worth(turned) == pytest.approx(worth(of), rel=1e-6, abs=1e-7)
+
+
+@given(SEEDS, st.floats(1e-4, 1e4))
+def test_units_do_not_matter(seed: int, factor: float) -> None:
+    """Of parameters, whatever is known of them, and of amounts of which one is chosen."""
+    of = ledger(seed)
+    scaled = np.array([factor, 1.0, factor])
+    groups = [
+        each if each.together else replace(each, columns=factor * each.columns, unit=factor * each.unit)
+        for each in of.groups
+    ]
+    other = replace(of, jacobian=scaled[:, None] * of.jacobian, precision=scaled**2 * of.precision, groups=groups)
+    assert worth(other) == pytest.approx(worth(of), rel=1e-5, abs=1e-6)
+
+
+@given(SEEDS)
+def test_what_shares_no_error_may_as_well_be_two_blocks(seed: int) -> None:
+    of = ledger(seed)
+    first, second = of.blocks[0], of.blocks[1]
+    whole = Block(
+        np.concatenate((first.rows, second.rows)),
+        np.block([[first.columns, np.zeros((3, 4))], [np.zeros((1, 3)), second.columns]]),
+        np.concatenate((first.kinds, second.kinds)),
+        scatters=True,
+    )
+    split = [first, replace(second, scatters=True)]
+    assert worth(replace(of, blocks=[whole])) == pytest.approx(worth(replace(of, blocks=split)), rel=1e-6, abs=1e-7)
+
+
+@given(SEEDS)
+def test_what_does_nothing_leaves_the_evidence_as_it_is(seed: int) -> None:
+    """Columns of nothing, or of what the parameters do too, or that the tests hardly see."""
+    of = ledger(seed)
+    nothing, spanned = np.zeros((2, of.residual.size)), of.jacobian[:2] + of.jacobian[1]
+    groups = [Group(each, np.ones(2), together=together) for each in (nothing, spanned) for together in (True, False)]
+    groups += [replace(of.groups[3], unit=np.zeros(2)), Group(nothing, np.ones(2), together=False, sense=1)]
+    for each in replace(of, groups=groups).worths:
+        assert each.log_evidence == pytest.approx(of.log_evidence, abs=1e-5)
+
+
+@given(SEEDS)
+def test_a_parameter_twice_is_as_good_as_once(seed: int) -> None:
+    of = ledger(seed)
+    twice = replace(of, jacobian=np.vstack((of.jacobian[:1], of.jacobian)), precision=np.append(0.0, of.precision))
+    worths, same = ([each.log_evidence - one.log_evidence for each in one.worths] for one in (twice, of))
+    assert worths == pytest.approx(same, abs=1e-4)
+
+
+def test_the_size_is_that_of_what_was_put_there() -> None:
+    of = ledger(6)
+    group = of.groups[3]
+    there = replace(
+        of,
+        residual=-0.03 / group.unit[0] * group.columns[0] * 10.0,
+        groups=(replace(group, columns=10.0 * group.columns),),
+    )
+    (found,) = there.worths
+    assert found.size == pytest.approx(0.03, rel=0.1)
+    assert found.likeliest == min(SIZES, key=lambda size: abs(size - 0.03))
+    (wrong,) = replace(there, residual=-there.residual).worths
+    assert wrong.log_evidence < there.log_evidence < found.log_evidence - 5.0
+
+
+@pytest.mark.parametrize("node", range(2))
+def test_the_chance_of_clean_tests_is_even(node: int) -> None:
+    """Drawn as the ledger says; with several nodes sizes adapt themselves, and extremes are rarer."""
+    of, random = ledger(7, groups=False, rows=14), np.random.default_rng(2)
+    noise = np.linalg.cholesky(covariance(of, NODES[node]))
+    drawn = [noise @ random.normal(size=of.residual.size) for _ in range(200)]
+    alone = [replace(of, residual=row, nodes=(NODES[node],)).chance for row in drawn]
+    every = [replace(of, residual=row).chance for row in drawn]
+    print(f"p {kstest(alone, 'uniform').pvalue:.3f}; below 5 %: {np.mean(np.array(every) < 0.05):.3f}")
+    assert kstest(alone, "uniform").pvalue > 1e-3
+    assert np.mean(np.array(every) < 0.05) < 0.09
+
+
+@pytest.mark.parametrize("far", [0.5, 3.0, 12.0])
+def test_nodes_that_something_makes_likely_are_kept(far: float) -> None:
+    of = ledger(8)
+    kept = of.likely(far)
+    assert [node for node in of.nodes if node in kept] == kept
+    exact = [restricted(of, covariance(of, node)) + node.log_weight for node in of.nodes]
+    within = max(value for value, node in zip(exact, of.nodes, strict=True) if not node.wide)
+    assert {id(node) for node, value in zip(of.nodes, exact, strict=True) if value > within - far} <= {
+        id(node) for node in kept
+    }

@@ -1,0 +1,184 @@
+"""What explains a gap proposes itself: effects by sensitivity, places by their rows, curves by their covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+import pytest
+from asking import INERTIA, no_loops, no_repeats, no_sweeps
+from rigged import LEVELS, SHARED, Fitted, Measured, changed
+
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import RigSettings
+from bushfit.diagnosis.currency import Ledger
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.explanations import Explanation, effects, places, unnamed
+from bushfit.diagnosis.propose import sensitivity
+from bushfit.diagnosis.rig_errors import blocks, nodes, scattering_alone
+from bushfit.effects import BASE, LIBRARY, effect_named
+from bushfit.effects.contract import Array, Values
+from bushfit.fitting.data_sets import DataSet, parted
+from bushfit.model.model import Model
+
+Tamper = Callable[[Campaign], Campaign]
+SHARED_RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
+
+
+@pytest.fixture(scope="module")
+def bare(measured: Measured, fitted: Fitted) -> Evidence:
+    return scattering_alone(fitted(measured(plan=SHARED)))
+
+
+def best(evidence: Evidence, every: Sequence[Explanation]) -> Explanation:
+    """The one that makes the tests likeliest."""
+    known = [each for each in every if each.group]
+    groups = [each.group for each in known if each.group]
+    rig = blocks(evidence, SHARED_RIG)
+    solution = evidence.solution
+    precision = np.zeros(len(solution.jacobian))
+    worths = Ledger(solution.residual, solution.jacobian, precision, rig, groups, nodes(evidence)).worths
+    return max(zip(known, worths, strict=True), key=lambda pair: pair[1].log_evidence)[0]
+
+
+def at(number: int, factor: complex, **where: float | tuple[float, ...]) -> Tamper:
+    """Some points of a sweep off: those at these frequencies, amplitudes and repeats."""
+
+    def made(c: Campaign) -> Campaign:
+        sweep = c.sweeps[number]
+        rows = np.all([np.isin(getattr(sweep, name), values) for name, values in where.items()], axis=0)
+        return changed(c, number, np.where(rows, factor, 1.0))
+
+    return made
+
+
+def loop_too_strong(c: Campaign) -> Campaign:
+    return replace(c, loops=(c.loops[0], replace(c.loops[1], force=1.06 * c.loops[1].force)))
+
+
+def both(one: Tamper, other: Tamper) -> Tamper:
+    return lambda c: one(other(c))
+
+
+@pytest.mark.parametrize(
+    ("tamper", "kind", "words"),
+    [
+        (at(1, 1.0 + 0.05j, frequency=75.0), "frequency", "75 Hz in radial, at every amplitude"),
+        (
+            both(at(0, 1.0 + 0.05j, frequency=75.0), at(1, 1.0 + 0.05j, frequency=75.0)),
+            "frequency",
+            "75 Hz in all directions, at every amplitude",
+        ),
+        (at(0, 0.96, frequency=(65.0, 75.0)), "frequency", "65 to 75 Hz in axial, at every amplitude"),
+        (at(0, 1.05, amplitude=LEVELS[1]), "level", "the axial level 0.2 mm"),
+        (at(0, 1.1, amplitude=LEVELS[1], repeat=2), "repeat", "repeat 2 of the axial level 0.2 mm"),
+        (at(1, 1.06, repeat=3), "repeat", "repeat 3 of the radial sweep sweep_radial"),
+        (loop_too_strong, "loop", "the loop loop_axial_2"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_the_place_that_went_wrong_is_the_likeliest(
+    measured: Measured, fitted: Fitted, tamper: Tamper, kind: str, words: str
+) -> None:
+    """Errors of the rig, of all sizes, are counted beside it."""
+    evidence = scattering_alone(fitted(tamper(measured(plan=SHARED))))
+    found = best(evidence, places(evidence))
+    assert (found.kind, found.family) == ("place", kind)
+    assert found.name == words
+
+
+def test_a_place_touches_its_own_rows_alone(bare: Evidence) -> None:
+    (level,) = [each for each in places(bare) if each.name == "the axial level 0.2 mm"]
+    sweep = parted(bare.data_sets)[1][0]
+    touched = np.tile(sweep.amplitude == LEVELS[1], 2)
+    rows = level.columns[:, bare.place[sweep]]
+    assert level.columns.shape[0] == 4  # gain and phase, each with a slope
+    assert np.array_equal(np.any(rows != 0.0, axis=0), touched)
+    assert np.count_nonzero(level.columns) == np.count_nonzero(rows)
+
+
+@pytest.mark.parametrize(
+    ("part", "gone"),
+    [(no_loops, {"loop"}), (no_repeats, {"repeat"}), (no_sweeps, {"level", "repeat", "frequency", "loop"})],
+)
+def test_places_are_those_of_the_tests_there_are(
+    measured: Measured, fitted: Fitted, part: Tamper, gone: set[str]
+) -> None:
+    evidence = scattering_alone(fitted(part(measured(plan=SHARED))))
+    assert {each.family for each in places(evidence)} == {"frequency", "level", "repeat", "loop"} - gone
+
+
+def test_curves_have_unit_variance_and_fall_off_with_distance(bare: Evidence) -> None:
+    """In shares of |K|, of one direction or of all, and of the loops their harmonics; a rough one as far as it goes."""
+    made = {each.name: each for each in unnamed(bare)}
+    assert set(made) == {f"{how} {where}" for how in ("smooth", "rough") for where in ("axial", "radial", "all")} | {
+        "loops"
+    }
+    sweep = parted(bare.data_sets)[1][0]
+    point = sweep.whiten(np.ones(sweep.frequency.size)).reshape(2, -1)[0]
+    same = np.flatnonzero((sweep.amplitude == LEVELS[1]) & (sweep.repeat == 1))
+    distance = np.log(sweep.frequency[same, None] / sweep.frequency[same])
+    for how, length, short in (("smooth", 1.5, 0.02), ("rough", 0.5, 0.6)):
+        group = made[f"{how} axial"]
+        own = group.columns[:, bare.place[sweep]].reshape(len(group.columns), 2, -1)[:, 0] / point
+        off = np.exp(-0.5 * (distance / length) ** 2) - (own.T @ own)[np.ix_(same, same)]
+        assert np.linalg.eigvalsh(off).min() > -0.01
+        assert off.max() < short
+        assert not group.columns[:, : bare.place[sweep].start].any()
+
+
+def test_effects_are_sized_by_what_they_change(bare: Evidence) -> None:
+    """A typical amount times its unit is its largest share of |K|; of one that replaces a branch its refit tells."""
+    found = {each.name: each for each in effects(bare, ("delay",), ())}
+    assert "delay" not in found
+    assert found["kraus"].group is None
+    group = found["inertia"].group
+    assert group is not None
+    assert (group.sense, found["inertia"].family) == (1, "inertia")
+    assert found["stiffness_factor.radial"].family == "stiffness_factor"
+    effect = effect_named("inertia")
+    heavy = bare.model.with_effect("inertia", {"inertia.mass": effect.amount.sized(0.01)})
+    largest = max(each.change(heavy, bare.model) for each in bare.data_sets)
+    assert 0.01 * group.unit[0] == pytest.approx(largest, rel=0.1)
+
+
+def test_every_effect_is_proposed_but_twins_and_what_the_tests_do_not_state(bare: Evidence) -> None:
+    found = {each.name: each for each in effects(bare, (), ())}
+    twins = {twin for effect in LIBRARY.values() for twin in effect.twins}
+    later = {name for name, effect in LIBRARY.items() if effect.after}
+    assert found.keys() >= LIBRARY.keys() - {*BASE, *twins, *later}
+    assert not found.keys() & twins
+    temperature = found["temperature"].proposal  # none is stated
+    assert temperature is not None
+    assert (temperature.score, temperature.visible) == (0.0, False)
+
+
+def test_what_belongs_to_another_direction_has_no_sensitivity_there(measured: Measured, fitted: Fitted) -> None:
+    plain = fitted(measured(INERTIA, SHARED))
+    effect = effect_named("stiffness_factor.radial")
+    _, (column,) = sensitivity(plain.model, plain.data_sets, effect)
+    there = {(str(data_set.direction), bool(np.any(column[place]))) for data_set, place in plain.place.items()}
+    assert there == {("axial", False), ("radial", True)}
+
+
+class Gapped:
+    """A test that answers the stiffness of a stop, and nothing finite where its gap is wide."""
+
+    direction, frequency, amplitude = "axial", np.array([5.0, 50.0]), np.array([1e-4, 1e-3])
+
+    def residual(self, model: Model, values: Values | None = None) -> Array:
+        if "bump_stop" not in model.effects:
+            return np.array([3.0])
+        values = values or model.values
+        return np.where(values["bump_stop.gap"] > 5e-4, np.nan, 3.0 + 2.0 * values["bump_stop.stiffness"])
+
+
+def test_shapes_without_a_response_are_left_out(paper_model: Model) -> None:
+    """The widest gap, at which no stop is asked for its stiffness either, is one of them."""
+    stop = effect_named("bump_stop")
+    shapes, columns = sensitivity(paper_model, cast(Sequence[DataSet], [Gapped()]), stop)
+    assert 0 < len(shapes) == len(columns)
+    assert all(shape["bump_stop.gap"] <= 5e-4 for shape in shapes)
+    np.testing.assert_allclose(columns, 2.0 * stop.amount.typical, rtol=1e-6)

@@ -1,0 +1,100 @@
+"""Errors of the rig: what a run, a level or a loop shares does what it says to the residuals, and nothing is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from asking import no_sweeps
+from rigged import LEVELS, SHARED, Fitted, Measured
+from scipy.special import logsumexp
+
+from bushfit.campaign.schema import RigSettings
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.priors import WAVES
+from bushfit.diagnosis.rig_errors import blocks, nodes, scattering_alone
+from bushfit.effects.contract import Array
+from bushfit.fitting.data_sets import SweepData, parted
+
+RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
+RUN, LEVEL, WAVE, LOOP = range(4)
+
+
+@pytest.fixture(scope="module")
+def bare(measured: Measured, fitted: Fitted) -> Evidence:
+    return scattering_alone(fitted(measured(plan=SHARED)))
+
+
+def off(evidence: Evidence, sweep: SweepData, change: Callable[[SweepData], Array]) -> Array:
+    """What a small relative change of the measured stiffness does to the residuals, per unit of it."""
+    step = 1e-6
+    changed = replace(sweep, sweep=replace(sweep.sweep, stiffness=sweep.sweep.stiffness * (1.0 - step * change(sweep))))
+    return evidence.embedded((changed.residual(evidence.model) - sweep.residual(evidence.model)) / step, sweep)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1.0j], ids=["gain", "phase"])
+@pytest.mark.parametrize(("kind", "repeats"), [(RUN, (2,)), (LEVEL, (1, 2, 3))])
+def test_what_shares_an_error_moves_together(
+    bare: Evidence, unit: complex, kind: int, repeats: tuple[int, ...]
+) -> None:
+    """A column is what an error of the class makes of a run, or of all runs of a level, in gain or in phase."""
+    sweep = parted(bare.data_sets)[1][1]
+    there = (sweep.sweep.amplitude == LEVELS[1]) & np.isin(sweep.sweep.repeat, repeats)
+    wanted = off(bare, sweep, lambda _: unit * there) * (RIG.gain_error if unit == 1.0 else RIG.phase_error)
+    every = [
+        (block, column)
+        for block in blocks(bare, RIG)
+        for column, own in zip(block.columns, block.kinds, strict=True)
+        if own == kind
+    ]
+    embedded = np.zeros((len(every), bare.residual.size))
+    for row, (block, column) in zip(embedded, every, strict=True):
+        row[block.rows] = column
+    best = min(embedded, key=lambda row: float(np.abs(row - wanted).max()))
+    assert np.abs(best - wanted).max() < 0.02 * np.abs(wanted).max()
+
+
+def test_every_point_is_in_one_block_and_scatters_as_its_sweep(bare: Evidence) -> None:
+    """Loops each by itself, and each level of a sweep in gain and in phase."""
+    loops, sweeps = parted(bare.data_sets)
+    made = blocks(bare, RIG)
+    rows = np.concatenate([block.rows for block in made])
+    assert np.array_equal(np.sort(rows), np.arange(bare.residual.size))
+    assert [block.scatters for block in made].count(False) == len(loops)
+    assert sum(block.scatters for block in made) == 2 * len(LEVELS) * len(sweeps)
+    kinds = np.concatenate([block.kinds for block in made if block.scatters])
+    runs = 2 * 3 * len(LEVELS) * len(sweeps)
+    assert [np.count_nonzero(kinds == kind) for kind in (RUN, LEVEL, WAVE)] == [runs, runs // 3, runs * WAVES]
+
+
+def test_waves_are_independent_of_what_the_run_shares(bare: Evidence) -> None:
+    """And fall in variance as the square of their order."""
+    block = next(block for block in blocks(bare, RIG) if block.scatters)
+    (level, *_), waves = block.columns[block.kinds == LEVEL], block.columns[block.kinds == WAVE]
+    size = np.linalg.norm(waves[:WAVES], axis=1)
+    assert np.abs(waves @ level).max() < 0.05 * np.linalg.norm(level) * size[0]
+    assert size[0] / size == pytest.approx(np.arange(1, WAVES + 1), rel=0.02)
+
+
+def test_repeated_loops_share_their_gain(measured: Measured, fitted: Fitted) -> None:
+    campaign = no_sweeps(measured(plan=SHARED))
+    first, second = campaign.loops
+    bare = scattering_alone(fitted(replace(campaign, loops=(first, second, replace(first, name="again")))))
+    assert sorted(block.rows.size for block in blocks(bare, RIG)) == [second.time.size, 2 * first.time.size]
+    assert all(block.kinds.tolist() == [LOOP] for block in blocks(bare, RIG))
+
+
+def test_sizes_have_weights_that_sum_to_one(measured: Measured, fitted: Fitted, bare: Evidence) -> None:
+    """The scatter has sizes of its own where few points tell it, loops alone have no runs."""
+    sweep = parted(bare.data_sets)[1][0]
+    few = replace(bare, data_sets=(replace(sweep, noise=replace(sweep.noise, scatter_freedom=4)),))
+    alone = scattering_alone(fitted(no_sweeps(measured(plan=SHARED))))
+    for evidence, scatters, runs in ((bare, 1, 5), (few, 3, 5), (alone, 1, 1)):
+        made = nodes(evidence)
+        assert logsumexp([node.log_weight for node in made]) == pytest.approx(0.0, abs=1e-9)
+        assert len({node.scatter for node in made}) == scatters
+        assert len({node.errors[RUN] for node in made}) == runs
+        assert {node.wide for node in made} == {False, True}
+        assert all(node.wide == (node.errors[LEVEL] > 1.5) for node in made)

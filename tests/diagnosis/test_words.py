@@ -1,0 +1,107 @@
+"""From probabilities to a verdict, on hypotheses written by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import log
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from bushfit.diagnosis.beam import Hypothesis
+from bushfit.diagnosis.explanations import Explanation
+from bushfit.diagnosis.words import Finding, judged
+from bushfit.effects.mistakes import MISTAKES
+
+TOLERANCE = 0.01
+
+
+def one(parts: str, odds: float, *, size: float = 0.05, chance: float = 0.5) -> Hypothesis:
+    """Of parts joined by +: effects, "unnamed", "levels", places as "kind:name", a mistake by its name; "" of none."""
+    names = parts.split("+") if parts else []
+    places = tuple(Explanation("place", *name.split(":"), None) for name in names if ":" in name)
+    claims: list[Any] = [SimpleNamespace(mistake=MISTAKES[name], tests=(0,)) for name in names if name in MISTAKES]
+    others = {"unnamed", "levels", *MISTAKES}
+    effects = tuple(name for name in names if ":" not in name and name not in others)
+    weighed: Any = SimpleNamespace(state=SimpleNamespace(effects=effects), first=SimpleNamespace(chance=chance))
+    claim, curve = claims[0] if claims else None, "smooth all" if "unnamed" in names else ""
+    size = size if names else 0.0
+    return Hypothesis(effects, claim, places, curve, "levels" in names, log(odds), size, weighed)
+
+
+def of(**odds: float) -> Finding:
+    found = [one(parts.replace("__", "."), share) for parts, share in odds.items()]
+    return judged(sorted(found, key=lambda each: -each.log_posterior), TOLERANCE)
+
+
+def told(finding: Finding) -> dict[str, float]:
+    """Parts and rounded probabilities of what is told."""
+    return {"+".join(sorted(each.parts)): round(each.probability, 2) for each in finding.told}
+
+
+@pytest.mark.parametrize(
+    ("odds", "verdict", "expected"),
+    [
+        ({"": 0.2, "inertia": 0.8}, "consistent", {}),
+        ({"": 0.01, "inertia": 0.99}, "named", {"inertia": 1.0}),
+        ({"inertia": 0.6, "inertia+delay": 0.39, "": 0.01}, "named", {"inertia": 1.0}),
+        ({"inertia": 0.35, "inertia+delay": 0.65}, "named", {"inertia": 0.35, "delay+inertia": 0.65}),
+        ({"inertia+delay": 0.99, "inertia": 0.01}, "named", {"delay+inertia": 0.99}),
+        ({"inertia": 0.69, "fixture_resonance": 0.31}, "named", {"inertia": 1.0}),
+        ({"delay+inertia": 0.69, "delay+fixture_resonance": 0.31}, "named", {"delay+inertia": 1.0}),
+        ({"inertia": 0.31, "fixture_resonance": 0.69}, "ambiguous", {"fixture_resonance": 0.69, "inertia": 0.31}),
+        ({"inertia": 0.5, "delay": 0.3, "viscous": 0.2}, "ambiguous", {"inertia": 0.5, "delay": 0.3, "viscous": 0.2}),
+        ({"inertia": 0.6, "delay": 0.38, "viscous": 0.02}, "ambiguous", {"inertia": 0.6, "delay": 0.38}),
+        ({"frequency:50 Hz": 0.7, "inertia": 0.3}, "ambiguous", {"place: frequency": 0.7, "inertia": 0.3}),
+        ({"unnamed": 0.6, "inertia": 0.4}, "described", {"unnamed": 0.6, "inertia": 0.4}),
+        ({"unnamed": 0.4, "inertia": 0.6}, "ambiguous", {"unnamed": 0.4, "inertia": 0.6}),
+        ({"unnamed": 0.99, "inertia": 0.01}, "described", {"unnamed": 0.99}),
+        ({"frequency:50 Hz": 0.5, "frequency:45 to 55 Hz": 0.49, "": 0.01}, "unexplained", {"place: frequency": 1.0}),
+        ({"levels": 0.99, "": 0.01}, "unexplained", {"levels": 1.0}),
+        ({"delay+level:1 mm": 0.99, "delay": 0.01}, "partly", {"delay+place: level": 0.99}),
+        ({"peak_to_peak": 0.99, "": 0.01}, "named", {"peak_to_peak": 1.0}),
+        ({"peak_to_peak": 0.5, "delay": 0.5}, "ambiguous", {"peak_to_peak": 0.5, "delay": 0.5}),
+    ],
+    ids=str,
+)
+def test_verdicts(odds: dict[str, float], verdict: str, expected: dict[str, float]) -> None:
+    finding = of(**odds)
+    assert (finding.verdict, told(finding)) == (verdict, expected)
+    assert finding.nothing == pytest.approx(odds.get("", 0.0))
+
+
+def test_what_changes_less_than_the_tolerance_is_nothing() -> None:
+    small, large = one("inertia", 0.2, size=0.009), one("inertia+delay", 0.8)
+    assert judged([large, small], TOLERANCE).verdict == "consistent"
+    finding = judged([large, small], 0.001)
+    assert (finding.verdict, finding.nothing) == ("named", 0.0)
+
+
+def test_of_more_than_can_be_told_it_is_described_by_what_nearly_all_have_in_common() -> None:
+    others = ("inertia", "viscous", "maxwell", "high_pass", "clearance", "asymmetry")
+    finding = of(**{f"delay+{name}": 1.0 for name in others})
+    assert (finding.verdict, finding.leads, len(finding.told)) == ("described", ("delay",), 4)
+    assert of(**dict.fromkeys(others, 1.0)).leads == ()
+
+
+@pytest.mark.parametrize(("alone", "verdict"), [(-8.0, "partly"), (-15.0, "described")])
+def test_names_stand_beside_what_has_none_where_they_bring_most(alone: float, verdict: str) -> None:
+    """In ln evidence, of what both bring over nothing."""
+    logs = {"inertia+unnamed": 0.0, "inertia": alone, "": -100.0}
+    finding = judged([replace(one(parts, 1.0), log_posterior=each) for parts, each in logs.items()], TOLERANCE)
+    assert finding.verdict == verdict
+    assert finding.leads == (("inertia",) if verdict == "described" else ())
+    assert told(finding) == {"inertia+unnamed": 1.0}
+
+
+@pytest.mark.parametrize("more", [(), ("inertia+delay",)])
+def test_a_leader_that_does_not_fit_is_a_lead(more: tuple[str, ...]) -> None:
+    finding = judged([*(one(parts, 2.0) for parts in more), one("inertia", 1.0, chance=1e-4)], TOLERANCE)
+    assert (finding.verdict, finding.leads) == ("described", ("inertia",))
+
+
+def test_only_ratios_count() -> None:
+    every = [one("inertia", 0.5), one("delay", 0.3), one("unnamed", 0.19), one("", 0.01)]
+    far = [replace(each, log_posterior=each.log_posterior - 5000.0) for each in every]
+    assert told(judged(far, TOLERANCE)) == told(judged(every, TOLERANCE))
