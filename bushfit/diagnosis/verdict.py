@@ -126,8 +126,9 @@ class Told:
         asked, finding = self.search.asked, self.finding
         lead = f"; no more than leads: {_all(finding.leads)}" if finding.leads else ""
         spot = self.first.best if self.first and finding.verdict == "unexplained" else None
-        if not spot and asked.most and (found := describe(self.base, asked.start, asked.held, asked.bounds)):
-            words = f"a real gap stays that no known effect closes: {found.size}; {found.words}{lead}"
+        rig = self.data.campaign.rig
+        if not spot and asked.most and (found := describe(self.base, rig, asked.held, asked.bounds)):
+            words = f"a real gap stays that no known effect closes: {found.words}{lead}"
             names = [Named(UNNAMED, found.evidence)]
             held = found.correction.held
             return self._finished("described", words, found.after, names, description=found.description, held=held)
