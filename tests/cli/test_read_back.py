@@ -233,6 +233,5 @@ def test_every_shape_of_campaign_by_every_command(
     campaign: Callable[[str], Path], tmp_path: Path, shape: str, writer: str
 ) -> None:
     tests = campaign(shape)
-    models = written(tests, writer, tmp_path)
-    for model in models:
-        taken(tests, model, tmp_path, FORMATS, whole=model == models[-1])
+    for model in written(tests, writer, tmp_path):
+        taken(tests, model, tmp_path, FORMATS, whole=model.stem == WRITERS[writer])
