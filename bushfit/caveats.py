@@ -1,20 +1,34 @@
 """What a prediction cannot say: sentences on what was not fitted, what is extrapolated, and what a model leaves out."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import chain
 
+import numpy as np
+
+from bushfit import units
 from bushfit.effects import Level, effect_named
 from bushfit.effects.contract import Array
 from bushfit.geometry import Bushing, Direction, Place
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.units import number, told
+from bushfit.units import number
 
 #: Beyond the fitted range by more than this, relative to its end, a prediction is an extrapolation: rigs miss their
 #: set points by less.
 MARGIN = 0.01
 #: Share by which a finite bulk modulus lowers the radial stiffness, from which that is said: that of the other errors.
 _NOTED_LOWERING = 0.01
+#: Relative difference of two stiffnesses that is none.
+_SAME = 1e-6
+
+
+def told(result: Result, found: Iterable[Iterable[str]] = (), notes: Iterable[str] = ()) -> list[str]:
+    """All that a reader of a result's numbers must know, each sentence once: the one list that every output shows.
+
+    First the notes, then what the fit warned of, what was found of each prediction, and what holds in every direction.
+    """
+    return list(dict.fromkeys((*notes, *result.warnings, *chain.from_iterable(found), *caveats(result))))
 
 
 def caveats(result: Result) -> list[str]:
@@ -102,6 +116,40 @@ def _radial_error(bushing: Bushing) -> str:
     return f'{off}, by which shape = "calibrated" goes'
 
 
+def of_points(
+    result: Result,
+    place: Place,
+    frequency: Array,
+    amplitude: Array,
+    stiffness: Array,
+    if_rigs: Array | None = None,
+    measured: Array | None = None,
+    temperature: float | None = None,
+) -> Iterator[str]:
+    """Warnings of |K| predicted at operating points [Hz], [m or rad], (n,): what was not fitted there, and how far off
+    it is what was measured, for want of the rig, and what it would be if what is unresolved is the rig's."""
+    yield from unfitted(result, place)
+    yield from extrapolations(result, place, frequency, amplitude)
+    yield from circumstances(result.model.without(Level.INSTRUMENT), temperature)
+    rig = rig_effects(result)
+    if rig and measured is not None and not np.isnan(measured).all():
+        off = percent_off(stiffness / np.abs(measured))
+        yield f"{place}: without {' and '.join(rig)} the predicted stiffness is {off} against what was measured"
+    if if_rigs is not None:
+        for name in result.unresolved:
+            twins = " or ".join(effect_named(name).twins)
+            yield f"{name} is taken as the bushing's, but these tests cannot tell it from {twins}"
+        ratio, if_so = if_rigs / stiffness, f"if {' and '.join(result.unresolved)} is the rig's"
+        off = f"{percent_off(ratio)} {if_so}; low and high span both"
+        yield f"{place}: stiffness {f'the same {if_so}' if np.allclose(ratio, 1.0, atol=_SAME) else off}"
+
+
+def percent_off(ratio: Array) -> str:
+    """How far ratios are off 1, in words: "+1.2 to +3.4 %"."""
+    ends = [number(100.0 * end - 100.0, 2, "+") for end in (np.nanmin(ratio), np.nanmax(ratio))]
+    return f"{' to '.join(dict.fromkeys(ends))} %"
+
+
 def circumstances(model: Model, temperature: float | None) -> Iterator[str]:
     """What is taken of the circumstances that the model depends on, where they are not asked for."""
     known = set() if temperature is None else {"temperature"}
@@ -121,6 +169,6 @@ def extrapolations(
     )
     for axis, unit, digits, asked, (low, high) in axes:
         if asked.min() < low * (1 - MARGIN) or asked.max() > high * (1 + MARGIN):
-            here, there = (told(unit, *ends, digits=digits) for ends in ((asked.min(), asked.max()), (low, high)))
+            here, there = (units.told(unit, *ends, digits=digits) for ends in ((asked.min(), asked.max()), (low, high)))
             said = f"predicted at {axis} of {here}, but fitted at {there} only: extrapolated beyond"
             yield f"{what or direction}: {said}"

@@ -1,6 +1,6 @@
 """What every export format is given, and what it gives back."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -22,6 +22,7 @@ class Order:
     Args:
         result: the fitted model.
         source: the file it came from, with its SHA-256.
+        warnings: what a user must know before using the numbers.
         predictions: its dynamic stiffness over the whole grid of frequencies and amplitudes, one a place.
         accuracy: largest relative error of the modulus that arms in place of a springpot may have.
         units: of the files; None leaves them to the format: mm, t, s and N in decks, those of people in tables.
@@ -31,11 +32,16 @@ class Order:
 
     result: Result
     source: Source
+    warnings: Sequence[str]
     predictions: tuple[Prediction, ...]
     accuracy: float
     units: UnitSystem | None = None
     dialect: Dialect = "nastran"
     decimal_comma: bool = False
+
+    def said(self, losses: Iterable[str]) -> list[str]:
+        """What every format says beside its numbers: what it leaves out, and the warnings."""
+        return [*(f"left out: {loss}" for loss in losses), *(f"warning: {line}" for line in self.warnings)]
 
     @property
     def places(self) -> tuple[Place, ...]:

@@ -79,5 +79,5 @@ def _said(order: Order) -> Iterator[tuple[str, str]]:
         yield "test, sha256", source.sha256
     yield "bushfit", __version__
     yield "left out", NO_LOOPS
-    for line in dict.fromkeys(line for prediction in order.predictions for line in prediction.warnings):
+    for line in order.warnings:
         yield "warning", line

@@ -36,7 +36,10 @@ _FEWEST = 3
 #: How the rows are ordered: what needs a look first.
 _ORDER = ("failed", "fail", "conditional fail", "conditional pass")
 #: Columns of words, and those that end a row as remarks.
-_WORDS, _REMARKS = ("status", "limits", "verdict", "named effects"), ("out of limits", "on the edge", "on a bound")
+_WORDS, _REMARKS = (
+    ("status", "limits", "verdict", "named effects"),
+    ("out of limits", "on the edge", "on a bound", "warnings"),
+)
 #: What lies further from the median than this, in standard deviations of the batch, is drawn at the edge of a chart.
 _FURTHEST = 12.0
 #: Limits are told by these words, and coloured so.
