@@ -64,7 +64,7 @@ def direction_error(file: Path, sheet: str | None = None) -> MeasurementError:
         place=sheet and f'sheet "{sheet}"',
         found="neither its name nor its columns say axial, radial or torsion",
         expected="a direction",
-        hint="state it: --direction axial (or radial, torsion)",
+        hint="state it: --direction axial (or radial, torsion); or where others say another, name the file after it",
     )
 
 

@@ -127,10 +127,9 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         reached = reached + pace * step
     if not history.periodic and np.any(off > _UNSETTLED * size):
         raise ModelError(
-            "the rig gives way too much to be followed through time",
-            place="rig_compliance.compliance",
+            "a rig or sleeve gives way too much to be followed through time",
             found=f"{float(np.max(compliance)):.3g} m/N",
-            expected="a rig several times stiffer than the bushing",
+            expected="one that is several times stiffer than the bushing",
         )
     return felt
 

@@ -268,8 +268,8 @@ def cautions(
     if not names:
         return [*notes, _checked(model, data_sets)]
     return [
-        *notes,
         *filter(None, [covariance.restricted(names).left_open(model.values)]),
+        *notes,
         *([_STOPPED.format(solution.evaluations, _FLAT if solution.flat else _SLOPE)] if solution.stopped else []),
         *(_at_edge(name, end, bounds) for name, end in at_bound.items()),
         *left_open(model, data_sets, [name for name in names if name not in at_bound], covariance),

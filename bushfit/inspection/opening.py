@@ -65,9 +65,6 @@ def inspect(file: Path, stated: Mapping[str, Any], beside: Said | None = None) -
         measured, entry, odd = _read_loop(file, read_as, entry, table)
         kind, looked = _look(measured, by_name, _keywords(file, read_as, entry, LoopFile))
     columns = _columns(table, is_sweep=is_sweep)
-    named = by_name.direction
-    if direction and named and not isinstance(direction, Specimen) and named is not direction:
-        odd.append(f"the name says {named}, it is taken for {direction} as stated")
     facts, counted = {**looked.facts, **outside.facts}, outside.is_counted
     if is_sweep and (amplitude := table.roles.get("amplitude")):
         counted = amplitude.convention is not None

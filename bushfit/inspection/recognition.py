@@ -105,17 +105,19 @@ def direction_of(file: Path, table: Table, stated: Mapping[str, Any]) -> Directi
     """The direction of a test of the bushing as the user states it, or else as its file does; None where neither does.
 
     Raises:
-        MeasurementError: units of torsion where the user states another direction.
+        MeasurementError: a file that says another direction than the user.
     """
     turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
+    headers = table.layout.written or table.headers
+    found = direction_of_file(file, headers, turns=turns, sheet=table.source.sheet)
     if "direction" not in stated:
-        return direction_of_file(file, table.layout.written or table.headers, turns=turns, sheet=stated.get("sheet"))
-    if turns and not Direction(stated["direction"]).is_rotation:
+        return found
+    if found and found != stated["direction"]:
         raise table.header_error(
-            "the units say torsion",
-            found=f"{', '.join(table.headers)}; stated: {stated['direction']}",
+            f"{'the units say' if turns else 'the file says'} {found}, and --direction {stated['direction']}",
+            found=", ".join([*filter(None, [file.name, table.source.sheet]), *headers]),
             expected="one direction",
-            hint="state --direction torsion, or none",
+            hint="leave --direction out; or give the file a name that says its direction, which goes before its header",
         )
     return Direction(stated["direction"])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 import shutil
 import tomllib
@@ -104,6 +105,36 @@ def test_what_only_the_user_knows_is_asked_for_and_written(typed: Callable, test
     ]
     assert set(written["sweeps"][0]) == {"file", "direction"}
     assert load_campaign(tmp_path / "x/campaign.toml").loops[0].time[-1] > 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "header", "says", "other"),
+    [
+        ("sweep_axial.csv", "stiffness [N/mm]", "axial", "radial"),
+        ("x.csv", "Radial stiffness [N/mm]", "radial", "axial"),
+        ("rad_7.csv", "Axial stiffness [N/mm]", "radial", "axial"),
+        ("x.xlsx", "stiffness [N/mm]", "radial", "axial"),
+        ("turned.csv", "stiffness [N m/deg]", "torsion", "radial"),
+    ],
+)
+def test_a_direction_that_is_stated_contradicts_no_file(
+    typed: Callable, tests: list[Path], tmp_path: Path, name: str, header: str, says: str, other: str
+) -> None:
+    """A sheet's name goes before the file's, that before headers, units of an angle before all."""
+    table, file = pd.read_csv(tests[1]).rename(columns={"stiffness [N/mm]": header}), tmp_path / "lab" / name
+    table = table.rename(columns={"amplitude [mm]": "amplitude [deg]"} if says == "torsion" else {})
+    (tmp_path / "lab/plain.csv").write_bytes(tests[1].read_bytes())
+    if file.suffix == ".xlsx":
+        table.to_excel(file, sheet_name="Radial", index=False)
+    else:
+        table.to_csv(file, index=False)
+    for command in (("init", "lab", *GEOMETRY), ("init", file, *GEOMETRY), ("inspect", file, "--no-plots")):
+        done = typed(*command, "--direction", other, "-o", "x")
+        assert (done.returncode, (tmp_path / "x").exists()) == (2, False)
+        assert re.search(rf"{name}, .* says? {says}, and --direction {other}\n", done.stderr)
+        assert "leave --direction out" in done.stderr
+    assert typed("init", file, *GEOMETRY, "--direction", says, "-o", "x").returncode == 0
+    assert typed("init", "lab/plain.csv", *GEOMETRY, "--direction", other, "-o", "y").returncode == 0
 
 
 def test_a_file_that_names_a_direction_is_no_block_in_shear(typed: Callable, tests: list[Path], tmp_path: Path) -> None:

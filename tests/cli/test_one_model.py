@@ -101,10 +101,10 @@ def test_what_is_unknown_by_100_per_cent_is_said_first(bushfit: Run, work: Path,
     (work / "configs/one_loop.toml").write_text(text[: text.index("[[sweeps]]")], encoding="utf-8")
     for done in both(bushfit, "configs/one_loop.toml", tmp_path):
         assert done.stderr.startswith(f"CMP 15 961: consistent; {UNKNOWN}\n")
-    assert UNKNOWN in model_of(tmp_path / "run")["warnings"]
+    assert model_of(tmp_path / "run")["warnings"][0] == UNKNOWN
     fitted = bushfit("fit", "configs/one_loop.toml", "-o", tmp_path / "fit", "--no-plots", "--json")
     assert fitted.stderr.startswith(f"CMP 15 961: {UNKNOWN}\n")
-    assert UNKNOWN in json.loads(fitted.stdout)["warnings"]
+    assert json.loads(fitted.stdout)["warnings"][0] == UNKNOWN
     assert "unknown by 100 %" not in bushfit("fit", CAMPAIGN, "-o", tmp_path / "all", "--no-plots").stderr
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from looking import look, without
 
-from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
 from bushfit.inspection.draft import file_text
 from bushfit.inspection.opening import inspect
@@ -61,19 +60,6 @@ def test_direction_from_the_name(loop: Loop, tmp_path: Path, name: str, directio
         assert inspect(tmp_path / name, {}).direction is direction
     else:
         assert look(tmp_path, loop, name).direction is direction
-
-
-def test_the_direction_stated_goes_before_the_name_and_that_is_said(loop: Loop, tmp_path: Path) -> None:
-    seen = look(tmp_path, loop, "loop_axial_1.csv", direction="radial")
-    assert seen.direction is Direction.RADIAL
-    assert seen.looked.odd == ("the name says axial, it is taken for radial as stated",)
-    assert look(tmp_path, loop, "loop_axial_1.csv", direction="axial").looked.odd == ()
-    with pytest.raises(BushfitError, match="does not fit"):
-        look(tmp_path, loop, "loop_axial_1.csv", direction="torsion")
-    table = raw_loop_table(loop).set_axis(["time [s]", "rotation [deg]", "moment [N m]"], axis=1)
-    (tmp_path / "x.csv").write_bytes(to_csv(table))
-    with pytest.raises(BushfitError, match="the units say torsion"):
-        inspect(tmp_path / "x.csv", {"direction": "axial"})
 
 
 def test_what_the_user_states_goes_into_the_text(loop: Loop, tmp_path: Path) -> None:
