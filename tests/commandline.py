@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +31,7 @@ def call(folder: Path, *arguments: object) -> Done:
         contextlib.chdir(folder),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),
+        mock.patch.dict(os.environ),
         mock.patch.object(sys, "argv", ["bushfit", *map(str, arguments)]),
         pytest.raises(SystemExit) as left,
     ):

@@ -1,7 +1,7 @@
 """Workers: processes of this machine or of a Dask cluster, through one `concurrent.futures.Executor`.
 
-Rows go out in chunks, few at a time. A worker that dies costs its rows a second try, alone; a row that takes its
-worker with it every time is given up, and the rest goes on.
+Rows go out in chunks, few at a time. A worker that dies costs its rows a second try, each alone; a row whose worker
+dies then, too, is given up, and the rest goes on.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import logging
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
 from collections import deque
@@ -33,10 +34,15 @@ _CHUNK_SECONDS = 0.5
 _LARGEST_CHUNK = 64
 #: Chunks handed out per worker: one to do and one to go on with.
 _CHUNKS_PER_WORKER = 2
-#: Times that a row may be alone with its worker when the worker dies; then the row is to blame.
-_MOST_DEATHS = 3
-#: Sizes in bytes below which glibc keeps freed memory for the next row: handing it back takes a tenth of the time.
-_HEAP = {"MALLOC_TRIM_THRESHOLD_": "134217728", "MALLOC_MMAP_THRESHOLD_": "33554432"}
+#: Pools that are tried for a chunk: the first may have lost a worker just now.
+_MOST_POOLS = 3
+#: Environment of the workers. Python puts the current folder before its own on the path of what it starts, unless told
+#: not to. Below so many bytes glibc keeps freed memory for the next row: handing it back takes a tenth of the time.
+_ENVIRONMENT = {
+    "PYTHONSAFEPATH": "1",
+    "MALLOC_TRIM_THRESHOLD_": "134217728",
+    "MALLOC_MMAP_THRESHOLD_": "33554432",
+}
 #: Time for a Dask scheduler to answer [s] (chosen: a cluster in the same house answers at once).
 _CONNECT_SECONDS = 5.0
 #: Time for a first worker of a Dask cluster to appear [s] (chosen: a queue may have to start it).
@@ -56,11 +62,12 @@ class LocalPool:
         """One that works: a new one where the last is broken."""
         if self._executor is None:
             # No fork of this process: it has threads. A server forks instead, with all imported already.
-            os.environ.update(_HEAP)  # read by the C library of processes to come
+            # They import what this process does, from where it does.
+            os.environ.update(_ENVIRONMENT, PYTHONPATH=os.pathsep.join(sys.path))
             kind = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
             context = multiprocessing.get_context(kind)
             if kind == "forkserver":
-                context.set_forkserver_preload(["bushfit.batch.work", "bushfit.jobs.fits"])
+                context.set_forkserver_preload(["bushfit.batch.work", "bushfit.jobs.fits", "lmfit", "pandas"])
             self._executor = futures.ProcessPoolExecutor(self._jobs, context, initializer=_begin_worker)
         return self._executor
 
@@ -152,10 +159,10 @@ def run(
     Args:
         rows, pool: what to do, and where.
         work: results of a chunk of rows, in their order; it must bear being asked again.
-        give_up: the result of a row that took its worker down time after time, from a sentence on that.
+        give_up: the result of a row that took its worker down twice, from a sentence on that.
 
     Raises:
-        BatchError: the workers are gone for good.
+        BatchError: no worker starts, or they are gone for good.
     """
     left, size = iter(enumerate(rows)), 1
     out: dict[Future[Sequence[R]], list[tuple[int, T]]] = {}
@@ -195,23 +202,35 @@ def run(
 
 def _submit(pool: Pool, work: Callable[[Sequence[T]], Sequence[R]], rows: Sequence[T]) -> Future[Sequence[R]]:
     """Hand rows to a worker, of a new pool where the old one has lost a worker, or loses it just now."""
-    for _ in range(_MOST_DEATHS):
+    for _ in range(_MOST_POOLS):
         try:
             return pool.executor().submit(work, rows)
-        except (futures.BrokenExecutor, OSError) as error:
+        except (futures.BrokenExecutor, OSError, EOFError) as error:
             pool.mend(error)
-    return pool.executor().submit(work, rows)
+            cause = error
+    raise _no_worker(cause) from cause
 
 
 def _alone(row: T, work: Callable[[Sequence[T]], Sequence[R]], give_up: Callable[[str], R], pool: Pool) -> R:
     """The result of a row that was with a worker when it died: nothing else is out while it tries again."""
-    cause = ""
-    for _ in range(_MOST_DEATHS):
-        try:
-            return _submit(pool, work, [row]).result()[0]
-        except BatchError:
-            raise
-        except (Exception, CancelledError) as error:
-            pool.mend(error)
-            cause = f"{type(error).__name__}: {error}"
-    return give_up(f"its worker process died {_MOST_DEATHS} times with nothing else to do (out of memory?): {cause}")
+    try:
+        return _submit(pool, work, [row]).result()[0]
+    except BatchError:
+        raise
+    except (Exception, CancelledError) as error:
+        pool.mend(error)
+        cause = error
+    try:
+        _submit(pool, work, []).result()  # a worker that dies over nothing was not brought down by the row
+    except (futures.BrokenExecutor, OSError, EOFError) as error:
+        raise _no_worker(error) from error
+    return give_up(f"its worker process died twice, then over it alone; out of memory, most likely ({cause})")
+
+
+def _no_worker(cause: BaseException) -> BatchError:
+    return BatchError(
+        "no worker process starts",
+        found=str(cause) or type(cause).__name__,
+        expected="processes that import what this one does",
+        hint="what they say of it stands above; install bushfit and its packages anew",
+    )

@@ -55,7 +55,8 @@ def sweep_data(
     """One data set per sweep; the noise of those of one rig, the bushing's or a specimen's, is estimated together."""
     rigs = [sweep.direction if isinstance(sweep.direction, Specimen) else None for sweep in sweeps]
     noises = {
-        rig: sweep_noise([sweep for sweep, own in zip(sweeps, rigs, strict=True) if own == rig], stated) for rig in rigs
+        rig: sweep_noise([sweep for sweep, own in zip(sweeps, rigs, strict=True) if own == rig], stated)
+        for rig in dict.fromkeys(rigs)
     }
     data_sets = [SweepData(sweep, noises[rig], residuals) for sweep, rig in zip(sweeps, rigs, strict=True)]
     return [data_set.weighted(np.array(data_set.sweep.weight)) for data_set in data_sets]

@@ -4,8 +4,6 @@ A series of order m has real coefficients (mean, m cosines, m negative sines), (
 (m + 1,): c_k stands for Re c_k exp(2 pi i k phase). Phase counts cycles.
 """
 
-from itertools import accumulate, repeat
-
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 from numpy.typing import NDArray
@@ -41,8 +39,11 @@ def resolved_order(rows_per_cycle: float, most: int) -> int:
 def basis(phase: Array, order: int) -> Array:
     """Columns 1, cos(2 pi k phase) and -sin(2 pi k phase) for k = 1 ... order, (n, 2 order + 1)."""
     turn = np.exp(2j * np.pi * phase)
-    powers = np.array(list(accumulate(repeat(turn, order), np.multiply)))
-    return np.vstack((np.ones(phase.size), powers.real, -powers.imag)).T
+    powers = np.multiply.accumulate(np.broadcast_to(turn, (order, phase.size)), axis=0)
+    rows = np.ones((2 * order + 1, phase.size))
+    rows[1 : order + 1] = powers.real
+    np.negative(powers.imag, out=rows[order + 1 :])
+    return rows.T
 
 
 def least_squares(columns: Array, values: Array, weight: Array | None = None) -> Array:

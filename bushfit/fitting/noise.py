@@ -16,7 +16,7 @@ from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
 from bushfit.fitting.outliers import least_absolute
 from bushfit.reading.measurement import Sweep
-from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
+from bushfit.reduction.scatter import MEDIAN_TO_SIGMA, median
 
 #: Least noise of any rig, relative to the largest force or to |K|.
 FLOOR = 1e-4
@@ -332,12 +332,12 @@ def _usual(difference: Array, log_step: Array) -> Array:
     if np.count_nonzero(usual) < _FEWEST_SOUGHT:
         return usual
     parts = _parts(difference)
-    off = np.abs(parts - np.median(parts[usual], axis=0))
-    scale = MEDIAN_TO_SIGMA * np.median(off[usual], axis=0)
+    off = np.abs(parts - median(parts[usual]))
+    scale = MEDIAN_TO_SIGMA * median(off[usual])
     lengths = np.log(np.maximum(np.hypot(*off.T), FLOOR))
     x, y, half = log_step[usual], lengths[usual], np.count_nonzero(usual) // 2
-    slope = np.median((y[-half:] - y[:half]) / (x[-half:] - x[:half]))
-    scale = scale * np.exp(np.maximum(slope * (log_step - np.median(x)), 0.0))[:, None]
+    slope = median((y[-half:] - y[:half]) / (x[-half:] - x[:half]))
+    scale = scale * np.exp(np.maximum(slope * (log_step - median(x)), 0.0))[:, None]
     return usual & np.all((off <= _OUTLIER * scale) | (scale == 0.0), axis=1)
 
 

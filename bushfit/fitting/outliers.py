@@ -13,7 +13,7 @@ from scipy.ndimage import median_filter
 from scipy.special import chdtri, fdtri
 
 from bushfit.effects.contract import Array
-from bushfit.reduction.scatter import MEDIAN_TO_SIGMA
+from bushfit.reduction.scatter import MEDIAN_TO_SIGMA, median
 
 #: Probability that noise alone makes an outlier among all rows of a test; chosen: one test in a hundred.
 _CHANCE = 0.01
@@ -54,7 +54,7 @@ def from_neighbours(values: Array, rows: Array, window: int = NEIGHBOURS) -> Arr
     """Distance of some rows from the median over their neighbours and themselves, (len(rows),)."""
     width = min(window, values.size)
     first = np.clip(rows - width // 2, 0, values.size - width)
-    return values[rows] - np.median(sliding_window_view(values, width)[first], axis=1)
+    return values[rows] - median(sliding_window_view(values, width)[first], axis=1)
 
 
 def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:

@@ -98,7 +98,11 @@ def line_of(data: bytes, index: int) -> str:
 
 
 def sha256(data: bytes) -> Future[str]:
-    """SHA-256 of a file's bytes as hexadecimal digits, made meanwhile in a thread."""
+    """SHA-256 of a file's bytes as hexadecimal digits, of many bytes made meanwhile in a thread."""
+    if len(data) <= CHUNK_BYTES:
+        made = Future[str]()
+        made.set_result(hashlib.sha256(data).hexdigest())
+        return made
     thread = ThreadPoolExecutor(1)
     digest = thread.submit(lambda: hashlib.sha256(data).hexdigest())
     thread.shutdown(wait=False)

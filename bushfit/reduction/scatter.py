@@ -12,3 +12,11 @@ def scatter(values: Floats) -> tuple[float, float]:
     """Median of values, (n,), and their standard deviation by the median absolute deviation."""
     middle = float(np.median(values))
     return middle, MEDIAN_TO_SIGMA * float(np.median(np.abs(values - middle)))
+
+
+def median(values: Floats, axis: int = 0) -> Floats:
+    """Median along an axis of values none of which is NaN: that of NumPy takes ten times as long over few."""
+    ordered = np.sort(values, axis=axis)
+    middle = ordered.shape[axis] // 2
+    low = middle - 1 + ordered.shape[axis] % 2
+    return np.asarray((ordered.take(low, axis) + ordered.take(middle, axis)) / 2.0)

@@ -54,20 +54,14 @@ def run(
         hours: of the session that is planned where effects are left open; None for none.
 
     Notes:
-        A campaign that takes its worker down time after time is a failure of its own row.
+        A campaign that takes its worker down twice is a failure of its own row.
     """
-    if jobs == 1:
-        return [_noted(work(task, kept, hours), progress) for task in chosen]
     done: dict[int, Outcome] = {}
     for number, found in pool.run(chosen, partial(_in_worker, kept=kept, hours=hours), str, pool.LocalPool(jobs)):
         outcome = Outcome(chosen[number], None, "failed", error=found) if isinstance(found, str) else found
-        done[number] = _noted(outcome, progress)
+        progress(outcome)
+        done[number] = outcome
     return [done[number] for number in range(len(chosen))]
-
-
-def _noted(outcome: Outcome, progress: Callable[[Outcome], None]) -> Outcome:
-    progress(outcome)
-    return outcome
 
 
 def _in_worker(chosen: Sequence[Task], kept: Path | None, hours: float | None) -> list[Outcome | str]:

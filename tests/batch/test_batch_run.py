@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,8 @@ import pytest
 from junitparser import JUnitXml
 from trees import stamps, tree
 
-from bushfit.batch import ledger
+from bushfit.batch import ledger, work
+from bushfit.batch.manifest import Row
 
 PATTERN = "bushings/*/bushing.toml"
 
@@ -320,6 +321,36 @@ def test_killed_at_any_moment_and_resumed_it_is_as_if_it_had_run_through(shop: P
     assert 0 < kept[0] < 40, "killed in mid-run"
     assert before.items() <= stamps(shop / "killed/bushings").items(), "nothing kept is done again"
     assert tree(shop / "killed") == tree(shop / "whole")
+
+
+def test_no_process_runs_what_lies_in_the_current_folder(shop: Path) -> None:
+    (shop / "bushfit").mkdir()
+    for name in ("bushfit/__init__.py", "numpy.py", "lmfit.py", "signal.py"):
+        (shop / name).write_text(f"open({str(shop / 'ran')!r}, 'w').close()\n")
+    (shop / "many.csv").write_text("campaign\nbushings/b0/bushing.toml\nbushings/b1/bushing.toml\n")
+    done = subprocess.run(command(Path("all"), "-q"), cwd=shop, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert not (shop / "ran").exists()
+
+
+def deadly(rows: Sequence[Row], orders: work.Orders) -> list[tuple[str, bytes]]:
+    """The work, but the bushing b2 kills its process, as a system without memory does."""
+    if any(row.name == "b2" for row in rows):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return work.work(rows, orders)
+
+
+def test_a_campaign_that_kills_its_worker_is_told_once_and_the_others_go_on(
+    typed: Callable[..., Any], shop: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("bushfit.batch.run.work", deadly)
+    done = typed("batch", PATTERN, "-o", "all", "--no-plots", "--no-report", "--jobs", "2")
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    assert [row["status"] for row in rows(shop / "all")] == ["done", "done", "failed", "done", "done"]
+    (told,) = [line for line in done.stderr.splitlines() if line.startswith("failed: ")]
+    assert told.startswith("failed: b2: its worker process died twice, then over it alone; out of memory")
+    assert not (shop / "all/bushings/b2").exists()
 
 
 def test_two_batches_do_not_share_a_folder(typed: Callable[..., Any], shop: Path) -> None:

@@ -19,10 +19,11 @@ from pathlib import Path
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
+from bushfit.batch import ledger
 from bushfit.batch.manifest import Settings, read_manifest
 from bushfit.batch.pool import LocalPool
 from bushfit.batch.run import Plan, run
-from bushfit.batch.work import Orders
+from bushfit.batch.work import Orders, work
 from bushfit.campaign.schema import SimulateSettings
 from bushfit.model.model import Model
 from bushfit.report.contents import Formats
@@ -60,9 +61,23 @@ def manifest(bushings: Path, count: int, name: str = "campaign") -> Path:
     return file
 
 
-def seconds(bushings: Path, count: int, jobs: int, folder: Path) -> float:
+def plan_of(bushings: Path, count: int, folder: Path) -> Plan:
     rows, none = read_manifest(str(manifest(bushings, count)), Settings()).rows, Formats(False, False, False)
-    plan = Plan("benchmark", rows, Orders(folder, (), none, resume=False), None, None, none)
+    return Plan("benchmark", rows, Orders(folder, (), none, resume=False), None, None, none)
+
+
+def of_its_fits(bushings: Path, count: int, folder: Path) -> float:
+    """Seconds that the rows take one after the other in this process, which has imported all they need."""
+    plan = plan_of(bushings, count, folder)
+    for name in (ledger.ROWS, ledger.ASIDE):
+        (folder / name).mkdir(parents=True)
+    begin = time.perf_counter()
+    work(plan.rows, plan.orders)
+    return time.perf_counter() - begin
+
+
+def seconds(bushings: Path, count: int, jobs: int, folder: Path) -> float:
+    plan = plan_of(bushings, count, folder)
     begin = time.perf_counter()
     summary = run(plan, LocalPool(jobs), str, lambda _: None)
     assert summary.status["done"] == count
@@ -71,10 +86,12 @@ def seconds(bushings: Path, count: int, jobs: int, folder: Path) -> float:
 
 def test_campaigns_a_second(benchmark: BenchmarkFixture, bushings: Path, tmp_path: Path) -> None:
     """Wall time of batches on one core and on two, and of a shell loop over `bushfit fit`, with plots and without."""
-    count = 400 if benchmark.enabled else 8
+    count = 300 if benchmark.enabled else 8
     seconds(bushings, 8, 2, tmp_path / "warm")
     two = benchmark.pedantic(seconds, (bushings, count, 2, tmp_path / "two"), rounds=1)
     one = seconds(bushings, count, 1, tmp_path / "one")
+    of_its_fits(bushings, 8, tmp_path / "imported")
+    over_fits = two / of_its_fits(bushings, count, tmp_path / "fits")
     singles: dict[tuple[str, ...], list[float]] = {(): [], ("--no-plots",): []}
     for number, (options, taken) in product(range(3), singles.items()):
         folder = str(tmp_path / f"{number}{len(options)}")
@@ -85,10 +102,13 @@ def test_campaigns_a_second(benchmark: BenchmarkFixture, bushings: Path, tmp_pat
     typed, bare = (sorted(taken)[1] for taken in singles.values())
     print(
         f"\n{count} campaigns: {count / two:.0f} a second on 2 cores, {one / two:.2f} times one core's rate, "
+        f"{over_fits:.2f} times the sum of the fits on one core, "
         f"{typed * count / two:.0f} times a shell loop over `bushfit fit` ({typed:.2f} s each), "
         f"{bare * count / two:.0f} times one over `bushfit fit --no-plots` ({bare:.2f} s each)"
     )
-    benchmark.extra_info.update(rate=count / two, over_one_core=one / two, over_shell_loop=typed * count / two)
+    benchmark.extra_info.update(
+        rate=count / two, over_one_core=one / two, over_fits=over_fits, over_shell_loop=typed * count / two
+    )
 
 
 def peaks(command: list[str]) -> tuple[int, int]:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import builtins
 import io
 import json
+import os
+import signal
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from commandline import call
 
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import BASE, LIBRARY
@@ -259,3 +262,22 @@ def test_another_mistake_counts_as_wrong(mistaken: list[Outcome]) -> None:
     assert not any((wrong.mistake_told, wrong.mistake_alone))
     rows = {row.measure: row for row in card([wrong, mistaken[2]], "mistakes")}
     assert rows["another mistake or an effect named"].met is False
+
+
+def deadly(chosen: list[Task], kept: Path | None, hours: float | None) -> list[Outcome | str]:
+    """Tasks, the first of which kills its process, as a system without memory does; nothing comes of the others."""
+    if any(task.seed == SEED for task in chosen):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return [Outcome(task, None, "none") for task in chosen]
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_campaign_that_kills_its_worker_fails_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, jobs: str
+) -> None:
+    monkeypatch.setattr("bushfit.scorecard.scorecard._in_worker", deadly)
+    run = call(tmp_path, "scorecard", "--campaigns", "5", "--seed", SEED, "--jobs", jobs, "--json")
+    found = json.loads(run.stdout)["outcomes"]
+    failed = [one for one in found if one["verdict"] == "failed"]
+    assert len(failed) == sum(one["task"]["seed"] == SEED for one in found) < len(found)
+    assert all("its worker process died twice" in one["error"] for one in failed)
