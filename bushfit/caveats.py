@@ -5,14 +5,13 @@ from itertools import chain
 
 import numpy as np
 
-from bushfit import units
 from bushfit.effects import Level, effect_named
 from bushfit.effects.contract import Array
 from bushfit.geometry import Bushing, Direction, Place
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.units import number
+from bushfit.units import number, told
 
 #: Beyond the fitted range by more than this, relative to its end, a prediction is an extrapolation: rigs miss their
 #: set points by less.
@@ -23,17 +22,19 @@ _NOTED_LOWERING = 0.01
 _SAME = 1e-6
 
 
-def told(result: Result, found: Iterable[Iterable[str]] = (), notes: Iterable[str] = ()) -> list[str]:
+def warnings_of(result: Result, found: Iterable[Iterable[str]] = (), notes: Iterable[str] = ()) -> list[str]:
     """All that a reader of a result's numbers must know, each sentence once: the one list that every output shows.
 
-    First the notes, then what the fit warned of, what was found of each prediction, and what holds in every direction.
+    First the notes, then what the fit warned of, what was found of each prediction, what holds of the result itself.
     """
     return list(dict.fromkeys((*notes, *result.warnings, *chain.from_iterable(found), *caveats(result))))
 
 
 def caveats(result: Result) -> list[str]:
-    """Sentences on what holds of a model's prediction in every direction."""
-    lines = []
+    """Sentences on what holds of a result itself, whatever is predicted with it."""
+    fitted = result.measured.directions if result.measured else ()
+    lines = [line for name in fitted for line in unfitted(result, result.place(name))]
+    lines += _unresolved(result)
     if "springpot" not in result.model.effects:
         lines.append("the model has no springpot: its stiffness does not depend on frequency")
     if unnamed := result.model.unnamed:
@@ -136,12 +137,17 @@ def of_points(
         off = percent_off(stiffness / np.abs(measured))
         yield f"{place}: without {' and '.join(rig)} the predicted stiffness is {off} against what was measured"
     if if_rigs is not None:
-        for name in result.unresolved:
-            twins = " or ".join(effect_named(name).twins)
-            yield f"{name} is taken as the bushing's, but these tests cannot tell it from {twins}"
+        yield from _unresolved(result)
         ratio, if_so = if_rigs / stiffness, f"if {' and '.join(result.unresolved)} is the rig's"
         off = f"{percent_off(ratio)} {if_so}; low and high span both"
         yield f"{place}: stiffness {f'the same {if_so}' if np.allclose(ratio, 1.0, atol=_SAME) else off}"
+
+
+def _unresolved(result: Result) -> Iterator[str]:
+    """What counts as the bushing's, though it may be the rig's."""
+    for name in result.unresolved:
+        twins = " or ".join(effect_named(name).twins)
+        yield f"{name} is taken as the bushing's, but these tests cannot tell it from {twins}"
 
 
 def percent_off(ratio: Array) -> str:
@@ -169,6 +175,6 @@ def extrapolations(
     )
     for axis, unit, digits, asked, (low, high) in axes:
         if asked.min() < low * (1 - MARGIN) or asked.max() > high * (1 + MARGIN):
-            here, there = (units.told(unit, *ends, digits=digits) for ends in ((asked.min(), asked.max()), (low, high)))
+            here, there = (told(unit, *ends, digits=digits) for ends in ((asked.min(), asked.max()), (low, high)))
             said = f"predicted at {axis} of {here}, but fitted at {there} only: extrapolated beyond"
             yield f"{what or direction}: {said}"

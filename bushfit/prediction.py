@@ -116,9 +116,8 @@ def predict(
     found = replace(first, if_rigs=others[-1] if others else None, measured=measured)
     every = (first, *others)
     bands: dict[str, Any] = {name: _spanned([getattr(each, name) for each in every]) for name in _BANDS}
-    others_stiffness = found.if_rigs and found.if_rigs.stiffness.value
-    at = frequency, amplitude, found.stiffness.value
-    told = of_points(result, direction, *at, None if rig else others_stiffness, None if rig else measured, temperature)
+    at, if_rigs = (frequency, amplitude, first.stiffness.value), others[-1].stiffness.value if others else None
+    told = of_points(result, direction, *at, if_rigs, None if rig else measured, temperature)
     return replace(found, **bands, warnings=tuple(told))
 
 

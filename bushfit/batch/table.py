@@ -56,4 +56,4 @@ class Table:
             value = found.get(quantity.name, (None,) * 4)[_PARTS[part]]
             cells.append(None if value is None else value * quantity.factor)
         bounds = ", ".join(f"{name} ({end})" for name, end in record.get("at_bound", {}).items())
-        return [*cells, bounds, "; ".join(record.get("warnings", ()))]
+        return [*cells, bounds, SEPARATOR.join(record.get("warnings", ()))]

@@ -14,7 +14,7 @@ from bushfit.batch.document import Found, Record
 from bushfit.batch.manifest import Row, Settings
 from bushfit.batch.points import Point
 from bushfit.campaign.campaign import Campaign, load_campaign
-from bushfit.caveats import told
+from bushfit.caveats import warnings_of
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import effect_named
 from bushfit.effects.contract import Parameter
@@ -210,7 +210,7 @@ def _numbers(result: Result, points: Sequence[Point], notes: Sequence[str]) -> F
         "nrmse": quality.nrmse if quality else None,
         "reduced_chi_square": quality.reduced_chi_square if quality else None,
         "points": at,
-        "warnings": told(result, said, notes),
+        "warnings": warnings_of(result, said, notes),
     }
 
 

@@ -56,7 +56,6 @@ def command(
 
     result, notes = open_model(model), list[str]()
     if bushing:
-        notes += result.warnings
         result, note = carried(result, load_bushing(bushing))
         notes.append(note)
         directions = directions or ("axial", "radial")

@@ -10,7 +10,7 @@ from typing import Any
 from bushfit import __version__
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
-from bushfit.caveats import told
+from bushfit.caveats import warnings_of
 from bushfit.comparison import Comparison, compare, holm, with_holm
 from bushfit.diagnosis.evidence import result_of
 from bushfit.diagnosis.families import FittedFamily, fit_families, known_families
@@ -98,10 +98,10 @@ class Compared:
                     for line in prediction.warnings:
                         of_each.setdefault(line, []).append(who)
         for label, entry in zip(self.labels, self.entries, strict=True):
-            for line in told(entry.result):
+            for line in warnings_of(entry.result):
                 of_each.setdefault(line, []).append(label)
-        of_all = [f"{', '.join(dict.fromkeys(who))}: {line}" for line, who in of_each.items()]
-        return [*self.notes, *self._shared(), *of_all]
+        told = [f"{', '.join(dict.fromkeys(who))}: {line}" for line, who in of_each.items()]
+        return [*self.notes, *self._shared(), *told]
 
     def _shared(self) -> list[str]:
         """That results were fitted to the same files, and what this does."""

@@ -216,8 +216,10 @@ def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
     if measured:
         of_specimens = tuple(name for name in measured.directions if name in names)
         measured = replace(measured, directions=of_specimens or (result.name,))
-    there = [name for name in result.covariance.names if name in model.values]
+    known = [name for name in result.covariance.names if name in model.values]
     fitted = tuple(name for name in result.fitted if name in model.values)
-    covariance = result.covariance.restricted(there)
-    carried_there = Result(model, fitted, covariance, None, measured, inputs=result.inputs, specimens=result.specimens)
-    return replace(carried_there, unresolved=tuple(name for name in result.unresolved if name in kept)), said
+    covariance = result.covariance.restricted(known)
+    there = Result(model, fitted, covariance, None, measured, inputs=result.inputs, specimens=result.specimens)
+    warnings = tuple(f"{result.name}: {line}" for line in result.warnings)
+    unresolved = tuple(name for name in result.unresolved if name in kept)
+    return replace(there, warnings=warnings, unresolved=unresolved), said

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bushfit.caveats import of_points
-from bushfit.caveats import told as told_of
+from bushfit.caveats import of_points, warnings_of
 from bushfit.diagnosis.document import BeforeAfter, EffectEntry
 from bushfit.geometry import Bushing, Place, Specimen
 from bushfit.model.document import TestTable
@@ -69,7 +68,7 @@ def story(found: Checked, tables: Tables) -> dict[str, Any]:
         "gap": gap_panels(result, tables, tests),
         "gaps": (gaps := _gaps(found)),
         "added": any(before != after for _, before, after in gaps if after),
-        "warnings": told_of(result, _of_tables(result, tables), diagnosis["warnings"] if diagnosis else ()),
+        "warnings": warnings_of(result, _of_tables(result, tables), diagnosis["warnings"] if diagnosis else ()),
         "unresolved": result.unresolved,
         "outliers": len(result.outliers),
         "about": about,
