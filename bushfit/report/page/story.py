@@ -69,7 +69,6 @@ def story(found: Checked, tables: Tables) -> dict[str, Any]:
         "gaps": (gaps := _gaps(found)),
         "added": any(before != after for _, before, after in gaps if after),
         "warnings": warnings_of(result, _of_tables(result, tables), diagnosis["warnings"] if diagnosis else ()),
-        "unresolved": result.unresolved,
         "outliers": len(result.outliers),
         "about": about,
         "files": _files(found),
