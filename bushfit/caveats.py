@@ -9,7 +9,6 @@ from bushfit.effects import Level, effect_named
 from bushfit.effects.contract import Array
 from bushfit.geometry import Bushing, Direction, Place
 from bushfit.model.covariance import Z95
-from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.units import number, told
 
@@ -23,10 +22,7 @@ _SAME = 1e-6
 
 
 def warnings_of(result: Result, found: Iterable[Iterable[str]] = (), notes: Iterable[str] = ()) -> list[str]:
-    """All that a reader of a result's numbers must know, each sentence once: the one list that every output shows.
-
-    First the notes, then what the fit warned of, what was found of each prediction, what holds of the result itself.
-    """
+    """All that a reader of a result's numbers must know: notes, the fit's, of predictions, of the result; each once."""
     return list(dict.fromkeys((*notes, *result.warnings, *chain.from_iterable(found), *caveats(result))))
 
 
@@ -34,7 +30,9 @@ def caveats(result: Result) -> list[str]:
     """Sentences on what holds of a result itself, whatever is predicted with it."""
     fitted = result.measured.directions if result.measured else ()
     lines = [line for name in fitted for line in unfitted(result, result.place(name))]
-    lines += _unresolved(result)
+    for name in result.unresolved:
+        twins = " or ".join(effect_named(name).twins)
+        lines.append(f"{name} is taken as the bushing's, but these tests cannot tell it from {twins}")
     if "springpot" not in result.model.effects:
         lines.append("the model has no springpot: its stiffness does not depend on frequency")
     if unnamed := result.model.unnamed:
@@ -118,48 +116,30 @@ def _radial_error(bushing: Bushing) -> str:
 
 
 def of_points(
-    result: Result,
-    place: Place,
-    frequency: Array,
-    amplitude: Array,
-    stiffness: Array,
-    if_rigs: Array | None = None,
-    measured: Array | None = None,
-    temperature: float | None = None,
+    result: Result, place: Place, at: Array, if_rigs: Array | None, measured: Array | None, temperature: float | None
 ) -> Iterator[str]:
-    """Warnings of |K| predicted at operating points [Hz], [m or rad], (n,): what was not fitted there, and how far off
-    it is what was measured, for want of the rig, and what it would be if what is unresolved is the rig's."""
+    """Warnings of |K| at operating points, (3, n): frequency [Hz], amplitude, |K| [SI], which may be the rig's in part,
+    or was measured otherwise, (n,)."""
+    frequency, amplitude, stiffness = at
     yield from unfitted(result, place)
     yield from extrapolations(result, place, frequency, amplitude)
-    yield from circumstances(result.model.without(Level.INSTRUMENT), temperature)
+    known = set() if temperature is None else {"temperature"}
+    effects = result.model.without(Level.INSTRUMENT).records
+    yield from (effect.taken for effect in effects if effect.taken and not known & {*effect.under})
     rig = rig_effects(result)
     if rig and measured is not None and not np.isnan(measured).all():
         off = percent_off(stiffness / np.abs(measured))
         yield f"{place}: without {' and '.join(rig)} the predicted stiffness is {off} against what was measured"
     if if_rigs is not None:
-        yield from _unresolved(result)
         ratio, if_so = if_rigs / stiffness, f"if {' and '.join(result.unresolved)} is the rig's"
         off = f"{percent_off(ratio)} {if_so}; low and high span both"
         yield f"{place}: stiffness {f'the same {if_so}' if np.allclose(ratio, 1.0, atol=_SAME) else off}"
-
-
-def _unresolved(result: Result) -> Iterator[str]:
-    """What counts as the bushing's, though it may be the rig's."""
-    for name in result.unresolved:
-        twins = " or ".join(effect_named(name).twins)
-        yield f"{name} is taken as the bushing's, but these tests cannot tell it from {twins}"
 
 
 def percent_off(ratio: Array) -> str:
     """How far ratios are off 1, in words: "+1.2 to +3.4 %"."""
     ends = [number(100.0 * end - 100.0, 2, "+") for end in (np.nanmin(ratio), np.nanmax(ratio))]
     return f"{' to '.join(dict.fromkeys(ends))} %"
-
-
-def circumstances(model: Model, temperature: float | None) -> Iterator[str]:
-    """What is taken of the circumstances that the model depends on, where they are not asked for."""
-    known = set() if temperature is None else {"temperature"}
-    yield from (effect.taken for effect in model.records if effect.taken and not known & {*effect.under})
 
 
 def extrapolations(

@@ -116,8 +116,9 @@ def predict(
     found = replace(first, if_rigs=others[-1] if others else None, measured=measured)
     every = (first, *others)
     bands: dict[str, Any] = {name: _spanned([getattr(each, name) for each in every]) for name in _BANDS}
-    at, if_rigs = (frequency, amplitude, first.stiffness.value), others[-1].stiffness.value if others else None
-    told = of_points(result, direction, *at, if_rigs, None if rig else measured, temperature)
+    at = np.array((frequency, amplitude, first.stiffness.value))
+    if_rigs = others[-1].stiffness.value if others else None
+    told = of_points(result, direction, at, if_rigs, None if rig else measured, temperature)
     return replace(found, **bands, warnings=tuple(told))
 
 

@@ -1,9 +1,10 @@
 """What every export format is given, and what it gives back."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from bushfit.caveats import warnings_of
 from bushfit.export.systems import UnitSystem
 from bushfit.geometry import Place
 from bushfit.model.arms import Arms
@@ -22,7 +23,6 @@ class Order:
     Args:
         result: the fitted model.
         source: the file it came from, with its SHA-256.
-        warnings: what a user must know before using the numbers.
         predictions: its dynamic stiffness over the whole grid of frequencies and amplitudes, one a place.
         accuracy: largest relative error of the modulus that arms in place of a springpot may have.
         units: of the files; None leaves them to the format: mm, t, s and N in decks, those of people in tables.
@@ -32,16 +32,16 @@ class Order:
 
     result: Result
     source: Source
-    warnings: Sequence[str]
     predictions: tuple[Prediction, ...]
     accuracy: float
     units: UnitSystem | None = None
     dialect: Dialect = "nastran"
     decimal_comma: bool = False
 
-    def said(self, losses: Iterable[str]) -> list[str]:
-        """What every format says beside its numbers: what it leaves out, and the warnings."""
-        return [*(f"left out: {loss}" for loss in losses), *(f"warning: {line}" for line in self.warnings)]
+    def said(self, losses: Iterable[str]) -> list[tuple[str, str]]:
+        """What every format says beside its numbers: what it leaves out, and all warnings."""
+        found = warnings_of(self.result, [prediction.warnings for prediction in self.predictions])
+        return [*(("left out", loss) for loss in losses), *(("warning", line) for line in found)]
 
     @property
     def places(self) -> tuple[Place, ...]:

@@ -108,7 +108,7 @@ class Export:
             asked = replace(self.predict.asked, frequencies=union)
             predicted = replace(self.predict, asked=asked).run(result, campaign)
         settings = (self.accuracy, self.units, self.dialect, self.decimal_comma)
-        order = Order(result, source, predicted.warnings, tuple(predicted.predictions), *settings)
+        order = Order(result, source, tuple(predicted.predictions), *settings)
         return Written(predicted, {name: _writer(name)(order) for name in self.formats})
 
 

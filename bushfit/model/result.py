@@ -216,10 +216,9 @@ def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
     if measured:
         of_specimens = tuple(name for name in measured.directions if name in names)
         measured = replace(measured, directions=of_specimens or (result.name,))
-    known = [name for name in result.covariance.names if name in model.values]
+    there = [name for name in result.covariance.names if name in model.values]
     fitted = tuple(name for name in result.fitted if name in model.values)
-    covariance = result.covariance.restricted(known)
-    there = Result(model, fitted, covariance, None, measured, inputs=result.inputs, specimens=result.specimens)
-    warnings = tuple(f"{result.name}: {line}" for line in result.warnings)
-    unresolved = tuple(name for name in result.unresolved if name in kept)
-    return replace(there, warnings=warnings, unresolved=unresolved), said
+    covariance = result.covariance.restricted(there)
+    told = tuple(f"{result.name}: {line}" for line in result.warnings)
+    carried_there = Result(model, fitted, covariance, None, measured, told, result.inputs, specimens=result.specimens)
+    return replace(carried_there, unresolved=tuple(name for name in result.unresolved if name in kept)), said

@@ -37,7 +37,8 @@ _FEWEST = 3
 #: How the rows are ordered: what needs a look first.
 _ORDER = ("failed", "fail", "conditional fail", "conditional pass")
 #: Columns of words, and those that end a row as remarks.
-_WORDS, _REMARKS = ("status", "limits", "verdict", "named effects"), ("out of limits", "on the edge", "on a bound")
+_WORDS = ("status", "limits", "verdict", "named effects")
+_REMARKS = ("out of limits", "on the edge", "on a bound", "warnings")
 #: What lies further from the median than this, in standard deviations of the batch, is drawn at the edge of a chart.
 _FURTHEST = 12.0
 #: Limits are told by these words, and coloured so.
@@ -84,7 +85,7 @@ def read_batch(folder: Path, base: str = "", rows: Path | None = None) -> Conten
     require_schema(document, file, "a batch", SCHEMA, hint="run the batch again with --resume")
     check_tables(document, file, Batch, kind=ModelError)
     table = read_table(folder, "batch")
-    if table is None or not {"name", "status", "folder"} <= set(table):
+    if table is None or not {"name", "status", "folder", "warnings"} <= set(table):
         raise ModelError(
             "the table of the batch is missing", file=folder / "batch.csv", hint="run the batch again with --resume"
         )
@@ -109,10 +110,10 @@ def index_page(documents: Documents, tables: Tables, *, reported: Collection[str
     shown = [name for name in _WORDS if name in table and any(table[name])]
     rows = _ordered(table)
     most = max(1, _MOST_CELLS // (len(shown) + len(quantities) + 1))
-    warned = [cell.split(BETWEEN) if cell else [] for cell in table.get("warnings", [""] * len(table))]
+    warned = [cell.split(BETWEEN) if cell else [] for cell in table["warnings"]]
     footnotes = list(dict.fromkeys(line for at in rows[:most] for line in warned[at]))
-    places = {line: str(place) for place, line in enumerate(footnotes, 1)}
-    noted = {at: ", ".join(places[line] for line in warned[at]) for at in rows[:most]}
+    for at in rows[:most]:
+        table.loc[at, "warnings"] = ", ".join(str(footnotes.index(line) + 1) for line in warned[at])
     charts = sorted(quantities, key=lambda header: all(end is None for end in quantities[header].allowed))
     charts = [header for header in charts if np.isfinite(table[header]).sum() >= _FEWEST]
     return rendered(
@@ -124,10 +125,10 @@ def index_page(documents: Documents, tables: Tables, *, reported: Collection[str
             ],
             "left_charts": max(0, len(charts) - _MOST_CHARTS),
             "heads": [*shown, *(_for_people(header, each)[0] for header, each in quantities.items())],
-            "remarked": footnotes or any(any(table[name]) for name in _REMARKS if name in table),
+            "remarked": any(any(table[name]) for name in _REMARKS if name in table),
             "footnotes": footnotes,
             "texts": len(shown),
-            "rows": [_row(table.iloc[at], shown, quantities, noted[at], reported, base) for at in rows[:most]],
+            "rows": [_row(table.iloc[at], shown, quantities, reported, base) for at in rows[:most]],
             "left_rows": max(0, len(rows) - most),
             "tones": _TONES,
             "failed": [
@@ -146,14 +147,9 @@ def _ordered(table: Any) -> list[int]:
 
 
 def _row(
-    row: Any,
-    shown: list[str],
-    quantities: Mapping[str, Quantity],
-    noted: str,
-    reported: Collection[str],
-    base: str,
+    row: Any, shown: list[str], quantities: Mapping[str, Quantity], reported: Collection[str], base: str
 ) -> dict[str, Any]:
-    """A bushing in a row: its link, its words, its numbers with whether they are out of limits, its footnotes."""
+    """A bushing in a row: its link, its words, and its numbers with whether they are out of limits."""
     folder = row["folder"]
     page = "/report.html" if folder in reported else "/"
     cells = []
@@ -162,13 +158,13 @@ def _row(
         out = (low is not None and value < low) or (high is not None and value > high)
         cells.append(("" if math.isnan(value) else number(value * _for_people(header, quantity)[1], 4), out))
     link = base + quote(folder) + page if folder else ""
-    remarks = [f"{name}: {row[name]}" for name in _REMARKS if row.get(name)]
+    remarks = "; ".join(f"{name}: {row[name]}" for name in _REMARKS if row.get(name))
     return {
         "name": row["name"],
         "link": link,
         "words": [row[name] for name in shown],
         "cells": cells,
-        "remarks": "; ".join([*remarks, f"warnings {noted}"] if noted else remarks),
+        "remarks": remarks,
     }
 
 

@@ -79,12 +79,12 @@ def story(found: Checked, tables: Tables) -> dict[str, Any]:
 def _of_tables(result: Result, tables: Tables) -> Iterator[Iterator[str]]:
     """The warnings of what is predicted in the table of each place."""
     for name, place in places_of(result, tables).items():
-        if name in tables:
-            table, (amplitude, stiffness, _), (length, _, resisted) = tables[name], columns_of(place), place.display
-            at, moved, size = numbers(table, "frequency [Hz]", amplitude, stiffness)
+        (amplitude, stiffness, _), ((_, length), _, (_, unit)) = columns_of(place), place.display
+        headers = "frequency [Hz]", amplitude, stiffness
+        if name in tables and len(table := complete(tables[name], *headers)):
             others = (f"{stiffness}, {IF_RIGS}", f"measured {stiffness}")
-            beside = [numbers(table, header)[0] / resisted.factor if header in table else None for header in others]
-            yield of_points(result, place, at, moved / length.factor, size / resisted.factor, *beside)
+            rigs, measured = (numbers(table, each)[0] / unit if each in table else None for each in others)
+            yield of_points(result, place, numbers(table, *headers) / [[1.0], [length], [unit]], rigs, measured, None)
 
 
 def _bodies(result: Result) -> Iterator[tuple[str, str]]:
