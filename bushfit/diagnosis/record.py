@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import cast
 
+from bushfit.caveats import warnings_of
 from bushfit.diagnosis.document import (
     Description,
     DiagnosisFile,
@@ -159,7 +160,7 @@ class Diagnosis:
             "gap": self._gap(),
             "usable": self._usable(),
             "next_test": self.next_test,
-            "warnings": list(dict.fromkeys((*self.notes, *self.result.warnings))),
+            "warnings": warnings_of(self.result, notes=self.notes),
         }
         return plain(document, DiagnosisFile)
 
