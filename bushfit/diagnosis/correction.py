@@ -77,7 +77,7 @@ def correct(fitted: Evidence, bare: Evidence, plain: Ledger) -> Correction | Non
         return None
     likeliest = replace(plain, groups=(), nodes=[plain.likeliest])
     names = tuple(dict.fromkeys(map(str, both[0].directions)))
-    each = [(name,) for name in names]
+    each: Sequence[tuple[str, ...]] = [(name,) for name in names]
     shared = [[names], each] if len(names) > 1 else [each]
     found, worth = _of_most_evidence(both, likeliest, shared)
     if (peak := _peak(both[1], likeliest)) is not None:
