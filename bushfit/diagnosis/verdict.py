@@ -8,13 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
-from bushfit.diagnosis.beam import Hypothesis, Search
+from bushfit.diagnosis.beam import Search
 from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.described import describe
 from bushfit.diagnosis.document import Description, Verdict
 from bushfit.diagnosis.evidence import Evidence, result_of
 from bushfit.diagnosis.explanations import FaultyPlace
 from bushfit.diagnosis.holdout import HoldOut, hold_out
+from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.record import Diagnosis, Judged, Named, Odds, Where, chances

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from bushfit.diagnosis.beam import Hypothesis
 from bushfit.diagnosis.explanations import Explanation
+from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.words import Finding, judged
 from bushfit.effects.mistakes import MISTAKES
 
