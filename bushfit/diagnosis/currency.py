@@ -218,6 +218,12 @@ class Ledger:
         kept = (alone > alone[within].max() - far) | (best > best[within].max() - far)
         return [node for node, near in zip(self.nodes, kept.tolist(), strict=True) if near]
 
+    @property
+    def likeliest(self) -> Node:
+        """The node, within the class of the rig, at which one of the groups makes the tests likeliest."""
+        best = np.max(np.array([self._solved.base, *(worth.by_node for worth in self.worths)]), axis=0)
+        return self.nodes[int(np.argmax(np.where(self._within, best, -np.inf)))]
+
     @cached_property
     def _within(self) -> Array:
         return np.array([not node.wide for node in self.nodes])
@@ -246,6 +252,22 @@ class Ledger:
                 there = self._solved.size[:, own - first, None], self._solved.along[:, own - first, None]
                 found[number] = self._worth(*_of_one(group, *there))
         return [found[number] for number in range(len(self.groups))]
+
+    def amounts(self, number: int) -> tuple[Array, Array]:
+        """Mean, (g,), and covariance, (g, g), of the amounts of a group whose columns move together, over all sizes and
+        the nodes within the class of the rig."""
+        kind, place = next((kind, own.index(number)) for kind, (own, _) in enumerate(self._alike) if number in own)
+        size, vectors = np.linalg.eigh(self._solved.grams[kind][self._within, place])
+        along = self._solved.along[self._within][:, self._places[number] - 1 - len(self.jacobian)]
+        along = np.einsum("nij,ni->nj", vectors, along)[:, None]
+        v2 = np.square(SIZES)[:, None]
+        grown = 1.0 + v2 * np.maximum(size, 0.0)[:, None]
+        gain = 0.5 * np.sum(v2 * along**2 / grown - np.log(grown), axis=-1) + self._solved.base[self._within, None]
+        share = np.exp(gain - logsumexp(gain))
+        means = np.einsum("nij,nsj->nsi", vectors, -v2 * along / grown)
+        mean = np.einsum("ns,nsi->i", share, means)
+        spread = np.einsum("nij,nj,nkj->ik", vectors, np.einsum("ns,nsj->nj", share, v2 / grown), vectors)
+        return mean, spread + np.einsum("ns,nsi,nsj->ij", share, means - mean, means - mean)
 
     def _worth(self, gains: Array, moved: Array) -> Worth:
         """From gains in ln evidence and squares of the change, (nodes, columns, sizes)."""

@@ -1,13 +1,19 @@
 """What has no name, described: a smooth correction where it stands, and the power law that it is like."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.correction import Correction, correct
+from bushfit.diagnosis.currency import Ledger
 from bushfit.diagnosis.document import Description
 from bushfit.diagnosis.evidence import Evidence, fit_from
+from bushfit.diagnosis.explanations import unnamed
 from bushfit.diagnosis.fingerprint import Fingerprint, fingerprint
-from bushfit.diagnosis.locate import contrasts, locate
+from bushfit.diagnosis.locate import locate
+from bushfit.diagnosis.rig_errors import blocks, nodes, scattering_alone
 from bushfit.effects.unnamed import NAME
 from bushfit.errors import FitError
 from bushfit.fitting.data_sets import parted
@@ -17,8 +23,8 @@ from bushfit.units import number
 
 #: Evaluations of the model in its refit at most: a correction is of what the best parameters leave, so it has to end.
 _EVALUATIONS = 400
-#: Probability with which noise alone stays below the threshold of what a power law leaves.
-_CHANCE = 0.998
+#: Logarithm of odds below which a size of the rig's errors does not count; chosen for time: a twentieth of the best.
+_NEAR = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,14 +34,15 @@ class Described:
     Args:
         after: the model with its correction, and the tests as far as it can answer them.
         fingerprint: the nearest power law; None where these tests show none.
-        form_excess: misfit of the loop that it meets worst beyond noise, in units of noise, all harmonics counted; 0
-            where it meets them all.
+        words: how large the gap is and what it is like, for people.
+        evidence: where the correction may be trusted, for people.
     """
 
     after: Evidence
     correction: Correction
     fingerprint: Fingerprint | None
-    form_excess: float
+    words: str
+    evidence: str
 
     @property
     def description(self) -> Description | None:
@@ -45,61 +52,14 @@ class Described:
             return None
         return Description(found.phase_deg, found.frequency_power, found.amplitude_power, found.words)
 
-    @property
-    def words(self) -> str:
-        """What the gap is like, for people."""
-        if self.fingerprint is None:
-            return "nothing is told of its form"
-        no_law = "" if self.fingerprint.is_power_law else "it is no power law of frequency and amplitude; nearest: "
-        return no_law + self.fingerprint.words + self._peak
 
-    @property
-    def _peak(self) -> str:
-        """Its peak, where it has one."""
-        if self.correction.data.peak is None:
-            return ""
-        middle, width = (number(each, 2) for each in self.correction.data.peak)
-        return f"; with a peak, as of a resonance, at {middle} Hz, {width} Hz wide"
-
-    @property
-    def size(self) -> str:
-        """How large the gap is, for people."""
-        shares = self.correction.data.largest, Z95 * self.correction.band
-        largest, band = (number(100.0 * share, 2) for share in shares)
-        return f"up to {largest} % of |K|, known within {band} % of itself"
-
-    @property
-    def evidence(self) -> str:
-        """Where the correction may be trusted, for people."""
-        where = "; ".join(
-            f"{', '.join(patch.directions)} {_span(patch.frequency_Hz)} Hz, {_span(patch.strain, 100.0)} % strain"
-            for patch in self.correction.data.patches
-        )
-        return f"to be trusted between these tests alone ({where}){self._of_loops}, and of this bushing"
-
-    @property
-    def _of_loops(self) -> str:
-        """What the correction does not say of loops, and by how much their form stays off."""
-        if not parted(self.after.data_sets)[0]:
-            return ""
-        off = self.form_excess
-        stays = f" (their form stays off by {number(off, 2)} times the noise)" if off else ""
-        return f", of loops the first harmonic only{stays}"
-
-
-def _span(values: Sequence[float], factor: float = 1.0) -> str:
-    """The least and the largest value."""
-    return " to ".join(number(factor * end, 2) for end in (min(values), max(values)))
-
-
-def describe(evidence: Evidence, start: Mapping[str, float], held: Sequence[str], bounds: Bounds) -> Described | None:
-    """A smooth correction of a fitted model and its fingerprint; None where no correction stands the hold-out.
+def describe(evidence: Evidence, rig: RigSettings, held: Sequence[str], bounds: Bounds) -> Described | None:
+    """A smooth correction of a fitted model and its fingerprint; None where the tests are no likelier with it.
 
     The parameters are fitted again with each loop standing on its first harmonic, because nothing is known of the law
     in time of what has no name.
 
     Args:
-        start: values of the model's parameters read off the data, for a model that the gap has bent too far.
         held, bounds: parameters that do not move, and limits of the others inside their own.
     """
     if NAME in evidence.model.effects:
@@ -109,20 +69,58 @@ def describe(evidence: Evidence, start: Mapping[str, float], held: Sequence[str]
         base = _refitted(base, (*held, *base.solution.at_bound), bounds)
     except FitError:  # too few points are left for the parameters
         return None
-    correction = correct(base)
-    if correction is None or not correction.kept:
+    bare = scattering_alone(base)
+    rows, curves = bare.solution.jacobian, [each.group for each in unnamed(bare) if each.group]
+    plain = Ledger(bare.residual, rows, np.zeros(len(rows)), blocks(bare, rig), curves, nodes(bare))
+    plain = replace(plain, nodes=plain.likely(_NEAR))
+    correction = correct(base, bare, plain)
+    if correction is None:
         return None
     effects = (*base.model.effects, NAME)
     model, names = replace(base.model, effects=effects, unnamed=correction.data), base.solution.coordinates.names
     left, rows = residual(model, base.data_sets), jacobian(model, base.data_sets, names)
     after = Evidence(replace(base.solution, model=model, residual=left, jacobian=rows), base.data_sets)
-    whole = replace(after.solution, residual=residual(model, evidence.data_sets))
-    forms = [where.excess for where in locate(Evidence(whole, evidence.data_sets)) if where.kind == "loop"]
-    like = fingerprint(base, contrasts(base), _CHANCE, start, bounds)
-    return Described(after, correction, like, max(forms, default=0.0))
+    like = fingerprint(base, bare, plain, bounds)
+    whole = Evidence(replace(after.solution, residual=residual(model, evidence.data_sets)), evidence.data_sets)
+    return Described(after, correction, like, _words(correction, like), _trusted(correction, whole))
 
 
 def _refitted(evidence: Evidence, held: Sequence[str], bounds: Bounds) -> Evidence:
     """The model fitted to each sweep and to the first harmonic of each loop, to the end."""
     data_sets = tuple(data_set.timeless() for data_set in evidence.data_sets)
     return Evidence(fit_from(evidence.model, data_sets, held, bounds).finished(_EVALUATIONS).solution, data_sets)
+
+
+def _words(correction: Correction, like: Fingerprint | None) -> str:
+    """How large it is and what it is like."""
+    largest, band = (number(100.0 * share, 2) for share in (correction.data.largest, Z95 * correction.band))
+    said = [f"up to {largest} % of |K|, known within {band} % of itself"]
+    if like is None:
+        said.append("nothing is told of its form")
+    elif like.is_power_law:
+        said.append(like.words)
+    else:
+        said.append(
+            "it is no power law of frequency and amplitude" + (f"; nearest: {like.words}" if like.is_told else "")
+        )
+    if correction.data.peak:
+        middle, width = (number(each, 2) for each in correction.data.peak)
+        said.append(f"with a peak, as of a resonance, at {middle} Hz, {width} Hz wide")
+    return "; ".join(said)
+
+
+def _trusted(correction: Correction, whole: Evidence) -> str:
+    """Where it may be trusted, and by how much the form of the worst loop stays off, all harmonics counted."""
+    patches = [
+        f"{', '.join(patch.directions)} {_span(patch.frequency_Hz)} Hz, {_span(patch.strain, 100.0)} % strain"
+        for patch in correction.data.patches
+    ]
+    off = max((where.excess for where in locate(whole) if where.kind == "loop"), default=0.0)
+    stays = f" (their form stays off by {number(off, 2)} times the noise)" if off else ""
+    loops = f", of loops the first harmonic only{stays}" if parted(whole.data_sets)[0] else ""
+    return f"to be trusted between these tests alone ({'; '.join(patches)}){loops}, and of this bushing"
+
+
+def _span(values: Sequence[float], factor: float = 1.0) -> str:
+    """The least and the largest value."""
+    return " to ".join(number(factor * end, 2) for end in (min(values), max(values)))

@@ -10,7 +10,7 @@ from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.agreement import met_within, misfits, usable
 from bushfit.fitting.assess import Stage, apart_in_temperature, covariance, measured_range, quality
-from bushfit.fitting.data_set import DataSet, Freedoms
+from bushfit.fitting.data_set import DataSet
 from bushfit.fitting.data_sets import sources
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.procedures import cautions
@@ -81,18 +81,6 @@ class Evidence:
         """Where each data set's residuals stand."""
         ends = np.cumsum([data_set.size for data_set in self.data_sets]).tolist()
         return {data_set: slice(end - data_set.size, end) for end, data_set in zip(ends, self.data_sets, strict=True)}
-
-    @cached_property
-    def rigs(self) -> list[tuple[Freedoms, Array, list[Array], list[Array]]]:
-        """Per rig how well its noise is known, the indices of its residuals, of those that share an error of a block
-        each, and of those that share an error of a level."""
-        found: dict[Freedoms, tuple[list[Array], list[Array], list[Array]]] = {}
-        for data_set, place in self.place.items():
-            rows, blocks, levels = found.setdefault(data_set.freedoms, ([], [], []))
-            rows.append(np.arange(place.start, place.stop))
-            blocks += [place.start + block for block in data_set.blocks]
-            levels += [place.start + level for level in data_set.levels]
-        return [(freedoms, np.concatenate(rows), blocks, levels) for freedoms, (rows, blocks, levels) in found.items()]
 
     def embedded(self, values: Array, data_set: DataSet) -> Array:
         """Residuals of one data set among those of all, 0 elsewhere, (n,)."""

@@ -33,13 +33,6 @@ _HARMONICS = {
 }
 
 
-def contrasts(evidence: Evidence) -> Array:
-    """Whitened columns of all that is smooth: per level and part a polynomial in ln f, per loop its harmonics."""
-    return np.array(
-        [evidence.embedded(row, data_set) for data_set in evidence.data_sets for row in data_set.contrasts()]
-    )
-
-
 def largest_smooth_misfit(evidence: Evidence) -> float:
     """Largest smooth misfit anywhere, relative to |K| or to half a loop's force range."""
     return max(data_set.smooth_misfit(evidence.model) for data_set in evidence.data_sets)

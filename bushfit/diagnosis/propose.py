@@ -13,7 +13,6 @@ from itertools import product
 import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence, fit_from
-from bushfit.diagnosis.score_test import SENSITIVITY_LEFT, ScoreTest
 from bushfit.effects import Branch, Effect, Parameter, at_places, qualified, twins_of
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
@@ -25,6 +24,8 @@ from bushfit.model.model import Model
 _PROBES = 5
 #: Least and largest order of a derivative that is tried: one far below and one far above that of filled rubber, 0.2.
 _ORDERS = (0.05, 0.9)
+#: Share of a unit sensitivity that the model's own parameters must leave for it to count as visible.
+_LEFT = 1e-4
 #: Amount at which a sensitivity is taken, relative to the typical one: small enough to be a derivative, large enough to
 #: keep seven digits of the difference.
 _STEP = 1e-5
@@ -67,23 +68,34 @@ def proposals(evidence: Evidence, excluded: Collection[str], held: Sequence[str]
     probed = [answers[effect] for effect in asked]
     ends = np.cumsum([0, *(len(columns) for _, columns in probed)])
     every = np.concatenate([np.empty((0, evidence.residual.size)), *(columns for _, columns in probed)])
-    test = ScoreTest(evidence, every, list(np.arange(len(every))[:, None]), SENSITIVITY_LEFT)
-    amounts, gains, sizes = np.ravel(test.amounts()), np.array(test.gains()), test.sizes
+    gains, amounts, seen = scores(evidence, every)
     found = []
     for effect, (shapes, columns), first, last in zip(asked, probed, ends[:-1], ends[1:], strict=True):
         amount = effect.amount
         sense = 1 if amount.neutral == amount.bounds[0] else 0
-        scores = np.where((amounts[first:last] > 0.0) | (sense == 0), gains[first:last], 0.0)
-        best = int(np.argmax(scores))
+        possible_gains = np.where((amounts[first:last] > 0.0) | (sense == 0), gains[first:last], 0.0)
+        best = int(np.argmax(possible_gains))
         suggested = float(np.clip(amounts[first + best] * amount.typical, *amount.bounds))
         shape = shapes[best] | ({qualified(effect, amount): suggested} if amount.log else {})
         model = evidence.model.with_effect(effect.name, shape)
-        visible = sizes[first + best] > 0
-        found.append(Proposal(effect.name, model, float(scores[best]), columns, sense, visible))
+        visible = bool(seen[first + best])
+        found.append(Proposal(effect.name, model, float(possible_gains[best]), columns, sense, visible))
     for effect in missing:
         if effect.replaces in evidence.model.effects:
             found += filter(None, [_replacing(evidence, effect, held)])
     return sorted(found, key=lambda proposal: -proposal.score)
+
+
+def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
+    """What each column, whitened (c, n), would take off chi-square beside the parameters, were all linear, its amount,
+    and whether these tests show it; 0 of what they do not, (c,) each."""
+    lengths = np.linalg.norm(columns, axis=1)
+    lengths = np.where(lengths > 0.0, lengths, 1.0)
+    left = evidence.beside(columns / lengths[:, None])
+    size, along = np.einsum("ij,ij->i", left, left), left @ evidence.residual
+    seen = size > _LEFT**2
+    per_size = seen / np.where(seen, size, 1.0)
+    return per_size * np.square(along), -per_size * along / lengths, seen
 
 
 def missing_effects(model: Model, places: Collection[str], excluded: Collection[str] = ()) -> list[Effect]:

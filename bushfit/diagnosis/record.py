@@ -6,6 +6,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from bushfit.caveats import warnings_of
 from bushfit.diagnosis.document import (
     Description,
     DiagnosisFile,
@@ -192,7 +193,7 @@ class Diagnosis:
             "gap": self._gap(),
             "usable": self._usable(),
             "next_test": self.next_test,
-            "warnings": list(dict.fromkeys((*self.notes, *self.result.warnings))),
+            "warnings": warnings_of(self.result, notes=self.notes),
         }
         return plain(document, DiagnosisFile)
 

@@ -8,13 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
-from bushfit.diagnosis.beam import Hypothesis, Search
+from bushfit.diagnosis.beam import Search
 from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.described import describe
 from bushfit.diagnosis.document import Description, Verdict
 from bushfit.diagnosis.evidence import Evidence, result_of
 from bushfit.diagnosis.explanations import FaultyPlace
 from bushfit.diagnosis.holdout import HoldOut, hold_out
+from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.record import Diagnosis, Judged, Named, Odds, Where, chances
@@ -126,8 +127,9 @@ class Told:
         asked, finding = self.search.asked, self.finding
         lead = f"; no more than leads: {_all(finding.leads)}" if finding.leads else ""
         spot = self.first.best if self.first and finding.verdict == "unexplained" else None
-        if not spot and asked.most and (found := describe(self.base, asked.start, asked.held, asked.bounds)):
-            words = f"a real gap stays that no known effect closes: {found.size}; {found.words}{lead}"
+        rig = self.data.campaign.rig
+        if not spot and asked.most and (found := describe(self.base, rig, asked.held, asked.bounds)):
+            words = f"a real gap stays that no known effect closes: {found.words}{lead}"
             names = [Named(UNNAMED, found.evidence)]
             held = found.correction.held
             return self._finished("described", words, found.after, names, description=found.description, held=held)

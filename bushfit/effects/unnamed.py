@@ -206,20 +206,6 @@ def nodes_among(points: Array, most: int) -> Array:
     return np.array(chosen)
 
 
-def patches_of(
-    directions: Sequence[Sequence[str]], nodes: Sequence[Array], strengths: int, mean: Array, error: Array
-) -> tuple[Patch, ...]:
-    """Patches from the values at the nodes of each and so many strengths of a peak, all in phase and all in quadrature,
-    (2, m), and the errors at the nodes, (2, nodes)."""
-    made, value_ends = [], np.cumsum([len(own) + strengths for own in nodes])
-    error_ends = np.cumsum([len(own) for own in nodes])
-    for names, own, end, last in zip(directions, nodes, value_ends, error_ends, strict=True):
-        values, peak = mean[:, end - len(own) - strengths : end - strengths], mean[:, end - strengths : end]
-        parts = (*np.exp(own.T), *values, *error[:, last - len(own) : last], *peak)
-        made.append(Patch(tuple(names), *(tuple(part.tolist()) for part in parts)))
-    return tuple(made)
-
-
 EFFECT = Layer(
     name=NAME,
     sentence="What no effect of the library explains, as a smooth correction over frequency and amplitude.",

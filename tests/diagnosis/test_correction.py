@@ -58,7 +58,7 @@ def with_mode(campaign: Campaign) -> Campaign:
 @pytest.fixture(scope="module")
 def resonant(measured: Measured, fitted: Fitted) -> Described:
     evidence = fitted(with_mode(measured()))
-    found = describe(evidence, 0.998, evidence.model.values, (), {})
+    found = describe(evidence, evidence.model.values, (), {})
     assert found is not None
     return found
 
@@ -78,7 +78,7 @@ def correction(evidence: Evidence) -> Correction:
 
 @pytest.fixture(scope="module")
 def described(evidence: Evidence) -> Described:
-    found = describe(evidence, 0.998, evidence.model.values, (), {})
+    found = describe(evidence, evidence.model.values, (), {})
     assert found is not None
     return found
 
@@ -153,7 +153,7 @@ def test_the_model_file_holds_the_peak(resonant: Described) -> None:
 def test_nothing_is_described_on_clean_campaigns(measured: Measured, fitted: Fitted) -> None:
     for seed in range(4):
         clean = fitted(measured(seed=seed))
-        assert describe(clean, 0.998, clean.model.values, (), {}) is None
+        assert describe(clean, clean.model.values, (), {}) is None
 
 
 def test_a_fault_of_one_level_is_not_described(measured: Measured, fitted: Fitted) -> None:
