@@ -61,7 +61,7 @@ class Outcome:
         settled: what came of the planned session, where effects of the library were left open and it was asked for.
         decides: the test on the rig that is asked for, where the virtual rig can make none that decides.
         nothing: probability told of nothing; None where there is no diagnosis.
-        leader: what was told as likeliest, in words; "" where nothing was.
+        leader: what was told as likeliest, by the names of its parts; "" where nothing was.
         odds: probability told of the leader, if anything is missing.
     """
 
