@@ -41,7 +41,7 @@ def scattering_alone(evidence: Evidence) -> Evidence:
 def nodes(evidence: Evidence) -> list[Node]:
     """Sizes of the rig's errors with their prior weights; the scatter has some of its own where few repeats tell it."""
     sweeps = parted(evidence.data_sets)[1]
-    freedom = max((each.freedoms.scatter for each in sweeps), default=0)
+    freedom = max((each.noise.scatter_freedom for each in sweeps), default=0)
     thirds = (np.arange(3) + 0.5) / 3
     scatters = np.sqrt(freedom / chdtri(freedom, 1.0 - thirds)).tolist() if 0 < freedom < KNOWN else [1.0]
     runs = RUNS if sweeps else ((0.0, 1.0),)
