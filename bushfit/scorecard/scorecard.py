@@ -21,7 +21,7 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.locate import largest_smooth_misfit
 from bushfit.diagnosis.record import Diagnosis, Settings
 from bushfit.diagnosis.workflow import diagnose
-from bushfit.effects import effect_of, twins_of
+from bushfit.effects import effect_of
 from bushfit.effects.mistakes import mistake_named
 from bushfit.errors import MeasurementError
 from bushfit.fitting.data import Data
@@ -146,12 +146,6 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
         tuple(covered),
         seconds,
         task.kind == "mistake" and _matters(diagnosis.before, truth),
-        twins=tuple(
-            tuple(
-                twin for name in (effect.label, *_names(effect.alternatives)) for twin in twins_of(name) if twin != name
-            )
-            for effect in diagnosis.effects
-        ),
         before=heldout["before"],
         nothing=diagnosis.odds.nothing,
         leader=leader,
