@@ -101,11 +101,13 @@ class Odds:
         nothing: probability that nothing is missing beyond noise and tolerance.
         told: explanations in words with their probabilities, if anything is missing; the most probable first.
         values: of the parameters under each of these, as far as it was fitted; else none.
+        labels: each of these by the names of its parts, joined by " + ".
     """
 
     nothing: float
     told: tuple[tuple[str, float], ...] = ()
     values: tuple[Mapping[str, float], ...] = ()
+    labels: tuple[str, ...] = ()
 
     def averaged(self, result: Result) -> Result:
         """A result whose covariance counts that another explanation may hold: each adds the square of how far its

@@ -155,7 +155,7 @@ class Told:
         told = sorted(self.finding.told, key=lambda each: -each.probability)
         values = (each.best.weighed.state.evidence.model.values if each.best.refitted else {} for each in told)
         pairs = ((self._in_words(each), each.probability) for each in told)
-        return Odds(self.finding.nothing, tuple(pairs), tuple(values))
+        return Odds(self.finding.nothing, tuple(pairs), tuple(values), tuple(map(self.label, told)))
 
     def _in_words(self, each: Composition) -> str:
         """A composition as it is told to people: what each of its parts is, with its name."""
