@@ -77,9 +77,8 @@ def correct(fitted: Evidence, bare: Evidence, plain: Ledger) -> Correction | Non
         return None
     likeliest = replace(plain, groups=(), nodes=[plain.likeliest])
     names = tuple(dict.fromkeys(map(str, both[0].directions)))
-    each = [(name,) for name in names]
-    shared = [[names], each] if len(names) > 1 else [each]
-    found, worth = _of_most_evidence(both, likeliest, shared)
+    shared: list[Sequence[tuple[str, ...]]] = [[names], [(name,) for name in names]]
+    found, worth = _of_most_evidence(both, likeliest, shared[: len(names)])
     if (peak := _peak(both[1], likeliest)) is not None:
         peaked, worth_of_it = _of_most_evidence(both, likeliest, [found.directions], peak)
         if worth_of_it - log(_PEAKS**2) > worth:  # as likely beforehand as all peaks that are tried

@@ -254,8 +254,8 @@ class Ledger:
         return [found[number] for number in range(len(self.groups))]
 
     def amounts(self, number: int) -> tuple[Array, Array]:
-        """Mean and covariance of the amounts of a group whose columns move together, over all sizes and the nodes within
-        the class of the rig, (g,) and (g, g)."""
+        """Mean and covariance of the amounts of a group whose columns move together, over all sizes and the nodes
+        within the class of the rig, (g,) and (g, g)."""
         kind, place = next((kind, own.index(number)) for kind, (own, _) in enumerate(self._alike) if number in own)
         size, vectors = np.linalg.eigh(self._solved.grams[kind][self._within, place])
         along = self._solved.along[self._within][:, self._places[number] - 1 - len(self.jacobian)]

@@ -135,7 +135,7 @@ def fingerprint(
     pairs = [(Terms(fitted, measure), Terms(bare, measure)) for measure in _IN_WORDS]
     found = [_Grid.of_the_likeliest(one, other, plain, begun, bounds) for one, other in pairs if one.sensible]
     grids = sorted(filter(None, found), key=lambda grid: -grid.log_evidence)
-    if not grids or grids[0].log_evidence < plain.log_evidence:
+    if not grids or grids[0].log_evidence < grids[0].ledger.log_evidence:
         return None
     apart = np.array([grid.log_evidence - grids[0].log_evidence for grid in grids])
     alike = tuple(grid.terms.measure for grid, off in zip(grids[1:], apart[1:], strict=True) if -off < 0.5 * TELLS)
@@ -146,7 +146,8 @@ def fingerprint(
     drawn[0] = np.degrees(middle + np.angle(turn * np.exp(-1j * middle)))
     phase, p, q = (tuple(each) for each in np.quantile(drawn, (0.5, 0.025, 0.975), axis=-1).T.tolist())
     law = logsumexp(apart) + grids[0].log_evidence - log(len(grids))
-    smooth = logsumexp([worth.log_evidence for worth in plain.worths]) - log(len(plain.worths))
+    curves = replace(grids[0].ledger, groups=plain.groups).worths  # around the same parameters and term
+    smooth = logsumexp([worth.log_evidence for worth in curves]) - log(len(curves))
     return Fingerprint(grids[0].terms.measure, alike, phase, p, q, bool(law > smooth))
 
 
@@ -167,8 +168,8 @@ class _Grid:
 
     @classmethod
     def of_the_likeliest(cls, fitted: Terms, bare: Terms, plain: Ledger, model: Model, bounds: Bounds) -> _Grid | None:
-        """The grid that the likeliest pairs fill, around the parameters and the term that go best with one another; None
-        where these do not come to rest from those of a model."""
+        """The grid that the likeliest pairs fill, around the parameters and the term that go best with one
+        another; None where these do not come to rest from those of a model."""
         about = bare.points - bare.points.mean(axis=0)
         changes = np.ptp(about, axis=0) > 0.0
         value = bare.off(model)  # at first around the measured stiffness, by which a term of any size is linear
@@ -227,7 +228,7 @@ def _linear(terms: Terms, model: Model, value: Array, shapes: Array) -> tuple[Ar
 
 
 def _stepped(terms: Terms, model: Model, value: Array, shape: Array, bounds: Bounds) -> tuple[Model, Array]:
-    """The parameters beside a term of this shape, and its value, one step farther, damped while that lowers the misfit."""
+    """Parameters beside a term of this shape, and its value, one step farther, damped while that lowers the misfit."""
     shape = terms.of_size_one(shape, model)
     left, rows, columns = _linear(terms, model, value, shape)
     every, coordinates = np.concatenate((rows, columns[0])), terms.evidence.solution.coordinates

@@ -79,10 +79,6 @@ class Terms:
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
     def off(self, model: Model) -> Array:
-        """Measured less modelled stiffness at the points, (p,) [N/m or N m/rad]."""
-        return np.concatenate([each.measured - each.noise_free(model).measured for each in self.data_sets])
-
-    def off(self, model: Model) -> Array:
         """The value with which a model meets the measured stiffness at every point, complex, (p,)."""
         off = [each.measured - each.noise_free(model).measured for each in self.data_sets]
         return np.concatenate(off) / self.unit(model)
