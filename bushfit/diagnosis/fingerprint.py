@@ -56,8 +56,6 @@ _LAWS: tuple[tuple[float, float, float, tuple[Measure, ...], str], ...] = (
     (180, 0, 0, ("stiffness", "modulus"), "a spring that is missing"),
     (90, 0, -1, ("stiffness", "modulus"), "dry friction"),
     (90, 0, 0, ("stiffness", "modulus", "gain"), "a loss that is the same at every frequency"),
-    (0, 0, 0, ("gain",), "a gain that is too low in the model"),
-    (180, 0, 0, ("gain",), "a gain that is too high in the model"),
     (90, 1, 0, ("gain",), "a delay of the displacement"),
     (-90, 1, 0, ("gain",), "a delay of the force"),
 )
